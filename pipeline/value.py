@@ -1,0 +1,46 @@
+"""What travels on a wire: small frozen dataclasses, each an array (or a few) and what it means."""
+
+import dataclasses
+from typing import Any, ClassVar, dataclass_transform
+
+VALUE_TYPES: dict[str, type["Value"]] = {}
+"""Every value class by its full name. Decoding looks names up here and nowhere else, so that a file can
+never name a class that is not a value."""
+
+
+@dataclass_transform(frozen_default=True)
+class Value:
+    """Base of everything that travels on a wire. A subclass becomes a frozen dataclass by itself.
+
+    Fields are arrays, numbers, strings, other values, and tuples, lists and string-keyed dicts of these: what
+    `codec.py` can write. `in_place` marks a large value that one stage updates in place (a map); it is then not
+    frozen, and the engine sees to it that nobody reads it too late. `bulky` marks what is too large to be kept over
+    a whole log (images): it is never cached.
+    """
+
+    in_place: ClassVar[bool] = False
+    bulky: ClassVar[bool] = False
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        dataclasses.dataclass(frozen=not cls.in_place, eq=False)(cls)
+        VALUE_TYPES[value_name(cls)] = cls
+
+
+def value_name(cls: type) -> str:
+    """The name under which a value class is written to files."""
+    return f"{cls.__module__}.{cls.__qualname__}"
+
+
+class Tick(Value):
+    """One turn of the loop: its number, the time it stands for, and its log.
+
+    `stamp` is in nanoseconds (the header stamp of the tick's image); `log` counts the logs of the run from 0;
+    `frame` is the record's number within its log; `first_of_log` is true where a new log begins.
+    """
+
+    index: int
+    stamp: int
+    log: int = 0
+    frame: int = 0
+    first_of_log: bool = False

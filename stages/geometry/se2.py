@@ -1,0 +1,47 @@
+"""SE(2): poses (x, y, heading) as the last axis of arrays; metres and radians, headings counter-clockwise."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+def wrap(angle: npt.ArrayLike) -> Array:
+    """Angles brought into [-pi, pi)."""
+    wrapped: Array = np.mod(np.asarray(angle, dtype=np.float64) + math.pi, 2 * math.pi) - math.pi
+    return wrapped
+
+
+def compose(pose: npt.ArrayLike, motion: npt.ArrayLike) -> Array:
+    """The pose reached from `pose` by a motion given in its frame: (..., 3) and (..., 3) -> (..., 3)."""
+    pose, motion = np.asarray(pose, dtype=np.float64), np.asarray(motion, dtype=np.float64)
+    cos, sin = np.cos(pose[..., 2]), np.sin(pose[..., 2])
+    return np.stack(
+        [
+            pose[..., 0] + cos * motion[..., 0] - sin * motion[..., 1],
+            pose[..., 1] + sin * motion[..., 0] + cos * motion[..., 1],
+            wrap(pose[..., 2] + motion[..., 2]),
+        ],
+        axis=-1,
+    )
+
+
+def between(start: npt.ArrayLike, end: npt.ArrayLike) -> Array:
+    """The motion that leads from `start` to `end`, in the frame of `start`: `compose(start, between(start, end)) = end`."""
+    start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    cos, sin = np.cos(start[..., 2]), np.sin(start[..., 2])
+    dx, dy = end[..., 0] - start[..., 0], end[..., 1] - start[..., 1]
+    return np.stack([cos * dx + sin * dy, -sin * dx + cos * dy, wrap(end[..., 2] - start[..., 2])], axis=-1)
+
+
+def interpolate(times: npt.ArrayLike, poses: npt.ArrayLike, at: npt.ArrayLike) -> Array:
+    """Poses at given times between stamped poses, linear in x, y and along the shorter turn in heading.
+
+    `times` (N,) ascending, `poses` (N, 3), `at` (M,) within the range of `times`; returns (M, 3).
+    """
+    times, poses, at = np.asarray(times), np.asarray(poses, dtype=np.float64), np.asarray(at)
+    heading = np.unwrap(poses[:, 2])
+    columns = [np.interp(at, times, poses[:, 0]), np.interp(at, times, poses[:, 1]), np.interp(at, times, heading)]
+    return np.stack([columns[0], columns[1], wrap(columns[2])], axis=-1)

@@ -1,0 +1,1 @@
+"""Where ticks come from: recordings of several kinds, and the simulator."""

@@ -1,0 +1,61 @@
+"""Beliefs about the robot's pose. Every belief answers `estimate()`."""
+
+from abc import abstractmethod
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Value
+from omninav.stages.geometry.particles import heaviest_mode, weighted_moments
+
+from .pose import Pose
+
+Array = npt.NDArray[np.float64]
+
+
+class PoseEstimate(Value):
+    """A pose to act upon: the belief's heaviest mode, with the whole belief's mean beside it.
+
+    `covariance` (3, 3) is the mode's own, over (x, y, heading) in m, m, rad; `mode_weight` is its share of the
+    belief in [0, 1]; `mean` is the mean pose of the whole belief (circular in heading).
+    """
+
+    pose: Pose
+    covariance: Array
+    mode_weight: float
+    mean: Pose
+
+
+class Belief(Value):
+    """What is believed of the robot's pose."""
+
+    @abstractmethod
+    def estimate(self) -> PoseEstimate:
+        """The heaviest mode as one pose."""
+
+
+class Particles(Belief):
+    """Weighted samples of the pose. `poses`: (N, 3) x, y (m), heading (rad), map frame. `weights`: (N,), sum 1."""
+
+    poses: Array
+    weights: Array
+
+    def estimate(self) -> PoseEstimate:
+        mode, covariance, share = heaviest_mode(self.poses, self.weights)
+        mean, _ = weighted_moments(self.poses, self.weights)
+        return PoseEstimate(Pose(*map(float, mode)), covariance, share, Pose(*map(float, mean)))
+
+
+class SinglePose(Belief):
+    """A belief that is one pose, with no doubt expressed (nearest-image matching)."""
+
+    pose: Pose
+
+    def estimate(self) -> PoseEstimate:
+        return PoseEstimate(self.pose, np.zeros((3, 3)), 1.0, self.pose)
+
+
+class Likelihood(Value):
+    """How well each particle explains the present view. `values`: (N,), not negative, any scale."""
+
+    values: Array

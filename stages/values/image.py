@@ -1,0 +1,38 @@
+"""Pictures: as the camera gave them, and as panoramas in one common form."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Value
+
+Pixels = npt.NDArray[np.uint8]
+
+
+class Image(Value):
+    """A picture as the camera gave it. `pixels`: (height, width, 3) uint8, blue-green-red as in OpenCV."""
+
+    bulky = True
+    pixels: Pixels
+
+
+class Panorama(Value):
+    """The full circle around the robot, seen by a person: columns run clockwise, forward is in the middle.
+
+    `pixels`: (rows, columns, 3) uint8, blue-green-red. The centre of column c looks along the azimuth
+    `pi - 2 pi (c + 0.5) / columns` (radians, counter-clockwise from the robot's forward), so a robot that turns
+    counter-clockwise sees the scene move to the right. `elevation_top` and `elevation_bottom` are the elevations
+    of the upper and the lower edge (radians above the horizon), None where the camera's geometry is not known.
+    """
+
+    bulky = True
+    pixels: Pixels
+    elevation_top: float | None = None
+    elevation_bottom: float | None = None
+
+
+def column_azimuths(columns: int) -> npt.NDArray[np.float64]:
+    """Azimuths of the column centres of a panorama: (columns,) radians, counter-clockwise from forward."""
+    azimuths: npt.NDArray[np.float64] = math.pi - 2 * math.pi * (np.arange(columns) + 0.5) / columns
+    return azimuths

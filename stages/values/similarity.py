@@ -1,0 +1,18 @@
+"""How alike the present view and the views of the map are."""
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Value
+
+
+class Similarities(Value):
+    """Similarity of the present view to references at headings. `values`: (references, headings) float32 in [0, 1].
+
+    Column h stands for a robot whose heading is the reference view's own heading turned counter-clockwise by
+    2 pi h / headings. `candidates` (references,) holds the indices of the map's references that were compared, in
+    ascending order; None means all of them.
+    """
+
+    values: npt.NDArray[np.float32]
+    candidates: npt.NDArray[np.int64] | None = None
