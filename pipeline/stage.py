@@ -237,7 +237,7 @@ def _read_signature(cls: type[Stage]) -> Signature:
     return Signature(
         inputs=inputs,
         outputs=_read_outputs(cls, hints.get("return"), where),
-        parameters=_read_parameters(cls),
+        parameters=read_parameters(cls),
         state=state,
         summary=first_line(cls),
         is_source=issubclass(cls, Source),
@@ -258,7 +258,8 @@ def _read_outputs(cls: type[Stage], returned: Any, where: str) -> dict[str, Port
     return ports
 
 
-def _read_parameters(cls: type[Any]) -> dict[str, Parameter]:
+def read_parameters(cls: type[Any]) -> dict[str, Parameter]:
+    """The typed fields of a dataclass with their defaults."""
     hints = _hints(cls, cls)
     found = {}
     for field in dataclasses.fields(cls):

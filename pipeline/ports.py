@@ -1,0 +1,195 @@
+"""Which value may go where: the only place with type rules, for wires and for parameters."""
+
+import dataclasses
+import inspect
+import types
+import typing
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from .problems import Problem, suggest
+from .stage import Bounds, read_parameters, split_optional
+
+
+def type_name(annotation: Any) -> str:
+    """A type as people write it: `Particles`, `int >= 1`, `'sqrt' | 'none'`, `list of Pose`."""
+    origin = get_origin(annotation)
+    if annotation is type(None):
+        return "null"
+    if annotation is Any:
+        return "anything"
+    if origin is Annotated:
+        inner, *extras = get_args(annotation)
+        return " ".join([type_name(inner), *(str(extra) for extra in extras if isinstance(extra, Bounds))])
+    if origin is Literal:
+        return " | ".join(repr(option) for option in get_args(annotation))
+    if origin in (Union, types.UnionType):
+        return " | ".join(type_name(option) for option in get_args(annotation))
+    if origin in (list, tuple, Sequence):
+        items = [a for a in get_args(annotation) if a is not Ellipsis]
+        if origin is tuple and Ellipsis not in get_args(annotation):
+            return f"[{', '.join(type_name(item) for item in items)}]"
+        return f"list of {type_name(items[0]) if items else 'anything'}"
+    if origin in (dict, Mapping):
+        return f"mapping to {type_name(get_args(annotation)[1])}"
+    return getattr(annotation, "__name__", str(annotation))
+
+
+def compatible(given: Any, wanted: Any) -> bool:
+    """Whether a value of type `given` may enter a port of type `wanted`: same class, subclass, or member of a union."""
+    if wanted is Any or given is Any:
+        return True
+    if get_origin(given) in (Union, types.UnionType):
+        return all(compatible(option, wanted) for option in get_args(given))
+    if get_origin(wanted) in (Union, types.UnionType):
+        return any(compatible(given, option) for option in get_args(wanted))
+    if inspect.isclass(given) and inspect.isclass(wanted):
+        return issubclass(given, wanted)
+    return bool(given == wanted)
+
+
+class _Unfit(Exception):
+    """Raised inside `convert` where a value does not fit; carries the problems found."""
+
+    def __init__(self, problems: list[Problem]) -> None:
+        self.problems = problems
+
+
+def convert(value: Any, wanted: Any, where: str) -> tuple[Any, list[Problem]]:
+    """A plain configuration value as the type a parameter asks for, or the problems that stand against it.
+
+    Whole numbers pass as floats, lists as tuples, mappings as dataclasses and texts as paths; nothing else is guessed.
+    """
+    try:
+        return _convert(value, wanted, where), []
+    except _Unfit as unfit:
+        return None, unfit.problems
+
+
+def _unfit(value: Any, wanted: Any, where: str, hint: str = "") -> _Unfit:
+    shown = repr(value) if not isinstance(value, Mapping) else "a mapping"
+    return _Unfit([Problem(where, f"{shown} ({type(value).__name__}), expected {type_name(wanted)}", hint)])
+
+
+def _convert(value: Any, wanted: Any, where: str) -> Any:
+    origin, arguments = get_origin(wanted), get_args(wanted)
+    if wanted is Any:
+        return value
+    if origin is Annotated:
+        converted = _convert(value, arguments[0], where)
+        for bounds in (extra for extra in arguments[1:] if isinstance(extra, Bounds)):
+            broken = bounds.violated_by(converted) if isinstance(converted, int | float) else None
+            if broken:
+                raise _Unfit([Problem(where, f"{converted!r} is out of bounds, expected {type_name(wanted)}")])
+        return converted
+    if origin is Literal:
+        if value in arguments and not isinstance(value, bool):
+            return value
+        if isinstance(value, bool) and any(option is value for option in arguments):
+            return value
+        hint = suggest(value, [str(a) for a in arguments], "choices") if isinstance(value, str) else ""
+        raise _unfit(value, wanted, where, hint)
+    if origin in (Union, types.UnionType):
+        return _convert_union(value, wanted, where)
+    if origin in (list, tuple, Sequence):
+        return _convert_items(value, wanted, where)
+    if origin in (dict, Mapping):
+        if not isinstance(value, Mapping):
+            raise _unfit(value, wanted, where)
+        return {str(key): _convert(item, arguments[1], f"{where}.{key}") for key, item in value.items()}
+    if dataclasses.is_dataclass(wanted) and isinstance(wanted, type):
+        if isinstance(value, wanted):
+            return value
+        if not isinstance(value, Mapping):
+            raise _unfit(value, wanted, where)
+        arguments_found, problems = convert_fields(value, wanted, where)
+        if problems:
+            raise _Unfit(problems)
+        return wanted(**arguments_found)
+    return _convert_plain(value, wanted, where)
+
+
+def _convert_plain(value: Any, wanted: Any, where: str) -> Any:
+    if wanted is type(None):
+        if value is None:
+            return None
+    elif wanted is bool:
+        if isinstance(value, bool):
+            return value
+    elif wanted is int:
+        if isinstance(value, int) and not isinstance(value, bool):
+            return value
+    elif wanted is float:
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return float(value)
+    elif wanted is str:
+        if isinstance(value, str):
+            return value
+    elif wanted is Path:
+        if isinstance(value, str | Path):
+            return Path(value)
+    elif wanted in (dict, list) and isinstance(value, wanted):
+        return value
+    raise _unfit(value, wanted, where)
+
+
+def _convert_union(value: Any, wanted: Any, where: str) -> Any:
+    rest, optional = split_optional(wanted)
+    if optional and value is None:
+        return None
+    if optional:
+        return _convert(value, rest, where)
+    several = []
+    for option in get_args(wanted):
+        try:
+            return _convert(value, option, where)
+        except _Unfit as unfit:
+            several.append(unfit.problems)
+    shaped = [p for p in several if any(problem.where != where for problem in p)]
+    raise _Unfit(shaped[0]) if shaped else _unfit(value, wanted, where)
+
+
+def _convert_items(value: Any, wanted: Any, where: str) -> Any:
+    origin, arguments = get_origin(wanted), get_args(wanted)
+    if not isinstance(value, list | tuple):
+        raise _unfit(value, wanted, where)
+    if origin is tuple and Ellipsis not in arguments:
+        if len(value) != len(arguments):
+            raise _unfit(value, wanted, where, f"give {len(arguments)} values")
+        kinds = list(arguments)
+    else:
+        kinds = [arguments[0]] * len(value)
+    items, problems = [], []
+    for number, (item, kind) in enumerate(zip(value, kinds, strict=True)):
+        try:
+            items.append(_convert(item, kind, f"{where}[{number}]"))
+        except _Unfit as unfit:
+            problems += unfit.problems
+    if problems:
+        raise _Unfit(problems)
+    return list(items) if origin is list else tuple(items)
+
+
+def convert_fields(
+    given: Mapping[Any, Any], wanted: type[Any], where: str, skip: typing.Container[str] = ()
+) -> tuple[dict[str, Any], list[Problem]]:
+    """A mapping as the keyword arguments of a dataclass (a stage or a group of parameters), and every problem."""
+    known = read_parameters(wanted)
+    arguments: dict[str, Any] = {}
+    problems: list[Problem] = []
+    for name, value in given.items():
+        if name in skip:
+            continue
+        path = f"{where}.{name}"
+        if name not in known:
+            hint = suggest(str(name), known, "parameters", prefix=f"{where}.")
+            problems.append(Problem(path, f"{wanted.__name__} has no parameter '{name}'", hint))
+            continue
+        arguments[name], found = convert(value, known[name].type, path)
+        problems += found
+    for name, parameter in known.items():
+        if parameter.default is dataclasses.MISSING and name not in given:
+            what = f"{wanted.__name__} needs '{name}' ({type_name(parameter.type)})"
+            problems.append(Problem(f"{where}.{name}", what, f"type {where}.{name}=…"))
+    return arguments, problems

@@ -1,0 +1,50 @@
+"""What is wrong with a configuration: where, what, and what to type. All of it at once."""
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong.
+
+    `where`: the config path (`nodes.match.headings`) or file; `what`: what was found and what was expected;
+    `hint`: what to type or where to look, '' where nothing useful can be said.
+    """
+
+    where: str
+    what: str
+    hint: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.what}" + (f"\n    {self.hint}" if self.hint else "")
+
+
+class ProblemsFound(Exception):
+    """A configuration that cannot be built or run, with everything that is wrong with it."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__(format_problems(self.problems))
+
+
+def format_problems(problems: Iterable[Problem]) -> str:
+    """All problems as text, one under the other, with their number at the head."""
+    problems = list(problems)
+    head = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
+    return "\n".join([f"{head}:", *(f"  {line}" for problem in problems for line in str(problem).split("\n"))])
+
+
+def nearest(name: str, options: Iterable[str]) -> str | None:
+    """The option most like `name`, None where none is like it."""
+    found = difflib.get_close_matches(name, list(options), n=1, cutoff=0.5)
+    return found[0] if found else None
+
+
+def suggest(name: str, options: Iterable[str], kind: str, prefix: str = "") -> str:
+    """A hint for a mistyped name: the nearest one where there is one, then all that exist."""
+    options = sorted(options)
+    listing = f"{kind}: {', '.join(options)}" if options else f"there are no {kind}"
+    near = nearest(name, options)
+    return f"did you mean '{prefix}{near}'? {listing}" if near else listing
