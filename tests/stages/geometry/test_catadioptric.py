@@ -1,0 +1,72 @@
+"""The closed forms of the hyperbolic mirror against the surface they stand for."""
+
+import math
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omninav.stages.geometry.catadioptric import back_project, project
+
+MIRRORS = st.tuples(st.floats(5.0, 60.0), st.floats(5.0, 60.0))
+INTRINSICS = st.tuples(
+    st.floats(100.0, 900.0),
+    st.floats(100.0, 900.0),
+    st.floats(0.0, 800.0),
+    st.floats(0.0, 800.0),
+    st.floats(-2.0, 2.0),
+)
+DIRECTIONS = st.tuples(st.floats(-1.0, 1.0), st.floats(-math.pi, math.pi))  # sine of elevation, bearing
+
+
+def unit(sine: float, bearing: float) -> np.ndarray:
+    cosine = math.sqrt(1.0 - sine * sine)
+    return np.array([cosine * math.cos(bearing), cosine * math.sin(bearing), sine])
+
+
+@given(MIRRORS, INTRINSICS, DIRECTIONS)
+def test_a_ray_comes_back_from_its_pixel_or_has_none(
+    mirror: tuple[float, float], intrinsics: tuple[float, ...], direction: tuple[float, float]
+) -> None:
+    ray = unit(*direction)
+    a, b = mirror
+    pixel = project(ray, *intrinsics, a, b)
+    margin = a - math.hypot(a, b) * ray[2]
+    if margin <= 0:
+        assert np.isnan(pixel).all()
+    elif margin > 1e-3 * a:
+        np.testing.assert_allclose(back_project(pixel, *intrinsics, a, b), ray, atol=1e-7)
+
+
+@given(MIRRORS, DIRECTIONS)
+def test_the_line_of_sight_through_a_pixel_meets_the_ray_on_the_upper_sheet_of_the_mirror(
+    mirror: tuple[float, float], direction: tuple[float, float]
+) -> None:
+    a, b = mirror
+    e = math.hypot(a, b)
+    ray = unit(*direction)
+    level = math.hypot(ray[0], ray[1])
+    if a - e * ray[2] <= 1e-2 * a or level < 1e-3:
+        return
+    u, v = project(ray, 500.0, 500.0, 320.0, 320.0, 0.0, a, b)
+    q = math.hypot(u - 320.0, v - 320.0) / 500.0
+    along = 2 * e * q / (level - q * ray[2])  # where the lines s * ray and t * (q, 1) - (0, 0, 2e) cross
+    assert along > 0
+    assert along * ray[2] + e > 0
+    x, z = along * level, along * ray[2] + e
+    assert abs(z**2 / a**2 - x**2 / b**2 - 1.0) < 1e-6 * (1.0 + z**2 / a**2)
+
+
+def test_pixels_past_the_asymptote_look_nowhere() -> None:
+    a, b = 28.095, 23.4125
+    limit = math.sqrt((a * a + b * b) / (a * a) - 1.0) * 497.0  # |q| = e / a
+    inside, outside = (320.0 + 0.999 * limit, 240.0), (320.0 + 1.001 * limit, 240.0)
+    rays = back_project([inside, outside], 497.0, 497.0, 320.0, 240.0, 0.0, a, b)
+    assert np.isfinite(rays[0]).all()
+    assert np.isnan(rays[1]).all()
+
+
+def test_the_ring_of_a_known_camera_spans_the_elevations_its_maker_states() -> None:
+    """photoreal-house: radii 34 and 238 px are elevations -60.8 and +30.0 degrees."""
+    rays = back_project([[319.5 + 34.0, 239.5], [319.5, 239.5 + 238.0]], 497, 497, 319.5, 239.5, 0.0, 28.095, 23.4125)
+    np.testing.assert_allclose(np.degrees(np.arcsin(rays[:, 2])), [-60.8, 30.0], atol=0.05)
