@@ -345,12 +345,15 @@ class _Builder:
         cycle = _cycle(order)
         if cycle:
             path = " -> ".join([*cycle, cycle[0]])
-            wire = next(w for w in self.wires if w.from_node == cycle[-1] and w.to_node == cycle[0] and not w.delay)
-            self._problem(wire.where, f"the nodes wait for each other: {path}", f"break the loop with a delay: {wire.where}={{from: {wire.origin}, delay: 1, initial: …}}")
+            around = zip(cycle, [*cycle[1:], cycle[0]], strict=True)
+            edges = {(start, end) for start, end in around}
+            wire = next(w for w in self.wires if (w.from_node, w.to_node) in edges and not w.delay)
+            hint = f"break the loop with a delay: {wire.where}={{from: {wire.origin}, delay: 1, initial: …}}"
+            self._problem(wire.where, f"the nodes wait for each other: {path}", hint)
             return Graph(self.nodes, self.wires, self.artifacts)
         self._order_in_place(order, lifetimes)
         listed = list(self.nodes)
-        running = nx.lexicographical_topological_sort(order, key=lambda name: (rank[lifetimes[name]], listed.index(name)))
+        running = nx.lexicographical_topological_sort(order, key=lambda name: (rank[lifetimes[name]], not self.nodes[name].signature.is_source, listed.index(name)))
         nodes = {name: dataclasses.replace(self.nodes[name], lifetime=lifetimes[name]) for name in running}
         return Graph(nodes, self.wires, self.artifacts)
 

@@ -29,6 +29,10 @@ class ProblemsFound(Exception):
         super().__init__(format_problems(self.problems))
 
 
+class BadInput(Exception):
+    """Input that cannot be used. The message is one line: where (file, topic, record), what, and what to do."""
+
+
 def format_problems(problems: Iterable[Problem]) -> str:
     """All problems as text, one under the other, with their number at the head."""
     problems = list(problems)

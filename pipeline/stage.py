@@ -101,6 +101,32 @@ class Context:
         self.facts[name] = value
 
 
+    def generator_state(self) -> dict[str, Any]:
+        """The bit generator's state as plain data."""
+        return dict(self.rng_unmarked().bit_generator.state)
+
+    def rng_unmarked(self) -> "np.random.Generator":
+        """The generator, for the engine's own bookkeeping."""
+        drew = self.drew
+        rng = self.rng
+        self.drew = drew
+        return rng
+
+    def notes(self) -> dict[str, Any]:
+        """Counts, details and facts so far, as plain data."""
+        return {"counts": dict(self.counts), "details": dict(self.details), "facts": dict(self.facts), "drew": self.drew}
+
+    def restore(self, generator: dict[str, Any], notes: dict[str, Any]) -> None:
+        """Put back what `generator_state` and `notes` gave."""
+        self.rng_unmarked().bit_generator.state = generator
+        self.restore_notes(notes)
+
+    def restore_notes(self, notes: dict[str, Any]) -> None:
+        """Put back what `notes` gave."""
+        self.counts, self.details = Counter(notes["counts"]), dict(notes["details"])
+        self.facts, self.drew = dict(notes["facts"]), notes["drew"]
+
+
 @dataclass_transform(kw_only_default=True)
 class Stage:
     """Base of all stages. A subclass is a keyword-only dataclass of its parameters with a `step`.
