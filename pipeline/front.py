@@ -1,0 +1,113 @@
+"""The front of a graph: what follows from the logs alone (unwarped, featured images), kept for the next run.
+
+A node is in the front when it is the source of a recorded log, or gets all its inputs from the front or from before the
+loop, without delays. What other nodes read of the front is its boundary; it is spooled tick by tick under the hash of
+stages, parameters, wires and logs. The seed is part of the key only where a front stage drew random numbers.
+"""
+
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .artifact import Cache
+from .codec import BadEncoding, decode, encode, seal, unseal
+from .files import digest_text, write_whole
+from .graph import ARTIFACTS, Graph
+from .spool import Spool
+
+
+@dataclass
+class CachedFront:
+    """The front of a graph in a cache. `replay` is None where it is still to be computed.
+
+    `said` tells in words why it was found or not.
+    """
+
+    nodes: frozenset[str]
+    boundary: tuple[str, ...]
+    key: str
+    said: str
+    replay: Sequence[Mapping[str, Any]] | None = None
+    notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+
+def front_nodes(graph: Graph) -> frozenset[str]:
+    """The names of the front's nodes; empty where the source listens to the graph (a simulator in a closed loop)."""
+    source = graph.source
+    if source is None or graph.inputs_of(source.name):
+        return frozenset()
+    front = {source.name}
+    before = {node.name for node in graph.of_lifetime("before")}
+    for node in graph.of_lifetime("tick"):
+        wires = graph.inputs_of(node.name)
+        ready = all(not w.delay and (w.from_node in front or (w.from_node in before and not _draws_on_artifacts(graph, w.from_node))) for w in wires)
+        if wires and ready:
+            front.add(node.name)
+    return frozenset(front)
+
+
+def _draws_on_artifacts(graph: Graph, name: str) -> bool:
+    return any(wire.from_node == ARTIFACTS or _draws_on_artifacts(graph, wire.from_node) for wire in graph.inputs_of(name))
+
+
+def front_key(graph: Graph, nodes: frozenset[str]) -> str:
+    """The hash of everything but the seed that decides what the front gives."""
+    before = {node.name for node in graph.of_lifetime("before")}
+    closure, waiting = set(nodes), list(nodes)
+    while waiting:
+        for wire in graph.inputs_of(waiting.pop()):
+            if wire.from_node in before and wire.from_node not in closure:
+                closure.add(wire.from_node)
+                waiting.append(wire.from_node)
+    digests = [f"{name}:{graph.nodes[name].stage.inputs_digest()}" for name in sorted(closure)]
+    return digest_text("front", graph.digest(closure), *digests)
+
+
+@contextmanager
+def cached_front(graph: Graph, cache: Cache | None, seed: int) -> Iterator[CachedFront | None]:
+    """The front of a graph, found in the cache or to be recorded. Others who want the same one wait meanwhile."""
+    nodes = front_nodes(graph)
+    if cache is None or not nodes or graph.source is None:
+        yield None
+        return
+    readers = [wire for wire in graph.wires if wire.from_node in nodes and wire.to_node not in nodes]
+    boundary = sorted({wire.origin for wire in readers} | {f"{graph.source.name}.tick"})
+    bulky = [origin for origin in boundary if getattr(getattr(graph.port(origin), "type", None), "bulky", False)]
+    if bulky:
+        who = ", ".join(sorted({wire.to_node for wire in readers if wire.origin == bulky[0]}))
+        yield CachedFront(nodes, tuple(boundary), "", f"not cached: {bulky[0]} is too large to keep and is read by {who}", replay=None)
+        return
+    key = digest_text(front_key(graph, nodes), *boundary)
+    with ExitStack() as held:
+        held.enter_context(cache.lock(key))
+        for candidate in (key, seeded(key, seed)):
+            path = cache.path(candidate, ".front")
+            if path.exists():
+                try:
+                    notes = decode(unseal(cache.path(candidate, ".notes").read_bytes(), str(path)))
+                    spool = Spool(path)
+                    if len(spool) == notes["ticks"]:
+                        held.close()
+                        said = f"found: {', '.join(sorted(nodes))} of this log with these parameters were computed before"
+                        yield CachedFront(nodes, tuple(boundary), key, said, spool, notes["nodes"])
+                        return
+                except (BadEncoding, FileNotFoundError):
+                    path.unlink(missing_ok=True)  # half a result is no result: it is made again
+        yield CachedFront(nodes, tuple(boundary), key, "not found: code, parameters or log are new, or it never ran to its end")
+
+
+def seeded(key: str, seed: int) -> str:
+    """The key of a result that depends on the seed."""
+    return digest_text(key, f"seed {seed}")
+
+
+def keep(front: CachedFront, cache: Cache, seed: int, spool: Path, ticks: int, notes: Mapping[str, Mapping[str, Any]]) -> None:
+    """Put a recorded front into the cache. `notes` are those of its nodes: what they counted, and whether they drew."""
+    drew = any(note["drew"] for note in notes.values())
+    key = seeded(front.key, seed) if drew else front.key
+    cache.folder.mkdir(parents=True, exist_ok=True)
+    write_whole(cache.path(key, ".notes"), seal(encode({"ticks": ticks, "nodes": dict(notes)})))
+    shutil.move(spool, cache.path(key, ".front"))
