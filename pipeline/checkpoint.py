@@ -15,7 +15,7 @@ class Checkpoint:
     """Everything that decides how a run goes on.
 
     `identity`: hash of graph, inputs and seed, so that it is never used for another run. `ticks`: how many are
-    done. `ended`: the logs have ended, only "after" stages are left. `channels`: delayed values, oldest first.
+    done. `ended`: the logs have ended, only "after" stages are left. `replayed`: the front came from the cache. `channels`: delayed values, oldest first.
     `held`: last present values. `states`: fields of the stages' States. `generators`: bit generators' states.
     `notes`: what contexts counted. `spools`: length in bytes of every growing sequence. A value that stands in several
     places (a map that is read delayed and kept for the end) is written once and is one object again when loaded.
@@ -24,6 +24,7 @@ class Checkpoint:
     identity: str
     ticks: int
     ended: bool = False
+    replayed: bool = False
     channels: dict[str, list[Any]] = field(default_factory=dict)
     held: dict[str, Any] = field(default_factory=dict)
     states: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -48,6 +49,7 @@ def save(path: Path, checkpoint: Checkpoint) -> None:
         "identity": checkpoint.identity,
         "ticks": checkpoint.ticks,
         "ended": checkpoint.ended,
+        "replayed": checkpoint.replayed,
         "channels": {key: [number(value) for value in values] for key, values in checkpoint.channels.items()},
         "held": {key: number(value) for key, value in checkpoint.held.items()},
         "states": checkpoint.states,

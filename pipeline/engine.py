@@ -175,6 +175,8 @@ class Engine:
             self.calls[node.name].run(self.values)
         self._fill_channels()
         self._resume()
+        for name in replaying:
+            self.calls[name].ctx.restore_notes(dict(self.front.notes[name]))  # type: ignore[union-attr]
         if not self.ended:
             self._loop(replaying)
             self.ended = True
@@ -272,6 +274,7 @@ class Engine:
             identity=self.identity,
             ticks=self.ticks,
             ended=self.ended,
+            replayed=self.front is not None and self.front.replay is not None,
             channels={key: list(channel.waiting) for key, channel in self.channels.items()},
             held={origin: self.values[f"{origin}#held"] for origin in sorted(self.kept) if f"{origin}#held" in self.values},
             states={name: encode_state(call.state) for name, call in self.calls.items() if call.state is not None},
@@ -288,6 +291,10 @@ class Engine:
                 spool.cut(0)
             return
         found = checkpoints.load(path)
+        if found.replayed and (self.front is None or self.front.replay is None):
+            for spool in self.spools.values():  # the cache it read from is gone: the same run, from its start
+                spool.cut(0)
+            return
         if found.identity != self.identity:
             raise BadInput(f"{path} belongs to another run (its configuration or its logs have changed): start a new run")
         self.ticks, self.ended = found.ticks, found.ended
@@ -301,5 +308,5 @@ class Engine:
                 restore_state(state, fields)
         for name, call in self.calls.items():
             call.ctx.restore(found.generators[name], found.notes[name])
-        for name, size in found.spools.items():
-            self.spools[name].cut(size)
+        for name, spool in self.spools.items():
+            spool.cut(found.spools[name])

@@ -14,7 +14,7 @@ from typing import Any
 
 from .artifact import Cache
 from .codec import BadEncoding, decode, encode, seal, unseal
-from .files import digest_text, write_whole
+from .files import digest_file, digest_text, whole_file, write_whole
 from .graph import ARTIFACTS, Graph
 from .spool import Spool
 
@@ -88,8 +88,8 @@ def cached_front(graph: Graph, cache: Cache | None, seed: int) -> Iterator[Cache
             if path.exists():
                 try:
                     notes = decode(unseal(cache.path(candidate, ".notes").read_bytes(), str(path)))
-                    spool = Spool(path)
-                    if len(spool) == notes["ticks"]:
+                    if digest_file(path) == notes["digest"]:
+                        spool = Spool(path)
                         held.close()
                         said = f"found: {', '.join(sorted(nodes))} of this log with these parameters were computed before"
                         yield CachedFront(nodes, tuple(boundary), key, said, spool, notes["nodes"])
@@ -104,10 +104,11 @@ def seeded(key: str, seed: int) -> str:
     return digest_text(key, f"seed {seed}")
 
 
-def keep(front: CachedFront, cache: Cache, seed: int, spool: Path, ticks: int, notes: Mapping[str, Mapping[str, Any]]) -> None:
+def keep(front: CachedFront, cache: Cache, seed: int, spool: Path, notes: Mapping[str, Mapping[str, Any]]) -> None:
     """Put a recorded front into the cache. `notes` are those of its nodes: what they counted, and whether they drew."""
     drew = any(note["drew"] for note in notes.values())
     key = seeded(front.key, seed) if drew else front.key
-    cache.folder.mkdir(parents=True, exist_ok=True)
-    write_whole(cache.path(key, ".notes"), seal(encode({"ticks": ticks, "nodes": dict(notes)})))
-    shutil.move(spool, cache.path(key, ".front"))
+    with whole_file(cache.path(key, ".front")) as part:
+        shutil.copyfile(spool, part)
+        digest = digest_file(part)
+    write_whole(cache.path(key, ".notes"), seal(encode({"digest": digest, "nodes": dict(notes)})))

@@ -88,6 +88,19 @@ class Graph:
         """The nodes that read an output port, by any kind of wire. `readers_of("source.truth")` is who sees truth."""
         return sorted({wire.to_node for wire in self.wires if origin in (wire.origin, wire.initial)})
 
+    def leading_to(self, origins: Iterable[str]) -> "Graph":
+        """The part of the graph that some outputs depend on, by any kind of wire."""
+        needed, waiting = set(), [origin.partition(".")[0] for origin in origins]
+        while waiting:
+            name = waiting.pop()
+            if name in needed or name not in self.nodes:
+                continue
+            needed.add(name)
+            for wire in self.inputs_of(name):
+                waiting += [wire.from_node, *([wire.initial.partition(".")[0]] if wire.initial else [])]
+        nodes = {name: node for name, node in self.nodes.items() if name in needed}
+        return Graph(nodes, [wire for wire in self.wires if wire.to_node in needed], self.artifact_types)
+
     def digest(self, only: Iterable[str] | None = None) -> str:
         """A hash over stages' code, parameters and wires: of the whole graph, or of some nodes and what enters them."""
         names = sorted(self.nodes if only is None else only)

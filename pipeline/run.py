@@ -1,0 +1,459 @@
+"""A run: its folder, its manifest, its artifacts, its engine, and the files that are left at the end."""
+
+import importlib.metadata
+import json
+import logging
+import os
+import platform
+import shutil
+import subprocess
+import traceback
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from .artifact import Cache, read_artifact, read_header, write_artifact
+from .engine import Engine, StageFailed
+from .files import digest_file, digest_text, write_whole
+from .front import CachedFront, cached_front, keep, seeded
+from .graph import Graph, build
+from .problems import BadInput, Problem, ProblemsFound, suggest
+from .results import Figure, Metrics, Table
+from .value import VALUE_TYPES, Value
+
+LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "numba", "networkx", "hydra-core", "mcap", "rosbags")
+log = logging.getLogger("omninav")
+
+
+@dataclass(frozen=True)
+class ArtifactPlan:
+    """Where an artifact comes from: a file, or a graph whose output `origin` is taken."""
+
+    name: str
+    file: Path | None = None
+    graph: Graph | None = None
+    origin: str = ""
+    variant: str = ""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A configuration that has been checked: the graph, its artifacts, and what is to be saved."""
+
+    config: Mapping[str, Any]
+    graph: Graph
+    artifacts: tuple[ArtifactPlan, ...]
+    saves: Mapping[str, str]
+
+    @property
+    def variant(self) -> str:
+        """The variant's name."""
+        return str(self.config.get("variant"))
+
+    @property
+    def seed(self) -> int:
+        """The run's seed."""
+        return int(self.config.get("seed", 0))
+
+
+def plan(config: Mapping[str, Any]) -> Plan:
+    """Check a plain, resolved configuration. Raises `ProblemsFound` with everything that is wrong with it."""
+    problems: list[Problem] = []
+    artifacts, types = [], {}
+    for key in ("seed",):
+        if not isinstance(config.get(key, 0), int) or isinstance(config.get(key, 0), bool) or config.get(key, 0) < 0:
+            problems.append(Problem(key, f"{config.get(key)!r}, expected a whole number >= 0", f"type {key}=0"))
+    for name, spec in (config.get("artifacts") or {}).items():
+        try:
+            made = _plan_artifact(str(name), spec)
+        except ProblemsFound as found:
+            problems += found.problems
+            types[str(name)] = Any
+            continue
+        artifacts.append(made)
+        if made.graph is not None:
+            port = made.graph.port(made.origin)
+            types[made.name] = port.type if port else Any
+        elif made.file is not None:
+            types[made.name] = VALUE_TYPES.get(read_header(made.file)["type"], Any)
+    graph: Graph | None = None
+    try:
+        graph = build(config, types)
+    except ProblemsFound as found:
+        problems += found.problems
+    saves = config.get("saves") or {}
+    for name, origin in saves.items() if graph is not None else ():
+        port = graph.port(str(origin)) if graph is not None else None
+        if port is None:
+            outputs = [f"{n.name}.{p}" for n in graph.nodes.values() for p in n.signature.outputs] if graph else []
+            problems.append(Problem(f"saves.{name}", f"there is no output '{origin}'", suggest(str(origin), outputs, "outputs")))
+    if problems or graph is None:
+        raise ProblemsFound(dict.fromkeys(problems))
+    return Plan(config, graph, tuple(artifacts), saves)
+
+
+def _plan_artifact(name: str, spec: Any) -> ArtifactPlan:
+    where = f"artifacts.{name}"
+    if not isinstance(spec, Mapping):
+        raise ProblemsFound([Problem(where, "expected a mapping with `variant` or `file`")])
+    if spec.get("file") is not None:
+        file = Path(str(spec["file"]))
+        try:
+            read_header(file)
+        except BadInput as error:
+            raise ProblemsFound([Problem(name, str(error), f"type {name}=FILE.omap, or tour=LOG to make one")]) from None
+        return ArtifactPlan(name, file=file)
+    if spec.get("graph") is None:
+        hint = f"type tour=LOG to learn one with '{spec.get('variant')}', or {name}=FILE.omap to load one"
+        raise ProblemsFound([Problem(name, f"this variant needs a {name}, and none is given", hint)])
+    graph = build(spec["graph"], prefix=f"{where}.", shared=spec.get("share") or ())
+    origin = str(spec.get("from") or (spec["graph"].get("saves") or {}).get(name, ""))
+    if graph.port(origin) is None:
+        outputs = [f"{n.name}.{p}" for n in graph.nodes.values() for p in n.signature.outputs]
+        raise ProblemsFound([Problem(f"{where}.from", f"there is no output '{origin}'", suggest(origin, outputs, "outputs"))])
+    return ArtifactPlan(name, graph=graph.leading_to([origin]), origin=origin, variant=str(spec.get("variant")))
+
+
+@dataclass
+class Run:
+    """A run folder with its manifest, which is written at the start and completed at the end."""
+
+    folder: Path
+    manifest: dict[str, Any] = field(default_factory=dict)
+
+    def save(self) -> None:
+        """Write the manifest as it stands."""
+        write_whole(self.folder / "manifest.json", json.dumps(self.manifest, indent=1, default=str) + "\n")
+
+    @property
+    def memory(self) -> Path:
+        """Where checkpoints and spools lie."""
+        return self.folder / "checkpoints"
+
+
+def start(planned: Plan, argv: Sequence[str], folder: Path | None = None) -> Run:
+    """Make the run's folder with config, graph and manifest. `folder` is given by a sweep, else made from the date."""
+    config = planned.config
+    inputs = input_digests(planned)
+    if folder is None:
+        root = Path(str(config.get("runs", "runs")))
+        folder = _fresh(root, f"{datetime.now():%Y-%m-%d_%H-%M-%S}_{planned.variant}")
+    folder.mkdir(parents=True, exist_ok=True)
+    run = Run(folder)
+    run.manifest = {
+        "omninav": _version("omninav"),
+        "status": "running",
+        "variant": planned.variant,
+        "argv": list(argv),
+        "cwd": os.getcwd(),
+        "started": datetime.now().isoformat(timespec="seconds"),
+        "git_commit": _git_commit(),
+        "graph": planned.graph.digest(),
+        "inputs": inputs,
+        "seed": planned.seed,
+        "python": platform.python_version(),
+        "libraries": {name: _version(name) for name in LIBRARIES},
+    }
+    write_whole(folder / "config.yaml", yaml.safe_dump(dict(config), sort_keys=False, allow_unicode=True, width=120))
+    from .draw import mermaid, svg  # drawing is not needed to start the command line
+
+    write_whole(folder / "graph.svg", svg(planned.graph))
+    write_whole(folder / "graph.mmd", mermaid(planned.graph))
+    run.save()
+    _point_latest(folder)
+    return run
+
+
+def execute(run: Run, planned: Plan, progress: Any = None) -> dict[str, Any]:
+    """Run a planned configuration in its folder, from its start or from where it was left, and return its metrics.
+
+    Raises `StageFailed` or `BadInput`; by then the manifest says so and the traceback is in `run.log`.
+    """
+    with _logged(run):
+        try:
+            return _execute(run, planned, progress)
+        except KeyboardInterrupt:
+            _fail(run, "interrupted", "stopped by the user")
+            raise
+        except Exception as error:
+            _fail(run, "failed", str(error) if isinstance(error, StageFailed | BadInput) else f"{type(error).__name__}: {error}")
+            raise
+
+
+def _execute(run: Run, planned: Plan, progress: Any) -> dict[str, Any]:
+    config, seed = planned.config, planned.seed
+    cache = Cache(Path(str(config["cache"]))) if config.get("cache") else None
+    every_s = float(config.get("checkpoint_s", 5.0))
+    artifacts: dict[str, Value] = {}
+    made: dict[str, Any] = {}
+    for artifact in planned.artifacts:
+        artifacts[artifact.name], made[artifact.name] = _artifact(run, artifact, seed, cache, every_s, progress)
+    run.manifest["artifacts"] = made
+    run.save()
+    identity = _identity(planned.graph, seed, *(fact["sha256"] for fact in made.values()))
+    wanted = sorted(set(planned.saves.values()))
+    with cached_front(planned.graph, cache, seed) as front:
+        engine = Engine(
+            planned.graph, artifacts, seed, run.folder, run.memory, wanted, identity, every_s, _usable(front), _stepper(progress, planned.variant)
+        )
+        last = engine.run()
+        _keep_front(engine, front, cache, seed)
+    for name, origin in planned.saves.items():
+        value = last[origin]
+        if isinstance(value, Value):
+            write_artifact(run.folder / f"{name}.omap", value, {"variant": planned.variant})
+    return _finish(run, planned, engine, front)
+
+
+def _artifact(
+    run: Run, artifact: ArtifactPlan, seed: int, cache: Cache | None, every_s: float, progress: Any
+) -> tuple[Value, dict[str, Any]]:
+    """The artifact's value, from its file, the cache or its graph's run, with what the manifest says of it."""
+    target = run.folder / f"{artifact.name}.omap"
+    if artifact.file is not None:
+        value = read_artifact(artifact.file)
+        shutil.copyfile(artifact.file, target)
+        return value, {"file": str(artifact.file), "sha256": digest_file(target), "said": "loaded from a file"}
+    graph = artifact.graph
+    assert graph is not None
+    place = cache or Cache(run.memory / "artifacts")
+    key = digest_text("artifact", graph.digest(), artifact.origin, *_digests_of(graph).values())
+    with place.lock(key):
+        found = next((path for k in (key, seeded(key, seed)) if (path := place.path(k, ".omap")).exists()), None)
+        said = "found: the same graph over the same log had made it before"
+        if found is None:
+            said = "made: code, parameters or log are new to the cache"
+            value, header, drew = _make(run, artifact, graph, seed, cache, every_s, progress)
+            found = place.path(seeded(key, seed) if drew else key, ".omap")
+            write_artifact(found, value, header)
+    value = read_artifact(found)
+    shutil.copyfile(found, target)
+    facts = read_header(found)["facts"]
+    return value, {"variant": artifact.variant, "from": artifact.origin, "sha256": digest_file(target), "said": said, **facts}
+
+
+def _make(
+    run: Run, artifact: ArtifactPlan, graph: Graph, seed: int, cache: Cache | None, every_s: float, progress: Any
+) -> tuple[Value, dict[str, Any], bool]:
+    memory = run.memory / artifact.name
+    with cached_front(graph, cache, seed) as front:
+        identity = _identity(graph, seed)
+        engine = Engine(
+            graph, {}, seed, None, memory, [artifact.origin], identity, every_s, _usable(front), _stepper(progress, artifact.variant)
+        )
+        value = engine.run()[artifact.origin]
+        _keep_front(engine, front, cache, seed)
+    if not isinstance(value, Value):
+        raise BadInput(f"'{artifact.variant}' ran to its end and gave no {artifact.name}: was there anything usable in its log?")
+    return value, {**_notes(engine), "variant": artifact.variant}, any(call.ctx.drew for call in engine.calls.values())
+
+
+def _usable(front: CachedFront | None) -> CachedFront | None:
+    return front if front is not None and front.key else None
+
+
+def _keep_front(engine: Engine, front: CachedFront | None, cache: Cache | None, seed: int) -> None:
+    if cache is not None and front is not None and front.key and front.replay is None:
+        spool = engine.spools["front"]
+        spool.size  # noqa: B018 - hands what is buffered to the operating system
+        keep(front, cache, seed, spool.path, {name: engine.calls[name].ctx.notes() for name in sorted(front.nodes)})
+
+
+def _notes(engine: Engine) -> dict[str, Any]:
+    """What the stages counted and stated, as the manifest holds it."""
+    dropped: dict[str, Any] = {}
+    facts: dict[str, Any] = {}
+    for name, call in engine.calls.items():
+        for kind, number in call.ctx.counts.items():
+            dropped[kind if "." in kind else f"{name}.{kind}"] = {"count": number, "first": call.ctx.details.get(kind, "")}
+        facts |= call.ctx.facts
+    return {"dropped": dropped, "facts": facts}
+
+
+def _finish(run: Run, planned: Plan, engine: Engine, front: CachedFront | None) -> dict[str, Any]:
+    from .report import write_report
+
+    metrics: dict[str, Any] = {}
+    figures: list[Figure] = []
+    tables: list[Table] = []
+    for node in [*planned.graph.of_lifetime("tick"), *planned.graph.of_lifetime("after")]:
+        for port in node.signature.outputs:
+            origin = f"{node.name}.{port}"
+            for value in _flat(engine.values.get(f"{origin}#held", engine.values.get(origin))):
+                if isinstance(value, Metrics):
+                    merge(metrics, value.values)
+                elif isinstance(value, Figure):
+                    figures.append(value)
+                elif isinstance(value, Table):
+                    tables.append(value)
+    notes = _notes(engine)
+    timing = stage_times(engine)
+    write_whole(run.folder / "metrics.json", json.dumps(metrics, indent=1, sort_keys=True) + "\n")
+    write_whole(run.folder / "timing.json", json.dumps(timing, indent=1) + "\n")
+    run.manifest |= {
+        "ended": datetime.now().isoformat(timespec="seconds"),
+        "ticks": engine.ticks,
+        "dropped": notes["dropped"],
+        "facts": {**{k: v for a in run.manifest["artifacts"].values() for k, v in _map_facts(a).items()}, **notes["facts"]},
+        "front": front.said if front is not None else "not cached: this graph has no front that follows from its log alone",
+    }
+    for kind, entry in notes["dropped"].items():
+        log.warning("%s: %s%s", kind, entry["count"], f" (first: {entry['first']})" if entry["first"] else "")
+    graph_svg, config_yaml = (run.folder / "graph.svg").read_text(), (run.folder / "config.yaml").read_text()
+    done = {**run.manifest, "status": "complete"}
+    write_report(run.folder, done, metrics, timing, graph_svg, figures, tables, config_yaml)
+    run.manifest = done
+    run.save()
+    for spool in engine.spools.values():
+        spool.close()
+    shutil.rmtree(run.memory, ignore_errors=True)
+    return metrics
+
+
+def _map_facts(artifact: Mapping[str, Any]) -> dict[str, Any]:
+    return {f"{key} (map)": value for key, value in (artifact.get("facts") or {}).items()}
+
+
+def _flat(value: Any) -> Iterator[Any]:
+    if isinstance(value, tuple | list):
+        for item in value:
+            yield from _flat(item)
+    elif value is not None:
+        yield value
+
+
+def merge(into: dict[str, Any], more: Mapping[str, Any]) -> None:
+    """Merge nested figures; what two stages state under one name comes from the later one."""
+    for key, value in more.items():
+        if isinstance(value, Mapping) and isinstance(into.get(key), dict):
+            merge(into[key], value)
+        else:
+            into[key] = dict(value) if isinstance(value, Mapping) else value
+
+
+def stage_times(engine: Engine) -> dict[str, Any]:
+    """Median, 95th percentile and maximum per stage in milliseconds, and the loop's ticks per second."""
+    import numpy as np
+
+    stages = {}
+    per_tick = 0.0
+    for name, call in engine.calls.items():
+        if len(call.times):
+            times = np.asarray(call.times) * 1e3
+            p50, p95 = np.percentile(times, [50, 95])
+            stages[name] = {"lifetime": call.node.lifetime, "calls": len(times), "p50_ms": p50, "p95_ms": p95, "max_ms": times.max()}
+            per_tick += float(times.mean()) if call.node.lifetime == "tick" else 0.0
+    return {"ticks": engine.ticks, "ticks_per_second": 1e3 / per_tick if per_tick else None, "stages": stages}
+
+
+def resume(folder: Path, progress: Any = None) -> tuple[Run, dict[str, Any]]:
+    """Go on with a run that was stopped, from its last checkpoint, to the bytes it would have given unbroken."""
+    manifest_file, config_file = folder / "manifest.json", folder / "config.yaml"
+    if not manifest_file.is_file() or not config_file.is_file():
+        raise BadInput(f"{folder}: not a run folder (no manifest.json and config.yaml); `ls runs` shows what there is")
+    run = Run(folder.resolve(), json.loads(manifest_file.read_text()))
+    if run.manifest["status"] == "complete":
+        shutil.rmtree(run.memory, ignore_errors=True)
+        return run, json.loads((folder / "metrics.json").read_text())
+    if Path(run.manifest["cwd"]).is_dir():
+        os.chdir(run.manifest["cwd"])  # its paths are relative to where it was started
+    planned = plan(yaml.safe_load(config_file.read_text()))
+    inputs = input_digests(planned)
+    changed = [name for name, digest in inputs.items() if run.manifest["inputs"].get(name) != digest]
+    if changed:
+        raise BadInput(f"{folder}: {', '.join(changed)} changed since the run was started; start a new run")
+    run.manifest["status"] = "running"
+    run.manifest.pop("error", None)
+    run.save()
+    return run, execute(run, planned, progress)
+
+
+def input_digests(planned: Plan) -> dict[str, str]:
+    """The content hash of every file that the run reads, by node. Raises `BadInput` where one cannot be read."""
+    digests = _digests_of(planned.graph)
+    for artifact in planned.artifacts:
+        if artifact.graph is not None:
+            digests |= {f"{artifact.name}.{name}": digest for name, digest in _digests_of(artifact.graph).items()}
+        elif artifact.file is not None:
+            digests[artifact.name] = digest_file(artifact.file)
+    return digests
+
+
+def _digests_of(graph: Graph) -> dict[str, str]:
+    found = {node.name: node.stage.inputs_digest() for node in graph.nodes.values()}
+    return {name: digest for name, digest in found.items() if digest is not None}
+
+
+def _identity(graph: Graph, seed: int, *more: str) -> str:
+    return digest_text(graph.digest(), str(seed), *_digests_of(graph).values(), *more)
+
+
+def _stepper(progress: Any, name: str) -> Any:
+    if progress is None:
+        return lambda done, total: None
+    return lambda done, total: progress.update(name, done, total)
+
+
+def _fail(run: Run, status: str, what: str) -> None:
+    run.manifest |= {"status": status, "error": what, "ended": datetime.now().isoformat(timespec="seconds")}
+    run.save()
+    log.error("%s\n%s", what, traceback.format_exc())
+
+
+@contextmanager
+def _logged(run: Run) -> Iterator[None]:
+    handler = logging.FileHandler(run.folder / "run.log", encoding="utf-8")
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    log.addHandler(handler)
+    log.setLevel(logging.INFO)
+    log.propagate = False
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        handler.close()
+
+
+def _fresh(root: Path, name: str) -> Path:
+    """A folder of that name that did not exist, made now (two runs may start in the same second)."""
+    for number in range(1, 1000):
+        folder = root / (name if number == 1 else f"{name}_{number}")
+        try:
+            folder.mkdir(parents=True)
+            return folder
+        except FileExistsError:
+            continue
+    raise BadInput(f"{root}: more than 1000 runs named {name}")
+
+
+def _point_latest(folder: Path) -> None:
+    link = folder.parent / "latest"
+    part = folder.parent / f".latest.{os.getpid()}"
+    try:
+        part.unlink(missing_ok=True)
+        part.symlink_to(folder.name)
+        os.replace(part, link)
+    except OSError:  # a file system without links, or a folder of that name: the run does not need it
+        part.unlink(missing_ok=True)
+
+
+def _version(distribution: str) -> str:
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def _git_commit() -> str | None:
+    """The commit of omninav's own checkout, with a mark where files differ from it; None where there is none."""
+    here = Path(__file__).resolve().parent
+    try:
+        asked = subprocess.run(["git", "describe", "--always", "--dirty", "--abbrev=40"], cwd=here, capture_output=True, text=True, timeout=5)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return asked.stdout.strip() or None if asked.returncode == 0 else None
