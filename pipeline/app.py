@@ -1,0 +1,464 @@
+"""The command line. Only the parser is loaded at the start; everything heavy is imported by the command that needs it."""
+
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+CONF = "omninav.conf"
+OUTCOMES = "OMNINAV_OUTCOMES"
+"""Names the file in which the jobs of a sweep, also those in other processes, leave their exit codes."""
+
+HELP = """\
+omninav: finding the way with an omnidirectional camera
+
+  omninav                                        the built-in world: a map, a drive, a report
+  omninav variant=omniview_mcl tour=T log=L      learn the map from a tour, localise a drive with it
+  omninav variant=omniview_mcl map=M log=L       the same with a map that was saved before
+  omninav -m match=selective,l2 seed=0,1,2       a sweep: every combination, one page
+  omninav resume runs/latest                     go on with a run that was stopped
+  omninav compare runs/A runs/B                  figures side by side
+
+  check [overrides]       say everything that is wrong with a configuration, and run nothing
+  graph [overrides]       draw the graph: SVG and Mermaid (out=FOLDER)
+  stages [role]           all stages with ports, parameters and source; third parties' too
+  variants                what variant= can be
+  simulate [overrides]    write a log of the built-in world (world=… route=… day=… log=out.mcap)
+  report [run]            a run's results and where its report lies
+  compare RUN RUN …       several runs side by side
+  resume RUN              go on with a run that was stopped
+  doctor                  versions, plugins, and what may be missing
+
+A log is an .mcap file, a rosbag2 folder, a ROS 1 .bag, LAYOUT:FOLDER for images with CSVs (antworld:path), or a
+recording's .yaml. Any parameter can be set: nodes.match.headings=72; any stage swapped: match=l2.
+Hydra's own flags work as ever: --config-dir, --cfg job, --multirun, --info, --hydra-help.
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit code: 0 well, 1 a stage failed, 2 the configuration or an input is wrong."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    if arguments and arguments[0] in ("-h", "--help", "help"):
+        print(HELP, end="")
+        return 0
+    if arguments and arguments[0] == "--version":
+        import importlib.metadata
+
+        print(f"omninav {importlib.metadata.version('omninav')}")
+        return 0
+    if os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())  # so that `_target_: my_stages.MyMatch` finds my_stages.py here
+    command = COMMANDS.get(arguments[0]) if arguments else None
+    if command is None and arguments and arguments[0].isidentifier():
+        return _unknown_command(arguments[0])
+    from .problems import BadInput, ProblemsFound
+
+    try:
+        return command(arguments[1:]) if command else _launch(arguments)
+    except ProblemsFound as found:
+        print(found, file=sys.stderr)
+        return 2
+    except BadInput as error:
+        print(error, file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        return 0
+    except KeyboardInterrupt:
+        print("stopped; `omninav resume runs/latest` goes on", file=sys.stderr)
+        return 130
+
+
+def _unknown_command(name: str) -> int:
+    from .problems import suggest
+
+    print(f"'{name}' is no command. {suggest(name, COMMANDS, 'commands', prefix='omninav ')}", file=sys.stderr)
+    return 2
+
+
+# running
+
+
+def _launch(arguments: list[str]) -> int:
+    """Hand over to Hydra, which composes the configuration and calls `_job`, once or once per job of a sweep."""
+    import tempfile
+
+    import hydra
+
+    _offer_plugins()
+    with tempfile.TemporaryDirectory() as place:
+        outcomes = Path(place) / "outcomes"
+        os.environ[OUTCOMES] = str(outcomes)
+        sys.argv = ["omninav", *arguments]
+        try:
+            hydra.main(config_path=f"pkg://{CONF}", config_name="config", version_base="1.3")(_job)()
+        except SystemExit as stop:  # Hydra has said what it did not understand
+            if stop.code:
+                return 2
+        codes = [int(line) for line in outcomes.read_text().split()] if outcomes.exists() else []
+    return max(codes, default=0)
+
+
+def _job(config: Any) -> None:
+    """One run. Never raises and never exits: in a sweep the other jobs go on, and the exit code is left in a file."""
+    from .problems import BadInput, ProblemsFound
+    from .run import StageFailed
+
+    sweep = _sweep_folder()
+    code, error = 0, ""
+    try:
+        _run(config, sweep)
+    except ProblemsFound as found:
+        code, error = 2, str(found)
+    except BadInput as bad:
+        code, error = 2, str(bad)
+    except StageFailed as failed:
+        code, error = 1, str(failed)
+    except KeyboardInterrupt:
+        code, error = 130, "stopped; `omninav resume runs/latest` goes on"
+    except Exception as unknown:  # a defect of ours: one line here, the trace in run.log
+        code, error = 1, f"{type(unknown).__name__}: {unknown}"
+        if sweep is None and not isinstance(unknown, OSError):
+            import traceback
+
+            traceback.print_exc()
+    if error:
+        print(f"job {sweep[1]}: {error}" if sweep else error, file=sys.stderr, flush=True)
+        if code == 1:
+            folder = sweep[0] / sweep[1] if sweep else Path(str(config.get("runs", "runs"))) / "latest"
+            print(f"the traceback is in {folder / 'run.log'}", file=sys.stderr, flush=True)
+    if sweep is not None:
+        _note_job(sweep, code, error)
+    if OUTCOMES in os.environ:
+        with open(os.environ[OUTCOMES], "a") as file:
+            file.write(f"{code}\n")
+
+
+def _run(config: Any, sweep: tuple[Path, str, str] | None) -> None:
+    from .progress import Progress
+    from .report import results_table
+    from .run import execute, plan, start
+
+    planned = plan(complete(config))
+    folder = sweep[0] / sweep[1] if sweep else None
+    argv = ["omninav", *(sweep[2].split() if sweep else sys.argv[1:])]
+    run = start(planned, argv, folder)
+    with Progress() as progress:
+        metrics = execute(run, planned, progress)
+    if sweep is None:
+        _print(results_table(metrics))
+    print(f"report: {_shown(run.folder / 'report.html')}", flush=True)
+
+
+def _print(renderable: Any) -> None:
+    from rich.console import Console
+
+    Console(width=None if sys.stdout.isatty() else 120).print(renderable)
+
+
+def _shown(path: Path) -> str:
+    try:
+        return str(path.resolve().relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)
+
+
+def _sweep_folder() -> tuple[Path, str, str] | None:
+    """In a sweep: its folder, this job's number, and what this job overrides; None in a single run."""
+    from hydra.core.hydra_config import HydraConfig
+    from hydra.types import RunMode
+
+    settings = HydraConfig.get()
+    if settings.mode != RunMode.MULTIRUN:
+        return None
+    return Path(settings.sweep.dir).resolve(), str(settings.job.num), " ".join(settings.overrides.task)
+
+
+def _note_job(sweep: tuple[Path, str, str], code: int, error: str) -> None:
+    """Put a job's end on the sweep's page at once. Jobs in other processes wait for each other here."""
+    import fcntl
+    import json
+
+    from .files import write_whole
+    from .report import write_sweep_page
+
+    folder, number, overrides = sweep
+    own = folder / number
+    own.mkdir(parents=True, exist_ok=True)
+    manifest = json.loads((own / "manifest.json").read_text()) if (own / "manifest.json").exists() else {"status": "refused"}
+    manifest |= {"job": number, "overrides": overrides} | ({"error": error} if error else {})
+    write_whole(own / "manifest.json", json.dumps(manifest, indent=1) + "\n")
+    with (folder / ".page.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        write_sweep_page(folder, list(_sweep_rows(folder)))
+
+
+def _sweep_rows(folder: Path) -> Iterator[dict[str, Any]]:
+    import json
+
+    for own in sorted((path for path in folder.iterdir() if path.name.isdigit()), key=lambda path: int(path.name)):
+        if (own / "manifest.json").exists():
+            manifest = json.loads((own / "manifest.json").read_text())
+            metrics = json.loads((own / "metrics.json").read_text()) if (own / "metrics.json").exists() else {}
+            yield {"job": own.name, "folder": own, "manifest": manifest, "metrics": metrics}
+
+
+# configurations
+
+
+def complete(config: Any) -> dict[str, Any]:
+    """A composed configuration, resolved, with the graphs of its artifacts composed too: plain dicts, all said.
+
+    An artifact's graph is its variant's, with the nodes that it shares taken from this configuration, and all top-level
+    settings too; its log is the artifact's.
+    """
+    from hydra import compose
+    from omegaconf import OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
+
+    from .problems import Problem, ProblemsFound
+
+    graph_keys = {"variant", "nodes", "wires", "artifacts", "saves", "log", "tour", "map", "route", "experiment"}
+    try:
+        plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
+        for name, spec in (plain.get("artifacts") or {}).items():
+            if not isinstance(spec, Mapping) or spec.get("file") is not None or spec.get("variant") is None:
+                continue
+            if (spec.get("log") is None) != (plain.get("log") is None):
+                continue  # a log of one's own, but nothing to make the artifact from: `plan` says what is missing
+            other = compose("config", overrides=[f"variant={spec['variant']}"])
+            OmegaConf.set_struct(other, False)
+            for key in config:
+                if str(key) not in graph_keys:
+                    other[key] = config._get_node(key)
+            other.log, other.route, other.tour, other.map = spec.get("log"), spec.get("route"), None, None
+            for node in spec.get("share") or ():
+                if config.nodes.get(node) is not None:
+                    other.nodes[node] = OmegaConf.to_container(config.nodes[node], resolve=False)
+            for node, changes in (spec.get("nodes") or {}).items():
+                other.nodes[node] = OmegaConf.merge(other.nodes.get(node) or {}, changes)
+            made: dict[str, Any] = OmegaConf.to_container(other, resolve=True)  # type: ignore[assignment]
+            spec["graph"] = {key: made.get(key) for key in ("nodes", "wires", "saves")}
+            plain["artifacts"][name] = spec
+    except OmegaConfBaseException as error:
+        where = getattr(error, "full_key", None) or "config"
+        raise ProblemsFound([Problem(str(where), str(error).split("\n")[0])]) from None
+    return plain
+
+
+@contextmanager
+def _composed(arguments: Sequence[str]) -> Iterator[Any]:
+    """The configuration that overrides (and --config-dir) describe, for commands that run nothing."""
+    from hydra import compose, initialize_config_module
+    from hydra.errors import HydraException
+
+    from .problems import Problem, ProblemsFound
+
+    overrides, folders, waiting = [], [], list(arguments)
+    while waiting:
+        word = waiting.pop(0)
+        if word in ("--config-dir", "-cd"):
+            folders.append(waiting.pop(0) if waiting else "")
+        elif word.startswith("--config-dir="):
+            folders.append(word.partition("=")[2])
+        else:
+            overrides.append(word)
+    _offer_plugins()
+    if folders:
+        paths = ",".join(f"file://{Path(folder).resolve()}" for folder in folders)
+        overrides.append(f"hydra.searchpath=[{paths}]")
+    with initialize_config_module(CONF, version_base="1.3"):
+        try:
+            config = compose("config", overrides=overrides)
+        except HydraException as error:
+            raise ProblemsFound([Problem("command line", " ".join(str(error).split()))]) from None
+        yield config
+
+
+def _offer_plugins() -> None:
+    """Let `match=gradient` find a third party's stage `match.gradient`, as if it had a file in conf/match."""
+    from hydra.core.config_store import ConfigStore
+
+    from .catalog import plugins
+
+    for entry in plugins():
+        if entry.problem:
+            print(f"plugin left out: {entry.problem}", file=sys.stderr)
+            continue
+        name = entry.name.partition(".")[2]
+        ConfigStore.instance().store(name, {"_target_": entry.target}, group=entry.role, package=f"nodes.{entry.role}")
+
+
+# commands
+
+
+def _check(arguments: list[str]) -> int:
+    from .run import plan
+
+    with _composed(arguments) as config:
+        planned = plan(complete(config))
+    graph = planned.graph
+    counts = ", ".join(f"{len(graph.of_lifetime(kind))} {word}" for kind, word in (("before", "before the loop"), ("tick", "every tick"), ("after", "after it")))
+    print(f"{planned.variant}: nothing wrong with it. {len(graph.nodes)} nodes ({counts}), {len(graph.wires)} wires")
+    readers = graph.readers_of(f"{graph.source.name}.truth") if graph.source else []
+    print(f"ground truth is read by: {', '.join(readers) or 'nobody'}")
+    return 0
+
+
+def _graph(arguments: list[str]) -> int:
+    from .draw import mermaid, svg
+    from .files import write_whole
+    from .run import plan
+
+    out = next((Path(word.partition("=")[2]) for word in arguments if word.startswith("out=")), Path("."))
+    with _composed([word for word in arguments if not word.startswith("out=")]) as config:
+        planned = plan(complete(config))
+    drawn = {planned.variant: planned.graph} | {f"{planned.variant}.{a.name}": a.graph for a in planned.artifacts if a.graph}
+    for name, graph in drawn.items():
+        write_whole(out / f"{name}.svg", svg(graph))
+        write_whole(out / f"{name}.mmd", mermaid(graph))
+        print(f"{out / name}.svg and .mmd")
+    return 0
+
+
+def _stages(arguments: list[str]) -> int:
+    from .catalog import entries, resolve
+    from .ports import type_name
+    from .stage import signature
+
+    broken = 0
+    for entry in entries():
+        if arguments and entry.role not in arguments and entry.name not in arguments:
+            continue
+        if entry.problem:
+            broken += 1
+            print(f"{entry.name}  [{entry.origin}, cannot be used]\n    {entry.problem}\n")
+            continue
+        cls = resolve(entry.target)
+        read = signature(cls)
+        lines = [f"{entry.name}  [{entry.origin}]  {entry.summary}"]
+        lines += [f"    in   {p.name}: {'sequence of ' if p.collects else ''}{type_name(p.type)}{' (optional)' if p.optional else ''}" for p in read.inputs.values()]
+        lines += [f"    out  {p.name}: {type_name(p.type)}{' (may be absent)' if p.optional else ''}" for p in read.outputs.values()]
+        lines += [f"    set  {p.name}: {type_name(p.type)} = {p.default!r}" for p in read.parameters.values()]
+        lines += [f"    from {_paper(cls)}"] if _paper(cls) else []
+        lines += [f"    use  {entry.role}={entry.name.partition('.')[2]}  or  _target_: {entry.target}", ""]
+        print("\n".join(lines))
+    if broken:
+        print(f"{broken} plugin(s) cannot be used; everything else can", file=sys.stderr)
+    return 0
+
+
+def _paper(cls: type) -> str:
+    """The line of a stage's docstring that names its source, where it has one."""
+    import re
+
+    found = re.search(r"[^.\n]*\b(?:19|20)\d\d\b[^\n]*", cls.__doc__ or "")
+    return " ".join(found.group().split()) if found else ""
+
+
+def _variants(arguments: list[str]) -> int:
+    from importlib.resources import files
+
+    for file in sorted(files(CONF).joinpath("variant").iterdir(), key=lambda path: path.name):
+        if file.name.endswith(".yaml"):
+            first = file.read_text().split("\n")[0].lstrip("# ").strip()
+            print(f"{file.name.removesuffix('.yaml'):22} {first}")
+    return 0
+
+
+def _simulate(arguments: list[str]) -> int:
+    from .engine import Engine
+    from .run import plan
+
+    with _composed(["variant=simulate", *arguments]) as config:
+        planned = plan(complete(config))
+    Engine(planned.graph, {}, planned.seed).run()
+    return 0
+
+
+def _report(arguments: list[str]) -> int:
+    import json
+
+    from .problems import BadInput
+    from .report import results_table
+
+    folder = Path(arguments[0] if arguments else "runs/latest")
+    if not (folder / "report.html").is_file():
+        raise BadInput(f"{folder}: no report.html in it; is it a run that ended? `omninav resume {folder}` goes on with one that did not")
+    _print(results_table(json.loads((folder / "metrics.json").read_text())))
+    print(f"report: {folder / 'report.html'}")
+    return 0
+
+
+def _compare(arguments: list[str]) -> int:
+    import json
+
+    import yaml
+
+    from .problems import BadInput
+    from .report import compare_table
+
+    if len(arguments) < 2:
+        raise BadInput("compare: give two or more run folders: omninav compare runs/A runs/B")
+    runs = []
+    for word in arguments:
+        folder = Path(word)
+        if not (folder / "metrics.json").is_file():
+            raise BadInput(f"{folder}: no metrics.json in it; is it a run that ended?")
+        config = yaml.safe_load((folder / "config.yaml").read_text())
+        manifest = json.loads((folder / "manifest.json").read_text())
+        runs.append({"name": word.rstrip("/"), "metrics": json.loads((folder / "metrics.json").read_text()), "config": config, "manifest": manifest})
+    _print(compare_table(runs))
+    return 0
+
+
+def _resume(arguments: list[str]) -> int:
+    from .problems import BadInput
+    from .progress import Progress
+    from .report import results_table
+    from .run import StageFailed, resume
+
+    if len(arguments) != 1:
+        raise BadInput("resume: give one run folder: omninav resume runs/latest")
+    try:
+        with Progress() as progress:
+            run, metrics = resume(Path(arguments[0]), progress)
+    except StageFailed as failed:
+        print(f"{failed}\nthe traceback is in {Path(arguments[0]) / 'run.log'}", file=sys.stderr)
+        return 1
+    _print(results_table(metrics))
+    print(f"report: {_shown(run.folder / 'report.html')}")
+    return 0
+
+
+def _doctor(arguments: list[str]) -> int:
+    import platform
+
+    from .catalog import entries
+    from .run import LIBRARIES, _version
+
+    print(f"omninav {_version('omninav')}, Python {platform.python_version()} on {platform.platform()}, {os.cpu_count()} cores")
+    rows = list(entries())
+    for name in LIBRARIES:
+        print(f"  {name:26} {_version(name)}")
+    broken = [entry for entry in rows if entry.problem]
+    others = [entry for entry in rows if entry.origin != "built in" and not entry.problem]
+    print(f"{sum(entry.origin == 'built in' for entry in rows)} built-in stages, {len(others)} from others, {len(broken)} that cannot be used")
+    for entry in broken:
+        print(f"  {entry.name} [{entry.origin}]: {entry.problem}")
+    print(f"results go to {Path('runs').resolve()}" + ("" if os.access(".", os.W_OK) else ", which cannot be written: change to another folder"))
+    return 1 if broken else 0
+
+
+COMMANDS: dict[str, Callable[[list[str]], int]] = {
+    "check": _check,
+    "graph": _graph,
+    "stages": _stages,
+    "variants": _variants,
+    "simulate": _simulate,
+    "report": _report,
+    "compare": _compare,
+    "resume": _resume,
+    "doctor": _doctor,
+}
