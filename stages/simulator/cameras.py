@@ -1,0 +1,117 @@
+"""Cameras as rays: for each pixel the direction it looks along, in the robot's frame (x forward, y left, z up)."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.geometry.catadioptric import back_project
+from omninav.stages.values.camera import Camera, Cylindrical, Equirectangular, HyperbolicMirror, Perspective
+
+F64 = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """The pixels of a camera that see something.
+
+    `shape`: rows and columns of the picture. `pixels` (N,): their numbers, row by row. `directions` (N, 3): unit rays in
+    the robot's frame. `footprint` (N,): angle (rad) across a pixel. `gain` (N,): what vignetting leaves of the light.
+    """
+
+    shape: tuple[int, int]
+    pixels: npt.NDArray[np.int32]
+    directions: npt.NDArray[np.float32]
+    footprint: npt.NDArray[np.float32]
+    gain: npt.NDArray[np.float32]
+
+
+def camera_rays(camera: Camera, vignetting: float = 0.0) -> Rays:
+    """The rays of a camera; `vignetting` is the share of light that is lost in the corners of the picture.
+
+    Raises `TypeError` for a projection whose rays are not known (a donut without a mirror model).
+    """
+    v, u = np.mgrid[0 : camera.height_px, 0 : camera.width].astype(np.float64)
+    seen = np.ones(u.shape, dtype=bool)
+    if isinstance(camera, HyperbolicMirror):
+        directions = turn(mirror_directions(camera, np.stack([u, v], axis=-1)), camera.yaw)
+        radius = np.hypot(u - camera.centre_x, v - camera.centre_y)
+        seen = (radius >= camera.inner_radius_px) & (radius <= camera.outer_radius_px)
+    elif isinstance(camera, Cylindrical):
+        if camera.elevation_top is None or camera.elevation_bottom is None:
+            raise TypeError("a cylindrical camera without elevation_top and elevation_bottom has no rays; give both")
+        top, bottom = math.tan(camera.elevation_top), math.tan(camera.elevation_bottom)
+        slope = top + (bottom - top) * (v + 0.5) / camera.height_px
+        directions = from_angles(strip_azimuths(camera, u), np.arctan(slope))
+    elif isinstance(camera, Equirectangular):
+        span = camera.elevation_bottom - camera.elevation_top
+        directions = from_angles(
+            strip_azimuths(camera, u), camera.elevation_top + span * (v + 0.5) / camera.height_px
+        )
+    elif isinstance(camera, Perspective):
+        down = (v - camera.centre_y) / camera.focal_y
+        right = (u - camera.centre_x - camera.skew * down) / camera.focal_x
+        ahead = np.stack([np.ones_like(u), -right, -down], axis=-1)
+        directions = turn(ahead / np.linalg.norm(ahead, axis=-1, keepdims=True), camera.yaw)
+    else:
+        raise TypeError(f"no rays are known for {type(camera).__name__}; use HyperbolicMirror, Cylindrical, "
+                        "Equirectangular or Perspective")
+    seen &= np.isfinite(directions).all(axis=-1)
+    across, down_angle = _pixel_angles(directions)
+    with np.errstate(invalid="ignore"):
+        footprint = np.sqrt(across * down_angle)
+    corner = math.hypot(camera.width / 2, camera.height_px / 2)
+    rim = np.hypot(u + 0.5 - camera.width / 2, v + 0.5 - camera.height_px / 2) / corner
+    if isinstance(camera, Cylindrical | Equirectangular):
+        rim = np.zeros_like(rim)
+    return Rays(
+        shape=(camera.height_px, camera.width),
+        pixels=np.flatnonzero(seen).astype(np.int32),
+        directions=np.ascontiguousarray(directions[seen], dtype=np.float32),
+        footprint=np.nan_to_num(footprint[seen], nan=float(np.nanmax(footprint))).astype(np.float32),
+        gain=(1.0 - vignetting * rim[seen] ** 2).astype(np.float32),
+    )
+
+
+def mirror_directions(camera: HyperbolicMirror, pixels: npt.ArrayLike) -> F64:
+    """Unit rays (..., 3) in the mirror's frame of pixels (..., 2); NaN where they look past the mirror."""
+    return back_project(
+        pixels,
+        camera.focal_x,
+        camera.focal_y,
+        camera.centre_x,
+        camera.centre_y,
+        camera.skew,
+        camera.a,
+        camera.b,
+    )
+
+
+def strip_azimuths(camera: Cylindrical | Equirectangular, columns: npt.ArrayLike) -> F64:
+    """Azimuths (rad, counter-clockwise from forward) of the centres of columns of a strip."""
+    sign = 1.0 if camera.sense == "clockwise" else -1.0
+    azimuths: F64 = sign * 2.0 * math.pi * (camera.column_of_forward - (np.asarray(columns) + 0.5)) / camera.width
+    return azimuths
+
+
+def from_angles(azimuth: npt.ArrayLike, elevation: npt.ArrayLike) -> F64:
+    """Unit rays (..., 3) of azimuths and elevations (rad)."""
+    azimuth, elevation = np.asarray(azimuth), np.asarray(elevation)
+    return np.stack(
+        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)], axis=-1
+    )
+
+
+def turn(rays: F64, yaw: float) -> F64:
+    """Rays (..., 3) turned about z, counter-clockwise by `yaw`."""
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    x, y = rays[..., 0], rays[..., 1]
+    return np.stack([cos * x - sin * y, sin * x + cos * y, rays[..., 2]], axis=-1)
+
+
+def _pixel_angles(directions: F64) -> tuple[F64, F64]:
+    """Angles between neighbouring rays along rows and along columns, each (rows, columns)."""
+    across = np.linalg.norm(np.gradient(directions, axis=1), axis=-1)
+    down = np.linalg.norm(np.gradient(directions, axis=0), axis=-1)
+    return across, down

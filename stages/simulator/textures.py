@@ -1,0 +1,336 @@
+"""Procedural textures: square pictures from a material's name and a random generator, and their mip levels.
+
+Colours are blue-green-red. Each texture is drawn larger than it is kept and averaged down, so that no edge is jagged.
+"""
+
+import colorsys
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+U8 = npt.NDArray[np.uint8]
+F32 = npt.NDArray[np.float32]
+Colour = tuple[float, float, float]
+
+SIDE = 128
+"""Texels along a side of a texture's finest level."""
+DRAWN = 2 * SIDE
+"""Pixels along a side while a texture is drawn."""
+
+
+def draw(material: str, rng: np.random.Generator) -> U8:
+    """One texture (SIDE, SIDE, 3) of a material. Raises `KeyError` that lists the materials for a name that is none."""
+    if material not in MATERIALS:
+        raise KeyError(f"no material '{material}'; there are: {', '.join(sorted(MATERIALS))}")
+    canvas = MATERIALS[material](rng)
+    return cv2.resize(
+        np.clip(canvas, 0, 255).astype(np.uint8), (SIDE, SIDE), interpolation=cv2.INTER_AREA
+    ).astype(np.uint8, copy=False)
+
+
+def glow(material: str) -> float:
+    """Share of a material's brightness that does not come from the light around it."""
+    return {"lamp": 1.0, "window": 0.8, "screen": 0.8}.get(material, 0.0)
+
+
+def mip_levels(textures: U8) -> list[U8]:
+    """Levels of textures (N, S, S, 3), S a power of two: each the mean of 2 x 2 texels of the one before, down to 1."""
+    levels = [textures]
+    while levels[-1].shape[1] > 1:
+        count, side = levels[-1].shape[:2]
+        blocks = levels[-1].reshape(count, side // 2, 2, side // 2, 2, 3).astype(np.uint16).sum(axis=(2, 4))
+        levels.append(((blocks + 2) // 4).astype(np.uint8))
+    return levels
+
+
+def vivid(rng: np.random.Generator, saturation: tuple[float, float] = (0.5, 0.95)) -> Colour:
+    """A colour as print and packaging have it."""
+    red, green, blue = colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(*saturation), rng.uniform(0.5, 1.0))
+    return (255 * blue, 255 * green, 255 * red)
+
+
+def scaled(colour: Colour, factor: float) -> Colour:
+    """A colour made darker or lighter."""
+    return (colour[0] * factor, colour[1] * factor, colour[2] * factor)
+
+
+def blank(colour: Colour) -> F32:
+    """A canvas of one colour."""
+    return np.broadcast_to(np.array(colour, dtype=np.float32), (DRAWN, DRAWN, 3)).copy()
+
+
+def cloud(rng: np.random.Generator, cells: int, strength: float) -> F32:
+    """Smooth noise (DRAWN, DRAWN, 1) around 0, `cells` bumps along a side."""
+    coarse = rng.normal(0.0, strength, (cells + 1, cells + 1)).astype(np.float32)
+    smooth: F32 = cv2.resize(coarse, (DRAWN, DRAWN), interpolation=cv2.INTER_CUBIC).astype(np.float32)
+    return smooth[..., None]
+
+
+def grain(rng: np.random.Generator, strength: float) -> F32:
+    """Fine noise (DRAWN, DRAWN, 1) around 0."""
+    return rng.normal(0.0, strength, (DRAWN, DRAWN, 1)).astype(np.float32)
+
+
+def box(canvas: F32, left: float, top: float, right: float, bottom: float, colour: Colour) -> None:
+    """A filled rectangle, in parts of the canvas (0 to 1)."""
+    corners = [round(DRAWN * part) for part in (left, top, right, bottom)]
+    cv2.rectangle(canvas, (corners[0], corners[1]), (corners[2] - 1, corners[3] - 1), colour, -1)
+
+
+def _wall(rng: np.random.Generator) -> F32:
+    base = vivid(rng, (0.05, 0.3))
+    level = 225.0 / max(base)
+    canvas = blank(scaled(base, level)) + cloud(rng, 5, 4.0) + grain(rng, 3.0)
+    if rng.uniform() < 0.6:
+        stripe = vivid(rng, (0.4, 0.8))
+        height = rng.uniform(0.62, 0.75)
+        box(canvas, 0, height, 1, height + rng.uniform(0.03, 0.08), stripe)
+    box(canvas, 0, 0.965, 1, 1, (70, 75, 80))
+    return canvas
+
+
+def _concrete(rng: np.random.Generator) -> F32:
+    return blank((150, 155, 158)) + cloud(rng, 4, 12.0) + cloud(rng, 16, 7.0) + grain(rng, 6.0)
+
+
+def _stripes(rng: np.random.Generator) -> F32:
+    canvas = blank((225, 225, 225)) + grain(rng, 4.0)
+    colour = vivid(rng)
+    for k in range(0, 8, 2):
+        box(canvas, 0, k / 8, 1, (k + 1) / 8, colour)
+    return canvas
+
+
+def _floor(rng: np.random.Generator) -> F32:
+    canvas = blank((0, 0, 0))
+    tone = np.array([148.0, 158.0, 165.0]) + rng.normal(0.0, 3.0, 3)
+    for row in range(2):
+        for column in range(2):
+            tile = tone * (1.0 + rng.normal(0.0, 0.05)) * (0.86 if (row + column) % 2 else 1.0)
+            box(canvas, column / 2, row / 2, (column + 1) / 2, (row + 1) / 2, tuple(tile))
+    canvas += cloud(rng, 24, 7.0) + grain(rng, 5.0)
+    for k in (0.0, 0.5):
+        box(canvas, k, 0, k + 0.012, 1, (92, 98, 104))
+        box(canvas, 0, k, 1, k + 0.012, (92, 98, 104))
+    return canvas
+
+
+def _ceiling(rng: np.random.Generator) -> F32:
+    canvas = blank((205, 208, 208)) + grain(rng, 5.0) + cloud(rng, 3, 3.0)
+    box(canvas, 0, 0, 1, 0.02, (150, 152, 152))
+    box(canvas, 0, 0, 0.02, 1, (150, 152, 152))
+    if rng.uniform() < 0.08:
+        box(canvas, 0.3, 0.3, 0.7, 0.7, (120, 122, 122))
+        for k in range(6):
+            box(canvas, 0.32, 0.33 + 0.06 * k, 0.68, 0.36 + 0.06 * k, (170, 172, 172))
+    return canvas
+
+
+def _lamp(rng: np.random.Generator) -> F32:
+    canvas = blank((255, 255, 255))
+    for k in (0.0, 0.48, 0.96):
+        box(canvas, 0, k, 1, k + 0.04, (190, 195, 195))
+    return canvas
+
+
+def _wood(rng: np.random.Generator) -> F32:
+    rings = cv2.resize(rng.normal(0.0, 1.0, (2, 40)).astype(np.float32), (DRAWN, DRAWN), interpolation=cv2.INTER_CUBIC)
+    canvas = blank((95, 140, 185)) * (1.0 + 0.08 * rings[..., None].astype(np.float32)) + grain(rng, 4.0)
+    for k in (0.25, 0.5, 0.75):
+        box(canvas, k, 0, k + 0.008, 1, (55, 85, 115))
+    return canvas
+
+
+def _mat(rng: np.random.Generator) -> F32:
+    colour = vivid(rng, (0.5, 0.8))
+    canvas = blank(scaled(colour, 0.5)) + grain(rng, 14.0)
+    for edge, factor in ((0.06, 0.85), (0.12, 0.5), (0.3, 0.7), (0.36, 0.5)):
+        box(canvas, edge, edge, 1 - edge, 1 - edge, scaled(colour, factor))
+    return canvas + grain(rng, 8.0)
+
+
+def _counter(rng: np.random.Generator) -> F32:
+    colour = vivid(rng, (0.6, 0.9))
+    canvas = blank((205, 205, 200)) + grain(rng, 3.0)
+    box(canvas, 0, 0, 1, 0.1, (60, 62, 64))
+    box(canvas, 0, 0.4, 1, 0.62, colour)
+    box(canvas, 0.49, 0.1, 0.51, 1, (120, 120, 120))
+    return canvas
+
+
+def _door(rng: np.random.Generator) -> F32:
+    colour = scaled(vivid(rng, (0.2, 0.7)), rng.uniform(0.5, 0.9))
+    canvas = blank(scaled(colour, 0.45))
+    box(canvas, 0.06, 0.03, 0.94, 1.0, colour)
+    if rng.uniform() < 0.5:
+        box(canvas, 0.3, 0.12, 0.7, 0.45, (190, 175, 150))
+        box(canvas, 0.2, 0.55, 0.8, 0.92, scaled(colour, 0.8))
+    else:
+        for k in range(3):
+            box(canvas, 0.16, 0.1 + 0.3 * k, 0.84, 0.34 + 0.3 * k, scaled(colour, 0.8))
+    box(canvas, 0.8, 0.5, 0.88, 0.54, (60, 200, 215))
+    return canvas + grain(rng, 3.0)
+
+
+def _window(rng: np.random.Generator) -> F32:
+    rows = np.linspace(0.0, 1.0, DRAWN, dtype=np.float32)[:, None, None]
+    sky, ground = np.array((250, 235, 215), dtype=np.float32), np.array((120, 190, 150), dtype=np.float32)
+    canvas: F32 = np.where(rows < rng.uniform(0.5, 0.7), sky - 40 * rows, ground) + cloud(rng, 6, 10.0)
+    canvas = np.ascontiguousarray(canvas, dtype=np.float32)
+    for k in (0.0, 0.475, 0.95):
+        box(canvas, k, 0, k + 0.05, 1, (235, 235, 235))
+        box(canvas, 0, k, 1, k + 0.05, (235, 235, 235))
+    return canvas
+
+
+def _poster(rng: np.random.Generator) -> F32:
+    ground = vivid(rng, (0.3, 0.95))
+    canvas = blank(ground)
+    style = rng.integers(4)
+    if style == 0:
+        for _ in range(int(rng.integers(3, 7))):
+            at = rng.uniform(0.15, 0.85, 2) * DRAWN
+            cv2.circle(canvas, (int(at[0]), int(at[1])), int(rng.uniform(0.08, 0.28) * DRAWN), vivid(rng), -1)
+    elif style == 1:
+        count = int(rng.integers(3, 6))
+        for k in range(count):
+            box(canvas, 0, k / count, 1, (k + 1) / count, vivid(rng))
+    elif style == 2:
+        corners = (rng.uniform(0.05, 0.95, (5, 2)) * DRAWN).astype(np.int32)
+        cv2.fillPoly(canvas, [corners], vivid(rng))
+        cv2.fillPoly(canvas, [corners[::-1] // 2 + DRAWN // 4], vivid(rng))
+    else:
+        box(canvas, 0, 0, 0.5, 0.5, vivid(rng))
+        box(canvas, 0.5, 0.5, 1, 1, vivid(rng))
+    ink = (250.0, 250.0, 250.0) if rng.uniform() < 0.5 else (25.0, 25.0, 25.0)
+    top = rng.uniform(0.15, 0.6)
+    for letter in range(int(rng.integers(3, 6))):
+        for row, column in np.argwhere(rng.uniform(size=(5, 3)) < 0.6):
+            left, above = 0.1 + 0.16 * letter + 0.042 * column, top + 0.05 * row
+            box(canvas, left, above, left + 0.042, above + 0.05, ink)
+    for k in (0.0, 0.97):
+        box(canvas, k, 0, k + 0.03, 1, (245, 245, 245))
+        box(canvas, 0, k, 1, k + 0.03, (245, 245, 245))
+    return canvas + grain(rng, 3.0)
+
+
+def _carton(rng: np.random.Generator) -> F32:
+    canvas = blank((95, 140, 180)) * rng.uniform(0.8, 1.15) + cloud(rng, 6, 5.0) + grain(rng, 5.0)
+    box(canvas, 0.46, 0, 0.54, 1, (130, 175, 205))
+    if rng.uniform() < 0.7:
+        left, top = rng.uniform(0.08, 0.5), rng.uniform(0.15, 0.6)
+        box(canvas, left, top, left + 0.32, top + 0.25, vivid(rng))
+    return canvas
+
+
+def _goods(rng: np.random.Generator) -> F32:
+    """One compartment of a shelf: what stands on a board, its price rail below, an upright at the left edge."""
+    canvas = blank((52, 50, 48)) + cloud(rng, 4, 5.0)
+    FILLINGS[int(rng.integers(len(FILLINGS)))](canvas, rng)
+    rail = vivid(rng, (0.1, 0.9)) if rng.uniform() < 0.5 else (230.0, 230.0, 230.0)
+    box(canvas, 0, 0.9, 1, 1, rail)
+    for k in range(int(rng.integers(2, 5))):
+        left = 0.1 + 0.23 * k
+        box(canvas, left, 0.915, left + 0.1, 0.985, (250, 250, 250))
+    box(canvas, 0, 0, 0.025, 1, (120, 118, 115))
+    return canvas + grain(rng, 4.0)
+
+
+def _packets(canvas: F32, rng: np.random.Generator) -> None:
+    count = int(rng.integers(3, 8))
+    brands = [vivid(rng) for _ in range(int(rng.integers(1, 4)))]
+    height = rng.uniform(0.45, 0.85)
+    for k in range(count):
+        colour = scaled(brands[k % len(brands)], rng.uniform(0.85, 1.1))
+        left, right = 0.03 + 0.95 * k / count, 0.03 + 0.95 * (k + 0.93) / count
+        top = 0.9 - height * rng.uniform(0.93, 1.0)
+        box(canvas, left, top, right, 0.9, colour)
+        box(canvas, left, top + 0.12 * height, right, top + 0.4 * height, scaled(brands[0], 1.25))
+        box(canvas, left + 0.02, 0.9 - 0.35 * height, right - 0.02, 0.9 - 0.15 * height, (235, 235, 235))
+
+
+def _cans(canvas: F32, rng: np.random.Generator) -> None:
+    count, layers = int(rng.integers(4, 9)), int(rng.integers(1, 4))
+    brands = [vivid(rng) for _ in range(2)]
+    height = rng.uniform(0.24, 0.28) if layers == 3 else rng.uniform(0.3, 0.8 / layers)
+    shade = np.sin(np.linspace(0.25, np.pi - 0.25, max(1, int(0.9 * DRAWN / count)), dtype=np.float32))
+    for layer in range(layers):
+        for k in range(count):
+            left, bottom = 0.04 + 0.94 * k / count, 0.9 - layer * height
+            colour = brands[(k + layer) % 2]
+            box(canvas, left, bottom - height, left + 0.9 / count, bottom, colour)
+            box(canvas, left, bottom - 0.65 * height, left + 0.9 / count, bottom - 0.35 * height, scaled(brands[0], 1.3))
+            box(canvas, left, bottom - height, left + 0.9 / count, bottom - 0.93 * height, (190, 190, 190))
+            x, y0, y1 = round(left * DRAWN), round((bottom - height) * DRAWN), round(bottom * DRAWN)
+            patch = canvas[max(y0, 0) : y1, x : x + len(shade)]
+            patch *= shade[None, : patch.shape[1], None]
+
+
+def _bottles(canvas: F32, rng: np.random.Generator) -> None:
+    count = int(rng.integers(6, 12))
+    liquid, label = vivid(rng), vivid(rng)
+    for k in range(count):
+        left, width = 0.04 + 0.94 * k / count, 0.8 / count
+        top = 0.2 + rng.uniform(0.0, 0.05)
+        box(canvas, left, top + 0.2, left + width, 0.9, liquid)
+        box(canvas, left + 0.35 * width, top, left + 0.65 * width, top + 0.2, scaled(liquid, 0.8))
+        box(canvas, left + 0.3 * width, top - 0.04, left + 0.7 * width, top, (40, 40, 220))
+        box(canvas, left, top + 0.35, left + width, top + 0.55, label)
+
+
+def _tools(canvas: F32, rng: np.random.Generator) -> None:
+    canvas[:] = np.array(scaled(vivid(rng, (0.05, 0.5)), 0.85), dtype=np.float32)
+    handle = vivid(rng)
+    for k in range(int(rng.integers(5, 10))):
+        left = 0.06 + 0.1 * k
+        length = rng.uniform(0.35, 0.7)
+        box(canvas, left, 0.1, left + 0.02, 0.1 + length, (175, 175, 180))
+        box(canvas, left - 0.02, 0.1 + 0.55 * length, left + 0.04, 0.1 + length, handle)
+        if k % 2:
+            box(canvas, left - 0.03, 0.1, left + 0.05, 0.16, (150, 150, 155))
+
+
+def _rolls(canvas: F32, rng: np.random.Generator) -> None:
+    columns, rows = int(rng.integers(3, 7)), int(rng.integers(2, 5))
+    colours = [vivid(rng) for _ in range(3)]
+    radius = 0.42 * min(0.94 / columns, 0.85 / rows) * DRAWN
+    for row in range(rows):
+        for column in range(columns):
+            at = (int((0.04 + 0.94 * (column + 0.5) / columns) * DRAWN), int((0.05 + 0.85 * (row + 0.5) / rows) * DRAWN))
+            cv2.circle(canvas, at, int(radius), colours[int(rng.integers(3))], -1)
+            cv2.circle(canvas, at, int(0.35 * radius), (60, 60, 60), -1)
+
+
+def _plants(canvas: F32, rng: np.random.Generator) -> None:
+    for k in range(int(rng.integers(3, 6))):
+        left = 0.06 + 0.19 * k
+        box(canvas, left, 0.68, left + 0.13, 0.9, (60, 95, 185))
+        for _ in range(14):
+            at = (int((left + 0.065 + rng.normal(0, 0.05)) * DRAWN), int((0.48 + rng.normal(0, 0.1)) * DRAWN))
+            cv2.circle(canvas, at, int(rng.uniform(5, 13)), (40, rng.uniform(110, 200), rng.uniform(30, 90)), -1)
+        if rng.uniform() < 0.6:
+            cv2.circle(canvas, (int((left + 0.06) * DRAWN), int(0.4 * DRAWN)), 9, vivid(rng), -1)
+
+
+def _cases(canvas: F32, rng: np.random.Generator) -> None:
+    left = 0.03
+    while left < 0.9:
+        width, height = rng.uniform(0.15, 0.4), rng.uniform(0.3, 0.8)
+        right = min(left + width, 0.98)
+        colour = vivid(rng, (0.2, 0.9))
+        box(canvas, left, 0.9 - height, right, 0.9, colour)
+        box(canvas, left + 0.03, 0.93 - height, right - 0.03, 0.9 - 0.6 * height, scaled(vivid(rng), 1.1))
+        left = right + 0.015
+
+
+FILLINGS: tuple[Callable[[F32, np.random.Generator], None], ...] = (
+    _packets, _cans, _bottles, _tools, _rolls, _plants, _cases
+)  # fmt: skip
+
+MATERIALS: dict[str, Callable[[np.random.Generator], F32]] = {
+    "wall": _wall, "concrete": _concrete, "stripes": _stripes, "floor": _floor, "ceiling": _ceiling, "lamp": _lamp,
+    "wood": _wood, "mat": _mat, "counter": _counter, "door": _door, "window": _window, "poster": _poster,
+    "carton": _carton, "goods": _goods,
+}  # fmt: skip

@@ -1,0 +1,328 @@
+"""A world on one day: its bodies, its textures and lights as a scene to render, and where there is room to drive."""
+
+import math
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from . import textures
+from .config import Block, Hanging, Shelf, WorldConfig
+from .renderer import Scene
+
+F64 = npt.NDArray[np.float64]
+I64 = npt.NDArray[np.int64]
+
+WALL = 0.2
+"""Thickness (m) of the outer walls."""
+LOW = 0.03
+"""What is no higher (m) can be driven over."""
+HEADROOM = 1.4
+"""What hangs higher (m) can be driven under."""
+GOODS = 56
+"""Textures of goods in a world; a shelf's compartments choose among them."""
+
+
+@dataclass(frozen=True)
+class Tiling:
+    """How a face is covered: `tiles` (rows, columns) of textures, each `width` by `height` metres."""
+
+    tiles: I64
+    width: float
+    height: float
+
+
+@dataclass(frozen=True)
+class Box:
+    """A body: what it is, centre, half length and half depth, yaw, lower and upper z, and its faces' coverings.
+
+    `faces`: -x, +x, -y, +y, bottom, top in the box's own frame.
+    """
+
+    kind: str
+    centre: tuple[float, float]
+    half: tuple[float, float]
+    yaw: float
+    low: float
+    high: float
+    faces: tuple[Tiling, Tiling, Tiling, Tiling, Tiling, Tiling]
+
+
+def stream(seed: int, *names: str | int) -> np.random.Generator:
+    """A generator of its own for each purpose: no draw for one thing can change another."""
+    return np.random.default_rng([seed, *(zlib.crc32(str(name).encode()) for name in names)])
+
+
+class World:
+    """A world from its configuration, as it stands on a day.
+
+    The seed decides textures and goods; on days other than 0 a share of the shelves' compartments is filled anew.
+    """
+
+    def __init__(self, config: WorldConfig, day: int = 0) -> None:
+        self.config = config
+        self.day = day
+        self._textures: list[npt.NDArray[np.uint8]] = []
+        self._glow: list[float] = []
+        self._named: dict[tuple[str, str], int] = {}
+        self._goods = [self._texture("goods", f"goods {k}") for k in range(GOODS)]
+        self.boxes: list[Box] = [
+            *self._walls(),
+            *(box for k, shelf in enumerate(config.shelves) for box in self._shelf(shelf, k)),
+            *(self._block(block, k) for k, block in enumerate(config.blocks)),
+            *(self._hanging(hanging, k) for k, hanging in enumerate(config.hangings)),
+            *(self._lamp(k) for k in range(len(config.lamps))),
+        ]
+        self.floor = self._ground("floor", 6)
+        self.ceiling = self._ground("ceiling", 6)
+
+    # What stands where
+
+    def _texture(self, material: str, name: str) -> int:
+        """Number of the texture of a material for a thing of that name, drawn when first asked for."""
+        if (material, name) not in self._named:
+            self._named[material, name] = len(self._textures)
+            self._textures.append(textures.draw(material, stream(self.config.seed, "texture", material, name)))
+            self._glow.append(textures.glow(material))
+        return self._named[material, name]
+
+    def _plain(self, texture: int, width: float, height: float, step: float = math.inf) -> Tiling:
+        """One texture over a face of `width` by `height` m, repeated about every `step` m."""
+        columns, rows = max(1, round(width / step)), max(1, round(height / step))
+        return Tiling(np.full((rows, columns), texture), width / columns, height / rows)
+
+    def _ground(self, material: str, kinds: int) -> Tiling:
+        rows, columns = math.ceil(self.config.size[1]), math.ceil(self.config.size[0])
+        choice = stream(self.config.seed, "ground", material).integers(kinds, size=(rows, columns))
+        numbers = np.array([self._texture(material, f"{material} {k}") for k in range(kinds)])
+        return Tiling(numbers[choice], self.config.size[0] / columns, self.config.size[1] / rows)
+
+    def _walls(self) -> list[Box]:
+        width, depth = self.config.size
+        high = self.config.height
+        walls = []
+        for name, centre, length, yaw in (
+            ("east", (width + WALL / 2, depth / 2), depth, math.pi / 2),
+            ("north", (width / 2, depth + WALL / 2), width, 0.0),
+            ("west", (-WALL / 2, depth / 2), depth, math.pi / 2),
+            ("south", (width / 2, -WALL / 2), width, 0.0),
+        ):
+            texture = self._texture("wall", name)
+            half = (length / 2 + WALL, WALL / 2)
+            columns = max(1, round(length / 2))
+            side = Tiling(np.full((1, columns), texture), 2 * half[0] / columns, high)
+            end = self._plain(texture, WALL, high)
+            cap = self._plain(texture, 2 * half[0], WALL)
+            walls.append(Box("wall", centre, half, yaw, 0.0, high, (end, end, side, side, cap, cap)))
+        return walls
+
+    def _shelf(self, shelf: Shelf, number: int) -> list[Box]:
+        goods = self._goods_on(shelf, number)
+        wood = self._texture("wood", "shelf")
+        cap = self._plain(wood, shelf.length, shelf.depth, 1.0)
+        height = shelf.height / shelf.levels
+        sides = [
+            Tiling(goods[face], extent / goods[face].shape[1], height)
+            for face, extent in enumerate((shelf.depth, shelf.depth, shelf.length, shelf.length))
+        ]
+        half = (shelf.length / 2, shelf.depth / 2)
+        body = Box("shelf", shelf.centre, half, shelf.yaw, 0.0, shelf.height, (*sides, cap, cap))  # type: ignore[arg-type]
+        return [body, *self._stock(shelf, number)] if shelf.stock else [body]
+
+    def _goods_on(self, shelf: Shelf, number: int) -> list[I64]:
+        """Textures (levels, compartments) on each of a shelf's four sides, about one compartment a metre."""
+        rng = stream(self.config.seed, "goods", number)
+        sides = []
+        for extent in (shelf.depth, shelf.depth, shelf.length, shelf.length):
+            shape = (shelf.levels, max(1, round(extent)))
+            sides.append(np.array(self._goods)[rng.integers(GOODS, size=shape)])
+        if self.day:
+            anew = stream(self.config.seed, "goods", number, "day", self.day)
+            for side in sides:
+                changed = anew.uniform(size=side.shape) < self.config.rearranged
+                side[changed] = np.array(self._goods)[anew.integers(GOODS, size=int(changed.sum()))]
+        return sides
+
+    def _stock(self, shelf: Shelf, number: int) -> list[Box]:
+        """Cartons on top of a shelf, one here and there."""
+        rng = stream(self.config.seed, "stock", number)
+        boxes: list[Box] = []
+        along = -shelf.length / 2 + 0.3
+        while along < shelf.length / 2 - 0.4:
+            length, depth, height = rng.uniform(0.3, 0.6), rng.uniform(0.3, 0.6), rng.uniform(0.2, 0.5)
+            if rng.uniform() < 0.7:
+                across = rng.uniform(-0.15, 0.15)
+                at = _place(shelf.centre, shelf.yaw, along + length / 2 - 0.15, across)
+                yaw = shelf.yaw + rng.uniform(-0.15, 0.15)
+                carton = self._texture("carton", f"carton {rng.integers(12)}")
+                boxes.append(self._solid("stock", at, (length, depth), yaw, shelf.height, height, carton, carton))
+            along += length + rng.uniform(0.1, 0.5)
+        return boxes
+
+    def _solid(
+        self,
+        kind: str,
+        centre: tuple[float, float],
+        size: tuple[float, float],
+        yaw: float,
+        low: float,
+        height: float,
+        side: int,
+        top: int,
+        step: float = math.inf,
+    ) -> Box:
+        ends, fronts = self._plain(side, size[1], height, step), self._plain(side, size[0], height, step)
+        cap = self._plain(top, size[0], size[1], step)
+        half = (size[0] / 2, size[1] / 2)
+        return Box(kind, centre, half, yaw, low, low + height, (ends, ends, fronts, fronts, cap, cap))
+
+    def _block(self, block: Block, number: int) -> Box:
+        side = self._texture(block.material, f"block {number}")
+        top = self._texture(block.top, f"block {number} top")
+        step = 1.0 if min(block.size) < 1.0 and block.height > 1.5 else math.inf
+        return self._solid(
+            "block", block.centre, block.size, block.yaw, block.bottom_z, block.height, side, top, step
+        )
+
+    def _hanging(self, hanging: Hanging, number: int) -> Box:
+        texture = self._texture(hanging.material, f"hanging {number}")
+        thick = 0.03
+        at = _place(hanging.centre, hanging.facing, thick / 2, 0.0)
+        return self._solid(
+            "hanging",
+            at,
+            (hanging.width, thick),
+            hanging.facing + math.pi / 2,
+            hanging.bottom_z,
+            hanging.height,
+            texture,
+            texture,
+        )
+
+    def _lamp(self, number: int) -> Box:
+        lamp = self.config.lamps[number]
+        texture = self._texture("lamp", "lamp")
+        low = self.config.height - 0.08
+        return self._solid("lamp", lamp.centre, lamp.size, 0.0, low, 0.06, texture, texture)
+
+    # As arrays for the renderer
+
+    @cached_property
+    def scene(self) -> Scene:
+        """This world for the ray caster."""
+        tilings = [self.floor, self.ceiling, *(face for box in self.boxes for face in box.faces)]
+        lengths = [tiling.tiles.size for tiling in tilings]
+        starts = np.concatenate([[0], np.cumsum(lengths)[:-1]])
+        table = [(start, t.tiles.shape[1], t.tiles.shape[0]) for start, t in zip(starts, tilings, strict=True)]
+        levels = textures.mip_levels(np.stack(self._textures))
+        cell_start, cell_boxes, cell_top, grid, shape = self._cells(0.5)
+        step = 0.1
+        return Scene(
+            boxes=np.array([
+                (*b.centre, math.cos(b.yaw), math.sin(b.yaw), *b.half, b.low, b.high) for b in self.boxes
+            ]),
+            faces=(2 + np.arange(6 * len(self.boxes), dtype=np.int32)).reshape(-1, 6),
+            surface_table=np.array(table, dtype=np.int32),
+            surface_size=np.array([(t.width, t.height) for t in tilings]),
+            tiles=np.concatenate([t.tiles.ravel() for t in tilings]).astype(np.int32),
+            texels=np.concatenate([level.ravel() for level in levels]),
+            level_start=np.concatenate([[0], np.cumsum([level.size for level in levels])[:-1]]).astype(np.int64),
+            side=textures.SIDE,
+            glow=np.array(self._glow, dtype=np.float32),
+            cell_start=cell_start,
+            cell_boxes=cell_boxes,
+            cell_top=cell_top,
+            grid=grid,
+            rows=shape[0],
+            columns=shape[1],
+            light=self._light(step, grid, shape),
+            light_step=step,
+            height=self.config.height,
+        )
+
+    def _cells(
+        self, size: float
+    ) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32], F64, F64, tuple[int, int]]:
+        """Which boxes touch which cell of a grid over the floor, by their bounding rectangles."""
+        corner = -WALL - 0.05
+        columns = math.ceil((self.config.size[0] - 2 * corner) / size)
+        rows = math.ceil((self.config.size[1] - 2 * corner) / size)
+        members: list[list[int]] = [[] for _ in range(rows * columns)]
+        top = np.zeros(rows * columns)
+        for number, box in enumerate(self.boxes):
+            outline = footprint(box)
+            low = np.floor((outline.min(axis=0) - corner) / size - 1e-9).astype(int)
+            high = np.floor((outline.max(axis=0) - corner) / size + 1e-9).astype(int)
+            for row in range(max(low[1], 0), min(high[1], rows - 1) + 1):
+                for column in range(max(low[0], 0), min(high[0], columns - 1) + 1):
+                    members[row * columns + column].append(number)
+                    top[row * columns + column] = max(top[row * columns + column], box.high)
+        start = np.concatenate([[0], np.cumsum([len(m) for m in members])]).astype(np.int32)
+        flat = np.array([number for m in members for number in m], dtype=np.int32)
+        return start, flat, top, np.array([corner, corner, size]), (rows, columns)
+
+    def _light(self, step: float, grid: F64, shape: tuple[int, int]) -> npt.NDArray[np.float32]:
+        """Irradiance on faces that look up, +x, -x, +y, -y: every lamp's, with the square of the distance, unshaded.
+
+        The floor is darker close to what stands on it. The mean over the floor is brought to 1.
+        """
+        columns, rows = math.ceil(shape[1] * grid[2] / step) + 1, math.ceil(shape[0] * grid[2] / step) + 1
+        x, y = grid[0] + step * np.arange(columns), grid[1] + step * np.arange(rows)
+        points = np.stack(np.meshgrid(x, y), axis=-1)
+        normals = np.array([(0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], dtype=float)
+        heights = np.array([0.0, 1.0, 1.0, 1.0, 1.0])
+        light = np.zeros((rows, columns, 5, 3))
+        for lamp in self.config.lamps:
+            for side in range(5):
+                across = np.array(lamp.centre) - points
+                rise = self.config.height - heights[side]
+                square = (across**2).sum(axis=-1) + rise**2
+                facing = across @ normals[side, :2] + rise * normals[side, 2]
+                fall = np.maximum(facing, 0.0) / square**1.5 * (rise / np.sqrt(square))
+                light[:, :, side, :] += fall[..., None] * np.array(lamp.light)
+        mean = light[:, :, 0, :].mean() or 1.0
+        light *= (1.0 - self.config.ambient) / mean
+        light[:, :, 1:, :] *= 1.6  # a wall also gets what floor and ceiling throw back
+        light += self.config.ambient
+        clear = self.clearance(points.reshape(-1, 2)).reshape(rows, columns)
+        light[:, :, 0, :] *= (1.0 - 0.4 * np.exp(-np.maximum(clear, 0.0) / 0.15))[..., None]
+        return light.astype(np.float32)
+
+    # Room to drive
+
+    @cached_property
+    def obstacles(self) -> list[Box]:
+        """What a robot cannot drive over or under."""
+        return [box for box in self.boxes if box.high > LOW and box.low < HEADROOM]
+
+    def clearance(self, points: npt.ArrayLike) -> F64:
+        """Distance (m) of points (N, 2) of the map to the nearest obstacle or wall; 0 inside one."""
+        points = np.asarray(points, dtype=np.float64)
+        nearest = np.full(len(points), np.inf)
+        for box in self.obstacles:
+            cos, sin = math.cos(box.yaw), math.sin(box.yaw)
+            away = points - np.array(box.centre)
+            along = np.abs(cos * away[:, 0] + sin * away[:, 1]) - box.half[0]
+            across = np.abs(cos * away[:, 1] - sin * away[:, 0]) - box.half[1]
+            np.minimum(nearest, np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0)), out=nearest)
+        inside = ((points >= 0.0) & (points <= np.array(self.config.size))).all(axis=1)
+        return np.where(inside, nearest, 0.0)
+
+    def is_free(self, points: npt.ArrayLike, radius: float) -> npt.NDArray[np.bool_]:
+        """Whether a disc of `radius` m has room at points (N, 2)."""
+        return self.clearance(points) > radius
+
+
+def footprint(box: Box) -> F64:
+    """The four corners (4, 2) of a box on the floor."""
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * np.array(box.half)
+    return np.array([_place(box.centre, box.yaw, along, across) for along, across in corners])
+
+
+def _place(centre: Sequence[float], yaw: float, along: float, across: float) -> tuple[float, float]:
+    """A point given in a turned frame at `centre`, on the map."""
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return centre[0] + cos * along - sin * across, centre[1] + sin * along + cos * across
