@@ -45,3 +45,14 @@ def interpolate(times: npt.ArrayLike, poses: npt.ArrayLike, at: npt.ArrayLike) -
     heading = np.unwrap(poses[:, 2])
     columns = [np.interp(at, times, poses[:, 0]), np.interp(at, times, poses[:, 1]), np.interp(at, times, heading)]
     return np.stack([columns[0], columns[1], wrap(columns[2])], axis=-1)
+
+
+def chain(motions: npt.ArrayLike) -> Array:
+    """Poses reached by motions one after another from the origin: (N, 3) -> (N, 3), the first motion included."""
+    motions = np.asarray(motions, dtype=np.float64)
+    heading = np.cumsum(motions[:, 2])
+    before = heading - motions[:, 2]
+    cos, sin = np.cos(before), np.sin(before)
+    x = np.cumsum(cos * motions[:, 0] - sin * motions[:, 1])
+    y = np.cumsum(sin * motions[:, 0] + cos * motions[:, 1])
+    return np.stack([x, y, wrap(heading)], axis=-1)

@@ -1,0 +1,97 @@
+"""Position and heading errors against ground truth, frame by frame."""
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline.results import Metrics
+from omninav.stages.geometry.errors import first_settled, heading_errors_deg, position_errors
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.drives import Array, Drive, drives, known
+from omninav.stages.values.pose import Motion, Pose
+
+
+class TrajectoryErrors(Stage):
+    """Errors of the estimate against ground truth, with those of odometry alone and of the belief's mean beside them.
+
+    Per log: `frames`; `position_error_m` and `heading_error_deg` (mean, median, p90, max); `loss_rate`, the share of
+    frames further than `lost_m` from the truth; `converged_after_frames`, how many frames went by before the error
+    stayed below 1 m and 20 degrees for ten frames (None if it never did); the errors and loss rate again under
+    `after_convergence`. `odometry_alone` starts at the first true pose. The top level is the last log, and `logs` has
+    one entry per log where there are several. Frames without truth or without estimate are left out and counted.
+    """
+
+    lost_m: Annotated[float, Bounds(gt=0)] = 2.5
+
+    class Out(Outputs):
+        """`metrics`: for metrics.json."""
+
+        metrics: Metrics
+
+    def step(
+        self,
+        ctx: Context,
+        ticks: Sequence[Tick],
+        estimates: Sequence[PoseEstimate | None],
+        truth: Sequence[Pose | None],
+        motion: Sequence[Motion | None],
+    ) -> Out:
+        """The whole run at once."""
+        per_log = [drive_metrics(drive, self.lost_m) for drive in drives(ticks, estimates, truth, motion)]
+        if not per_log:
+            return self.Out(metrics=Metrics({"frames": 0}))
+        values = dict(per_log[-1])
+        if len(per_log) > 1:
+            values["logs"] = per_log
+        return self.Out(metrics=Metrics(values))
+
+
+def drive_metrics(drive: Drive, lost_m: float) -> dict[str, Any]:
+    """Figures of one drive, named as in metrics.json; only `frames` where there is no ground truth."""
+    result: dict[str, Any] = {"frames": len(drive)}
+    if not drive.has_truth:
+        return result
+    scored = known(drive.truth) & known(drive.estimate)
+    result["frames_without_truth"] = int((~known(drive.truth)).sum())
+    result["frames_without_estimate"] = int((known(drive.truth) & ~known(drive.estimate)).sum())
+    if not scored.any():
+        return result
+    truth, estimate = drive.truth[scored], drive.estimate[scored]
+    settled = first_settled(position_errors(estimate, truth), heading_errors_deg(estimate, truth))
+    odometry = drive.odometry_alone()
+    result |= pose_errors(estimate, truth, lost_m)
+    result["converged_after_frames"] = None if settled is None else int(np.flatnonzero(scored)[settled])
+    result["after_convergence"] = None if settled is None else pose_errors(estimate[settled:], truth[settled:], lost_m)
+    result["mean_pose"] = _errors_and_after(drive.mean[scored], truth, settled, lost_m)
+    if odometry is not None:
+        result["odometry_alone"] = _errors_and_after(odometry[scored], truth, settled, lost_m)
+    return result
+
+
+def _errors_and_after(poses: Array, truth: Array, settled: int | None, lost_m: float) -> dict[str, Any]:
+    """Errors over all frames, and over those after the estimate's convergence, so that like is compared with like."""
+    after = None if settled is None else pose_errors(poses[settled:], truth[settled:], lost_m)
+    return pose_errors(poses, truth, lost_m) | {"after_convergence": after}
+
+
+def pose_errors(poses: Array, truth: Array, lost_m: float) -> dict[str, Any]:
+    """Position error (m), heading error (degrees) and loss rate of poses (N, 3) against truth (N, 3)."""
+    position = position_errors(poses, truth)
+    return {
+        "position_error_m": spread(position),
+        "heading_error_deg": spread(heading_errors_deg(poses, truth)),
+        "loss_rate": float((position > lost_m).mean()),
+    }
+
+
+def spread(errors: npt.NDArray[np.float64]) -> dict[str, float]:
+    """Mean, median, 90th percentile and maximum (percentiles interpolate linearly)."""
+    return {
+        "mean": float(errors.mean()),
+        "median": float(np.median(errors)),
+        "p90": float(np.percentile(errors, 90)),
+        "max": float(errors.max()),
+    }

@@ -1,0 +1,114 @@
+"""What was collected over a run, as arrays: one drive per log."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Tick
+from omninav.stages.geometry.se2 import between, chain, compose
+
+from .belief import PoseEstimate
+from .pose import Motion, Pose
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """One log's frames. Poses are (N, 3) x, y (m), heading (rad) in the map frame; rows of NaN where there was none.
+
+    `frames`: the frame's number in its log. `stamps`: header stamps (ns). `estimate`: the belief's heaviest mode,
+    `mean` the whole belief's mean. `truth`: ground truth. `motion`: SE(2) increment since the frame before.
+    """
+
+    log: int
+    frames: npt.NDArray[np.int64]
+    stamps: npt.NDArray[np.int64]
+    estimate: Array
+    covariance: Array
+    mean: Array
+    truth: Array
+    motion: Array
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    @property
+    def seconds(self) -> Array:
+        """Time since the first frame (s)."""
+        seconds: Array = (self.stamps - self.stamps[0]) / 1e9
+        return seconds
+
+    @property
+    def has_truth(self) -> bool:
+        """Whether any frame has a true pose."""
+        return bool(known(self.truth).any())
+
+    def odometry_alone(self) -> Array | None:
+        """Where odometry alone would have led, from the first true pose on; (N, 3), None where there is no motion.
+
+        A frame whose motion is absent did not move. Without any truth the path is laid through the last estimate, so
+        that its shape can be compared.
+        """
+        if not known(self.motion).any():
+            return None
+        path = chain(np.nan_to_num(self.motion))
+        if self.has_truth:
+            anchor, at = int(np.argmax(known(self.truth))), self.truth
+        elif known(self.estimate).any():
+            anchor, at = len(self) - 1 - int(np.argmax(known(self.estimate)[::-1])), self.estimate
+        else:
+            return path
+        return compose(at[anchor], between(path[anchor], path))
+
+
+def known(poses: Array) -> npt.NDArray[np.bool_]:
+    """Which rows of (N, 3) poses are there: (N,)."""
+    there: npt.NDArray[np.bool_] = np.isfinite(poses).all(axis=1)
+    return there
+
+
+def drives(
+    ticks: Sequence[Tick],
+    estimates: Sequence[PoseEstimate | None],
+    truth: Sequence[Pose | None],
+    motion: Sequence[Motion | None],
+) -> list[Drive]:
+    """Collected sequences, one entry per tick, cut into drives at the logs' boundaries. Each is read once, in order."""
+    logs: dict[int, list[int]] = {}
+    entries = []
+    for row, (tick, estimate, true, moved) in enumerate(zip(ticks, estimates, truth, motion, strict=True)):
+        logs.setdefault(tick.log, []).append(row)
+        entries.append(
+            (
+                tick.frame,
+                tick.stamp,
+                _row(estimate and estimate.pose),
+                np.full((3, 3), np.nan) if estimate is None else estimate.covariance,
+                _row(estimate and estimate.mean),
+                _row(true),
+                (np.nan,) * 3 if moved is None else (moved.x, moved.y, moved.turn),
+            )
+        )
+    found = []
+    for log, rows in logs.items():
+        frames, stamps, pose, covariance, mean, true_pose, steps = zip(*(entries[row] for row in rows), strict=True)
+        found.append(
+            Drive(
+                log=log,
+                frames=np.array(frames, dtype=np.int64),
+                stamps=np.array(stamps, dtype=np.int64),
+                estimate=np.array(pose, dtype=np.float64),
+                covariance=np.array(covariance, dtype=np.float64),
+                mean=np.array(mean, dtype=np.float64),
+                truth=np.array(true_pose, dtype=np.float64),
+                motion=np.array(steps, dtype=np.float64),
+            )
+        )
+    return found
+
+
+def _row(pose: Pose | None) -> tuple[float, float, float]:
+    return (np.nan,) * 3 if pose is None else (pose.x, pose.y, pose.heading)

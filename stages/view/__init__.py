@@ -1,0 +1,1 @@
+"""What a finished run looks like: pictures for the report, trajectories and logs for other tools."""

@@ -1,0 +1,64 @@
+"""What the robot saw: a few panoramas one above the other."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import cv2
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline.results import Figure
+
+from .moments import spread_out
+from .panorama_snapshot import EncodedPanorama
+from .style import picture
+
+
+class PanoramaStrip(Stage):
+    """Panoramas of a few frames of the last log, azimuth in degrees along the lower edge."""
+
+    frames: Annotated[int, Bounds(ge=1, le=8)] = 4
+
+    class Out(Outputs):
+        """`figure`: a row per frame."""
+
+        figure: Figure | None = None
+
+    def step(self, ctx: Context, ticks: Sequence[Tick], snapshots: Sequence[EncodedPanorama | None]) -> Out:
+        """The whole run at once."""
+        kept = [(tick, shot) for tick, shot in zip(ticks, snapshots, strict=True) if shot is not None]
+        kept = [entry for entry in kept if entry[0].log == kept[-1][0].log]
+        if not kept:
+            return self.Out()
+        pictures = [
+            (tick.frame, cv2.imdecode(np.frombuffer(shot.jpeg, np.uint8), cv2.IMREAD_COLOR))
+            for tick, shot in (kept[i] for i in spread_out(len(kept), self.frames))
+        ]
+        return self.Out(
+            figure=Figure(
+                name="panorama_strip",
+                title="What the robot saw",
+                caption="Panoramas as the features stage gets them: forward (0°) in the middle, left of the robot "
+                "(+90°) on the left, both edges straight behind.",
+                content=_draw(pictures),
+                media_type="image/jpeg",
+                order=5,
+            )
+        )
+
+
+def _draw(pictures: Sequence[tuple[int, np.ndarray]]) -> bytes:  # type: ignore[type-arg]
+    rows, columns = pictures[0][1].shape[:2]
+    height = float(np.clip(7.2 * rows / columns, 0.5, 2.2))
+    with picture(8.0, len(pictures) * (height + 0.12) + 0.45, media_type="image/jpeg") as drawn:
+        for number, (frame, pixels) in enumerate(pictures):
+            axes = drawn.canvas.add_subplot(len(pictures), 1, number + 1)
+            axes.imshow(pixels[:, :, ::-1], extent=(180, -180, 0, 1), aspect="auto", interpolation="antialiased")
+            axes.set_yticks([])
+            axes.set_ylabel(f"frame\n{frame}", rotation=0, ha="right", va="center", fontsize=8)
+            axes.grid(visible=False)
+            axes.set_xticks([180, 90, 0, -90, -180])
+            axes.tick_params(labelbottom=number == len(pictures) - 1)
+            if number == len(pictures) - 1:
+                axes.set_xlabel("azimuth (°), counter-clockwise from forward")
+    return drawn.content

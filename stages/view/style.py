@@ -1,0 +1,120 @@
+"""One look for all pictures: colours that colour-blind readers tell apart, units on axes, the same bytes every time."""
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.values.maps import ReferenceGraph
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Canvas
+
+Array = npt.NDArray[np.float64]
+
+# Okabe & Ito's palette (2008), dark enough on white
+ESTIMATE, TRUTH, ODOMETRY = "#0072B2", "#111111", "#D55E00"
+REFERENCE, EDGE, MARK, PARTICLE = "#8a8f98", "#c9ccd1", "#009E73", "#CC79A7"
+
+RC: dict[str, Any] = {
+    "font.family": "DejaVu Sans",  # comes with matplotlib: the same picture on every machine
+    "font.size": 9,
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#666666",
+    "axes.grid": True,
+    "grid.color": "#e6e6e6",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "lines.linewidth": 1.5,
+    "lines.solid_joinstyle": "round",
+    "figure.facecolor": "white",
+}
+
+
+class Picture:
+    """A figure being drawn; `content` holds its bytes once the `picture` block has ended."""
+
+    def __init__(self, canvas: "Canvas") -> None:
+        self.canvas = canvas
+        self.content = b""
+
+
+@contextmanager
+def picture(width: float, height: float, dpi: int = 110, media_type: str = "image/png") -> Iterator[Picture]:
+    """A blank figure of width x height inches in the house style, without pyplot's global state.
+
+    Line drawings are PNG; what holds photographs is JPEG (`media_type` image/jpeg), or it would be far too large.
+    """
+    import matplotlib
+    from matplotlib.figure import Figure as Canvas
+
+    with matplotlib.rc_context({**matplotlib.rcParamsDefault, **RC}):
+        drawn = Picture(Canvas(figsize=(width, height), dpi=dpi, layout="constrained"))
+        yield drawn
+        buffer = io.BytesIO()
+        if media_type == "image/jpeg":
+            drawn.canvas.savefig(buffer, format="jpeg", pil_kwargs={"quality": 85})
+        else:
+            drawn.canvas.savefig(buffer, format="png", metadata={"Software": None}, pil_kwargs={"optimize": True})
+        drawn.content = buffer.getvalue()
+
+
+def plan_axes(axes: "Axes", extent: tuple[float, float, float, float] | None = None) -> None:
+    """Axes of a plan view: metres, equal scales, optionally the part (x from, x to, y from, y to) to show."""
+    axes.set_aspect("equal", adjustable="box" if extent else "datalim")
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+    if extent:
+        axes.set_xlim(extent[0], extent[1])
+        axes.set_ylim(extent[2], extent[3])
+
+
+def draw_map(axes: "Axes", map: ReferenceGraph | None, label: bool = True) -> None:
+    """Reference views as grey dots, joined by their edges."""
+    if map is None or not len(map):
+        return
+    from matplotlib.collections import LineCollection
+
+    if len(map.edges):
+        axes.add_collection(LineCollection(list(map.poses[map.edges][:, :, :2]), colors=EDGE, linewidths=0.7, zorder=1))
+    size = float(np.clip(3000 / len(map), 1.5, 9))
+    name = f"references ({len(map)})" if label else None
+    axes.scatter(map.poses[:, 0], map.poses[:, 1], s=size, color=REFERENCE, linewidths=0, zorder=1.5, label=name)
+
+
+def draw_pose(axes: "Axes", pose: Array, length: float, colour: str, label: str | None = None) -> None:
+    """A pose as a dot with an arrow of `length` metres along its heading."""
+    if not np.isfinite(pose).all():
+        return
+    tip = (pose[0] + length * np.cos(pose[2]), pose[1] + length * np.sin(pose[2]))
+    arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", xy=tip, xytext=(pose[0], pose[1]), arrowprops=arrow, zorder=6)
+    axes.plot([pose[0]], [pose[1]], "o", color=colour, markersize=4.5, zorder=6, label=label)
+
+
+def extent_of(*points: Array, margin: float = 0.06) -> tuple[float, float, float, float] | None:
+    """The part of the plane that holds all finite points, (N, 2 or more) each, with a margin; None where there are none."""
+    together = np.concatenate([np.empty((0, 2)), *(p[:, :2] for p in points)])
+    together = together[np.isfinite(together).all(axis=1)]
+    if not len(together):
+        return None
+    low, high = together.min(axis=0), together.max(axis=0)
+    pad = margin * float((high - low).max()) + 0.25
+    return float(low[0] - pad), float(high[0] + pad), float(low[1] - pad), float(high[1] + pad)
+
+
+def fitting_height(extent: tuple[float, float, float, float] | None, width: float, low: float, high: float) -> float:
+    """Height (inches) at which an equal-axes plot of `extent` fills a figure of this width, within limits."""
+    if extent is None:
+        return low
+    shape = (extent[3] - extent[2]) / (extent[1] - extent[0])
+    return float(np.clip(width * shape + 0.9, low, high))

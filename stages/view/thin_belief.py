@@ -1,0 +1,42 @@
+"""A belief in few particles, small enough to be kept for every frame."""
+
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.values.belief import Belief, Particles
+
+Array = npt.NDArray[np.float64]
+
+
+class ThinBelief(Stage):
+    """At most `particles` equally weighted particles that stand for a belief, chosen without chance.
+
+    Beliefs of other kinds are shown by the one pose that they stand for.
+    """
+
+    particles: Annotated[int, Bounds(ge=1)] = 300
+
+    class Out(Outputs):
+        """`belief`: particles, map frame."""
+
+        belief: Particles
+
+    def step(self, ctx: Context, belief: Belief) -> Out:
+        """One belief, thinned."""
+        if isinstance(belief, Particles):
+            return self.Out(belief=thin(belief, self.particles))
+        pose = belief.estimate().pose
+        return self.Out(belief=Particles(np.array([[pose.x, pose.y, pose.heading]]), np.ones(1)))
+
+
+def thin(belief: Particles, particles: int) -> Particles:
+    """Systematic choice by weight at the middles of `particles` equal shares; fewer particles are given as they are."""
+    if len(belief.weights) <= particles:
+        return belief
+    edges = np.cumsum(belief.weights)
+    middles = (np.arange(particles) + 0.5) / particles * edges[-1]
+    chosen = np.minimum(np.searchsorted(edges, middles), len(edges) - 1)
+    return Particles(belief.poses[chosen], np.full(particles, 1 / particles))
