@@ -46,17 +46,17 @@ def camera_rays(camera: Camera, vignetting: float = 0.0) -> Rays:
         directions = from_angles(strip_azimuths(camera, u), np.arctan(slope))
     elif isinstance(camera, Equirectangular):
         span = camera.elevation_bottom - camera.elevation_top
-        directions = from_angles(
-            strip_azimuths(camera, u), camera.elevation_top + span * (v + 0.5) / camera.height_px
-        )
+        directions = from_angles(strip_azimuths(camera, u), camera.elevation_top + span * (v + 0.5) / camera.height_px)
     elif isinstance(camera, Perspective):
         down = (v - camera.centre_y) / camera.focal_y
         right = (u - camera.centre_x - camera.skew * down) / camera.focal_x
         ahead = np.stack([np.ones_like(u), -right, -down], axis=-1)
         directions = turn(ahead / np.linalg.norm(ahead, axis=-1, keepdims=True), camera.yaw)
     else:
-        raise TypeError(f"no rays are known for {type(camera).__name__}; use HyperbolicMirror, Cylindrical, "
-                        "Equirectangular or Perspective")
+        raise TypeError(
+            f"no rays are known for {type(camera).__name__}; use HyperbolicMirror, Cylindrical, "
+            "Equirectangular or Perspective"
+        )
     seen &= np.isfinite(directions).all(axis=-1)
     across, down_angle = _pixel_angles(directions)
     with np.errstate(invalid="ignore"):

@@ -142,7 +142,7 @@ def _hit(scene: Scene, x: float, y: float, z: float, dx: float, dy: float, dz: f
                 if candidate == tested:
                     continue
                 tested = candidate
-                t, side = _meet(scene.boxes[candidate], x, y, z, dx, dy, dz)
+                t, side = _meet(scene.boxes, candidate, x, y, z, dx, dy, dz)
                 if t < far:
                     far = t
                     box = candidate
@@ -160,23 +160,23 @@ def _hit(scene: Scene, x: float, y: float, z: float, dx: float, dy: float, dz: f
 
 
 @_compiled()
-def _meet(box: F64, x: float, y: float, z: float, dx: float, dy: float, dz: float) -> tuple[float, int]:
+def _meet(boxes: F64, box: int, x: float, y: float, z: float, dx: float, dy: float, dz: float) -> tuple[float, int]:
     """Distance along a ray to a box and the face it enters by; 1e18 where it misses it or starts inside."""
-    px, py = x - box[0], y - box[1]
-    cos, sin = box[2], box[3]
+    px, py = x - boxes[box, 0], y - boxes[box, 1]
+    cos, sin = boxes[box, 2], boxes[box, 3]
     ox, oy = cos * px + sin * py, cos * py - sin * px
     ux, uy = cos * dx + sin * dy, cos * dy - sin * dx
     near, leave = -1e18, 1e18
     face = 0
     if ux != 0.0:
-        near, leave = (-box[4] - ox) / ux, (box[4] - ox) / ux
+        near, leave = (-boxes[box, 4] - ox) / ux, (boxes[box, 4] - ox) / ux
         if near > leave:
             near, leave = leave, near
             face = 1
-    elif abs(ox) > box[4]:
+    elif abs(ox) > boxes[box, 4]:
         return 1e18, 0
     if uy != 0.0:
-        first, last = (-box[5] - oy) / uy, (box[5] - oy) / uy
+        first, last = (-boxes[box, 5] - oy) / uy, (boxes[box, 5] - oy) / uy
         side = 2
         if first > last:
             first, last = last, first
@@ -185,12 +185,12 @@ def _meet(box: F64, x: float, y: float, z: float, dx: float, dy: float, dz: floa
             near = first
             face = side
         leave = min(leave, last)
-    elif abs(oy) > box[5]:
+    elif abs(oy) > boxes[box, 5]:
         return 1e18, 0
     if near > leave:
         return 1e18, 0
     if dz != 0.0:
-        first, last = (box[6] - z) / dz, (box[7] - z) / dz
+        first, last = (boxes[box, 6] - z) / dz, (boxes[box, 7] - z) / dz
         side = 4
         if first > last:
             first, last = last, first
@@ -199,7 +199,7 @@ def _meet(box: F64, x: float, y: float, z: float, dx: float, dy: float, dz: floa
             near = first
             face = side
         leave = min(leave, last)
-    elif z < box[6] or z > box[7]:
+    elif z < boxes[box, 6] or z > boxes[box, 7]:
         return 1e18, 0
     if near > leave or near <= 0.0:
         return 1e18, 0
@@ -230,25 +230,25 @@ def _shade(
         u, v = hx, hy
         slope = abs(dz)
     else:
-        body = scene.boxes[box]
-        px, py = hx - body[0], hy - body[1]
-        lx, ly = body[2] * px + body[3] * py, body[2] * py - body[3] * px
+        body = scene.boxes
+        px, py = hx - body[box, 0], hy - body[box, 1]
+        lx, ly = body[box, 2] * px + body[box, 3] * py, body[box, 2] * py - body[box, 3] * px
         surface = scene.faces[box, face]
-        v = body[7] - hz
+        v = body[box, 7] - hz
         if face == 0:
-            u = body[5] - ly
-            nx, ny = -body[2], -body[3]
+            u = body[box, 5] - ly
+            nx, ny = -body[box, 2], -body[box, 3]
         elif face == 1:
-            u = body[5] + ly
-            nx, ny = body[2], body[3]
+            u = body[box, 5] + ly
+            nx, ny = body[box, 2], body[box, 3]
         elif face == 2:
-            u = body[4] + lx
-            nx, ny = body[3], -body[2]
+            u = body[box, 4] + lx
+            nx, ny = body[box, 3], -body[box, 2]
         elif face == 3:
-            u = body[4] - lx
-            nx, ny = -body[3], body[2]
+            u = body[box, 4] - lx
+            nx, ny = -body[box, 3], body[box, 2]
         else:
-            u, v = body[4] + lx, body[5] - ly
+            u, v = body[box, 4] + lx, body[box, 5] - ly
         slope = abs(dz) if face >= 4 else abs(dx * nx + dy * ny)
 
     width, height = scene.surface_size[surface, 0], scene.surface_size[surface, 1]
@@ -324,12 +324,21 @@ def _light(scene: Scene, x: float, y: float, side: int) -> tuple[float, float, f
     left, below = int(column), int(row)
     wx, wy = column - left, row - below
     wa, wb, wc, wd = (1 - wx) * (1 - wy), wx * (1 - wy), (1 - wx) * wy, wx * wy
-    a, b = scene.light[below, left, side], scene.light[below, left + 1, side]
-    c, d = scene.light[below + 1, left, side], scene.light[below + 1, left + 1, side]
+    light = scene.light
+    above, right = below + 1, left + 1
     return (
-        wa * a[0] + wb * b[0] + wc * c[0] + wd * d[0],
-        wa * a[1] + wb * b[1] + wc * c[1] + wd * d[1],
-        wa * a[2] + wb * b[2] + wc * c[2] + wd * d[2],
+        wa * light[below, left, side, 0]
+        + wb * light[below, right, side, 0]
+        + wc * light[above, left, side, 0]
+        + wd * light[above, right, side, 0],
+        wa * light[below, left, side, 1]
+        + wb * light[below, right, side, 1]
+        + wc * light[above, left, side, 1]
+        + wd * light[above, right, side, 1],
+        wa * light[below, left, side, 2]
+        + wb * light[below, right, side, 2]
+        + wc * light[above, left, side, 2]
+        + wd * light[above, right, side, 2],
     )
 
 

@@ -25,9 +25,9 @@ def draw(material: str, rng: np.random.Generator) -> U8:
     if material not in MATERIALS:
         raise KeyError(f"no material '{material}'; there are: {', '.join(sorted(MATERIALS))}")
     canvas = MATERIALS[material](rng)
-    return cv2.resize(
-        np.clip(canvas, 0, 255).astype(np.uint8), (SIDE, SIDE), interpolation=cv2.INTER_AREA
-    ).astype(np.uint8, copy=False)
+    return cv2.resize(np.clip(canvas, 0, 255).astype(np.uint8), (SIDE, SIDE), interpolation=cv2.INTER_AREA).astype(
+        np.uint8, copy=False
+    )
 
 
 def glow(material: str) -> float:
@@ -261,7 +261,9 @@ def _cans(canvas: F32, rng: np.random.Generator) -> None:
             left, bottom = 0.04 + 0.94 * k / count, 0.9 - layer * height
             colour = brands[(k + layer) % 2]
             box(canvas, left, bottom - height, left + 0.9 / count, bottom, colour)
-            box(canvas, left, bottom - 0.65 * height, left + 0.9 / count, bottom - 0.35 * height, scaled(brands[0], 1.3))
+            box(
+                canvas, left, bottom - 0.65 * height, left + 0.9 / count, bottom - 0.35 * height, scaled(brands[0], 1.3)
+            )
             box(canvas, left, bottom - height, left + 0.9 / count, bottom - 0.93 * height, (190, 190, 190))
             x, y0, y1 = round(left * DRAWN), round((bottom - height) * DRAWN), round(bottom * DRAWN)
             patch = canvas[max(y0, 0) : y1, x : x + len(shade)]
@@ -298,7 +300,10 @@ def _rolls(canvas: F32, rng: np.random.Generator) -> None:
     radius = 0.42 * min(0.94 / columns, 0.85 / rows) * DRAWN
     for row in range(rows):
         for column in range(columns):
-            at = (int((0.04 + 0.94 * (column + 0.5) / columns) * DRAWN), int((0.05 + 0.85 * (row + 0.5) / rows) * DRAWN))
+            at = (
+                int((0.04 + 0.94 * (column + 0.5) / columns) * DRAWN),
+                int((0.05 + 0.85 * (row + 0.5) / rows) * DRAWN),
+            )
             cv2.circle(canvas, at, int(radius), colours[int(rng.integers(3))], -1)
             cv2.circle(canvas, at, int(0.35 * radius), (60, 60, 60), -1)
 

@@ -183,9 +183,7 @@ class World:
         side = self._texture(block.material, f"block {number}")
         top = self._texture(block.top, f"block {number} top")
         step = 1.0 if min(block.size) < 1.0 and block.height > 1.5 else math.inf
-        return self._solid(
-            "block", block.centre, block.size, block.yaw, block.bottom_z, block.height, side, top, step
-        )
+        return self._solid("block", block.centre, block.size, block.yaw, block.bottom_z, block.height, side, top, step)
 
     def _hanging(self, hanging: Hanging, number: int) -> Box:
         texture = self._texture(hanging.material, f"hanging {number}")
@@ -221,9 +219,7 @@ class World:
         cell_start, cell_boxes, cell_top, grid, shape = self._cells(0.5)
         step = 0.1
         return Scene(
-            boxes=np.array([
-                (*b.centre, math.cos(b.yaw), math.sin(b.yaw), *b.half, b.low, b.high) for b in self.boxes
-            ]),
+            boxes=np.array([(*b.centre, math.cos(b.yaw), math.sin(b.yaw), *b.half, b.low, b.high) for b in self.boxes]),
             faces=(2 + np.arange(6 * len(self.boxes), dtype=np.int32)).reshape(-1, 6),
             surface_table=np.array(table, dtype=np.int32),
             surface_size=np.array([(t.width, t.height) for t in tilings]),
@@ -243,9 +239,7 @@ class World:
             height=self.config.height,
         )
 
-    def _cells(
-        self, size: float
-    ) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32], F64, F64, tuple[int, int]]:
+    def _cells(self, size: float) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32], F64, F64, tuple[int, int]]:
         """Which boxes touch which cell of a grid over the floor, by their bounding rectangles."""
         corner = -WALL - 0.05
         columns = math.ceil((self.config.size[0] - 2 * corner) / size)
