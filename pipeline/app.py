@@ -1,4 +1,4 @@
-"""The command line. Only the parser is loaded at the start; everything heavy is imported by the command that needs it."""
+"""The command line. Only the parser is loaded at the start; what is heavy is imported by the command that needs it."""
 
 import os
 import sys
@@ -102,8 +102,8 @@ def _launch(arguments: list[str]) -> int:
 
 def _job(config: Any) -> None:
     """One run. Never raises and never exits: in a sweep the other jobs go on, and the exit code is left in a file."""
+    from .engine import StageFailed
     from .problems import BadInput, ProblemsFound
-    from .run import StageFailed
 
     sweep = _sweep_folder()
     code, error = 0, ""
@@ -186,7 +186,9 @@ def _note_job(sweep: tuple[Path, str, str], code: int, error: str) -> None:
     folder, number, overrides = sweep
     own = folder / number
     own.mkdir(parents=True, exist_ok=True)
-    manifest = json.loads((own / "manifest.json").read_text()) if (own / "manifest.json").exists() else {"status": "refused"}
+    manifest = (
+        json.loads((own / "manifest.json").read_text()) if (own / "manifest.json").exists() else {"status": "refused"}
+    )
     manifest |= {"job": number, "overrides": overrides} | ({"error": error} if error else {})
     write_whole(own / "manifest.json", json.dumps(manifest, indent=1) + "\n")
     with (folder / ".page.lock").open("w") as lock:
@@ -239,8 +241,7 @@ def complete(config: Any) -> dict[str, Any]:
             for node, changes in (spec.get("nodes") or {}).items():
                 other.nodes[node] = OmegaConf.merge(other.nodes.get(node) or {}, changes)
             made: dict[str, Any] = OmegaConf.to_container(other, resolve=True)  # type: ignore[assignment]
-            spec["graph"] = {key: made.get(key) for key in ("nodes", "wires", "saves")}
-            plain["artifacts"][name] = spec
+            plain["artifacts"][name]["graph"] = {key: made.get(key) for key in ("nodes", "wires", "saves")}
     except OmegaConfBaseException as error:
         where = getattr(error, "full_key", None) or "config"
         raise ProblemsFound([Problem(str(where), str(error).split("\n")[0])]) from None
@@ -294,13 +295,15 @@ def _offer_plugins() -> None:
 
 
 def _check(arguments: list[str]) -> int:
+    from .graph import LIFETIMES
     from .run import plan
 
     with _composed(arguments) as config:
         planned = plan(complete(config))
     graph = planned.graph
-    counts = ", ".join(f"{len(graph.of_lifetime(kind))} {word}" for kind, word in (("before", "before the loop"), ("tick", "every tick"), ("after", "after it")))
-    print(f"{planned.variant}: nothing wrong with it. {len(graph.nodes)} nodes ({counts}), {len(graph.wires)} wires")
+    before, tick, after = (len(graph.of_lifetime(kind)) for kind in LIFETIMES)
+    print(f"{planned.variant}: nothing wrong with it. {len(graph.nodes)} nodes, {len(graph.wires)} wires")
+    print(f"{before} stages run before the loop, {tick} every tick, {after} after it")
     readers = graph.readers_of(f"{graph.source.name}.truth") if graph.source else []
     print(f"ground truth is read by: {', '.join(readers) or 'nobody'}")
     return 0
@@ -314,7 +317,9 @@ def _graph(arguments: list[str]) -> int:
     out = next((Path(word.partition("=")[2]) for word in arguments if word.startswith("out=")), Path("."))
     with _composed([word for word in arguments if not word.startswith("out=")]) as config:
         planned = plan(complete(config))
-    drawn = {planned.variant: planned.graph} | {f"{planned.variant}.{a.name}": a.graph for a in planned.artifacts if a.graph}
+    drawn = {planned.variant: planned.graph} | {
+        f"{planned.variant}.{a.name}": a.graph for a in planned.artifacts if a.graph
+    }
     for name, graph in drawn.items():
         write_whole(out / f"{name}.svg", svg(graph))
         write_whole(out / f"{name}.mmd", mermaid(graph))
@@ -338,8 +343,14 @@ def _stages(arguments: list[str]) -> int:
         cls = resolve(entry.target)
         read = signature(cls)
         lines = [f"{entry.name}  [{entry.origin}]  {entry.summary}"]
-        lines += [f"    in   {p.name}: {'sequence of ' if p.collects else ''}{type_name(p.type)}{' (optional)' if p.optional else ''}" for p in read.inputs.values()]
-        lines += [f"    out  {p.name}: {type_name(p.type)}{' (may be absent)' if p.optional else ''}" for p in read.outputs.values()]
+        lines += [
+            f"    in   {p.name}: {'all ' if p.collects else ''}{type_name(p.type)}{' (optional)' if p.optional else ''}"
+            for p in read.inputs.values()
+        ]
+        lines += [
+            f"    out  {p.name}: {type_name(p.type)}{' (may be absent)' if p.optional else ''}"
+            for p in read.outputs.values()
+        ]
         lines += [f"    set  {p.name}: {type_name(p.type)} = {p.default!r}" for p in read.parameters.values()]
         lines += [f"    from {_paper(cls)}"] if _paper(cls) else []
         lines += [f"    use  {entry.role}={entry.name.partition('.')[2]}  or  _target_: {entry.target}", ""]
@@ -385,7 +396,7 @@ def _report(arguments: list[str]) -> int:
 
     folder = Path(arguments[0] if arguments else "runs/latest")
     if not (folder / "report.html").is_file():
-        raise BadInput(f"{folder}: no report.html in it; is it a run that ended? `omninav resume {folder}` goes on with one that did not")
+        raise BadInput(f"{folder}: no report.html in it; `omninav resume {folder}` goes on with a run that did not end")
     _print(results_table(json.loads((folder / "metrics.json").read_text())))
     print(f"report: {folder / 'report.html'}")
     return 0
@@ -408,16 +419,24 @@ def _compare(arguments: list[str]) -> int:
             raise BadInput(f"{folder}: no metrics.json in it; is it a run that ended?")
         config = yaml.safe_load((folder / "config.yaml").read_text())
         manifest = json.loads((folder / "manifest.json").read_text())
-        runs.append({"name": word.rstrip("/"), "metrics": json.loads((folder / "metrics.json").read_text()), "config": config, "manifest": manifest})
+        runs.append(
+            {
+                "name": word.rstrip("/"),
+                "metrics": json.loads((folder / "metrics.json").read_text()),
+                "config": config,
+                "manifest": manifest,
+            }
+        )
     _print(compare_table(runs))
     return 0
 
 
 def _resume(arguments: list[str]) -> int:
+    from .engine import StageFailed
     from .problems import BadInput
     from .progress import Progress
     from .report import results_table
-    from .run import StageFailed, resume
+    from .run import resume
 
     if len(arguments) != 1:
         raise BadInput("resume: give one run folder: omninav resume runs/latest")
@@ -438,16 +457,21 @@ def _doctor(arguments: list[str]) -> int:
     from .catalog import entries
     from .run import LIBRARIES, _version
 
-    print(f"omninav {_version('omninav')}, Python {platform.python_version()} on {platform.platform()}, {os.cpu_count()} cores")
+    print(
+        f"omninav {_version('omninav')}, Python {platform.python_version()}, {platform.platform()}, {os.cpu_count()} cores"
+    )
     rows = list(entries())
     for name in LIBRARIES:
         print(f"  {name:26} {_version(name)}")
     broken = [entry for entry in rows if entry.problem]
     others = [entry for entry in rows if entry.origin != "built in" and not entry.problem]
-    print(f"{sum(entry.origin == 'built in' for entry in rows)} built-in stages, {len(others)} from others, {len(broken)} that cannot be used")
+    print(f"{len(rows) - len(others) - len(broken)} built-in stages, {len(others)} from others, {len(broken)} unusable")
     for entry in broken:
         print(f"  {entry.name} [{entry.origin}]: {entry.problem}")
-    print(f"results go to {Path('runs').resolve()}" + ("" if os.access(".", os.W_OK) else ", which cannot be written: change to another folder"))
+    print(
+        f"results go to {Path('runs').resolve()}"
+        + ("" if os.access(".", os.W_OK) else ", which cannot be written: change to another folder")
+    )
     return 1 if broken else 0
 
 

@@ -52,7 +52,9 @@ def read_header(path: Path) -> dict[str, Any]:
     with _opened(path) as archive:
         header: dict[str, Any] = json.loads(archive.read(_HEADER))
     if header.get("format") != FORMAT:
-        raise BadInput(f"{path}: written in format {header.get('format')}, this version reads {FORMAT}; make the map again")
+        raise BadInput(
+            f"{path}: written in format {header.get('format')}, this version reads {FORMAT}; make the map again"
+        )
     return header
 
 

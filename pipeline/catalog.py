@@ -4,7 +4,8 @@ A third party's stage is named `role.name`, as `match.gradient`:
 
 * installed: an entry point of the group `omninav.stages`, `"match.gradient" = "package.module:GradientMatch"`;
 * not installed: `OMNINAV_STAGES="match.gradient=path/to/gradient.py:GradientMatch"` (several with commas);
-* in a config file or on the command line: `_target_: package.module.GradientMatch` or `path/to/gradient.py:GradientMatch`.
+* in a config file or on the command line: `_target_: package.module.GradientMatch`, or
+  `path/to/gradient.py:GradientMatch`.
 """
 
 import importlib
@@ -118,7 +119,9 @@ def plugins() -> list[Entry]:
         name, equals, target = item.partition("=")
         if not equals or "." not in name or ":" not in target:
             wanted = "write role.name=package.module:Class or role.name=path/to/file.py:Class"
-            found.append(Entry(item, "", "environment", problem=f"'{item}' in {ENVIRONMENT} is not understood; {wanted}"))
+            found.append(
+                Entry(item, "", "environment", problem=f"'{item}' in {ENVIRONMENT} is not understood; {wanted}")
+            )
             continue
         found.append(Entry(name, target, "environment"))
     return found

@@ -14,11 +14,12 @@ FORMAT = 1
 class Checkpoint:
     """Everything that decides how a run goes on.
 
-    `identity`: hash of graph, inputs and seed, so that it is never used for another run. `ticks`: how many are
-    done. `ended`: the logs have ended, only "after" stages are left. `replayed`: the front came from the cache. `channels`: delayed values, oldest first.
-    `held`: last present values. `states`: fields of the stages' States. `generators`: bit generators' states.
-    `notes`: what contexts counted. `spools`: length in bytes of every growing sequence. A value that stands in several
-    places (a map that is read delayed and kept for the end) is written once and is one object again when loaded.
+    `identity`: hash of graph, inputs and seed, so that it is never used for another run. `ticks`: how many are done.
+    `ended`: the logs have ended, only "after" stages are left. `replayed`: the front came from the cache. `channels`:
+    delayed values, oldest first. `held`: last present values. `states`: fields of the stages' States. `generators`: bit
+    generators' states. `notes`: what contexts counted. `spools`: length in bytes of every growing sequence. A value
+    that stands in several places (a map that is read delayed and kept for the end) is written once and is one object
+    again when loaded.
     """
 
     identity: str

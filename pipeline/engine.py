@@ -21,7 +21,6 @@ from .graph import ARTIFACTS, Graph, Node, Wire
 from .problems import BadInput
 from .spool import Spool
 from .stage import Context, Source, State
-from .value import Tick
 
 
 class StageFailed(Exception):
@@ -73,7 +72,7 @@ class Call:
         self.node, self.ctx = node, ctx
         self.step: Callable[..., Any] = node.stage.step
         self.state: State | None = node.signature.state[1]() if node.signature.state else None
-        self.fixed = {node.signature.state[0]: self.state} if node.signature.state else {}
+        self.fixed: dict[str, Any] = {node.signature.state[0]: self.state} if node.signature.state else {}
         self.outputs = [(name, f"{node.name}.{name}") for name in node.signature.outputs]
         self.skips = f"skipped.{node.name}"
         self.inputs: list[tuple[str, str, str | None, bool]] = []
@@ -154,7 +153,9 @@ class Engine:
         self.channels = {channel_key(wire): Channel(wire) for wire in graph.wires if wire.delay}
         ticking = {node.name for node in graph.of_lifetime("tick")}
         after = {node.name for node in graph.of_lifetime("after")}
-        self.kept = {w.origin for w in graph.wires if w.from_node in ticking and (w.hold or w.to_node in after) and not w.collect}
+        self.kept = {
+            w.origin for w in graph.wires if w.from_node in ticking and (w.hold or w.to_node in after) and not w.collect
+        }
         self.kept |= {origin for origin in wanted if origin.partition(".")[0] in ticking}
         self.spools: dict[str, Spool] = {}
         if memory is not None:
@@ -276,7 +277,9 @@ class Engine:
             ended=self.ended,
             replayed=self.front is not None and self.front.replay is not None,
             channels={key: list(channel.waiting) for key, channel in self.channels.items()},
-            held={origin: self.values[f"{origin}#held"] for origin in sorted(self.kept) if f"{origin}#held" in self.values},
+            held={
+                origin: self.values[f"{origin}#held"] for origin in sorted(self.kept) if f"{origin}#held" in self.values
+            },
             states={name: encode_state(call.state) for name, call in self.calls.items() if call.state is not None},
             generators={name: call.ctx.generator_state() for name, call in self.calls.items()},
             notes={name: call.ctx.notes() for name, call in self.calls.items()},
@@ -296,7 +299,9 @@ class Engine:
                 spool.cut(0)
             return
         if found.identity != self.identity:
-            raise BadInput(f"{path} belongs to another run (its configuration or its logs have changed): start a new run")
+            raise BadInput(
+                f"{path} belongs to another run (its configuration or its logs have changed): start a new run"
+            )
         self.ticks, self.ended = found.ticks, found.ended
         for key, waiting in found.channels.items():
             self.channels[key].waiting.clear()

@@ -43,14 +43,20 @@ def front_nodes(graph: Graph) -> frozenset[str]:
     before = {node.name for node in graph.of_lifetime("before")}
     for node in graph.of_lifetime("tick"):
         wires = graph.inputs_of(node.name)
-        ready = all(not w.delay and (w.from_node in front or (w.from_node in before and not _draws_on_artifacts(graph, w.from_node))) for w in wires)
+        ready = all(
+            not w.delay
+            and (w.from_node in front or (w.from_node in before and not _draws_on_artifacts(graph, w.from_node)))
+            for w in wires
+        )
         if wires and ready:
             front.add(node.name)
     return frozenset(front)
 
 
 def _draws_on_artifacts(graph: Graph, name: str) -> bool:
-    return any(wire.from_node == ARTIFACTS or _draws_on_artifacts(graph, wire.from_node) for wire in graph.inputs_of(name))
+    return any(
+        wire.from_node == ARTIFACTS or _draws_on_artifacts(graph, wire.from_node) for wire in graph.inputs_of(name)
+    )
 
 
 def front_key(graph: Graph, nodes: frozenset[str]) -> str:
@@ -78,7 +84,9 @@ def cached_front(graph: Graph, cache: Cache | None, seed: int) -> Iterator[Cache
     bulky = [origin for origin in boundary if getattr(getattr(graph.port(origin), "type", None), "bulky", False)]
     if bulky:
         who = ", ".join(sorted({wire.to_node for wire in readers if wire.origin == bulky[0]}))
-        yield CachedFront(nodes, tuple(boundary), "", f"not cached: {bulky[0]} is too large to keep and is read by {who}", replay=None)
+        yield CachedFront(
+            nodes, tuple(boundary), "", f"not cached: {bulky[0]} is too large to keep and is read by {who}", replay=None
+        )
         return
     key = digest_text(front_key(graph, nodes), *boundary)
     with ExitStack() as held:
@@ -91,12 +99,16 @@ def cached_front(graph: Graph, cache: Cache | None, seed: int) -> Iterator[Cache
                     if digest_file(path) == notes["digest"]:
                         spool = Spool(path)
                         held.close()
-                        said = f"found: {', '.join(sorted(nodes))} of this log with these parameters were computed before"
+                        said = (
+                            f"found: {', '.join(sorted(nodes))} of this log with these parameters were computed before"
+                        )
                         yield CachedFront(nodes, tuple(boundary), key, said, spool, notes["nodes"])
                         return
                 except (BadEncoding, FileNotFoundError):
                     path.unlink(missing_ok=True)  # half a result is no result: it is made again
-        yield CachedFront(nodes, tuple(boundary), key, "not found: code, parameters or log are new, or it never ran to its end")
+        yield CachedFront(
+            nodes, tuple(boundary), key, "not found: code, parameters or log are new, or it never ran to its end"
+        )
 
 
 def seeded(key: str, seed: int) -> str:

@@ -16,6 +16,7 @@ from .stage import BadStage, Port, Signature, Stage, signature
 from .value import Tick
 
 Lifetime = Literal["before", "tick", "after"]
+LIFETIMES: tuple[Lifetime, ...] = ("before", "tick", "after")
 ARTIFACTS = "artifacts"
 """The name under which static values from files or other graphs' runs are wired: `artifacts.map`."""
 
@@ -107,13 +108,21 @@ class Graph:
         parts = []
         for name in names:
             node = self.nodes[name]
-            parts += [name, node.target, code_version(type(node.stage)), json.dumps(node.parameters, sort_keys=True, default=str)]
+            parts += [
+                name,
+                node.target,
+                code_version(type(node.stage)),
+                json.dumps(node.parameters, sort_keys=True, default=str),
+            ]
         parts += sorted(str(dataclasses.astuple(wire)) for wire in self.wires if wire.to_node in set(names))
         return digest_text(*parts)
 
 
 def build(
-    config: Mapping[str, Any], artifact_types: Mapping[str, Any] | None = None, prefix: str = "", shared: Iterable[str] = ()
+    config: Mapping[str, Any],
+    artifact_types: Mapping[str, Any] | None = None,
+    prefix: str = "",
+    shared: Iterable[str] = (),
 ) -> Graph:
     """The graph that a configuration describes.
 
@@ -129,7 +138,9 @@ def build(
 
 
 class _Builder:
-    def __init__(self, config: Mapping[str, Any], artifacts: dict[str, Any], prefix: str, shared: frozenset[str]) -> None:
+    def __init__(
+        self, config: Mapping[str, Any], artifacts: dict[str, Any], prefix: str, shared: frozenset[str]
+    ) -> None:
         self.config, self.artifacts, self.prefix, self.shared = config, artifacts, prefix, shared
         self.problems: list[Problem] = []
         self.nodes: dict[str, Node] = {}
@@ -190,7 +201,11 @@ class _Builder:
         parameters, found = convert_fields(spec, cls, path, skip=("_target_",))
         self.problems += found
         if found:
-            return None if any(p.default is dataclasses.MISSING for p in read.parameters.values()) else _unset(name, target, cls, read)
+            return (
+                None
+                if any(p.default is dataclasses.MISSING for p in read.parameters.values())
+                else _unset(name, target, cls, read)
+            )
         try:
             stage = cls(**parameters)
         except (ValueError, TypeError) as error:  # what __post_init__ says of parameters that do not go together
@@ -204,16 +219,28 @@ class _Builder:
     def _read_wires(self) -> None:
         wires = self.config.get("wires") or {}
         if not isinstance(wires, Mapping):
-            self._problem("wires", "expected a mapping: node -> port -> where it comes from", "write wires: {match: {map: artifacts.map}}")
+            self._problem(
+                "wires",
+                "expected a mapping: node -> port -> where it comes from",
+                "write wires: {match: {map: artifacts.map}}",
+            )
             return
         for name, ports in wires.items():
             if ports is None:
                 continue
             if not isinstance(ports, Mapping):
-                self._problem(f"wires.{name}", "expected a mapping from ports to where they come from", f"write wires: {{{name}: {{port: node.port}}}}")
+                self._problem(
+                    f"wires.{name}",
+                    "expected a mapping from ports to where they come from",
+                    f"write wires: {{{name}: {{port: node.port}}}}",
+                )
             elif name not in self.nodes:
                 if name not in self.broken:
-                    self._problem(f"wires.{name}", f"there is no node '{name}'", suggest(str(name), self.nodes, "nodes", prefix="wires."))
+                    self._problem(
+                        f"wires.{name}",
+                        f"there is no node '{name}'",
+                        suggest(str(name), self.nodes, "nodes", prefix="wires."),
+                    )
             else:
                 for port, spec in ports.items():
                     if spec is not None:
@@ -228,11 +255,17 @@ class _Builder:
             return
         options = {"from": spec} if isinstance(spec, str) else spec
         if not isinstance(options, Mapping) or not isinstance(options.get("from"), str):
-            self._problem(where, f"{spec!r} is no wire", "write node.port, or {from: node.port, delay: 1, initial: node.port}")
+            self._problem(
+                where, f"{spec!r} is no wire", "write node.port, or {from: node.port, delay: 1, initial: node.port}"
+            )
             return
         unknown = [key for key in options if key not in ("from", "delay", "initial", "hold", "collect")]
         for key in unknown:
-            self._problem(f"{where}.{key}", "a wire has no such option", suggest(str(key), ("from", "delay", "initial", "hold", "collect"), "options"))
+            self._problem(
+                f"{where}.{key}",
+                "a wire has no such option",
+                suggest(str(key), ("from", "delay", "initial", "hold", "collect"), "options"),
+            )
         delay, initial = options.get("delay", 0), options.get("initial")
         hold, collect = options.get("hold", False), options.get("collect", False)
         if not isinstance(delay, int) or isinstance(delay, bool) or delay < 0:
@@ -272,7 +305,9 @@ class _Builder:
         if node == ARTIFACTS:
             if port in self.artifacts:
                 return Port(port, self.artifacts[port])
-            self._problem(where, f"there is no artifact '{port}'", suggest(port, self.artifacts, "artifacts", prefix="artifacts."))
+            self._problem(
+                where, f"there is no artifact '{port}'", suggest(port, self.artifacts, "artifacts", prefix="artifacts.")
+            )
             return None
         if node not in self.nodes:
             near = nearest(node, self.nodes)
@@ -282,7 +317,9 @@ class _Builder:
         outputs = self.nodes[node].signature.outputs
         if port not in outputs:
             hint = suggest(port, outputs, f"outputs of {node}", prefix=f"{node}.")
-            self._problem(where, f"node '{node}' ({type(self.nodes[node].stage).__name__}) has no output '{port}'", hint)
+            self._problem(
+                where, f"node '{node}' ({type(self.nodes[node].stage).__name__}) has no output '{port}'", hint
+            )
             return None
         return outputs[port]
 
@@ -290,13 +327,16 @@ class _Builder:
         """Which outputs of the graph would fit a port: what to type instead of a wrong name."""
         found = [f"{ARTIFACTS}.{name}" for name, kind in self.artifacts.items() if compatible(kind, wanted.type)]
         for node in self.nodes.values():
-            found += [f"{node.name}.{p.name}" for p in node.signature.outputs.values() if compatible(p.type, wanted.type)]
+            found += [
+                f"{node.name}.{p.name}" for p in node.signature.outputs.values() if compatible(p.type, wanted.type)
+            ]
         kind = type_name(wanted.type)
         return f"what gives {kind} here: {', '.join(sorted(found))}" if found else f"nothing in this graph gives {kind}"
 
     def _check_types(self, where: str, origin: str, given: Port, node: Node, port: Port) -> None:
         if not compatible(given.type, port.type):
-            what = f"{origin} gives {type_name(given.type)}, {node.name}.{port.name} ({type(node.stage).__name__}) takes {type_name(port.type)}"
+            taker = f"{node.name}.{port.name} ({type(node.stage).__name__})"
+            what = f"{origin} gives {type_name(given.type)}, {taker} takes {type_name(port.type)}"
             self._problem(where, what, self._givers(port))
 
     def _check_missing(self) -> None:
@@ -311,11 +351,16 @@ class _Builder:
             for port in node.signature.inputs.values():
                 if not port.optional and (node.name, port.name) not in attempted:
                     where = f"wires.{node.name}.{port.name}"
-                    what = f"{type(node.stage).__name__} needs {type_name(port.type)} on '{port.name}', and nothing is wired to it"
+                    wanted = f"{type_name(port.type)} on '{port.name}'"
+                    what = f"{type(node.stage).__name__} needs {wanted}, and nothing is wired to it"
                     self._problem(where, what, self._givers(port))
         sources = [node.name for node in self.nodes.values() if node.signature.is_source]
         if len(sources) > 1:
-            self._problem("nodes", f"there are several sources ({', '.join(sources)}); a graph has one", "take all but one out: '~nodes.…'")
+            self._problem(
+                "nodes",
+                f"there are several sources ({', '.join(sources)}); a graph has one",
+                "take all but one out: '~nodes.…'",
+            )
         for name in sources:
             tick = self.nodes[name].signature.outputs.get("tick")
             if tick is None or tick.type is not Tick:
@@ -338,7 +383,11 @@ class _Builder:
         ticking = tick_roots | {n for root in tick_roots for n in nx.descendants(flow, root)}
         for wire in self.wires:
             if wire.to_node in after and wire.delay:
-                self._problem(wire.where, f"'{wire.to_node}' runs after the loop (it, or what it waits for, collects a sequence), where there is no tick before", "leave delay away")
+                self._problem(
+                    wire.where,
+                    f"'{wire.to_node}' runs after the loop (something collects a sequence), where there is no tick before",
+                    "leave delay away",
+                )
         for name in sorted(after & tick_roots):
             if self.nodes[name].signature.is_source:
                 self._problem(f"nodes.{name}", "a source cannot wait for what is collected until the end")
@@ -347,8 +396,7 @@ class _Builder:
         return {name: "after" if name in after else "tick" if name in ticking else "before" for name in self.nodes}
 
     def _ordered(self, lifetimes: dict[str, Lifetime]) -> Graph:
-        rank = {"before": 0, "tick": 1, "after": 2}
-        order: nx.DiGraph[str] = nx.DiGraph()
+                order: nx.DiGraph[str] = nx.DiGraph()
         order.add_nodes_from(self.nodes)
         for wire in self.wires:
             if wire.from_node != ARTIFACTS and not wire.delay:
@@ -366,7 +414,10 @@ class _Builder:
             return Graph(self.nodes, self.wires, self.artifacts)
         self._order_in_place(order, lifetimes)
         listed = list(self.nodes)
-        running = nx.lexicographical_topological_sort(order, key=lambda name: (rank[lifetimes[name]], not self.nodes[name].signature.is_source, listed.index(name)))
+        running = nx.lexicographical_topological_sort(
+            order,
+            key=lambda name: (LIFETIMES.index(lifetimes[name]), not self.nodes[name].signature.is_source, listed.index(name)),
+        )
         nodes = {name: dataclasses.replace(self.nodes[name], lifetime=lifetimes[name]) for name in running}
         return Graph(nodes, self.wires, self.artifacts)
 
@@ -374,21 +425,36 @@ class _Builder:
         """Readers of the delayed value run before the stage that updates it; whatever cannot be so is a problem."""
         firsts: dict[str, str | None] = {}
         for wire in self.wires:
-            given = self.nodes[wire.from_node].signature.outputs[wire.from_port] if wire.from_node in self.nodes else None
+            given = (
+                self.nodes[wire.from_node].signature.outputs[wire.from_port] if wire.from_node in self.nodes else None
+            )
             if given is None or not getattr(given.type, "in_place", False):
                 continue
             kind = type_name(given.type)
             if wire.collect or wire.hold or wire.delay > 1:
-                self._problem(wire.where, f"{kind} is updated in place: it can be read with delay 1 or undelayed, not collected, held or delayed further", "collect small events instead")
+                self._problem(
+                    wire.where,
+                    f"{kind} is updated in place: read it undelayed or with delay 1; it cannot be collected or held",
+                    "collect small events instead",
+                )
             if wire.delay == 1:
                 if firsts.setdefault(wire.origin, wire.initial) != wire.initial:
-                    self._problem(f"{wire.where}.initial", f"{wire.origin} is one {kind}: all its delayed wires need the same initial value", f"write initial: {firsts[wire.origin]}")
+                    self._problem(
+                        f"{wire.where}.initial",
+                        f"{wire.origin} is one {kind}: all its delayed wires need the same initial value",
+                        f"write initial: {firsts[wire.origin]}",
+                    )
                 if wire.to_node != wire.from_node:
                     order.add_edge(wire.to_node, wire.from_node)
                     cycle = _cycle(order)
                     if cycle:
                         order.remove_edge(wire.to_node, wire.from_node)
-                        self._problem(wire.where, f"'{wire.to_node}' must read {kind} before '{wire.from_node}' updates it, but runs after it ({' -> '.join(cycle)})", f"read it undelayed: {wire.where}={wire.origin}")
+                        self._problem(
+                            wire.where,
+                            f"'{wire.to_node}' must read {kind} before '{wire.from_node}' updates it, "
+                            f"but runs after it ({' -> '.join(cycle)})",
+                            f"read it undelayed: {wire.where}={wire.origin}",
+                        )
 
 
 def _cycle(order: "nx.DiGraph[str]") -> list[str] | None:

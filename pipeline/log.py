@@ -13,7 +13,6 @@ from collections import Counter, OrderedDict
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
-from difflib import get_close_matches
 from io import BytesIO
 from pathlib import Path
 from types import TracebackType
@@ -28,6 +27,7 @@ from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Footer, Schema
 from mcap.writer import CompressionType, Writer
 
 from .files import whole_file
+from .problems import BadInput, nearest
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -40,7 +40,7 @@ _DEFINITION_ENCODINGS = ("ros2msg", "ros2idl")
 _CHUNKS_IN_MEMORY = 4
 
 
-class LogError(Exception):
+class LogError(BadInput):
     """A log that cannot be read or written at all. The message is one line: which file, what, and what to do."""
 
 
@@ -112,23 +112,24 @@ class LogReader:
         try:
             with self.path.open("rb") as file:
                 if file.read(len(MAGIC)) != MAGIC:
-                    raise LogError(
-                        f"{self.path}: not an MCAP file (its first bytes are wrong)"
-                    )
+                    raise LogError(f"{self.path}: not an MCAP file (its first bytes are wrong)")
                 self._size = file.seek(0, 2)
-                self._known_chunks = self._read_summary(file)
+                self._known_chunks: list[ChunkIndex] = []
+                try:
+                    self._known_chunks = self._read_summary(file)
+                except Exception:  # a damaged summary is as good as none: the scan finds everything else
+                    self._channels.clear()
         except OSError as error:
             raise LogError(f"{self.path}: {error.strerror or error}") from None
 
     @property
     def topics(self) -> dict[str, str]:
         """Topic names and their message types, sorted by name."""
-        self._complete()
+        if not self._channels:
+            self._complete()
         return {
             channel.topic: self._type_of(channel)
-            for channel in sorted(
-                self._channels.values(), key=lambda channel: channel.topic
-            )
+            for channel in sorted(self._channels.values(), key=lambda channel: channel.topic)
         }
 
     @property
@@ -173,19 +174,12 @@ class LogReader:
         msgtype = self._types()[topic]
         try:
             return self._store(msgtype).deserialize_cdr(data, msgtype)
-        except (
-            Exception
-        ) as error:  # damaged bytes raise whatever the generated decoder stumbles over
-            raise BadMessage(
-                f"{self.path}: a message on {topic} is not a sound {msgtype} ({error})"
-            ) from None
+        except Exception as error:  # damaged bytes raise whatever the generated decoder stumbles over
+            raise BadMessage(f"{self.path}: a message on {topic} is not a sound {msgtype} ({error})") from None
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Message]:
         """Decoded messages in the order of their stamps; equal stamps in the order of the file."""
-        found = [
-            (record.stamp, number, record)
-            for number, record in enumerate(_without_data(self.scan(topics)))
-        ]
+        found = [(record.stamp, number, record) for number, record in enumerate(_without_data(self.scan(topics)))]
         types = self._types()
         for stamp, _, record in sorted(found):
             try:
@@ -193,9 +187,7 @@ class LogReader:
             except BadMessage as error:
                 self.drop("bad_message", str(error))
                 continue
-            yield Message(
-                record.topic, types[record.topic], stamp, record.log_time, content
-            )
+            yield Message(record.topic, types[record.topic], stamp, record.log_time, content)
 
     def drop(self, kind: str, detail: str) -> None:
         """Count something lost."""
@@ -215,11 +207,7 @@ class LogReader:
             return []
         file.seek(footer.summary_start)
         summary = file.read(self._size - _FOOTER_SIZE - footer.summary_start)
-        if (
-            footer.summary_crc
-            and zlib.crc32(tail[: -len(MAGIC) - 4], zlib.crc32(summary))
-            != footer.summary_crc
-        ):
+        if footer.summary_crc and zlib.crc32(tail[: -len(MAGIC) - 4], zlib.crc32(summary)) != footer.summary_crc:
             return []
         chunks = []
         for opcode, start, end in _records(summary):
@@ -244,9 +232,7 @@ class LogReader:
                 channel = _parse(Channel, content)
                 self._channels[channel.id] = channel
         except Exception as error:
-            self.drop(
-                "bad_chunk", f"{self.path}: a topic's description is damaged ({error})"
-            )
+            self.drop("bad_chunk", f"{self.path}: a topic's description is damaged ({error})")
 
     def _scan(self, topics: Collection[str] | None) -> Iterator[Record]:
         seen = set()
@@ -266,9 +252,7 @@ class LogReader:
                                 f"{self.path}: chunk at byte {start - _RECORD.size}: {error}",
                             )
                         continue
-                    yield from self._in_chunk(
-                        data, len(self._chunks) - 1, topics, whole
-                    )
+                    yield from self._in_chunk(data, len(self._chunks) - 1, topics, whole)
                 elif not whole:
                     continue
                 elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
@@ -278,12 +262,8 @@ class LogReader:
                     file.seek(start)
                     content = file.read(length)
                     channel, _, log_time, _ = _MESSAGE.unpack_from(content)
-                    data_at = Location(
-                        -1, start + _MESSAGE.size, length - _MESSAGE.size
-                    )
-                    yield from self._record(
-                        channel, log_time, content[_MESSAGE.size :], data_at, topics
-                    )
+                    data_at = Location(-1, start + _MESSAGE.size, length - _MESSAGE.size)
+                    yield from self._record(channel, log_time, content[_MESSAGE.size :], data_at, topics)
                 elif opcode == Opcode.ATTACHMENT:
                     file.seek(start)
                     self._attach(file.read(length), start)
@@ -305,21 +285,13 @@ class LogReader:
         while True:
             file.seek(at)
             head = file.read(_RECORD.size)
-            opcode, length = (
-                _RECORD.unpack(head) if len(head) == _RECORD.size else (0, 0)
-            )
+            opcode, length = _RECORD.unpack(head) if len(head) == _RECORD.size else (0, 0)
             if opcode == Opcode.DATA_END:
                 return
             start, end = at + _RECORD.size, at + _RECORD.size + length
             beyond = [known for known in starts if known > at]
             leaps = bool(beyond) and end > beyond[0]
-            if (
-                head
-                and 0 < opcode
-                and end <= self._size
-                and not leaps
-                and len(head) == _RECORD.size
-            ):
+            if head and opcode > 0 and end <= self._size and not leaps and len(head) == _RECORD.size:
                 yield opcode, start, length, True
                 at = end
             elif beyond:
@@ -335,18 +307,14 @@ class LogReader:
                     yield opcode, start, self._size - start, False
                 return
 
-    def _in_chunk(
-        self, data: bytes, chunk: int, topics: Collection[str] | None, whole: bool
-    ) -> Iterator[Record]:
+    def _in_chunk(self, data: bytes, chunk: int, topics: Collection[str] | None, whole: bool) -> Iterator[Record]:
         end = 0
         for opcode, start, end in _records(data):
             if opcode == Opcode.MESSAGE and end - start >= _MESSAGE.size:
                 channel, _, log_time, _ = _MESSAGE.unpack_from(data, start)
                 start += _MESSAGE.size
                 data_at = Location(chunk, start, end - start)
-                yield from self._record(
-                    channel, log_time, memoryview(data)[start:end], data_at, topics
-                )
+                yield from self._record(channel, log_time, memoryview(data)[start:end], data_at, topics)
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 self._learn(opcode, data[start:end])
         if whole and end != len(data):
@@ -372,9 +340,7 @@ class LogReader:
         elif topics is None or channel.topic in topics:
             stamp = log_time
             if self._has_header(channel) and len(data) >= 12:
-                seconds, nanoseconds = struct.unpack_from(
-                    "<iI" if data[1] & 1 else ">iI", data, 4
-                )
+                seconds, nanoseconds = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, 4)
                 stamp = seconds * 1_000_000_000 + nanoseconds
             yield Record(channel.topic, stamp, log_time, data, at)
 
@@ -388,18 +354,14 @@ class LogReader:
             attachment = _parse(Attachment, content)
             self._attachments[attachment.name] = attachment.data
         except Exception as error:
-            self.drop(
-                "bad_attachment", f"{self.path}: attachment at byte {start}: {error}"
-            )
+            self.drop("bad_attachment", f"{self.path}: attachment at byte {start}: {error}")
 
     def _type_of(self, channel: Channel) -> str:
         schema = self._schemas.get(channel.schema_id)
         return schema.name if schema else ""
 
     def _types(self) -> dict[str, str]:
-        return {
-            channel.topic: self._type_of(channel) for channel in self._channels.values()
-        }
+        return {channel.topic: self._type_of(channel) for channel in self._channels.values()}
 
     def _has_header(self, channel: Channel) -> bool:
         msgtype = self._type_of(channel)
@@ -429,9 +391,7 @@ class LogReader:
                     raise ValueError("no definition")
                 text = schema.data.decode()
                 store.register(
-                    get_types_from_msg(text, msgtype)
-                    if schema.encoding == "ros2msg"
-                    else get_types_from_idl(text)
+                    get_types_from_msg(text, msgtype) if schema.encoding == "ros2msg" else get_types_from_idl(text)
                 )
             except Exception:  # no readable definition in the file: the standard one, where it is a standard type
                 store = standard_types()
@@ -439,9 +399,7 @@ class LogReader:
         return self._stores[msgtype]
 
 
-def read_messages(
-    path: Path | str, topics: Collection[str] | None = None
-) -> Iterator[Message]:
+def read_messages(path: Path | str, topics: Collection[str] | None = None) -> Iterator[Message]:
     """Decoded messages of a log in the order of their header stamps. See `LogReader` for what becomes of damage."""
     yield from LogReader(path).messages(topics)
 
@@ -512,23 +470,17 @@ class LogWriter:
         try:
             data = bytes(standard_types().serialize_cdr(content, msgtype))
         except Exception as error:
-            raise LogError(
-                f"{self.path}: {topic}: not a valid {msgtype} ({error})"
-            ) from None
+            raise LogError(f"{self.path}: {topic}: not a valid {msgtype} ({error})") from None
         channel, known = self._channels.get(topic, (0, msgtype))
         if known != msgtype:
-            raise LogError(
-                f"{self.path}: {topic} carries {known}, not {msgtype}; use another topic"
-            )
+            raise LogError(f"{self.path}: {topic} carries {known}, not {msgtype}; use another topic")
         if not channel:
             channel = self._open_channel(topic, msgtype)
         time = stamp if log_time is None else log_time
         self._writer.add_message(channel, time, data, time, self._written[topic])
         self._written[topic] += 1
 
-    def attach(
-        self, name: str, data: bytes, media_type: str = "application/octet-stream"
-    ) -> None:
+    def attach(self, name: str, data: bytes, media_type: str = "application/octet-stream") -> None:
         """Append an attachment."""
         self._writer.add_attachment(0, 0, name, media_type, data)
 
@@ -536,9 +488,7 @@ class LogWriter:
         store = standard_types()
         if msgtype not in self._schemas:
             definition, _ = store.generate_msgdef(msgtype, ros_version=2)
-            self._schemas[msgtype] = self._writer.register_schema(
-                msgtype, "ros2msg", definition.encode()
-            )
+            self._schemas[msgtype] = self._writer.register_schema(msgtype, "ros2msg", definition.encode())
         channel = self._writer.register_channel(
             topic,
             "cdr",
@@ -549,26 +499,19 @@ class LogWriter:
         return channel
 
 
-def make_message(
-    msgtype: str, fields: Mapping[str, Any], stamp: int | None = None
-) -> Any:
+def make_message(msgtype: str, fields: Mapping[str, Any], stamp: int | None = None) -> Any:
     """A rosbags message from nested mappings; fields left out are zero or empty, `stamp` (ns) fills the header.
 
     Raises `LogError` for an unknown type or field, with the nearest name.
     """
     store = standard_types()
     if msgtype not in store.fielddefs:
-        raise LogError(
-            f"{msgtype}: no such message type{_nearest(msgtype, store.fielddefs)}"
-        )
+        raise LogError(f"{msgtype}: no such message type{_nearest(msgtype, store.fielddefs)}")
     definitions = dict(store.fielddefs[msgtype][1])
     for name in fields:
         if name not in definitions:
             raise LogError(f"{msgtype}: no field '{name}'{_nearest(name, definitions)}")
-    values = {
-        name: _make_field(definition, fields.get(name))
-        for name, definition in definitions.items()
-    }
+    values = {name: _make_field(definition, fields.get(name)) for name, definition in definitions.items()}
     if stamp is not None and "header" in definitions:
         seconds, nanoseconds = divmod(stamp, 1_000_000_000)
         values["header"].stamp.sec, values["header"].stamp.nanosec = (
@@ -583,41 +526,24 @@ def _make_field(definition: Any, value: Any) -> Any:
 
     kind, detail = definition
     if kind == Nodetype.NAME:
-        return (
-            make_message(detail, value or {})
-            if value is None or isinstance(value, Mapping)
-            else value
-        )
+        return make_message(detail, value or {}) if value is None or isinstance(value, Mapping) else value
     if kind == Nodetype.BASE:
         name = detail[0]
-        empty: Any = (
-            "" if name in ("string", "wstring") else False if name == "bool" else 0
-        )
+        empty: Any = "" if name in ("string", "wstring") else False if name == "bool" else 0
         return empty if value is None else value
     inner, count = detail
     if inner[0] == Nodetype.BASE and inner[1][0] not in ("string", "wstring"):
-        dtype = np.dtype(
-            {"octet": "uint8", "byte": "uint8", "char": "uint8"}.get(
-                inner[1][0], inner[1][0]
-            )
-        )
+        dtype = np.dtype({"octet": "uint8", "byte": "uint8", "char": "uint8"}.get(inner[1][0], inner[1][0]))
         if value is None:
             return np.zeros(count if kind == Nodetype.ARRAY else 0, dtype)
-        return (
-            np.frombuffer(value, dtype)
-            if isinstance(value, (bytes, memoryview))
-            else np.asarray(value, dtype)
-        )
+        return np.frombuffer(value, dtype) if isinstance(value, (bytes, memoryview)) else np.asarray(value, dtype)
     length = count if kind == Nodetype.ARRAY else 0
-    return [
-        _make_field(inner, item)
-        for item in (value if value is not None else [None] * length)
-    ]
+    return [_make_field(inner, item) for item in (value if value is not None else [None] * length)]
 
 
 def _nearest(name: str, names: Collection[str]) -> str:
-    near = get_close_matches(name, list(names), 1, 0.5)
-    return f"; did you mean '{near[0]}'?" if near else ""
+    near = nearest(name, names)
+    return f"; did you mean '{near}'?" if near else ""
 
 
 def _without_data(records: Iterator[Record]) -> Iterator[Record]:
@@ -649,9 +575,7 @@ def _unpack(content: bytes, whole: bool) -> bytes:
         return _unpack_cut(content)
     chunk = _parse(Chunk, content)
     if chunk.compression == "zstd":
-        data = zstandard.ZstdDecompressor().decompress(
-            chunk.data, max_output_size=chunk.uncompressed_size
-        )
+        data = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=chunk.uncompressed_size)
     elif chunk.compression == "lz4":
         data = lz4.frame.decompress(chunk.data)
     elif chunk.compression == "":

@@ -77,7 +77,12 @@ def _convert(value: Any, wanted: Any, where: str) -> Any:
     if wanted is Any:
         return value
     if origin is Annotated:
-        converted = _convert(value, arguments[0], where)
+        try:
+            converted = _convert(value, arguments[0], where)
+        except _Unfit as unfit:
+            if all(problem.where == where for problem in unfit.problems):
+                raise _unfit(value, wanted, where) from None  # so that the bounds are named too
+            raise
         for bounds in (extra for extra in arguments[1:] if isinstance(extra, Bounds)):
             broken = bounds.violated_by(converted) if isinstance(converted, int | float) else None
             if broken:

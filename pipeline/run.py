@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import Any
 import yaml
 
 from .artifact import Cache, read_artifact, read_header, write_artifact
+from .catalog import UnknownStage, resolve
 from .engine import Engine, StageFailed
 from .files import digest_file, digest_text, write_whole
 from .front import CachedFront, cached_front, keep, seeded
@@ -64,7 +65,9 @@ class Plan:
 def plan(config: Mapping[str, Any]) -> Plan:
     """Check a plain, resolved configuration. Raises `ProblemsFound` with everything that is wrong with it."""
     problems: list[Problem] = []
-    artifacts, types = [], {}
+    artifacts: list[ArtifactPlan] = []
+    types: dict[str, Any] = {}
+    _load_stages(config)
     for key in ("seed",):
         if not isinstance(config.get(key, 0), int) or isinstance(config.get(key, 0), bool) or config.get(key, 0) < 0:
             problems.append(Problem(key, f"{config.get(key)!r}, expected a whole number >= 0", f"type {key}=0"))
@@ -91,10 +94,20 @@ def plan(config: Mapping[str, Any]) -> Plan:
         port = graph.port(str(origin)) if graph is not None else None
         if port is None:
             outputs = [f"{n.name}.{p}" for n in graph.nodes.values() for p in n.signature.outputs] if graph else []
-            problems.append(Problem(f"saves.{name}", f"there is no output '{origin}'", suggest(str(origin), outputs, "outputs")))
+            problems.append(
+                Problem(f"saves.{name}", f"there is no output '{origin}'", suggest(str(origin), outputs, "outputs"))
+            )
     if problems or graph is None:
         raise ProblemsFound(dict.fromkeys(problems))
     return Plan(config, graph, tuple(artifacts), saves)
+
+
+def _load_stages(config: Mapping[str, Any]) -> None:
+    """Import the stages' modules, so that the value types which a map file may hold are known."""
+    for spec in (config.get("nodes") or {}).values():
+        if isinstance(spec, Mapping) and isinstance(spec.get("_target_"), str):
+            with suppress(UnknownStage):  # said by `build`
+                resolve(spec["_target_"])
 
 
 def _plan_artifact(name: str, spec: Any) -> ArtifactPlan:
@@ -106,7 +119,9 @@ def _plan_artifact(name: str, spec: Any) -> ArtifactPlan:
         try:
             read_header(file)
         except BadInput as error:
-            raise ProblemsFound([Problem(name, str(error), f"type {name}=FILE.omap, or tour=LOG to make one")]) from None
+            raise ProblemsFound(
+                [Problem(name, str(error), f"type {name}=FILE.omap, or tour=LOG to make one")]
+            ) from None
         return ArtifactPlan(name, file=file)
     if spec.get("graph") is None:
         hint = f"type tour=LOG to learn one with '{spec.get('variant')}', or {name}=FILE.omap to load one"
@@ -115,7 +130,9 @@ def _plan_artifact(name: str, spec: Any) -> ArtifactPlan:
     origin = str(spec.get("from") or (spec["graph"].get("saves") or {}).get(name, ""))
     if graph.port(origin) is None:
         outputs = [f"{n.name}.{p}" for n in graph.nodes.values() for p in n.signature.outputs]
-        raise ProblemsFound([Problem(f"{where}.from", f"there is no output '{origin}'", suggest(origin, outputs, "outputs"))])
+        raise ProblemsFound(
+            [Problem(f"{where}.from", f"there is no output '{origin}'", suggest(origin, outputs, "outputs"))]
+        )
     return ArtifactPlan(name, graph=graph.leading_to([origin]), origin=origin, variant=str(spec.get("variant")))
 
 
@@ -181,7 +198,11 @@ def execute(run: Run, planned: Plan, progress: Any = None) -> dict[str, Any]:
             _fail(run, "interrupted", "stopped by the user")
             raise
         except Exception as error:
-            _fail(run, "failed", str(error) if isinstance(error, StageFailed | BadInput) else f"{type(error).__name__}: {error}")
+            _fail(
+                run,
+                "failed",
+                str(error) if isinstance(error, StageFailed | BadInput) else f"{type(error).__name__}: {error}",
+            )
             raise
 
 
@@ -199,7 +220,16 @@ def _execute(run: Run, planned: Plan, progress: Any) -> dict[str, Any]:
     wanted = sorted(set(planned.saves.values()))
     with cached_front(planned.graph, cache, seed) as front:
         engine = Engine(
-            planned.graph, artifacts, seed, run.folder, run.memory, wanted, identity, every_s, _usable(front), _stepper(progress, planned.variant)
+            planned.graph,
+            artifacts,
+            seed,
+            run.folder,
+            run.memory,
+            wanted,
+            identity,
+            every_s,
+            _usable(front),
+            _stepper(progress, planned.variant),
         )
         last = engine.run()
         _keep_front(engine, front, cache, seed)
@@ -234,7 +264,13 @@ def _artifact(
     value = read_artifact(found)
     shutil.copyfile(found, target)
     facts = read_header(found)["facts"]
-    return value, {"variant": artifact.variant, "from": artifact.origin, "sha256": digest_file(target), "said": said, **facts}
+    return value, {
+        "variant": artifact.variant,
+        "from": artifact.origin,
+        "sha256": digest_file(target),
+        "said": said,
+        **facts,
+    }
 
 
 def _make(
@@ -244,12 +280,23 @@ def _make(
     with cached_front(graph, cache, seed) as front:
         identity = _identity(graph, seed)
         engine = Engine(
-            graph, {}, seed, None, memory, [artifact.origin], identity, every_s, _usable(front), _stepper(progress, artifact.variant)
+            graph,
+            {},
+            seed,
+            None,
+            memory,
+            [artifact.origin],
+            identity,
+            every_s,
+            _usable(front),
+            _stepper(progress, artifact.variant),
         )
         value = engine.run()[artifact.origin]
         _keep_front(engine, front, cache, seed)
     if not isinstance(value, Value):
-        raise BadInput(f"'{artifact.variant}' ran to its end and gave no {artifact.name}: was there anything usable in its log?")
+        raise BadInput(
+            f"'{artifact.variant}' ran to its end and gave no {artifact.name}: was there anything usable in its log?"
+        )
     return value, {**_notes(engine), "variant": artifact.variant}, any(call.ctx.drew for call in engine.calls.values())
 
 
@@ -270,7 +317,10 @@ def _notes(engine: Engine) -> dict[str, Any]:
     facts: dict[str, Any] = {}
     for name, call in engine.calls.items():
         for kind, number in call.ctx.counts.items():
-            dropped[kind if "." in kind else f"{name}.{kind}"] = {"count": number, "first": call.ctx.details.get(kind, "")}
+            dropped[kind if "." in kind else f"{name}.{kind}"] = {
+                "count": number,
+                "first": call.ctx.details.get(kind, ""),
+            }
         facts |= call.ctx.facts
     return {"dropped": dropped, "facts": facts}
 
@@ -299,8 +349,13 @@ def _finish(run: Run, planned: Plan, engine: Engine, front: CachedFront | None) 
         "ended": datetime.now().isoformat(timespec="seconds"),
         "ticks": engine.ticks,
         "dropped": notes["dropped"],
-        "facts": {**{k: v for a in run.manifest["artifacts"].values() for k, v in _map_facts(a).items()}, **notes["facts"]},
-        "front": front.said if front is not None else "not cached: this graph has no front that follows from its log alone",
+        "facts": {
+            **{k: v for a in run.manifest["artifacts"].values() for k, v in _map_facts(a).items()},
+            **notes["facts"],
+        },
+        "front": front.said
+        if front is not None
+        else "not cached: this graph has no front that follows from its log alone",
     }
     for kind, entry in notes["dropped"].items():
         log.warning("%s: %s%s", kind, entry["count"], f" (first: {entry['first']})" if entry["first"] else "")
@@ -346,7 +401,13 @@ def stage_times(engine: Engine) -> dict[str, Any]:
         if len(call.times):
             times = np.asarray(call.times) * 1e3
             p50, p95 = np.percentile(times, [50, 95])
-            stages[name] = {"lifetime": call.node.lifetime, "calls": len(times), "p50_ms": p50, "p95_ms": p95, "max_ms": times.max()}
+            stages[name] = {
+                "lifetime": call.node.lifetime,
+                "calls": len(times),
+                "p50_ms": p50,
+                "p95_ms": p95,
+                "max_ms": times.max(),
+            }
             per_tick += float(times.mean()) if call.node.lifetime == "tick" else 0.0
     return {"ticks": engine.ticks, "ticks_per_second": 1e3 / per_tick if per_tick else None, "stages": stages}
 
@@ -453,7 +514,13 @@ def _git_commit() -> str | None:
     """The commit of omninav's own checkout, with a mark where files differ from it; None where there is none."""
     here = Path(__file__).resolve().parent
     try:
-        asked = subprocess.run(["git", "describe", "--always", "--dirty", "--abbrev=40"], cwd=here, capture_output=True, text=True, timeout=5)
+        asked = subprocess.run(
+            ["git", "describe", "--always", "--dirty", "--abbrev=40"],
+            cwd=here,
+            capture_output=True,
+            text=True,
+            timeout=5,
+        )
     except (OSError, subprocess.TimeoutExpired):
         return None
     return asked.stdout.strip() or None if asked.returncode == 0 else None

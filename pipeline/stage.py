@@ -1,4 +1,4 @@
-"""A stage: a typed function with parameters. Ports and parameters are read off the class; there is no second description."""
+"""A stage: a typed function with parameters. Ports and parameters are read off the class, and nowhere else."""
 
 import dataclasses
 import inspect
@@ -26,11 +26,11 @@ class Bounds:
 
     def violated_by(self, number: float) -> str | None:
         """The broken limit as text, or None."""
-        for name, sign, limit, ok in (
-            ("ge", ">=", self.ge, self.ge is None or number >= self.ge),
-            ("gt", ">", self.gt, self.gt is None or number > self.gt),
-            ("le", "<=", self.le, self.le is None or number <= self.le),
-            ("lt", "<", self.lt, self.lt is None or number < self.lt),
+        for sign, limit, ok in (
+            (">=", self.ge, self.ge is None or number >= self.ge),
+            (">", self.gt, self.gt is None or number > self.gt),
+            ("<=", self.le, self.le is None or number <= self.le),
+            ("<", self.lt, self.lt is None or number < self.lt),
         ):
             if not ok:
                 return f"{sign} {limit:g}"
@@ -100,7 +100,6 @@ class Context:
         """Put a fact about the run into the manifest (`odometry: synthetic`)."""
         self.facts[name] = value
 
-
     def generator_state(self) -> dict[str, Any]:
         """The bit generator's state as plain data."""
         return dict(self.rng_unmarked().bit_generator.state)
@@ -114,7 +113,12 @@ class Context:
 
     def notes(self) -> dict[str, Any]:
         """Counts, details and facts so far, as plain data."""
-        return {"counts": dict(self.counts), "details": dict(self.details), "facts": dict(self.facts), "drew": self.drew}
+        return {
+            "counts": dict(self.counts),
+            "details": dict(self.details),
+            "facts": dict(self.facts),
+            "drew": self.drew,
+        }
 
     def restore(self, generator: dict[str, Any], notes: dict[str, Any]) -> None:
         """Put back what `generator_state` and `notes` gave."""

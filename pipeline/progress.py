@@ -1,0 +1,92 @@
+"""How far a run is: one live line in a terminal, JSON lines elsewhere. Both on stderr, so that stdout stays clean."""
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import TextIO
+
+
+class Progress:
+    """Shows frames done, frames per second and the time left; a context manager.
+
+    `update` is called every tick and returns at once unless something is due: ten times a second in a terminal, every
+    two seconds elsewhere, and once when a graph's loop has ended. `stream` and `clock` are there for tests.
+    """
+
+    def __init__(self, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic) -> None:
+        self._stream = sys.stderr if stream is None else stream
+        self._clock = clock
+        self._live = self._stream.isatty()
+        self._every = 0.1 if self._live else 2.0
+        self._due = 0.0
+        self._name = ""
+        self._started = 0.0
+        self._first = self._done = 0
+        self._total: int | None = None
+        self._shown: int | None = None
+
+    def __enter__(self) -> "Progress":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._close()
+
+    def update(self, name: str, done: int, total: int | None = None) -> None:
+        """`done` frames of `total` (None: not known) have gone through the graph `name`."""
+        if name != self._name:
+            self._begin(name, done)
+        self._done, self._total = done, total
+        now = self._clock()
+        if now >= self._due:
+            self._due = now + self._every
+            self._show(now)
+
+    def stage(self, name: str) -> None:
+        """The loop is over and the stage `name` is at work (what may take a while afterwards)."""
+        if self._live:
+            self._stream.write(f"\r\x1b[K{self._name}: {name} …")
+            self._stream.flush()
+
+    def _begin(self, name: str, done: int) -> None:
+        self._close()
+        now = self._clock()
+        self._name, self._started, self._first = name, now, done - 1
+        self._shown, self._due = None, now + self._every
+
+    def _close(self) -> None:
+        if self._name and self._shown != self._done:
+            self._show(self._clock())
+        if self._name and self._live:
+            self._stream.write("\n")
+            self._stream.flush()
+        self._name = ""
+
+    def _show(self, now: float) -> None:
+        self._shown = self._done
+        seconds = now - self._started
+        rate = (self._done - self._first) / seconds if seconds > 0 else 0.0
+        left = (self._total - self._done) / rate if self._total is not None and rate else None
+        if self._live:
+            self._stream.write("\r\x1b[K" + live_line(self._name, self._done, self._total, rate, left))
+        else:
+            said = {"graph": self._name, "frames": self._done, "of": self._total}
+            said |= {"frames_per_second": round(rate, 1), "seconds_left": None if left is None else round(left, 1)}
+            self._stream.write(json.dumps(said) + "\n")
+        self._stream.flush()
+
+
+def live_line(name: str, done: int, total: int | None, rate: float, left: float | None) -> str:
+    """The line in the terminal: `name  ━━━━────  120/300 frames  48.2 frames/s  0:04 left`."""
+    words = [name]
+    if total:
+        full = min(24, 24 * done // total)
+        words.append("━" * full + "─" * (24 - full))
+    words.append(f"{done}/{total} frames" if total is not None else f"{done} frames")
+    words.append(f"{rate:.1f} frames/s")
+    if left is not None and (total is None or done < total):
+        words.append(f"{int(left) // 60}:{int(left) % 60:02d} left")
+    return "  ".join(words)

@@ -1,0 +1,228 @@
+"""The engine: lifetimes, delays, absence, logs in a row, and going on from a checkpoint."""
+
+from pathlib import Path
+
+import pytest
+
+from omninav.pipeline.artifact import Cache
+from omninav.pipeline.engine import Engine, StageFailed
+from omninav.pipeline.front import cached_front, front_nodes, keep
+from omninav.pipeline.graph import Graph, build
+
+
+def graph_of(nodes: dict, wires: dict) -> Graph:
+    spelled = {
+        k: {"_target_": f"toys.{v}"} if isinstance(v, str) else {**v, "_target_": f"toys.{v['_target_']}"}
+        for k, v in nodes.items()
+    }
+    return build({"nodes": spelled, "wires": wires})
+
+
+COLLECT = {"from": "sum.number", "collect": True}
+SUM = {"source": "Count", "start": {"_target_": "Constant", "value": 5.0}, "sum": "Add", "all": "Collected"}
+SUM_WIRES = {
+    "sum": {"number": "source.number", "other": {"from": "sum.number", "delay": 1, "initial": "start.number"}},
+    "all": {"numbers": COLLECT, "present": COLLECT},
+}
+
+
+def numbers(graph: Graph, tmp_path: Path, seed: int = 0) -> list:
+    engine = Engine(graph, {}, seed, tmp_path, tmp_path / "memory", ["all.metrics"])
+    return engine.run()["all.metrics"].values["numbers"]["all"]
+
+
+def test_a_delayed_wire_gives_the_initial_value_and_then_the_tick_before(tmp_path: Path):
+    assert numbers(graph_of(SUM, SUM_WIRES), tmp_path) == [5, 6, 8, 11, 15, 20, 26, 33, 41, 50]
+
+
+def test_a_delay_of_three_lags_three_ticks(tmp_path: Path):
+    wires = {
+        "sum": {"number": "start.number", "other": {"from": "source.number", "delay": 3, "initial": "start.number"}},
+        "all": SUM_WIRES["all"],
+    }
+    assert numbers(graph_of(SUM, wires), tmp_path) == [10, 10, 10, 5, 6, 7, 8, 9, 10, 11]
+
+
+def test_a_stage_that_lacks_a_required_input_is_skipped_and_counted(tmp_path: Path):
+    graph = graph_of(
+        {**SUM, "source": {"_target_": "Count", "gap": 3}, "sum": "Scale"},
+        {"sum": {"number": "source.number"}, "all": SUM_WIRES["all"]},
+    )
+    engine = Engine(graph, {}, 0, tmp_path, tmp_path / "memory", ["all.metrics"])
+    found = engine.run()["all.metrics"].values["numbers"]
+    assert found == {"all": [0, 1, None, 3, 4, None, 6, 7, None, 9], "present": 7}
+    assert engine.calls["sum"].ctx.counts["skipped.sum"] == 3
+
+
+def test_hold_gives_the_last_present_value(tmp_path: Path):
+    held = {"from": "source.number", "hold": True}
+    graph = graph_of(
+        {**SUM, "source": {"_target_": "Count", "gap": 3}}, {"sum": {"number": held}, "all": SUM_WIRES["all"]}
+    )
+    assert numbers(graph, tmp_path)[:6] == [None, 0, 1, 1, 3, 4]
+
+
+def test_an_initial_value_that_comes_every_tick_replaces_the_delayed_one_when_it_is_present(tmp_path: Path):
+    nodes = {**SUM, "source": {"_target_": "Count", "length_": 3, "logs": 2}, "start": "Restart"}
+    wires = {**SUM_WIRES, "start": {"number": "source.number"}}
+    # first log from 100, second from 101: 100+0, +1, +2, then 101+3, +4, +5
+    assert numbers(graph_of(nodes, wires), tmp_path) == [100, 101, 103, 104, 108, 113]
+
+
+def test_a_value_updated_in_place_is_seen_delayed_before_the_writer_and_whole_at_the_end(tmp_path: Path):
+    delayed = {"from": "enter.ledger", "delay": 1, "initial": "new.ledger"}
+    nodes = {
+        "source": "Count",
+        "new": "NewLedger",
+        "enter": "Enter",
+        "look": "Look",
+        "final": "Look",
+        "all": "Collected",
+    }
+    wires = {
+        "enter": {"number": "source.number", "ledger": delayed},
+        "look": {"ledger": delayed},
+        "all": {"numbers": {"from": "look.number", "collect": True}},
+    }
+    assert numbers(graph_of({k: v for k, v in nodes.items() if k != "final"}, wires), tmp_path) == list(range(10))
+
+
+def test_randomness_comes_from_seed_and_node_name_alone(tmp_path: Path):
+    def noisy(extra: dict, seed: int, place: str) -> list:
+        nodes = {"source": "Count", "sum": "Noise", "all": "Collected", **extra}
+        wires = {
+            "sum": {"number": "source.number"},
+            "all": SUM_WIRES["all"],
+            **{name: {"number": "source.number"} for name in extra},
+        }
+        return numbers(graph_of(nodes, wires), tmp_path / place, seed)
+
+    assert noisy({}, 1, "a") == noisy({"another": "Noise"}, 1, "b")
+    assert noisy({}, 1, "c") != noisy({}, 2, "d")
+
+
+def test_a_failing_stage_is_named_with_the_tick(tmp_path: Path):
+    graph = graph_of({**SUM, "sum": "Fail"}, {"sum": {"number": "source.number"}, "all": SUM_WIRES["all"]})
+    with pytest.raises(
+        StageFailed,
+        match=r"stage 'sum' \(toys.Fail\) failed at tick 3 \(log 0, frame 3\): RuntimeError: the wheel fell off",
+    ):
+        numbers(graph, tmp_path)
+
+
+FULL = {
+    "source": {"_target_": "Count", "length_": 40, "gap": 7},
+    "start": {"_target_": "Constant", "value": 5.0},
+    "noise": "Noise",
+    "breaks": {"_target_": "Fail", "at": -1},
+    "seen": "Remember",
+    "sum": "Add",
+    "new": "NewLedger",
+    "enter": "Enter",
+    "look": "Look",
+    "all": "Collected",
+    "ledger": {"_target_": "Collected", "name": "ledger.txt"},
+}
+FULL_WIRES = {
+    "noise": {"number": "source.number"},
+    "breaks": {"number": "noise.number"},
+    "seen": {"number": "breaks.number"},
+    "sum": {
+        "number": {"from": "seen.number", "hold": True},
+        "other": {"from": "sum.number", "delay": 2, "initial": "start.number"},
+    },
+    "enter": {
+        "number": "noise.number",
+        "ledger": {"from": "enter.ledger", "delay": 1, "initial": "new.ledger", "hold": False},
+    },
+    "look": {"ledger": {"from": "enter.ledger", "delay": 1, "initial": "new.ledger", "hold": False}},
+    "all": {"numbers": {"from": "sum.number", "collect": True}},
+    "ledger": {"numbers": {"from": "noise.number", "collect": True}},
+}
+
+
+@pytest.mark.parametrize("at", [0, 1, 2, 13, 39])
+def test_a_run_that_was_stopped_goes_on_to_the_same_result(tmp_path: Path, at: int):
+    def run(place: Path, breaks_at: int) -> list:
+        graph = graph_of({**FULL, "breaks": {"_target_": "Fail", "at": breaks_at}}, FULL_WIRES)
+        engine = Engine(graph, {}, 3, place, place / "memory", ["all.metrics"], identity="same", every_s=0.0)
+        return [
+            engine.run()["all.metrics"].values,
+            (place / "numbers.txt").read_bytes(),
+            (place / "ledger.txt").read_bytes(),
+        ]
+
+    unbroken = run(tmp_path / "unbroken", -1)
+    if at % 7 == 6:
+        at += 1
+    with pytest.raises(StageFailed):
+        run(tmp_path / "broken", at)
+    assert run(tmp_path / "broken", -1) == unbroken
+
+
+def test_a_checkpoint_of_another_run_is_refused(tmp_path: Path):
+    from omninav.pipeline.problems import BadInput
+
+    graph = graph_of(SUM, SUM_WIRES)
+    Engine(graph, {}, 0, tmp_path, tmp_path / "memory", identity="one").run()
+    with pytest.raises(BadInput, match="belongs to another run"):
+        Engine(graph, {}, 0, tmp_path, tmp_path / "memory", identity="other").run()
+
+
+FRONT = {
+    "source": "Count",
+    "scale": {"_target_": "Scale", "factor": 2.0},
+    "start": "Constant",
+    "sum": "Add",
+    "all": "Collected",
+}
+FRONT_WIRES = {
+    "scale": {"number": "source.number"},
+    "sum": {"number": "scale.number", "other": {"from": "sum.number", "delay": 1, "initial": "start.number"}},
+    "all": SUM_WIRES["all"],
+}
+
+
+def test_the_front_is_what_follows_from_the_log_alone():
+    assert front_nodes(graph_of(FRONT, FRONT_WIRES)) == {"source", "scale"}
+
+
+def test_the_front_is_computed_once_and_then_replayed_with_the_same_result(tmp_path: Path):
+    cache = Cache(tmp_path / "cache")
+
+    def run(place: str) -> tuple[list, bool]:
+        graph = graph_of(FRONT, FRONT_WIRES)
+        with cached_front(graph, cache, 0) as front:
+            assert front is not None
+            engine = Engine(graph, {}, 0, tmp_path / place, tmp_path / place / "memory", ["all.metrics"], front=front)
+            values = engine.run()["all.metrics"].values["numbers"]["all"]
+            if front.replay is None:
+                keep(
+                    front,
+                    cache,
+                    0,
+                    engine.spools["front"].path,
+                    {n: engine.calls[n].ctx.notes() for n in front.nodes} if engine.spools["front"].size else {},
+                )
+            return values, front.replay is not None
+
+    first, second = run("a"), run("b")
+    assert first[0] == second[0]
+    assert (first[1], second[1]) == (False, True)
+
+
+def test_a_front_whose_boundary_is_bulky_is_not_cached_and_says_why(tmp_path: Path):
+    graph = graph_of(
+        {**FRONT, "eat": "Swallow", "scale": "Noise"},
+        {**FRONT_WIRES, "scale": {"number": "source.number"}, "eat": {"big": "source.big"}},
+    )
+    nodes = {**FRONT, "enter": "Swallow"}
+    wires = {**FRONT_WIRES, "enter": {"big": {"from": "source.big", "hold": True}}}
+    del graph
+    with cached_front(graph_of(nodes, wires), Cache(tmp_path), 0) as front:
+        assert front is not None
+        assert front.key != ""  # Swallow itself belongs to the front: only its number leaves it
+    delayed = {"big": {"from": "source.big", "delay": 1, "initial": "source.big"}}
+    with cached_front(graph_of(nodes, {**FRONT_WIRES, "enter": delayed}), Cache(tmp_path), 0) as front:
+        assert front is not None
+        assert "source.big is too large to keep and is read by enter" in front.said

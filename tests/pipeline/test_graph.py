@@ -1,0 +1,216 @@
+"""Graphs: what is accepted, and everything that is said about what is not."""
+
+import pytest
+
+import toys
+from omninav.pipeline.graph import build
+from omninav.pipeline.problems import ProblemsFound
+
+
+def config(nodes: dict, wires: dict | None = None) -> dict:
+    return {
+        "nodes": {
+            name: {"_target_": f"toys.{spec}"} if isinstance(spec, str) else spec for name, spec in nodes.items()
+        },
+        "wires": wires or {},
+    }
+
+
+def problems(nodes: dict, wires: dict | None = None, artifacts: dict | None = None) -> list:
+    with pytest.raises(ProblemsFound) as found:
+        build(config(nodes, wires), artifacts)
+    return list(found.value.problems)
+
+
+def only(nodes: dict, wires: dict | None = None, artifacts: dict | None = None):
+    found = problems(nodes, wires, artifacts)
+    assert len(found) == 1, [str(problem) for problem in found]
+    return found[0]
+
+
+LOOP = {"source": "Count", "start": "Constant", "sum": "Add"}
+LOOP_WIRES = {
+    "sum": {"number": "source.number", "other": {"from": "sum.number", "delay": 1, "initial": "start.number"}}
+}
+
+
+def test_lifetimes_follow_from_the_wires():
+    graph = build(
+        config(
+            {**LOOP, "scale": "Scale", "all": "Collected", "look": "Spell"},
+            {
+                **LOOP_WIRES,
+                "scale": {"number": "start.number"},
+                "all": {"numbers": {"from": "sum.number", "collect": True}},
+                "look": {"number": "scale.number"},
+            },
+        )
+    )
+    assert {n.name: n.lifetime for n in graph.nodes.values()} == {
+        "source": "tick",
+        "start": "before",
+        "sum": "tick",
+        "scale": "before",
+        "all": "after",
+        "look": "before",
+    }
+
+
+def test_who_reads_a_port_can_be_asked():
+    assert build(config(LOOP, LOOP_WIRES)).readers_of("start.number") == ["sum"]
+    assert build(config(LOOP, LOOP_WIRES)).readers_of("source.number") == ["sum"]
+
+
+def test_all_problems_are_said_at_once():
+    found = problems(
+        {"source": "Count", "scale": {"_target_": "toys.Scale", "facter": 2, "mode": "plane"}, "sum": "Add"},
+        {"sum": {"number": "sorce.number", "othr": "scale.number"}, "scal": {"number": "source.number"}},
+    )
+    assert [problem.where for problem in found] == [
+        "nodes.scale.facter",
+        "nodes.scale.mode",
+        "wires.sum.number",
+        "wires.sum.othr",
+        "wires.scal",
+        "wires.scale.number",
+    ]
+
+
+def test_an_unknown_parameter_names_the_nearest_one():
+    problem = only(
+        {"scale": {"_target_": "toys.Scale", "facter": 2}, "c": "Constant"}, {"scale": {"number": "c.number"}}
+    )
+    assert problem.where == "nodes.scale.facter"
+    assert "did you mean 'nodes.scale.factor'?" in problem.hint
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ({"factor": "two"}, "'two' (str), expected float > 0 and <= 100"),
+        ({"factor": -1}, "-1.0 is out of bounds, expected float > 0 and <= 100"),
+        ({"factor": True}, "True (bool), expected float > 0 and <= 100"),
+        ({"mode": "plane"}, "'plane' (str), expected 'plain' | 'negative'"),
+        ({"weights": [1, "x"]}, "'x' (str), expected float"),
+    ],
+)
+def test_a_wrong_parameter_names_what_was_expected(value: dict, said: str):
+    problem = only({"scale": {"_target_": "toys.Scale", **value}, "c": "Constant"}, {"scale": {"number": "c.number"}})
+    assert problem.what == said
+
+
+def test_wrong_types_on_a_wire_show_both_sides_and_what_would_fit():
+    problem = only(
+        {"c": "Constant", "spell": "Spell", "s": "Scale"},
+        {"spell": {"number": "c.number"}, "s": {"number": "spell.word"}},
+    )
+    assert problem.where == "wires.s.number"
+    assert problem.what == "spell.word gives Word, s.number (Scale) takes Number"
+    assert problem.hint == "what gives Number here: c.number, s.number"
+
+
+def test_a_missing_input_names_what_would_fit():
+    problem = only({"c": "Constant", "s": "Scale"})
+    assert (problem.where, problem.hint) == ("wires.s.number", "what gives Number here: c.number, s.number")
+
+
+def test_an_unknown_node_on_a_wire_names_the_nearest_one():
+    problem = only({"start": "Constant", "s": "Scale"}, {"s": {"number": "strat.number"}})
+    assert "did you mean 'start.number'?" in problem.hint
+
+
+def test_a_missing_artifact_is_a_problem_and_a_fitting_one_is_none():
+    assert "there is no artifact 'map'" in only({"s": "Scale"}, {"s": {"number": "artifacts.map"}}).what
+    build(config({"s": "Scale"}, {"s": {"number": "artifacts.map"}}), {"map": toys.Whole})
+    assert "gives Word" in only({"s": "Scale"}, {"s": {"number": "artifacts.map"}}, {"map": toys.Word}).what
+
+
+def test_a_delay_without_a_first_value_is_a_problem():
+    problem = only(LOOP, {"sum": {"number": "source.number", "other": {"from": "sum.number", "delay": 1}}})
+    assert "needs a first value" in problem.what
+    assert problem.hint == "type +wires.sum.other.initial=node.port"
+
+
+def test_a_loop_without_a_delay_shows_the_way_round():
+    problem = only(
+        {"a": "Add", "b": "Add", "c": "Constant"},
+        {"a": {"number": "c.number", "other": "b.number"}, "b": {"number": "a.number"}},
+    )
+    assert "the nodes wait for each other: a -> b -> a" in problem.what
+    assert "delay: 1" in problem.hint
+
+
+def test_a_sequence_port_needs_a_collect_wire_and_the_other_way_round():
+    problem = only({"c": "Constant", "all": "Collected"}, {"all": {"numbers": "c.number"}})
+    assert problem.hint == "write {from: …, collect: true}"
+    problem = only({"c": "Constant", "s": "Scale"}, {"s": {"number": {"from": "c.number", "collect": True}}})
+    assert "takes one value" in problem.what
+
+
+def test_nothing_after_the_loop_can_feed_the_loop_by_a_delay():
+    nodes = {**LOOP, "all": "Collected"}
+    wires = {**LOOP_WIRES, "all": {"numbers": {"from": "source.number", "collect": True}}}
+    build(config(nodes, wires))
+    nodes["late"] = "Add"
+    late = {"number": "source.number", "other": {"from": "late.number", "delay": 1, "initial": "start.number"}}
+    build(config(nodes, {**wires, "late": late}))
+
+
+def test_two_sources_are_one_too_many():
+    assert "several sources (a, b)" in only({"a": "Count", "b": "Count"}).what
+
+
+LEDGER = {"source": "Count", "new": "NewLedger", "look": "Look", "enter": "Enter"}
+DELAYED = {"from": "enter.ledger", "delay": 1, "initial": "new.ledger"}
+
+
+def test_readers_of_a_value_updated_in_place_run_before_its_writer():
+    wires = {"look": {"ledger": DELAYED}, "enter": {"number": "source.number", "ledger": DELAYED}}
+    order = list(build(config({"enter": "Enter", **LEDGER}, wires)).nodes)
+    assert order.index("look") < order.index("enter")
+
+
+def test_a_reader_that_cannot_run_before_the_writer_is_refused():
+    nodes = {**LEDGER, "again": "Look"}
+    wires = {
+        "enter": {"number": "source.number", "ledger": DELAYED},
+        "look": {"ledger": "enter.ledger"},
+        "again": {"ledger": DELAYED},
+    }
+    build(config(nodes, wires))
+    nodes["sum"] = "Add"
+    nodes["both"] = "Enter"
+    wires["both"] = {"number": "look.number", "ledger": DELAYED}
+    assert (
+        "must read Ledger before 'enter' updates it" in only({k: v for k, v in nodes.items() if k != "sum"}, wires).what
+    )
+
+
+@pytest.mark.parametrize("wire", [{"hold": True}, {"collect": True}, {"delay": 2, "initial": "new.ledger"}])
+def test_a_value_updated_in_place_cannot_be_held_collected_or_delayed_further(wire: dict):
+    found = problems(
+        LEDGER,
+        {"enter": {"number": "source.number", "ledger": DELAYED}, "look": {"ledger": {"from": "enter.ledger", **wire}}},
+    )
+    assert any("is updated in place" in problem.what for problem in found) or "collect" in wire
+
+
+def test_a_target_that_is_no_stage_is_refused_and_never_called():
+    for target in (
+        "toys.NotAStage",
+        "os.system",
+        "toys.Scale.step",
+        "nowhere.Thing",
+        "toys.Scael",
+        "plain",
+        "toys:Scael",
+    ):
+        problem = only({"x": {"_target_": target}})
+        assert problem.where == "nodes.x._target_"
+    assert not toys.NotAStage.called
+
+
+def test_a_node_can_be_taken_out():
+    assert list(
+        build(config({"c": "Constant"}) | {"nodes": {"c": {"_target_": "toys.Constant"}, "d": None}}).nodes
+    ) == ["c"]

@@ -1,0 +1,243 @@
+"""Small stages for the tests of the framework: numbers instead of robots."""
+
+import os
+import signal
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Source, Stage, State, Tick, Value
+from omninav.pipeline.files import write_whole
+from omninav.pipeline.results import Metrics
+
+
+class Number(Value):
+    value: float
+
+
+class Whole(Number):
+    """A Number of a narrower kind."""
+
+
+class Word(Value):
+    text: str
+
+
+class Big(Value):
+    bulky = True
+    array: np.ndarray
+
+
+class Ledger(Value):
+    """A large value that is updated in place."""
+
+    in_place = True
+    entries: list[float]
+
+
+class Count(Source):
+    """0, 1, 2, … ; every `gap`-th number is absent. Two logs where `logs` is 2."""
+
+    length_: int = 10
+    gap: int = 0
+    logs: int = 1
+
+    class Place(State):
+        next: int = 0
+
+    class Out(Outputs):
+        tick: Tick
+        number: Number | None = None
+        big: Big
+
+    def step(self, ctx: Context, place: Place) -> Out | None:
+        index = place.next
+        if index >= self.length_ * self.logs:
+            return None
+        place.next += 1
+        log, frame = divmod(index, self.length_)
+        tick = Tick(index, index * 10, log, frame, frame == 0)
+        absent = self.gap and index % self.gap == self.gap - 1
+        return self.Out(tick=tick, number=None if absent else Number(float(index)), big=Big(np.full(3, index)))
+
+    def length(self) -> int | None:
+        return self.length_ * self.logs
+
+
+class Constant(Stage):
+    """A number that is there before the loop."""
+
+    value: float = 0.0
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context) -> Out:
+        return self.Out(number=Number(self.value))
+
+
+class Restart(Stage):
+    """A number at the first tick of every log, nothing else."""
+
+    value: float = 100.0
+
+    class Out(Outputs):
+        number: Number | None = None
+
+    def step(self, ctx: Context, number: Number | None = None) -> Out:
+        return self.Out(number=Number(self.value + ctx.tick.log) if ctx.tick.first_of_log else None)
+
+
+class Scale(Stage):
+    """A number times a factor."""
+
+    factor: Annotated[float, Bounds(gt=0, le=100)] = 1.0
+    mode: Literal["plain", "negative"] = "plain"
+    weights: tuple[float, ...] = ()
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, number: Number) -> Out:
+        return self.Out(number=Number(number.value * self.factor * (-1 if self.mode == "negative" else 1)))
+
+
+class Noise(Stage):
+    """A number with noise from the stage's own generator."""
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, number: Number) -> Out:
+        return self.Out(number=Number(number.value + ctx.rng.standard_normal()))
+
+
+class Add(Stage):
+    """The sum of two numbers, the second of which may be missing."""
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, number: Number, other: Number | None = None) -> Out:
+        return self.Out(number=Number(number.value + (other.value if other else 0.0)))
+
+
+class Remember(Stage):
+    """Numbers seen so far, in a State."""
+
+    class Seen(State):
+        values: tuple = ()
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, number: Number, seen: Seen) -> Out:
+        seen.values = (*seen.values, number.value)
+        return self.Out(number=Number(float(len(seen.values))))
+
+
+class NewLedger(Stage):
+    """An empty ledger before the loop."""
+
+    class Out(Outputs):
+        ledger: Ledger
+
+    def step(self, ctx: Context) -> Out:
+        return self.Out(ledger=Ledger([]))
+
+
+class Enter(Stage):
+    """Adds a number to the ledger, in place."""
+
+    class Out(Outputs):
+        ledger: Ledger
+
+    def step(self, ctx: Context, number: Number, ledger: Ledger) -> Out:
+        ledger.entries.append(number.value)
+        return self.Out(ledger=ledger)
+
+
+class Look(Stage):
+    """How many entries the ledger has."""
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, ledger: Ledger) -> Out:
+        return self.Out(number=Number(float(len(ledger.entries))))
+
+
+class Spell(Stage):
+    """A number as a word."""
+
+    class Out(Outputs):
+        word: Word
+
+    def step(self, ctx: Context, number: Number) -> Out:
+        return self.Out(word=Word(str(number.value)))
+
+
+class Swallow(Stage):
+    """Takes bulky things."""
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, big: Big) -> Out:
+        return self.Out(number=Number(float(big.array.sum())))
+
+
+class Fail(Stage):
+    """Raises at a tick."""
+
+    at: int = 3
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, number: Number) -> Out:
+        if ctx.tick.index == self.at:
+            raise RuntimeError("the wheel fell off")
+        return self.Out(number=number)
+
+
+class Collected(Stage):
+    """All numbers, after the loop, as text in a file and as a metric."""
+
+    name: str = "numbers.txt"
+
+    class Out(Outputs):
+        metrics: Metrics
+
+    def step(self, ctx: Context, numbers: Sequence[Number | None], present: Sequence[Number] = ()) -> Out:
+        values = [n.value if n is not None else None for n in numbers]
+        if ctx.folder is not None:
+            write_whole(ctx.folder / self.name, repr(values))
+        return self.Out(metrics=Metrics({"numbers": {"all": values, "present": len(present)}}))
+
+
+class Kill(Stage):
+    """Kills its own process, as `kill -9` does, at a tick, unless a file exists."""
+
+    at: int = 5
+    unless: str = ""
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, number: Number) -> Out:
+        if ctx.tick.index == self.at and not Path(self.unless).exists():
+            Path(self.unless).touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return self.Out(number=number)
+
+
+class NotAStage:
+    """Something that must never be called from a configuration."""
+
+    called = False
+
+    def __init__(self) -> None:
+        type(self).called = True
