@@ -46,15 +46,25 @@ class Drive:
         """Whether any frame has a true pose."""
         return bool(known(self.truth).any())
 
-    def odometry_alone(self) -> Array | None:
-        """Where odometry alone would have led, from the first true pose on; (N, 3), None where there is no motion.
+    def odometry(self) -> Array | None:
+        """Motions one after another, from the origin at the first frame; (N, 3), None where there is no motion.
 
-        A frame whose motion is absent did not move. Without any truth the path is laid through the last estimate, so
-        that its shape can be compared.
+        A frame whose motion is absent did not move.
         """
         if not known(self.motion).any():
             return None
-        path = chain(np.nan_to_num(self.motion))
+        moved = np.nan_to_num(self.motion)
+        moved[0] = 0.0
+        return chain(moved)
+
+    def odometry_alone(self) -> Array | None:
+        """Where odometry alone would have led, from the first true pose on; (N, 3), None where there is no motion.
+
+        Without any truth the path is laid through the last estimate, so that its shape can be compared.
+        """
+        path = self.odometry()
+        if path is None:
+            return None
         if self.has_truth:
             anchor, at = int(np.argmax(known(self.truth))), self.truth
         elif known(self.estimate).any():

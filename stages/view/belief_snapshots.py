@@ -18,7 +18,7 @@ from .style import ESTIMATE, PARTICLE, TRUTH, draw_map, draw_pose, extent_of, fi
 
 
 class BeliefSnapshots(Stage):
-    """The particles over the map at `moments` frames of the last log, dense at its beginning, with estimate and truth."""
+    """The particles over the map at `moments` frames of the last log, dense at its beginning, with estimate, truth."""
 
     moments: Annotated[int, Bounds(ge=1, le=12)] = 6
 
@@ -52,7 +52,7 @@ class BeliefSnapshots(Stage):
             figure=Figure(
                 name="belief_snapshots",
                 title="How the belief came together",
-                caption=f"{len(panels)} moments of the drive, dense at its beginning. Pink: the belief's particles; arrows: "
+                caption=f"{len(panels)} moments of the drive, dense at its beginning. Pink: particles; arrows: "
                 "the estimate (blue) and the true pose (black). The spread is the standard deviation of the "
                 "particles' distance from their mean.",
                 content=_draw(panels, map),

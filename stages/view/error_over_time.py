@@ -8,7 +8,7 @@ from omninav.pipeline import Context, Outputs, Stage, Tick
 from omninav.pipeline.results import Figure
 from omninav.stages.geometry.errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.drives import Drive, drives
+from omninav.stages.values.drives import Array, Drive, drives
 from omninav.stages.values.pose import Motion, Pose
 
 from .style import ESTIMATE, MARK, ODOMETRY, picture
@@ -41,7 +41,7 @@ class ErrorOverTime(Stage):
             figure=Figure(
                 name="error_over_time",
                 title="Error over time",
-                caption="Distance from the true position and size of the heading error. The line marks the frame after which "
+                caption="Distance from the true position and size of the heading error. The line marks where "
                 "the error stays below 1 m and 20 degrees for ten frames. The scale is logarithmic.",
                 content=_draw(logs),
                 order=20,
@@ -87,8 +87,8 @@ def _draw(logs: Sequence[Drive]) -> bytes:
                     )
                 axes.set_ylabel(name)
                 axes.set_yscale("log")
-            upper.set_ylim(bottom=0.01)
-            lower.set_ylim(bottom=0.1, top=250)
+            upper.set_ylim(bottom=_floor(position[scored]))
+            lower.set_ylim(bottom=_floor(heading[scored]), top=250)
             upper.tick_params(labelbottom=False)
             lower.set_xlabel("time since the log's first frame (s)")
             upper.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
@@ -97,6 +97,11 @@ def _draw(logs: Sequence[Drive]) -> bytes:
             if len(logs) > 1:
                 upper.set_title(f"log {drive.log}")
     return drawn.content
+
+
+def _floor(errors: Array) -> float:
+    """Where a logarithmic axis begins: below nearly all errors, without following single zeros down."""
+    return max(float(np.percentile(errors, 2)) / 2, 1e-4) if len(errors) else 1e-2
 
 
 def _plain():  # type: ignore[no-untyped-def]

@@ -100,7 +100,7 @@ def _draw(panels: Sequence[tuple[Tick, Peaks, Pose | None]], map: ReferenceGraph
             profile.plot(turned[order], peak.profile[order], ".-", color=ESTIMATE, markersize=4)
             profile.set_xlim(-185, 185)
             profile.set_xticks([-180, -90, 0, 90, 180])
-            profile.set_xlabel("heading against the reference (°)")
+            profile.set_xlabel("heading − reference's (°)")
             true_turn = np.degrees(wrap(truths[number, 2] - ring[2]))
             if np.isfinite(true_turn):
                 profile.axvline(float(true_turn), color=TRUTH, linestyle="--", linewidth=1.1)

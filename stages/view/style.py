@@ -102,7 +102,7 @@ def draw_pose(axes: "Axes", pose: Array, length: float, colour: str, label: str 
 
 
 def extent_of(*points: Array, margin: float = 0.06) -> tuple[float, float, float, float] | None:
-    """The part of the plane that holds all finite points, (N, 2 or more) each, with a margin; None where there are none."""
+    """The part of the plane that holds all finite points, (N, 2 or more) each, with a margin; None: there are none."""
     together = np.concatenate([np.empty((0, 2)), *(p[:, :2] for p in points)])
     together = together[np.isfinite(together).all(axis=1)]
     if not len(together):

@@ -15,7 +15,7 @@ from .style import ESTIMATE, MARK, ODOMETRY, TRUTH, draw_map, extent_of, fitting
 
 
 class TrajectoryOverMap(Stage):
-    """Estimate, truth and odometry alone over the map's references and edges, one picture per log. Map frame, metres."""
+    """Estimate, truth and odometry alone over the map's references and edges, one panel per log (map frame, m)."""
 
     class Out(Outputs):
         """`figure`: the last log; `earlier`: where there are several, the ones before it in one picture."""
@@ -69,7 +69,7 @@ def _caption(drive: Drive, map: ReferenceGraph | None) -> str:
 def _draw(logs: Sequence[Drive], map: ReferenceGraph | None) -> bytes:
     columns = min(len(logs), 2)
     rows = -(-len(logs) // columns)
-    extent = extent_of(*(p for drive in logs for p in (drive.estimate, drive.truth)), *([map.poses] if map else []))
+    extent = _shown(logs, map)
     width = 8.0 / columns
     with picture(8.0, rows * fitting_height(extent, width, 2.6, 8.5 if columns == 1 else 5.0)) as drawn:
         for number, drive in enumerate(logs):
@@ -95,13 +95,18 @@ def _draw(logs: Sequence[Drive], map: ReferenceGraph | None) -> bytes:
                 drive.truth[known(drive.truth)][:1] if drive.has_truth else drive.estimate[known(drive.estimate)][:1]
             )
             axes.plot(start[:, 0], start[:, 1], "s", color=MARK, markersize=7, zorder=7, label="start")
-            # odometry drifts far away; it may leave the picture by half its size, not shrink the rest
-            shown = extent_of(drive.estimate, drive.truth, map.poses) if map else extent_of(drive.estimate, drive.truth)
-            plan_axes(axes, shown)
+            plan_axes(axes, extent)
             if len(logs) > 1:
                 axes.set_title(f"log {drive.log}")
-            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16 if shown is None else -0.1), ncols=5)
+        handles, labels = drawn.canvas.axes[0].get_legend_handles_labels()
+        drawn.canvas.legend(handles, labels, loc="outside lower center", ncols=5)
     return drawn.content
+
+
+def _shown(logs: Sequence[Drive], map: ReferenceGraph | None) -> tuple[float, float, float, float] | None:
+    """Truth and map, or estimate and map: what strays (odometry, a lost filter) leaves the picture, not shrinks it."""
+    kept = [drive.truth if drive.has_truth else drive.estimate for drive in logs]
+    return extent_of(*kept, *([map.poses] if map is not None else []), margin=0.15)
 
 
 def _broken_at_jumps(drive: Drive) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
