@@ -458,7 +458,7 @@ def _doctor(arguments: list[str]) -> int:
     from .run import LIBRARIES, _version
 
     print(
-        f"omninav {_version('omninav')}, Python {platform.python_version()}, {platform.platform()}, {os.cpu_count()} cores"
+        f"omninav {_version('omninav')}, Python {platform.python_version()}, {platform.system()}, {os.cpu_count()} cores"
     )
     rows = list(entries())
     for name in LIBRARIES:

@@ -385,7 +385,7 @@ class _Builder:
             if wire.to_node in after and wire.delay:
                 self._problem(
                     wire.where,
-                    f"'{wire.to_node}' runs after the loop (something collects a sequence), where there is no tick before",
+                    f"'{wire.to_node}' runs after the loop (something collects a sequence): no tick is before it",
                     "leave delay away",
                 )
         for name in sorted(after & tick_roots):
@@ -396,7 +396,7 @@ class _Builder:
         return {name: "after" if name in after else "tick" if name in ticking else "before" for name in self.nodes}
 
     def _ordered(self, lifetimes: dict[str, Lifetime]) -> Graph:
-                order: nx.DiGraph[str] = nx.DiGraph()
+        order: nx.DiGraph[str] = nx.DiGraph()
         order.add_nodes_from(self.nodes)
         for wire in self.wires:
             if wire.from_node != ARTIFACTS and not wire.delay:
@@ -408,16 +408,17 @@ class _Builder:
             path = " -> ".join([*cycle, cycle[0]])
             around = zip(cycle, [*cycle[1:], cycle[0]], strict=True)
             edges = {(start, end) for start, end in around}
-            wire = next(w for w in self.wires if (w.from_node, w.to_node) in edges and not w.delay)
+            wire = next((w for w in self.wires if (w.from_node, w.to_node) in edges and not w.delay), self.wires[0])
             hint = f"break the loop with a delay: {wire.where}={{from: {wire.origin}, delay: 1, initial: …}}"
             self._problem(wire.where, f"the nodes wait for each other: {path}", hint)
             return Graph(self.nodes, self.wires, self.artifacts)
         self._order_in_place(order, lifetimes)
         listed = list(self.nodes)
-        running = nx.lexicographical_topological_sort(
-            order,
-            key=lambda name: (LIFETIMES.index(lifetimes[name]), not self.nodes[name].signature.is_source, listed.index(name)),
-        )
+
+        def early(name: str) -> tuple[int, bool, int]:
+            return LIFETIMES.index(lifetimes[name]), not self.nodes[name].signature.is_source, listed.index(name)
+
+        running = nx.lexicographical_topological_sort(order, key=early)
         nodes = {name: dataclasses.replace(self.nodes[name], lifetime=lifetimes[name]) for name in running}
         return Graph(nodes, self.wires, self.artifacts)
 
