@@ -18,12 +18,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import lz4.frame
 import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Footer, Schema
+from lz4 import frame as lz4
 from mcap.writer import CompressionType, Writer
 
 from .files import whole_file
@@ -74,7 +74,7 @@ class Record(NamedTuple):
     stamp: int
     log_time: int
     data: bytes | memoryview
-    location: Location
+    location: Any
 
 
 class _Chunk(NamedTuple):
@@ -449,7 +449,7 @@ class LogWriter:
         trace: TracebackType | None,
     ) -> None:
         if kind is None:
-            self._writer.finish()
+            self._writer.finish()  # type: ignore[no-untyped-call]
         self._stack.__exit__(kind, error, trace)
 
     def write(
@@ -577,7 +577,7 @@ def _unpack(content: bytes, whole: bool) -> bytes:
     if chunk.compression == "zstd":
         data = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=chunk.uncompressed_size)
     elif chunk.compression == "lz4":
-        data = lz4.frame.decompress(chunk.data)
+        data = lz4.decompress(chunk.data)  # type: ignore[attr-defined]
     elif chunk.compression == "":
         data = chunk.data
     else:
@@ -595,5 +595,5 @@ def _unpack_cut(content: bytes) -> bytes:
     if compression == "zstd":
         return zstandard.ZstdDecompressor().decompressobj().decompress(data)
     if compression == "lz4":
-        return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data))
+        return bytes(lz4.LZ4FrameDecompressor().decompress(data))  # type: ignore[no-untyped-call]
     return data if compression == "" else b""

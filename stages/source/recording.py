@@ -6,13 +6,14 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from omninav.pipeline.problems import BadInput
 from omninav.stages.values.camera import Camera
 from omninav.stages.values.image import Pixels
 
 Array = npt.NDArray[np.float64]
 
 
-class UnreadableRecording(Exception):
+class UnreadableRecording(BadInput):
     """A recording that cannot be used. The message is one line: which file, topic or record, and what to do."""
 
 

@@ -1,0 +1,194 @@
+"""The source of recorded drives: one tick per usable picture."""
+
+import hashlib
+import math
+from collections import Counter
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
+from omninav.stages.geometry.se2 import between, compose
+from omninav.stages.values.camera import Camera
+from omninav.stages.values.image import Image
+from omninav.stages.values.pose import Motion, Pose
+
+from .opening import open_recording
+from .recording import Recording, UnreadableRecording
+from .topics import Topics
+
+Array = npt.NDArray[np.float64]
+
+
+class Position(State):
+    """Where in the logs the source is: log, next frame and last used frame (-1: none) as positions in the selection,
+    ticks made, and the made-up odometry so far (x, y in metres, heading in radians)."""
+
+    log: int = 0
+    next: int = 0
+    last: int = -1
+    ticks: int = 0
+    x: float = 0.0
+    y: float = 0.0
+    heading: float = 0.0
+
+
+class LogSource(Source):
+    """Recorded drives, one after another: a tick for every picture that can be used.
+
+    `log` names one recording or several (see `open_recording`); `first`, `stop` and `stride` select frames of each.
+    Poses are metres and radians; stamps are header stamps. `motion` is the SE(2) increment of the odometry between
+    the pictures' own times, absent at the first picture of each log; where pictures are left out it spans the gap.
+
+    A recording without odometry but with positions gets a made-up one (`odometry: synthetic` in the manifest): the
+    true increment, disturbed by `disturb`, with noise drawn frame by frame from the run's seed.
+    """
+
+    log: str | tuple[str, ...] | None = None
+    route: str | None = None
+    topics: Topics = Topics()
+    camera: str | None = None
+    layouts: tuple[str, ...] = ()
+    first: Annotated[int, Bounds(ge=0)] = 0
+    stop: Annotated[int, Bounds(ge=1)] | None = None
+    stride: Annotated[int, Bounds(ge=1)] = 1
+    synthetic_distance_noise: Annotated[float, Bounds(ge=0.10)] = 0.10
+    synthetic_turn_noise_deg_per_m: Annotated[float, Bounds(ge=3.0)] = 3.0
+    synthetic_turn_noise_deg_per_rad: Annotated[float, Bounds(ge=0.0)] = 3.0
+
+    class Out(Outputs):
+        tick: Tick
+        image: Image
+        camera: Camera
+        odometry: Pose | None = None
+        motion: Motion | None = None
+        truth: Pose | None = None
+
+    def setup(self, ctx: Context) -> None:
+        """Open all logs; what is lost by then is counted."""
+        self._open()
+        for recording in self._recordings:
+            for kind, number in sorted(recording.dropped.items()):
+                ctx.count(kind, number, recording.details.get(kind, ""))
+        kinds = [_odometry_kind(recording) for recording in self._recordings]
+        ctx.fact("odometry", ", ".join(dict.fromkeys(kinds)))
+
+    def inputs_digest(self) -> str | None:
+        """sha256 over the content of all logs, in their order."""
+        self._open()
+        whole = hashlib.sha256()
+        for recording in self._recordings:
+            whole.update(recording.digest().encode())
+        return whole.hexdigest()
+
+    def length(self) -> int | None:
+        """Ticks to come if every picture can be decoded."""
+        self._open()
+        return sum(len(frames) for frames in self._frames)
+
+    def step(self, ctx: Context, position: Position) -> Out | None:
+        """The next picture that can be used; None after the last."""
+        while position.log < len(self._recordings):
+            recording, frames = self._recordings[position.log], self._frames[position.log]
+            while position.next < len(frames):
+                frame = int(frames[position.next])
+                known = recording.dropped.copy()
+                pixels = recording.image(frame)
+                if pixels is not None:
+                    return self._out(ctx, position, recording, frames, Image(pixels))
+                for kind, number in sorted((Counter(recording.dropped) - known).items()):
+                    ctx.count(kind, number, recording.details.get(kind, ""))
+                position.next += 1
+            position.log, position.next, position.last = position.log + 1, 0, -1
+            position.x = position.y = position.heading = 0.0
+        return None
+
+    def _out(
+        self, ctx: Context, position: Position, recording: Recording, frames: npt.NDArray[np.int64], image: Image
+    ) -> Out:
+        frame, first = int(frames[position.next]), position.last < 0
+        last = None if first else int(frames[position.last])
+        tick = Tick(
+            index=position.ticks,
+            stamp=int(recording.stamps[frame]),
+            log=position.log,
+            frame=frame,
+            first_of_log=first,
+        )
+        truth = None if recording.truth is None else recording.truth[frame]
+        odometry, increment = None, None
+        if recording.odometry is not None:
+            odometry = recording.odometry[frame]
+            increment = None if last is None else between(recording.odometry[last], odometry)
+        elif recording.truth is not None:
+            if last is not None:
+                increment = self._disturbed(ctx, between(recording.truth[last], recording.truth[frame]))
+                moved = compose((position.x, position.y, position.heading), increment)
+                position.x, position.y, position.heading = (float(value) for value in moved)
+            odometry = np.array([position.x, position.y, position.heading])
+        position.last, position.next, position.ticks = position.next, position.next + 1, position.ticks + 1
+        return self.Out(
+            tick=tick,
+            image=image,
+            camera=recording.camera,
+            odometry=_pose(odometry),
+            motion=None if increment is None else Motion(*(float(value) for value in increment)),
+            truth=_pose(truth),
+        )
+
+    def _disturbed(self, ctx: Context, increment: Array) -> Array:
+        return disturb(
+            increment,
+            ctx.rng.standard_normal(2),
+            self.synthetic_distance_noise,
+            math.radians(self.synthetic_turn_noise_deg_per_m),
+            math.radians(self.synthetic_turn_noise_deg_per_rad),
+        )
+
+    def _open(self) -> None:
+        if getattr(self, "_recordings", None) is not None:
+            return
+        names = (self.log,) if isinstance(self.log, str) or self.log is None else self.log
+        if not names or None in names:
+            raise UnreadableRecording("no recording is named; type log=PATH")
+        recordings = [open_recording(str(name), self.topics, self.camera, self.layouts) for name in names]
+        self._frames = [
+            np.arange(len(recording.stamps))[self.first : self.stop : self.stride] for recording in recordings
+        ]
+        for recording, frames in zip(recordings, self._frames, strict=True):
+            if not len(frames):
+                raise UnreadableRecording(
+                    f"{recording.name}: first={self.first}, stop={self.stop} leaves none of its {len(recording.stamps)} frames; "
+                    "type nodes.source.first=0 nodes.source.stop=null"
+                )
+        self._recordings = recordings
+
+
+def disturb(increment: Array, noise: Array, distance: float, turn_per_metre: float, turn_per_radian: float) -> Array:
+    """An increment of motion (3,) as a poor odometry would have measured it.
+
+    `noise`: two independent standard normal numbers n1, n2. With d the length of the increment (m) and t its turn
+    (rad), the length becomes d + distance sqrt(d) n1 and the turn t + e, e = sqrt(turn_per_metre^2 d +
+    turn_per_radian^2 |t|) n2; the translation is turned by e / 2, as if the error had grown evenly on the way.
+    Variances grow with the way, so that cutting it into more frames changes nothing: over one metre the standard deviations are
+    `distance` (metres, that is, the share of the way) and `turn_per_metre` (radians); a turn of one radian adds
+    `turn_per_radian`. The model is that of the odometry motion model in Thrun, Burgard & Fox, Probabilistic Robotics
+    (2005), section 5.4, with variances in place of standard deviations.
+    """
+    length, turn = math.hypot(increment[0], increment[1]), abs(float(increment[2]))
+    error = math.sqrt(turn_per_metre**2 * length + turn_per_radian**2 * turn) * float(noise[1])
+    scale = 1.0 + distance / math.sqrt(length) * float(noise[0]) if length > 0 else 1.0
+    cos, sin = math.cos(error / 2) * scale, math.sin(error / 2) * scale
+    x, y = float(increment[0]), float(increment[1])
+    return np.array([cos * x - sin * y, sin * x + cos * y, float(increment[2]) + error])
+
+
+def _odometry_kind(recording: Recording) -> str:
+    if recording.odometry is not None:
+        return "measured"
+    return "missing" if recording.truth is None else "synthetic"
+
+
+def _pose(row: Array | None) -> Pose | None:
+    return None if row is None or not np.isfinite(row).all() else Pose(*(float(value) for value in row))

@@ -1,0 +1,94 @@
+"""ROS messages as what they mean here: poses in the plane, and pictures."""
+
+import math
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.values.image import Pixels
+
+POSE_TYPES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped")
+IMAGE_TYPES = ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image")
+LEVELS_OF_A_BLANK = 2
+"""A constant picture may differ by this much after JPEG compression (rounding of one level to either side)."""
+
+_AS_BGR = {
+    "bgr8": (3, None),
+    "8UC3": (3, None),
+    "rgb8": (3, cv2.COLOR_RGB2BGR),
+    "bgra8": (4, cv2.COLOR_BGRA2BGR),
+    "rgba8": (4, cv2.COLOR_RGBA2BGR),
+    "mono8": (1, cv2.COLOR_GRAY2BGR),
+    "8UC1": (1, cv2.COLOR_GRAY2BGR),
+    # OpenCV names a Bayer pattern by the second row's second and third pixel, ROS by the first row's first two
+    "bayer_rggb8": (1, cv2.COLOR_BayerBG2BGR),
+    "bayer_bggr8": (1, cv2.COLOR_BayerRG2BGR),
+    "bayer_gbrg8": (1, cv2.COLOR_BayerGR2BGR),
+    "bayer_grbg8": (1, cv2.COLOR_BayerGB2BGR),
+}
+
+
+class Undecodable(ValueError):
+    """Bytes that are no picture; the message says what is wrong with them."""
+
+
+def pose_of(message: Any) -> tuple[float, float, float]:
+    """x, y (m) and heading (rad) of an Odometry, PoseStamped or PoseWithCovarianceStamped message.
+
+    Raises ValueError where they are not finite numbers.
+    """
+    pose = message.pose
+    pose = getattr(pose, "pose", pose)
+    position, q = pose.position, pose.orientation
+    heading = math.atan2(2 * (q.w * q.z + q.x * q.y), q.w * q.w + q.x * q.x - q.y * q.y - q.z * q.z)
+    if not math.isfinite(position.x + position.y + heading):
+        raise ValueError("its pose is not finite")
+    return float(position.x), float(position.y), heading
+
+
+def pixels_of(message: Any) -> Pixels:
+    """The picture of an Image or CompressedImage message, (height, width, 3) uint8 blue-green-red.
+
+    Raises `Undecodable`.
+    """
+    return decode_picture(bytes(message.data)) if hasattr(message, "format") else _raw_pixels(message)
+
+
+def decode_picture(data: bytes) -> Pixels:
+    """A JPEG, PNG or other picture file's bytes as (height, width, 3) uint8 blue-green-red.
+
+    Raises `Undecodable`; also for a JPEG or PNG that was cut off, whose missing part OpenCV would fill with grey.
+    """
+    if data.startswith(b"\xff\xd8") and b"\xff\xd9" not in data[-4096:]:
+        raise Undecodable("a JPEG without its end")
+    if data.startswith(b"\x89PNG") and b"IEND" not in data[-4096:]:
+        raise Undecodable("a PNG without its end")
+    try:
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    except cv2.error as error:
+        raise Undecodable(str(error.err or error)) from None
+    if pixels is None:
+        raise Undecodable(f"{len(data)} bytes that are no picture OpenCV knows")
+    return np.asarray(pixels, dtype=np.uint8)
+
+
+def is_blank(pixels: Pixels) -> bool:
+    """Whether a picture is constant: no channel spans more than `LEVELS_OF_A_BLANK` grey levels."""
+    if np.ptp(pixels[::8, ::8], axis=(0, 1)).max() > LEVELS_OF_A_BLANK:
+        return False
+    return bool(np.ptp(pixels, axis=(0, 1)).max() <= LEVELS_OF_A_BLANK)
+
+
+def _raw_pixels(message: Any) -> Pixels:
+    if message.encoding not in _AS_BGR:
+        raise Undecodable(f"encoding '{message.encoding}' is not known (known: {', '.join(_AS_BGR)})")
+    channels, conversion = _AS_BGR[message.encoding]
+    height, width, step = int(message.height), int(message.width), int(message.step)
+    data: npt.NDArray[np.uint8] = np.frombuffer(bytes(message.data), np.uint8)
+    if width < 1 or height < 1 or step < width * channels or data.size < height * step:
+        raise Undecodable(f"{data.size} bytes for {width} x {height} pixels of {message.encoding}")
+    rows = data[: height * step].reshape(height, step)[:, : width * channels]
+    raw = np.ascontiguousarray(rows).reshape((height, width, channels) if channels > 1 else (height, width))
+    return np.asarray(raw if conversion is None else cv2.cvtColor(raw, conversion), dtype=np.uint8)
