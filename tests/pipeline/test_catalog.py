@@ -1,0 +1,110 @@
+"""Finding stages: built in, installed, from the environment, by path; and plugins that are broken."""
+
+import importlib
+from pathlib import Path
+
+import pytest
+
+import toys
+from omninav.pipeline.catalog import UnknownStage, code_version, entries, plugins, resolve
+
+STAGE = """
+from omninav.pipeline import Context, Outputs, Stage
+from toys import Number
+
+class Twice(Stage):
+    '''Twice a number.'''
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, number: Number) -> Out:
+        return self.Out(number=Number(2 * number.value))
+"""
+
+
+@pytest.fixture
+def stage_file(tmp_path: Path) -> Path:
+    path = tmp_path / "twice.py"
+    path.write_text(STAGE)
+    return path
+
+
+def test_a_stage_is_found_by_its_full_name_and_by_file(stage_file: Path):
+    assert resolve("toys.Scale") is toys.Scale
+    assert resolve("toys:Scale") is toys.Scale
+    assert resolve(f"{stage_file}:Twice").__doc__ == "Twice a number."
+
+
+def test_the_environment_offers_a_stage_by_name(stage_file: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("OMNINAV_STAGES", f"match.twice={stage_file}:Twice, match.scale=toys:Scale")
+    assert resolve("match.twice").__name__ == "Twice"
+    mine = [entry for entry in entries() if entry.origin == "environment"]
+    assert [(e.name, e.role, e.summary) for e in mine] == [
+        ("match.twice", "match", "Twice a number."),
+        ("match.scale", "match", "A number times a factor."),
+    ]
+
+
+def test_an_installed_package_offers_a_stage_by_entry_point(stage_file: Path, monkeypatch: pytest.MonkeyPatch):
+    folder = stage_file.parent / "twice-1.0.dist-info"
+    folder.mkdir()
+    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: twice\nVersion: 1.0\n")
+    (folder / "entry_points.txt").write_text("[omninav.stages]\nmatch.twice = twice:Twice\n")
+    monkeypatch.syspath_prepend(str(stage_file.parent))
+    importlib.invalidate_caches()
+    assert ("match.twice", "installed") in [(e.name, e.origin) for e in plugins()]
+    assert resolve("match.twice").__name__ == "Twice"
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("import not_there_at_all\n", "ModuleNotFoundError: No module named 'not_there_at_all'"),
+        ("raise SystemExit(3)\n", "SystemExit: 3"),
+        ("class Twice: pass\n", "is not a Stage"),
+        ("", "has no 'Twice'; its stages: none"),
+    ],
+)
+def test_a_broken_plugin_is_a_row_with_its_problem_and_the_others_stay(
+    content: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    (tmp_path / "broken.py").write_text(content)
+    monkeypatch.setenv("OMNINAV_STAGES", f"match.broken={tmp_path}/broken.py:Twice,match.scale=toys:Scale")
+    rows = {entry.name: entry for entry in entries() if entry.origin == "environment"}
+    assert said in rows["match.broken"].problem
+    assert rows["match.scale"].problem == ""
+
+
+def test_an_environment_entry_that_is_not_understood_says_what_to_write(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("OMNINAV_STAGES", "my_stage.py")
+    (entry,) = plugins()
+    assert "write role.name=package.module:Class" in entry.problem
+
+
+def test_a_missing_file_is_named(tmp_path: Path):
+    with pytest.raises(UnknownStage, match=r"there is no file .*nothing\.py"):
+        resolve(f"{tmp_path}/nothing.py:Twice")
+
+
+def test_the_code_version_changes_with_any_file_of_the_package(tmp_path: Path):
+    (tmp_path / "pack").mkdir()
+    (tmp_path / "pack" / "__init__.py").write_text("")
+    (tmp_path / "pack" / "other.py").write_text("x = 1\n")
+    one = _version_in_new_process(tmp_path)
+    (tmp_path / "pack" / "other.py").write_text("x = 2\n")
+    assert _version_in_new_process(tmp_path) != one
+    assert code_version(toys.Scale) == code_version(toys.Add)
+
+
+def _version_in_new_process(tmp_path: Path) -> str:
+    import subprocess
+    import sys
+
+    (tmp_path / "pack" / "stage.py").write_text(STAGE)
+    code = "import pack.stage; from omninav.pipeline.catalog import code_version; print(code_version(pack.stage.Twice))"
+    tests = str(Path(toys.__file__).parent)
+    environment = {"PYTHONPATH": f"{tmp_path}:{tests}", "PATH": "/usr/bin:/bin"}
+    return subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    ).stdout
