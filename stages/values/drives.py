@@ -76,8 +76,7 @@ class Drive:
 
 def known(poses: Array) -> npt.NDArray[np.bool_]:
     """Which rows of (N, 3) poses are there: (N,)."""
-    there: npt.NDArray[np.bool_] = np.isfinite(poses).all(axis=1)
-    return there
+    return np.asarray(np.isfinite(poses).all(axis=1))
 
 
 def drives(
@@ -95,9 +94,9 @@ def drives(
             (
                 tick.frame,
                 tick.stamp,
-                _row(estimate and estimate.pose),
+                _row(estimate.pose if estimate else None),
                 np.full((3, 3), np.nan) if estimate is None else estimate.covariance,
-                _row(estimate and estimate.mean),
+                _row(estimate.mean if estimate else None),
                 _row(true),
                 (np.nan,) * 3 if moved is None else (moved.x, moved.y, moved.turn),
             )

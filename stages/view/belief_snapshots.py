@@ -45,7 +45,9 @@ class BeliefSnapshots(Stage):
             belief, estimate = beliefs[row], estimates[row]
             if belief is not None:
                 seconds = (last[row].stamp - last[rows[0]].stamp) / 1e9
-                panels.append((last[row].frame, seconds, belief, _row(estimate and estimate.pose), _row(truth[row])))
+                panels.append(
+                    (last[row].frame, seconds, belief, _row(estimate.pose if estimate else None), _row(truth[row]))
+                )
         if not panels:
             return self.Out()
         return self.Out(

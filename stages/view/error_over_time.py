@@ -1,6 +1,7 @@
 """How far off the estimate was, frame by frame."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from omninav.stages.values.drives import Array, Drive, drives
 from omninav.stages.values.pose import Motion, Pose
 
 from .style import ESTIMATE, MARK, ODOMETRY, picture
+
+if TYPE_CHECKING:
+    from matplotlib.ticker import Formatter
 
 
 class ErrorOverTime(Stage):
@@ -104,7 +108,7 @@ def _floor(errors: Array) -> float:
     return max(float(np.percentile(errors, 2)) / 2, 1e-4) if len(errors) else 1e-2
 
 
-def _plain():  # type: ignore[no-untyped-def]
+def _plain() -> "Formatter":
     from matplotlib.ticker import FuncFormatter
 
     return FuncFormatter(lambda value, _: f"{value:g}")

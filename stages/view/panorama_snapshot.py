@@ -26,7 +26,7 @@ class PanoramaSnapshot(Stage):
         """One frame."""
         if not is_moment(tick.frame):
             return self.Out()
-        pixels = panorama.pixels
+        pixels: cv2.typing.MatLike = panorama.pixels
         if pixels.shape[1] > 720:
             size = (720, max(1, round(pixels.shape[0] * 720 / pixels.shape[1])))
             pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)

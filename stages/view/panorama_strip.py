@@ -8,6 +8,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.results import Figure
+from omninav.stages.values.image import Pixels
 
 from .moments import spread_out
 from .panorama_snapshot import EncodedPanorama
@@ -30,10 +31,8 @@ class PanoramaStrip(Stage):
         kept = [entry for entry in kept if entry[0].log == kept[-1][0].log]
         if not kept:
             return self.Out()
-        pictures = [
-            (tick.frame, cv2.imdecode(np.frombuffer(shot.jpeg, np.uint8), cv2.IMREAD_COLOR))
-            for tick, shot in (kept[i] for i in spread_out(len(kept), self.frames))
-        ]
+        chosen = [kept[i] for i in spread_out(len(kept), self.frames)]
+        pictures = [(tick.frame, _decoded(shot)) for tick, shot in chosen]
         return self.Out(
             figure=Figure(
                 name="panorama_strip",
@@ -47,7 +46,14 @@ class PanoramaStrip(Stage):
         )
 
 
-def _draw(pictures: Sequence[tuple[int, np.ndarray]]) -> bytes:  # type: ignore[type-arg]
+def _decoded(shot: EncodedPanorama) -> Pixels:
+    pixels = cv2.imdecode(np.frombuffer(shot.jpeg, np.uint8), cv2.IMREAD_COLOR)
+    if pixels is None:
+        raise ValueError("a snapshot that was encoded by PanoramaSnapshot cannot be decoded")
+    return pixels.astype(np.uint8, copy=False)
+
+
+def _draw(pictures: Sequence[tuple[int, Pixels]]) -> bytes:
     rows, columns = pictures[0][1].shape[:2]
     height = float(np.clip(7.2 * rows / columns, 0.5, 2.2))
     with picture(8.0, len(pictures) * (height + 0.12) + 0.45, media_type="image/jpeg") as drawn:

@@ -57,7 +57,9 @@ def picture(width: float, height: float, dpi: int = 110, media_type: str = "imag
     import matplotlib
     from matplotlib.figure import Figure as Canvas
 
-    with matplotlib.rc_context({**matplotlib.rcParamsDefault, **RC}):
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()  # a user's own matplotlibrc must not change the bytes
+        matplotlib.rcParams.update(RC)
         drawn = Picture(Canvas(figsize=(width, height), dpi=dpi, layout="constrained"))
         yield drawn
         buffer = io.BytesIO()

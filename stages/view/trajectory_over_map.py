@@ -7,7 +7,7 @@ import numpy as np
 from omninav.pipeline import Context, Outputs, Stage, Tick
 from omninav.pipeline.results import Figure
 from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.drives import Drive, drives, known
+from omninav.stages.values.drives import Array, Drive, drives, known
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion, Pose
 
@@ -109,7 +109,7 @@ def _shown(logs: Sequence[Drive], map: ReferenceGraph | None) -> tuple[float, fl
     return extent_of(*kept, *([map.poses] if map is not None else []), margin=0.15)
 
 
-def _broken_at_jumps(drive: Drive) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+def _broken_at_jumps(drive: Drive) -> tuple[Array, Array]:
     """The estimate's line, interrupted where it jumps by more than 2.5 m: a jump is not a path that was driven."""
     x, y = drive.estimate[:, 0].copy(), drive.estimate[:, 1].copy()
     jumps = np.flatnonzero(np.hypot(np.diff(x), np.diff(y)) > 2.5) + 1
