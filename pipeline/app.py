@@ -273,7 +273,8 @@ def _composed(arguments: Sequence[str]) -> Iterator[Any]:
         try:
             config = compose("config", overrides=overrides)
         except HydraException as error:
-            raise ProblemsFound([Problem("command line", " ".join(str(error).split()))]) from None
+            said = " ".join(str(error).partition("Config search path")[0].split())
+            raise ProblemsFound([Problem("command line", said)]) from None
         yield config
 
 
@@ -373,7 +374,8 @@ def _variants(arguments: list[str]) -> int:
 
     for file in sorted(files(CONF).joinpath("variant").iterdir(), key=lambda path: path.name):
         if file.name.endswith(".yaml"):
-            first = file.read_text().split("\n")[0].lstrip("# ").strip()
+            comments = (line for line in file.read_text().split("\n") if line.startswith("# ") and "@package" not in line)
+            first = next(comments, "").lstrip("# ")
             print(f"{file.name.removesuffix('.yaml'):22} {first}")
     return 0
 
@@ -458,7 +460,7 @@ def _doctor(arguments: list[str]) -> int:
     from .run import LIBRARIES, _version
 
     print(
-        f"omninav {_version('omninav')}, Python {platform.python_version()}, {platform.system()}, {os.cpu_count()} cores"
+        f"omninav {_version('omninav')}, Python {platform.python_version()}, {os.cpu_count()} cores"
     )
     rows = list(entries())
     for name in LIBRARIES:

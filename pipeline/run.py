@@ -331,7 +331,7 @@ def _finish(run: Run, planned: Plan, engine: Engine, front: CachedFront | None) 
     metrics: dict[str, Any] = {}
     figures: list[Figure] = []
     tables: list[Table] = []
-    for node in [*planned.graph.of_lifetime("tick"), *planned.graph.of_lifetime("after")]:
+    for node in planned.graph.nodes.values():
         for port in node.signature.outputs:
             origin = f"{node.name}.{port}"
             for value in _flat(engine.values.get(f"{origin}#held", engine.values.get(origin))):
