@@ -16,8 +16,8 @@ F64 = npt.NDArray[np.float64]
 class Rays:
     """The pixels of a camera that see something.
 
-    `shape`: rows and columns of the picture. `pixels` (N,): their numbers, row by row. `directions` (N, 3): unit rays in
-    the robot's frame. `footprint` (N,): angle (rad) across a pixel. `gain` (N,): what vignetting leaves of the light.
+    `shape`: rows and columns of the picture. `pixels` (N,): their numbers, row by row. `directions` (N, 3): unit rays
+    in the robot's frame. `footprint` (N,): angle (rad) across a pixel. `gain` (N,): share that vignetting leaves.
     """
 
     shape: tuple[int, int]

@@ -4,8 +4,31 @@ Metres and radians in the map frame (x right and y up on the map, z up, the floo
 """
 
 from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from omninav.pipeline import Bounds
 
 Point = tuple[float, float]
+Positive = Annotated[float, Bounds(gt=0)]
+Spread = Annotated[float, Bounds(ge=0)]
+Share = Annotated[float, Bounds(ge=0, le=1)]
+Material = Literal[
+    "wall",
+    "concrete",
+    "stripes",
+    "floor",
+    "ceiling",
+    "lamp",
+    "wood",
+    "mat",
+    "counter",
+    "door",
+    "window",
+    "poster",
+    "carton",
+    "goods",
+]
+"""What a face may look like; `textures.MATERIALS` draws them."""
 
 
 @dataclass(frozen=True)
@@ -13,10 +36,10 @@ class Shelf:
     """A shelf with goods on its four faces: centre, length along its own x, depth along its own y, turned by `yaw`."""
 
     centre: Point
-    length: float
-    depth: float
-    height: float = 1.8
-    levels: int = 4
+    length: Positive
+    depth: Positive
+    height: Positive = 1.8
+    levels: Annotated[int, Bounds(ge=1)] = 4
     yaw: float = 0.0
     stock: bool = True
     """Cartons stand on top."""
@@ -24,13 +47,13 @@ class Shelf:
 
 @dataclass(frozen=True)
 class Block:
-    """A plain body: pillar, counter, inner wall, furniture, mat. `material` is the texture of its sides, `top` of its top."""
+    """A plain body: pillar, counter, inner wall, furniture, mat. `material` is its sides' look, `top` its top's."""
 
     centre: Point
     size: Point
-    height: float
-    material: str = "concrete"
-    top: str = "wood"
+    height: Positive
+    material: Material = "concrete"
+    top: Material = "wood"
     bottom_z: float = 0.0
     yaw: float = 0.0
 
@@ -42,10 +65,10 @@ class Hanging:
     centre: Point
     facing: float
     """Heading of its outward normal."""
-    width: float
+    width: Positive
     bottom_z: float
-    height: float
-    material: str = "poster"
+    height: Positive
+    material: Material = "poster"
 
 
 @dataclass(frozen=True)
@@ -68,34 +91,34 @@ class Route:
 class Robot:
     """A differential drive and the hand on its joystick: limits (m/s, rad/s and per second), and its body."""
 
-    radius: float = 0.25
-    speed: float = 0.45
-    turn_speed: float = 0.9
-    acceleration: float = 0.5
-    turn_acceleration: float = 2.0
-    look_ahead: float = 0.45
+    radius: Positive = 0.25
+    speed: Positive = 0.45
+    turn_speed: Positive = 0.9
+    acceleration: Positive = 0.5
+    turn_acceleration: Positive = 2.0
+    look_ahead: Positive = 0.45
     """Distance (m) along the route of the point that is steered for."""
-    wander: float = 0.04
+    wander: Spread = 0.04
     """Spread (m) by which each day's line misses the inner waypoints."""
 
 
 @dataclass(frozen=True)
 class OdometryNoise:
-    """Noise of an odometry increment (rotation, translation, rotation), and the spread of each day's systematic errors.
+    """Noise of an odometry increment (rotation, translation, rotation), and the spread of a day's systematic errors.
 
-    sigma_trans = `translation` sqrt(m); sigma_rot^2 = `rotation`^2 |rad| + `drift`^2 m. The biases are drawn once a day.
+    sigma_trans = `translation` sqrt(m); sigma_rot^2 = `rotation`^2 |rad| + `drift`^2 m. Biases are drawn once a day.
     """
 
-    translation: float = 0.02
-    rotation: float = 0.021
+    translation: Spread = 0.02
+    rotation: Spread = 0.021
     """rad per sqrt(rad), 1.2 degrees."""
-    drift: float = 0.0122
+    drift: Spread = 0.0122
     """rad per sqrt(m), 0.7 degrees."""
-    scale_bias: float = 0.02
+    scale_bias: Spread = 0.02
     """Share by which translation is misjudged."""
-    rotation_bias: float = 0.015
+    rotation_bias: Spread = 0.015
     """Share by which rotation is misjudged."""
-    turn_bias: float = 0.0044
+    turn_bias: Spread = 0.0044
     """Rotation (rad) added per metre, 0.25 degrees."""
 
 
@@ -105,25 +128,25 @@ class MirrorCamera:
 
     width: int = 640
     height_px: int = 480
-    focal: float = 497.0
+    focal: Positive = 497.0
     centre: Point = (319.5, 239.5)
-    a: float = 28.095
-    b: float = 23.4125
+    a: Positive = 28.095
+    b: Positive = 23.4125
     inner_radius_px: float = 34.0
     outer_radius_px: float = 238.0
-    height: float = 0.9
+    height: Positive = 0.9
     yaw: float = 0.3
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """What the chip does: noise (grey levels), darker rim (share at the picture's corner), slow exposure drift (share)."""
+    """What the chip does: noise (grey levels), darker rim (share lost in the corner), slow exposure drift (share)."""
 
-    noise: float = 2.0
-    vignetting: float = 0.12
-    exposure: float = 1.0
-    exposure_drift: float = 0.04
-    exposure_period: float = 23.0
+    noise: Spread = 2.0
+    vignetting: Share = 0.12
+    exposure: Positive = 1.0
+    exposure_drift: Share = 0.04
+    exposure_period: Positive = 23.0
     """Seconds."""
 
 
@@ -131,8 +154,8 @@ class Sensor:
 class Timing:
     """Rates (Hz) of pictures and of odometry and truth."""
 
-    pictures: float = 2.0
-    odometry: float = 20.0
+    pictures: Positive = 2.0
+    odometry: Positive = 20.0
 
 
 def _shelves() -> tuple[Shelf, ...]:
@@ -195,7 +218,7 @@ def _routes() -> dict[str, Route]:
                 (9.75, 6.8),
                 (9.5, 4.9),
             )
-        ),  # fmt: skip
+        ),
         "drive": Route(
             waypoints=((2.4, 1.5), (9.0, 1.5), (9.7, 2.4), (9.75, 6.6), (9.0, 7.3), (2.2, 7.3), (1.5, 6.4), (1.7, 5.0))
         ),
@@ -213,13 +236,13 @@ class WorldConfig:
     name: str = "home_store_demo"
     seed: int = 1
     size: Point = (12.0, 9.0)
-    height: float = 3.2
+    height: Positive = 3.2
     shelves: tuple[Shelf, ...] = field(default_factory=_shelves)
     blocks: tuple[Block, ...] = field(default_factory=_blocks)
     hangings: tuple[Hanging, ...] = field(default_factory=_hangings)
     lamps: tuple[Lamp, ...] = field(default_factory=_lamps)
-    ambient: float = 0.45
-    rearranged: float = 0.1
+    ambient: Spread = 0.45
+    rearranged: Share = 0.1
     routes: dict[str, Route] = field(default_factory=_routes)
     robot: Robot = Robot()
     odometry: OdometryNoise = OdometryNoise()

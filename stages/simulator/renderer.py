@@ -7,8 +7,7 @@ numbers alone, so that threads cannot change a picture.
 """
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -19,8 +18,8 @@ from .cameras import Rays
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
+I64 = npt.NDArray[np.int64]
 U8 = npt.NDArray[np.uint8]
-_Function = TypeVar("_Function", bound=Callable[..., Any])
 
 FACES = 6
 """Faces of a box, in its own frame: -x, +x, -y, +y, bottom, top."""
@@ -29,14 +28,15 @@ FACES = 6
 class Scene(NamedTuple):
     """A world as arrays for the ray caster. Floor and ceiling are surfaces 0 and 1.
 
-    `boxes` (B, 8): centre x, y, cosine and sine of the yaw, half length, half depth, lower and upper z. `faces` (B, 6):
-    surface of each face. `surface_table` (S, 3): first entry in `tiles`, columns, rows; `surface_size` (S, 2): width and
-    height (m) of a tile. `tiles`: texture of each tile, row by row from the upper left as seen from outside.
-    `texels`: all mip levels of all textures, one after the other, each (textures, side, side, 3) blue-green-red;
-    `level_start`: where each begins; `side`: of level 0. `glow` (textures,): share of the texture that shines by itself.
-    `cell_start` and `cell_boxes`: boxes of each cell of the grid, `cell_top` the highest point in it; `grid`: x and y
-    of its corner, size of a cell; `rows`, `columns`: how many. `light` (rows, columns, 5, 3): irradiance of faces that
-    look up, +x, -x, +y, -y, at points `light_step` apart from the grid's corner. `height`: of the ceiling.
+    `boxes` (B, 9): centre x, y, cosine and sine of the yaw, half length, half depth, lower and upper z, squared radius.
+    `faces` (B, 6): surface of each face. `surface_table` (S, 3): first entry in `tiles`, columns, rows; `surface_size`
+    (S, 2): width and height (m) of a tile. `tiles`: texture of each tile, row by row from the upper left as seen from
+    outside. `texels`: all mip levels of all textures, one after the other, each (textures, side, side, 3)
+    blue-green-red; `level_start`: where each begins; `side`: of level 0. `glow` (textures,): share of the texture that
+    shines by itself. `cell_start` and `cell_boxes`: boxes of each cell of the grid, `cell_top` the highest point in it;
+    `grid`: x and y of its corner, size of a cell; `rows`, `columns`: how many. `light` (rows, columns, 5, 3):
+    irradiance of faces that look up, +x, -x, +y, -y, at points `light_step` apart from the grid's corner. `height`: of
+    the ceiling.
     """
 
     boxes: F64
@@ -45,7 +45,7 @@ class Scene(NamedTuple):
     surface_size: F64
     tiles: I32
     texels: U8
-    level_start: npt.NDArray[np.int64]
+    level_start: I64
     side: int
     glow: F32
     cell_start: I32
@@ -57,11 +57,6 @@ class Scene(NamedTuple):
     light: F32
     light_step: float
     height: float
-
-
-def _compiled(**options: bool) -> Callable[[_Function], _Function]:
-    decorate: Callable[[_Function], _Function] = numba.njit(cache=True, error_model="numpy", **options)
-    return decorate
 
 
 def render(
@@ -86,7 +81,7 @@ def render(
     return picture
 
 
-@_compiled(parallel=True)
+@numba.njit(cache=True, error_model="numpy", parallel=True)
 def _trace(
     scene: Scene,
     directions: F32,
@@ -109,7 +104,7 @@ def _trace(
         lit[i, 2] = red
 
 
-@_compiled()
+@numba.njit(cache=True, error_model="numpy")
 def _hit(scene: Scene, x: float, y: float, z: float, dx: float, dy: float, dz: float) -> tuple[float, int, int]:
     """Distance, box and face of what a ray meets first; box -1 is the floor (face 5) or the ceiling (face 4)."""
     far = 1e9
@@ -120,29 +115,31 @@ def _hit(scene: Scene, x: float, y: float, z: float, dx: float, dy: float, dz: f
         far = (scene.height - z) / dz
         face = 4
     box = -1
-    size = scene.grid[2]
+    # Taken out of the scene once: each mention of an array of a tuple counts references, which costs as much as a test.
+    boxes, cell_start, cell_boxes, cell_top = scene.boxes, scene.cell_start, scene.cell_boxes, scene.cell_top
+    left, below, size = scene.grid[0], scene.grid[1], scene.grid[2]
     rows, columns = scene.rows, scene.columns
-    column = int(math.floor((x - scene.grid[0]) / size))
-    row = int(math.floor((y - scene.grid[1]) / size))
+    column = math.floor((x - left) / size)
+    row = math.floor((y - below) / size)
     step_x = 1 if dx > 0.0 else -1
     step_y = 1 if dy > 0.0 else -1
     per_x = abs(size / dx) if dx != 0.0 else 1e18
     per_y = abs(size / dy) if dy != 0.0 else 1e18
-    next_x = (scene.grid[0] + (column + (step_x > 0)) * size - x) / dx if dx != 0.0 else 1e18
-    next_y = (scene.grid[1] + (row + (step_y > 0)) * size - y) / dy if dy != 0.0 else 1e18
+    next_x = (left + (column + (step_x > 0)) * size - x) / dx if dx != 0.0 else 1e18
+    next_y = (below + (row + (step_y > 0)) * size - y) / dy if dy != 0.0 else 1e18
     entered = 0.0
     tested = -1
     while 0 <= column < columns and 0 <= row < rows:
         leaves = min(next_x, next_y)
         cell = row * columns + column
         lowest = z + dz * (min(leaves, far) if dz < 0.0 else entered)
-        if lowest <= scene.cell_top[cell]:
-            for k in range(scene.cell_start[cell], scene.cell_start[cell + 1]):
-                candidate = scene.cell_boxes[k]
+        if lowest <= cell_top[cell]:
+            for k in range(cell_start[cell], cell_start[cell + 1]):
+                candidate = cell_boxes[k]
                 if candidate == tested:
                     continue
                 tested = candidate
-                t, side = _meet(scene.boxes, candidate, x, y, z, dx, dy, dz)
+                t, side = _meet(boxes, candidate, x, y, z, dx, dy, dz)
                 if t < far:
                     far = t
                     box = candidate
@@ -159,24 +156,29 @@ def _hit(scene: Scene, x: float, y: float, z: float, dx: float, dy: float, dz: f
     return far, box, face
 
 
-@_compiled()
+@numba.njit(cache=True, error_model="numpy")
 def _meet(boxes: F64, box: int, x: float, y: float, z: float, dx: float, dy: float, dz: float) -> tuple[float, int]:
     """Distance along a ray to a box and the face it enters by; 1e18 where it misses it or starts inside."""
     px, py = x - boxes[box, 0], y - boxes[box, 1]
+    beside = px * dy - py * dx
+    if beside * beside > boxes[box, 8] * (dx * dx + dy * dy):
+        return 1e18, 0
     cos, sin = boxes[box, 2], boxes[box, 3]
     ox, oy = cos * px + sin * py, cos * py - sin * px
     ux, uy = cos * dx + sin * dy, cos * dy - sin * dx
     near, leave = -1e18, 1e18
     face = 0
     if ux != 0.0:
-        near, leave = (-boxes[box, 4] - ox) / ux, (boxes[box, 4] - ox) / ux
+        per = 1.0 / ux
+        near, leave = (-boxes[box, 4] - ox) * per, (boxes[box, 4] - ox) * per
         if near > leave:
             near, leave = leave, near
             face = 1
     elif abs(ox) > boxes[box, 4]:
         return 1e18, 0
     if uy != 0.0:
-        first, last = (-boxes[box, 5] - oy) / uy, (boxes[box, 5] - oy) / uy
+        per = 1.0 / uy
+        first, last = (-boxes[box, 5] - oy) * per, (boxes[box, 5] - oy) * per
         side = 2
         if first > last:
             first, last = last, first
@@ -190,7 +192,8 @@ def _meet(boxes: F64, box: int, x: float, y: float, z: float, dx: float, dy: flo
     if near > leave:
         return 1e18, 0
     if dz != 0.0:
-        first, last = (boxes[box, 6] - z) / dz, (boxes[box, 7] - z) / dz
+        per = 1.0 / dz
+        first, last = (boxes[box, 6] - z) * per, (boxes[box, 7] - z) * per
         side = 4
         if first > last:
             first, last = last, first
@@ -206,7 +209,7 @@ def _meet(boxes: F64, box: int, x: float, y: float, z: float, dx: float, dy: flo
     return near, face
 
 
-@_compiled()
+@numba.njit(cache=True, error_model="numpy")
 def _shade(
     scene: Scene,
     x: float,
@@ -223,6 +226,10 @@ def _shade(
     """Colour of the point a ray meets: texture at the level its size asks for, times the light that falls on it."""
     if distance >= 1e8:
         return 0.0, 0.0, 0.0
+    boxes, faces, tiles = scene.boxes, scene.faces, scene.tiles
+    surface_table, surface_size = scene.surface_table, scene.surface_size
+    texels, level_start, side, glows = scene.texels, scene.level_start, scene.side, scene.glow
+    light, light_step, corner_x, corner_y = scene.light, scene.light_step, scene.grid[0], scene.grid[1]
     hx, hy, hz = x + distance * dx, y + distance * dy, z + distance * dz
     nx, ny = 0.0, 0.0
     if box < 0:
@@ -230,58 +237,63 @@ def _shade(
         u, v = hx, hy
         slope = abs(dz)
     else:
-        body = scene.boxes
-        px, py = hx - body[box, 0], hy - body[box, 1]
-        lx, ly = body[box, 2] * px + body[box, 3] * py, body[box, 2] * py - body[box, 3] * px
-        surface = scene.faces[box, face]
-        v = body[box, 7] - hz
+        px, py = hx - boxes[box, 0], hy - boxes[box, 1]
+        lx, ly = boxes[box, 2] * px + boxes[box, 3] * py, boxes[box, 2] * py - boxes[box, 3] * px
+        surface = faces[box, face]
+        v = boxes[box, 7] - hz
         if face == 0:
-            u = body[box, 5] - ly
-            nx, ny = -body[box, 2], -body[box, 3]
+            u = boxes[box, 5] - ly
+            nx, ny = -boxes[box, 2], -boxes[box, 3]
         elif face == 1:
-            u = body[box, 5] + ly
-            nx, ny = body[box, 2], body[box, 3]
+            u = boxes[box, 5] + ly
+            nx, ny = boxes[box, 2], boxes[box, 3]
         elif face == 2:
-            u = body[box, 4] + lx
-            nx, ny = body[box, 3], -body[box, 2]
+            u = boxes[box, 4] + lx
+            nx, ny = boxes[box, 3], -boxes[box, 2]
         elif face == 3:
-            u = body[box, 4] - lx
-            nx, ny = -body[box, 3], body[box, 2]
+            u = boxes[box, 4] - lx
+            nx, ny = -boxes[box, 3], boxes[box, 2]
         else:
-            u, v = body[box, 4] + lx, body[box, 5] - ly
+            u, v = boxes[box, 4] + lx, boxes[box, 5] - ly
         slope = abs(dz) if face >= 4 else abs(dx * nx + dy * ny)
 
-    width, height = scene.surface_size[surface, 0], scene.surface_size[surface, 1]
-    columns, rows = scene.surface_table[surface, 1], scene.surface_table[surface, 2]
-    column = min(max(int(math.floor(u / width)), 0), columns - 1)
-    row = min(max(int(math.floor(v / height)), 0), rows - 1)
-    texture = scene.tiles[scene.surface_table[surface, 0] + row * columns + column]
+    width, height = surface_size[surface, 0], surface_size[surface, 1]
+    columns, rows = surface_table[surface, 1], surface_table[surface, 2]
+    column = min(max(math.floor(u / width), 0), columns - 1)
+    row = min(max(math.floor(v / height), 0), rows - 1)
+    texture = tiles[surface_table[surface, 0] + row * columns + column]
     u, v = u / width - column, v / height - row
     # The footprint is an ellipse, longer by 1 / slope: its mean radius is a fair middle between blur and flicker.
-    texels = distance * footprint * scene.side / math.sqrt(width * height * max(slope, 1e-3))
-    level = min(max(math.log2(max(texels, 1e-6)), 0.0), len(scene.level_start) - 1.001)
+    across = distance * footprint * side / math.sqrt(width * height * max(slope, 1e-3))
+    level = min(max(math.log2(max(across, 1e-6)), 0.0), len(level_start) - 1.001)
     fine = int(level)
     part = level - fine
-    blue, green, red = _texel(scene, texture, fine, u, v)
+    blue, green, red = _texel(texels, level_start, side, texture, fine, u, v)
     if part > 0.0:
-        blue1, green1, red1 = _texel(scene, texture, fine + 1, u, v)
+        blue1, green1, red1 = _texel(texels, level_start, side, texture, fine + 1, u, v)
         blue += part * (blue1 - blue)
         green += part * (green1 - green)
         red += part * (red1 - red)
 
-    glow = float(scene.glow[texture])
+    glow = float(glows[texture])
     if glow >= 1.0:
         return blue, green, red
     if face >= 4:
-        blue_light, green_light, red_light = _light(scene, hx, hy, 0)
+        blue_light, green_light, red_light = _light(
+            light, (hx - corner_x) / light_step, (hy - corner_y) / light_step, 0
+        )
         if face == 4:  # what looks down is lit by what the floor throws back
             blue_light, green_light, red_light = 0.8 * blue_light, 0.8 * green_light, 0.8 * red_light
     else:
-        blue_x, green_x, red_x = _light(scene, hx, hy, 1 if nx > 0.0 else 2)
+        blue_x, green_x, red_x = _light(
+            light, (hx - corner_x) / light_step, (hy - corner_y) / light_step, 1 if nx > 0.0 else 2
+        )
         share = nx * nx
         blue_light, green_light, red_light = share * blue_x, share * green_x, share * red_x
         if share < 0.999999:
-            blue_y, green_y, red_y = _light(scene, hx, hy, 3 if ny > 0.0 else 4)
+            blue_y, green_y, red_y = _light(
+                light, (hx - corner_x) / light_step, (hy - corner_y) / light_step, 3 if ny > 0.0 else 4
+            )
             blue_light += (1.0 - share) * blue_y
             green_light += (1.0 - share) * green_y
             red_light += (1.0 - share) * red_y
@@ -294,37 +306,36 @@ def _shade(
     )
 
 
-@_compiled()
-def _texel(scene: Scene, texture: int, level: int, u: float, v: float) -> tuple[float, float, float]:
+@numba.njit(cache=True, error_model="numpy")
+def _texel(
+    texels: U8, level_start: I64, finest: int, texture: int, level: int, u: float, v: float
+) -> tuple[float, float, float]:
     """Colour of a texture at (u, v) in [0, 1], linear between the texels of one level."""
-    side = scene.side >> level
+    side = finest >> level
     column, row = u * side - 0.5, v * side - 0.5
-    left, above = int(math.floor(column)), int(math.floor(row))
+    left, above = math.floor(column), math.floor(row)
     wu, wv = column - left, row - above
     right, below = min(left + 1, side - 1), min(above + 1, side - 1)
     left, above = max(left, 0), max(above, 0)
-    start = scene.level_start[level] + texture * side * side * 3
+    start = level_start[level] + texture * side * side * 3
     a, b = start + (above * side + left) * 3, start + (above * side + right) * 3
     c, d = start + (below * side + left) * 3, start + (below * side + right) * 3
     wa, wb, wc, wd = (1 - wu) * (1 - wv), wu * (1 - wv), (1 - wu) * wv, wu * wv
-    t = scene.texels
     return (
-        wa * t[a] + wb * t[b] + wc * t[c] + wd * t[d],
-        wa * t[a + 1] + wb * t[b + 1] + wc * t[c + 1] + wd * t[d + 1],
-        wa * t[a + 2] + wb * t[b + 2] + wc * t[c + 2] + wd * t[d + 2],
+        wa * texels[a] + wb * texels[b] + wc * texels[c] + wd * texels[d],
+        wa * texels[a + 1] + wb * texels[b + 1] + wc * texels[c + 1] + wd * texels[d + 1],
+        wa * texels[a + 2] + wb * texels[b + 2] + wc * texels[c + 2] + wd * texels[d + 2],
     )
 
 
-@_compiled()
-def _light(scene: Scene, x: float, y: float, side: int) -> tuple[float, float, float]:
-    """Light that falls at a point of the map on a face that looks one of five ways, linear between samples."""
-    rows, columns = scene.light.shape[0], scene.light.shape[1]
-    column = min(max((x - scene.grid[0]) / scene.light_step, 0.0), columns - 1.001)
-    row = min(max((y - scene.grid[1]) / scene.light_step, 0.0), rows - 1.001)
+@numba.njit(cache=True, error_model="numpy")
+def _light(light: F32, column: float, row: float, side: int) -> tuple[float, float, float]:
+    """Light that falls at a point of the light map on a face that looks one of five ways, linear between samples."""
+    column = min(max(column, 0.0), light.shape[1] - 1.001)
+    row = min(max(row, 0.0), light.shape[0] - 1.001)
     left, below = int(column), int(row)
     wx, wy = column - left, row - below
     wa, wb, wc, wd = (1 - wx) * (1 - wy), wx * (1 - wy), (1 - wx) * wy, wx * wy
-    light = scene.light
     above, right = below + 1, left + 1
     return (
         wa * light[below, left, side, 0]
@@ -342,16 +353,16 @@ def _light(scene: Scene, x: float, y: float, side: int) -> tuple[float, float, f
     )
 
 
-@_compiled()
-def _mix(number: int) -> int:
+@numba.njit(cache=True, error_model="numpy")
+def _mix(number: np.uint64) -> np.uint64:
     """The next number of a counter-based sequence: splitmix64's finaliser (Steele, Lea & Flood 2014)."""
     number = (number ^ (number >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     number = (number ^ (number >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return number ^ (number >> np.uint64(31))
 
 
-@_compiled(parallel=True)
-def _expose(lit: F32, pixels: I32, gain: F32, exposure: float, noise: float, key: int, picture: U8) -> None:
+@numba.njit(cache=True, error_model="numpy", parallel=True)
+def _expose(lit: F32, pixels: I32, gain: F32, exposure: float, noise: float, key: np.uint64, picture: U8) -> None:
     """The chip: light times exposure and vignetting, plus noise that follows from key, pixel and colour alone."""
     ray_of = np.full(len(picture), -1, dtype=np.int32)
     for i in numba.prange(len(pixels)):

@@ -210,9 +210,9 @@ def _poster(rng: np.random.Generator) -> F32:
         for row, column in np.argwhere(rng.uniform(size=(5, 3)) < 0.6):
             left, above = 0.1 + 0.16 * letter + 0.042 * column, top + 0.05 * row
             box(canvas, left, above, left + 0.042, above + 0.05, ink)
-    for k in (0.0, 0.97):
-        box(canvas, k, 0, k + 0.03, 1, (245, 245, 245))
-        box(canvas, 0, k, 1, k + 0.03, (245, 245, 245))
+    for edge in (0.0, 0.97):
+        box(canvas, edge, 0, edge + 0.03, 1, (245, 245, 245))
+        box(canvas, 0, edge, 1, edge + 0.03, (245, 245, 245))
     return canvas + grain(rng, 3.0)
 
 

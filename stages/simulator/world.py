@@ -219,7 +219,20 @@ class World:
         cell_start, cell_boxes, cell_top, grid, shape = self._cells(0.5)
         step = 0.1
         return Scene(
-            boxes=np.array([(*b.centre, math.cos(b.yaw), math.sin(b.yaw), *b.half, b.low, b.high) for b in self.boxes]),
+            boxes=np.array(
+                [
+                    (
+                        *b.centre,
+                        math.cos(b.yaw),
+                        math.sin(b.yaw),
+                        *b.half,
+                        b.low,
+                        b.high,
+                        b.half[0] ** 2 + b.half[1] ** 2,
+                    )
+                    for b in self.boxes
+                ]
+            ),
             faces=(2 + np.arange(6 * len(self.boxes), dtype=np.int32)).reshape(-1, 6),
             surface_table=np.array(table, dtype=np.int32),
             surface_size=np.array([(t.width, t.height) for t in tilings]),

@@ -5,11 +5,14 @@ import json
 from collections import Counter
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.files import digest_file, digest_text
+from omninav.pipeline.log import LogWriter
 from omninav.stages import simulator
 from omninav.stages.geometry import catadioptric, se2
 from omninav.stages.simulator.cameras import Rays, camera_rays
@@ -21,6 +24,7 @@ from omninav.stages.simulator.world import World, stream
 from omninav.stages.values.camera import HyperbolicMirror
 from omninav.stages.values.image import Pixels
 
+from .camera_yaml import write_camera
 from .recording import UnreadableRecording
 
 F64 = npt.NDArray[np.float64]
@@ -36,8 +40,8 @@ class SimulatedRecording:
     """One drive along a named route of a world, on a day: the same seed, route and day give the same bytes.
 
     A `Recording`. Pictures come in any order at the same price and with the same noise. The day decides the line that
-    is driven, the odometry's errors, the noise and which goods were moved. Raises `UnreadableRecording` for a route that
-    the world does not have.
+    is driven, the odometry's errors, the noise and which goods were moved. Raises `UnreadableRecording` for a route
+    that the world does not have.
     """
 
     def __init__(self, world: WorldConfig, route: str, day: int) -> None:
@@ -104,6 +108,52 @@ class SimulatedRecording:
         code = [*sorted(folder.glob("*.py")), Path(__file__), Path(catadioptric.__file__), Path(se2.__file__)]
         described = json.dumps(dataclasses.asdict(self.world), sort_keys=True)
         return digest_text(described, self.route, str(self.day), *(digest_file(path) for path in code))
+
+
+def record(recording: SimulatedRecording, path: Path, quality: int = 90) -> None:
+    """Write a simulated drive as an MCAP log: JPEG pictures, camera information, odometry, truth, and camera.yaml.
+
+    Topics as every recording has them; odometry and truth at their own rate. Log times run behind header stamps as a
+    camera's and a wheel's do (42 and 2 ms). The same recording gives the same bytes.
+    """
+    camera = recording.camera
+    matrix = [camera.focal_x, camera.skew, camera.centre_x, 0.0, camera.focal_y, camera.centre_y, 0.0, 0.0, 1.0]
+    info = {
+        "header": {"frame_id": "omni_camera"},
+        "width": camera.width,
+        "height": camera.height_px,
+        "distortion_model": "hyperbolic_mirror",
+        "d": [camera.a, camera.b],
+        "k": matrix,
+    }
+    events = [(int(stamp) + 2_000_000, 0, number) for number, stamp in enumerate(recording.times)]
+    events += [(int(stamp) + 42_000_000, 1, number) for number, stamp in enumerate(recording.stamps)]
+    with LogWriter(path) as log:
+        log.attach("camera.yaml", write_camera(camera).encode(), "application/yaml")
+        for time, kind, number in sorted(events):
+            if kind == 0:
+                stamp = int(recording.times[number])
+                rolled = {
+                    "header": {"frame_id": "odom"},
+                    "child_frame_id": "base_link",
+                    "pose": {"pose": _pose(recording.rolled[number])},
+                }
+                truth = {"header": {"frame_id": "map"}, "pose": _pose(recording.driven[number])}
+                log.write("/odom", "nav_msgs/msg/Odometry", stamp, rolled, time)
+                log.write("/ground_truth/pose", "geometry_msgs/msg/PoseStamped", stamp, truth, time)
+            else:
+                stamp = int(recording.stamps[number])
+                _, packed = cv2.imencode(".jpg", recording.image(number), [cv2.IMWRITE_JPEG_QUALITY, quality])
+                picture = {"header": {"frame_id": "omni_camera"}, "format": "jpeg", "data": packed.ravel()}
+                log.write("/camera/camera_info", "sensor_msgs/msg/CameraInfo", stamp, info, time)
+                log.write("/camera/image/compressed", "sensor_msgs/msg/CompressedImage", stamp, picture, time)
+
+
+def _pose(pose: F64) -> dict[str, Any]:
+    """A pose (x, y, heading) as the fields of a geometry_msgs/Pose."""
+    x, y, heading = (float(value) for value in pose)
+    turned = {"z": float(np.sin(heading / 2)), "w": float(np.cos(heading / 2))}
+    return {"position": {"x": x, "y": y}, "orientation": turned}
 
 
 def mirror(camera: MirrorCamera) -> HyperbolicMirror:
