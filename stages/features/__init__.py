@@ -1,0 +1,1 @@
+"""Panoramas into short descriptions of what is seen in which direction."""

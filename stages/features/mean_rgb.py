@@ -1,0 +1,38 @@
+"""Mean colour per segment of the panorama."""
+
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.values.features import SegmentColours
+from omninav.stages.values.image import Panorama, Pixels
+
+from .segments import segment_edges
+
+
+def mean_colours(pixels: Pixels, segments: int) -> npt.NDArray[np.float32]:
+    """Mean blue, green, red (0..255) of each segment's columns over all rows: (segments, 3) float32."""
+    edges = segment_edges(pixels.shape[1], segments)
+    columns = pixels.sum(axis=0, dtype=np.uint32)
+    sums = np.add.reduceat(columns, edges[:-1], axis=0)
+    return (sums / (np.diff(edges)[:, None] * pixels.shape[0])).astype(np.float32)
+
+
+class MeanRgb(Stage):
+    """Mean colour per segment: the simple appearance feature used before the histograms.
+
+    Gross & Koenig 2004, section 2 (there "mean RGB"); values 0..255 in blue-green-red.
+    """
+
+    segments: Annotated[int, Bounds(ge=1)] = 36
+
+    class Out(Outputs):
+        """The description of the view."""
+
+        features: SegmentColours
+
+    def step(self, ctx: Context, panorama: Panorama) -> Out:
+        """Describe one panorama."""
+        return self.Out(features=SegmentColours(mean_colours(panorama.pixels, self.segments)))

@@ -1,0 +1,1 @@
+"""Pictures into panoramas: one file per projection."""

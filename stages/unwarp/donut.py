@@ -1,0 +1,165 @@
+"""Unwarps the picture of a mirror nothing is known of: a ring around a centre, found in the picture if need be."""
+
+import dataclasses
+import math
+from typing import Annotated
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.pipeline.problems import BadInput
+from omninav.stages.values.camera import Camera, Donut
+from omninav.stages.values.image import Image, Panorama, Pixels, column_azimuths
+
+from .table import LastTable, Table, fixed_point
+
+Array = npt.NDArray[np.float64]
+Ring = tuple[float, float, float, float]
+"""Centre x, centre y, inner radius, outer radius, in pixels."""
+
+
+class RingNotFound(ValueError):
+    """No ring stands out in the picture."""
+
+
+def radial_edges(grey: npt.NDArray[np.float32], centre: tuple[float, float], radii: int, rays: int = 90) -> Array:
+    """How much of a circle is an edge, per radius in whole pixels: (radii,) in [0, 1].
+
+    A ray counts at a radius where the step of brightness across it is large against the picture's ordinary steps;
+    a saturated measure, so that one bright window does not outweigh a circle.
+    """
+    polar = cv2.warpPolar(grey, (radii, rays), centre, radii, cv2.INTER_LINEAR | cv2.WARP_POLAR_LINEAR)
+    step = np.abs(np.diff(polar, axis=1, append=polar[:, -1:]))
+    strength = step / (step + np.float32(8.0))
+    score: Array = strength.mean(axis=0).astype(np.float64)
+    return score
+
+
+def find_ring(pixels: Pixels) -> Ring:
+    """Centre and radii of the mirror's ring in a picture; raises RingNotFound where no circle stands out.
+
+    The outer radius belongs to the circle, around any centre near the picture's middle, that is an edge over most of its
+    length; the inner one to the strongest circle around the same centre within the inner 45 percent, where the camera
+    sees itself.
+    """
+    height, width = pixels.shape[:2]
+    scale = max(1.0, max(height, width) / 240.0)
+    small = cv2.resize(pixels, None, fx=1.0 / scale, fy=1.0 / scale, interpolation=cv2.INTER_AREA)
+    grey = cv2.GaussianBlur(cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32), (0, 0), 1.2)
+    h, w = grey.shape
+    reach = int(0.62 * min(h, w))
+    least = int(0.28 * min(h, w))
+
+    def best(centre: tuple[float, float]) -> tuple[float, int]:
+        edges = radial_edges(grey, centre, reach)
+        radius = least + int(np.argmax(edges[least:-2]))
+        return float(edges[radius]), radius
+
+    middle, span, step = (w / 2.0, h / 2.0), 0.16 * min(h, w), 0.02 * min(h, w)
+    score, radius, centre = 0.0, 0, middle
+    while step > 0.2:
+        offsets = np.arange(-span, span + step / 2, step)
+        for dy in offsets:
+            for dx in offsets:
+                candidate = (middle[0] + float(dx), middle[1] + float(dy))
+                found, at = best(candidate)
+                if found > score:
+                    score, radius, centre = found, at, candidate
+        middle, span, step = centre, step, step / 3
+    if score < 0.35:
+        raise RingNotFound("no circle stands out")
+    edges = radial_edges(grey, centre, reach)
+    low, high = max(2, int(0.06 * radius)), int(0.45 * radius)
+    inner = low + int(np.argmax(edges[low:high]))
+    return (
+        (centre[0] + 0.5) * scale - 0.5,
+        (centre[1] + 0.5) * scale - 0.5,
+        (inner + 1.5) * scale,
+        (radius - 0.5) * scale,
+    )
+
+
+def donut_table(camera: Donut, columns: int, rows: int) -> Table:
+    """Rows are equal steps of radius from the outer one (top) to the inner one, columns equal steps of azimuth."""
+    assert camera.centre_x is not None and camera.centre_y is not None
+    assert camera.inner_radius_px is not None and camera.outer_radius_px is not None
+    ring = camera.outer_radius_px - camera.inner_radius_px
+    radius = camera.outer_radius_px - ring * (np.arange(rows) + 0.5) / rows
+    bearing = column_azimuths(columns) - camera.yaw
+    sign = 1.0 if camera.sense == "clockwise" else -1.0
+    u = camera.centre_x + radius[:, None] * np.cos(bearing)
+    v = camera.centre_y + sign * radius[:, None] * np.sin(bearing)
+    return fixed_point(u, v)
+
+
+class FoundRing(State):
+    """What was found in the first picture that showed a ring; it stays, so that panoramas do not jump."""
+
+    centre_x: float = math.nan
+    centre_y: float = math.nan
+    inner_radius_px: float = math.nan
+    outer_radius_px: float = math.nan
+
+
+def with_ring(camera: Donut, image: Image, found: FoundRing, ctx: Context) -> Donut | None:
+    """The camera with centre and radii; what it leaves open is found in the picture, once, and remembered in `found`."""
+    given = (camera.centre_x, camera.centre_y, camera.inner_radius_px, camera.outer_radius_px)
+    if all(value is not None for value in given):
+        return camera
+    if math.isnan(found.centre_x):
+        try:
+            ring = find_ring(image.pixels)
+        except RingNotFound:
+            ctx.count(
+                "no_ring_in_picture",
+                detail="unwarp: no mirror ring found in the picture; give centre and radii in camera.yaml",
+            )
+            return None
+        found.centre_x, found.centre_y, found.inner_radius_px, found.outer_radius_px = ring
+        ctx.fact("mirror_ring_px", list(ring))
+    values = (found.centre_x, found.centre_y, found.inner_radius_px, found.outer_radius_px)
+    names = ("centre_x", "centre_y", "inner_radius_px", "outer_radius_px")
+    return dataclasses.replace(
+        camera,
+        **{name: ring if value is None else value for name, value, ring in zip(names, given, values, strict=True)},
+    )
+
+
+class DonutUnwarp(Stage):
+    """Panorama from an uncalibrated mirror image, by centre and radii, found in the picture where not given.
+
+    Rows are equal steps of radius, the outer circle on top; elevations are not known. What is found in the first picture that shows a ring
+    is kept for all (State). Raises BadInput where the recording's camera is another one.
+    """
+
+    columns: Annotated[int, Bounds(ge=8)] = 360
+    rows: Annotated[int, Bounds(ge=1)] = 80
+
+    class Out(Outputs):
+        """The ring, unrolled; absent as long as no ring was found."""
+
+        panorama: Panorama | None = None
+
+    def setup(self, ctx: Context) -> None:
+        """No table yet: the camera comes with the first picture."""
+        self._tables = LastTable(self._table)
+        self._open: Camera | None = None
+        self._complete: Donut | None = None
+
+    def _table(self, camera: Camera) -> Table:
+        assert isinstance(camera, Donut)
+        return donut_table(camera, self.columns, self.rows)
+
+    def step(self, ctx: Context, image: Image, camera: Camera, found: FoundRing) -> Out:
+        """Unroll one picture."""
+        if not isinstance(camera, Donut):
+            raise BadInput(
+                f"unwarp: this recording's camera is a {type(camera).__name__}, not a Donut; use unwarp=by_camera"
+            )
+        if camera is not self._open or self._complete is None:
+            self._complete, self._open = with_ring(camera, image, found, ctx), camera
+        if self._complete is None:
+            return self.Out()
+        return self.Out(panorama=self._tables.apply(image, self._complete))

@@ -1,0 +1,58 @@
+"""Remap tables: where in a picture each pixel of a panorama lies, in OpenCV's fixed point."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.values.camera import Camera
+from omninav.stages.values.image import Image, Panorama, Pixels
+
+Array = npt.NDArray[np.float64]
+
+
+class Table(NamedTuple):
+    """A panorama's recipe: `whole` (rows, columns, 2) int16 and `part` (rows, columns) uint16, as `cv2.remap` takes them.
+
+    The elevations are those of the panorama's upper and lower edge (radians), None where they are not known. `wraps`:
+    columns beyond the picture's left or right edge continue at the other one (the picture is itself a full circle).
+    """
+
+    whole: npt.NDArray[np.int16]
+    part: npt.NDArray[np.uint16]
+    elevation_top: float | None = None
+    elevation_bottom: float | None = None
+    wraps: bool = False
+
+    def apply(self, pixels: Pixels) -> Panorama:
+        """The panorama of a picture; what lies outside the picture is black."""
+        border = cv2.BORDER_WRAP if self.wraps else cv2.BORDER_CONSTANT
+        mapped: Pixels = cv2.remap(pixels, self.whole, self.part, cv2.INTER_LINEAR, borderMode=border)
+        return Panorama(mapped, self.elevation_top, self.elevation_bottom)
+
+
+def fixed_point(
+    u: Array, v: Array, top: float | None = None, bottom: float | None = None, wraps: bool = False
+) -> Table:
+    """A table from the picture's column `u` and row `v` (rows, columns) of each panorama pixel; NaN becomes black."""
+    u, v = np.nan_to_num(u, nan=-10.0), np.nan_to_num(v, nan=-10.0)
+    whole, part = cv2.convertMaps(u.astype(np.float32), v.astype(np.float32), cv2.CV_16SC2)
+    return Table(whole, part, top, bottom, wraps)
+
+
+class LastTable:
+    """Keeps the table of the camera seen last, so that it is built once per camera and not once per picture."""
+
+    def __init__(self, build: Callable[[Camera], Table]) -> None:
+        self._build = build
+        self._camera: Camera | None = None
+        self._table: Table | None = None
+
+    def apply(self, image: Image, camera: Camera) -> Panorama:
+        """The panorama of a picture that `camera` took."""
+        if camera is not self._camera or self._table is None:
+            self._table = self._build(camera)
+            self._camera = camera
+        return self._table.apply(image.pixels)
