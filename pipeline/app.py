@@ -221,7 +221,7 @@ def complete(config: Any) -> dict[str, Any]:
 
     from .problems import Problem, ProblemsFound
 
-    graph_keys = {"variant", "nodes", "wires", "artifacts", "saves", "log", "tour", "map", "route", "experiment"}
+    graph_keys = {"variant", "nodes", "wires", "artifacts", "saves", "log", "tour", "map", "route", "day"}
     try:
         plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
         for name, spec in (plain.get("artifacts") or {}).items():
@@ -234,7 +234,7 @@ def complete(config: Any) -> dict[str, Any]:
             for key in config:
                 if str(key) not in graph_keys:
                     other[key] = config._get_node(key)
-            other.log, other.route, other.tour, other.map = spec.get("log"), spec.get("route"), None, None
+            other.update({"tour": None, "map": None} | {key: spec.get(key) for key in ("log", "route", "day")})
             for node in spec.get("share") or ():
                 if config.nodes.get(node) is not None:
                     other.nodes[node] = OmegaConf.to_container(config.nodes[node], resolve=False)

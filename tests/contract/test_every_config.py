@@ -1,0 +1,64 @@
+"""What every configuration file promises: it opens with what it is and a command that composes."""
+
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+from hydra import compose, initialize_config_module
+from omegaconf import OmegaConf
+
+from omninav.pipeline.app import complete
+from omninav.pipeline.catalog import resolve
+from omninav.pipeline.run import plan
+from omninav.pipeline.stage import signature
+
+CONF = Path(__file__).resolve().parents[2] / "conf"
+FILES = [path for path in sorted(CONF.rglob("*.yaml")) if path.name != "config.yaml" and path.parent.name != "recording"]
+each = pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.stem}")
+
+
+def head(path: Path) -> list[str]:
+    return path.read_text().split("\n")[:2]
+
+
+@each
+def test_its_first_line_is_its_package_and_its_second_says_what_it_is(path: Path):
+    package, said = head(path)
+    role = path.parent.name
+    wanted = "_global_" if role in ("variant", "results", "experiment", "ablation") else None
+    assert package in ([f"# @package {wanted}"] if wanted else [f"# @package nodes.{role}", f"# @package {role}"])
+    assert re.match(r"# .{10,}\.  omninav \S", said), said
+
+
+@each
+def test_the_command_in_its_head_composes(path: Path):
+    command = head(path)[1].partition("  omninav ")[2].split()
+    assert f"{path.parent.name}={path.stem}" in command, command
+    with initialize_config_module("omninav.conf", version_base="1.3"):
+        compose("config", overrides=[word for word in command if not word.startswith("-")])
+
+
+@each
+def test_it_names_every_parameter_of_its_stage_with_a_legal_value(path: Path):
+    content = yaml.safe_load(path.read_text()) or {}
+    if "_target_" not in content:
+        return
+    parameters = signature(resolve(content.pop("_target_"))).parameters
+    assert set(content) == set(parameters)
+
+
+@pytest.mark.parametrize("path", sorted((CONF / "variant").glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_variant_builds(path: Path):
+    with initialize_config_module("omninav.conf", version_base="1.3"):
+        planned = plan(complete(compose("config", overrides=[f"variant={path.stem}"])))
+    assert planned.variant == path.stem
+    assert planned.graph.nodes
+
+
+def test_every_group_is_listed_before_the_variant():
+    defaults = yaml.safe_load((CONF / "config.yaml").read_text())["defaults"]
+    groups = [next(iter(item)) for item in defaults if isinstance(item, dict)]
+    folders = {path.name for path in CONF.iterdir() if path.is_dir() and any(path.glob("*.yaml"))}
+    assert folders - {"recording"} <= set(groups)
+    assert OmegaConf.load(CONF / "config.yaml").nodes == {}
