@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import zstandard
+from lz4 import frame as lz4
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Footer, Schema
-from lz4 import frame as lz4
 from mcap.writer import CompressionType, Writer
 
 from .files import whole_file

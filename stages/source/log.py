@@ -159,7 +159,7 @@ class LogSource(Source):
         for recording, frames in zip(recordings, self._frames, strict=True):
             if not len(frames):
                 raise UnreadableRecording(
-                    f"{recording.name}: first={self.first}, stop={self.stop} leaves none of its {len(recording.stamps)} frames; "
+                    f"{recording.name}: first={self.first}, stop={self.stop} leaves none of its frames; "
                     "type nodes.source.first=0 nodes.source.stop=null"
                 )
         self._recordings = recordings
@@ -171,10 +171,10 @@ def disturb(increment: Array, noise: Array, distance: float, turn_per_metre: flo
     `noise`: two independent standard normal numbers n1, n2. With d the length of the increment (m) and t its turn
     (rad), the length becomes d + distance sqrt(d) n1 and the turn t + e, e = sqrt(turn_per_metre^2 d +
     turn_per_radian^2 |t|) n2; the translation is turned by e / 2, as if the error had grown evenly on the way.
-    Variances grow with the way, so that cutting it into more frames changes nothing: over one metre the standard deviations are
-    `distance` (metres, that is, the share of the way) and `turn_per_metre` (radians); a turn of one radian adds
-    `turn_per_radian`. The model is that of the odometry motion model in Thrun, Burgard & Fox, Probabilistic Robotics
-    (2005), section 5.4, with variances in place of standard deviations.
+    Variances grow with the way, so that cutting it into more frames changes nothing: over one metre the standard
+    deviations are `distance` (metres, that is, the share of the way) and `turn_per_metre` (radians); a turn of one
+    radian adds `turn_per_radian`. The model is the odometry motion model of Thrun, Burgard & Fox, Probabilistic
+    Robotics (2005), section 5.4, with variances in place of standard deviations.
     """
     length, turn = math.hypot(increment[0], increment[1]), abs(float(increment[2]))
     error = math.sqrt(turn_per_metre**2 * length + turn_per_radian**2 * turn) * float(noise[1])

@@ -10,9 +10,16 @@ from omninav.pipeline.log import Location, LogReader, Record
 from .topics import TopicRecording, Topics, record_topics
 
 
-def open_mcap(name: str, paths: Sequence[Path], topics: Topics, camera: Path | None = None) -> TopicRecording:
-    """A recording from MCAP files, in the order given. Raises `UnreadableRecording` or `LogError`."""
+def open_mcap(
+    name: str, paths: Sequence[Path], topics: Topics, camera: Path | None = None, lost: Sequence[str] = ()
+) -> TopicRecording:
+    """A recording from MCAP files, in the order given; `lost` parts are counted as `missing_file`.
+
+    Raises `UnreadableRecording` or `LogError`.
+    """
     feed = LogReader(paths[0]) if len(paths) == 1 else SplitLog(paths)
+    for file in lost:
+        feed.drop("missing_file", f"{name}: its part {file} does not exist")
     return record_topics(name, feed, topics, camera, paths)
 
 
