@@ -18,9 +18,10 @@ class RelativeErrors(Stage):
     """Absolute trajectory error after the best rigid alignment, and relative pose error over a distance.
 
     Sturm et al. 2012 ("A benchmark for the evaluation of RGB-D SLAM systems", section on metrics), in the plane and
-    without scale: `ate_m` is the distance that is left after the rigid motion that fits the estimate to the truth best
-    in the least squares sense; `rpe_m` and `rpe_deg` compare estimated and true motion between frames that lie
-    `distance_m` of true path apart, every frame being a start. Per-log as in `TrajectoryErrors`.
+    without scale: `absolute_trajectory_error_m` is the distance that is left after the rigid motion that fits the
+    estimate to the truth best in the least squares sense; `relative_position_error_m` and `relative_heading_error_deg`
+    compare estimated and true motion between frames that lie `distance_m` of true path apart, every frame being a
+    start. The last log is measured; nothing is given without ground truth.
     """
 
     distance_m: Annotated[float, Bounds(gt=0)] = 1.0
@@ -39,20 +40,23 @@ class RelativeErrors(Stage):
         motion: Sequence[Motion | None],
     ) -> Out:
         """The whole run at once."""
-        per_log = [_drive_errors(drive, self.distance_m) for drive in drives(ticks, estimates, truth, motion)]
-        return self.Out(metrics=Metrics({"relative": per_log[-1]} if per_log and per_log[-1] else {}))
+        logs = drives(ticks, estimates, truth, motion)
+        return self.Out(metrics=Metrics(trajectory_metrics(logs[-1], self.distance_m) if logs else {}))
 
 
-def _drive_errors(drive: Drive, distance_m: float) -> dict[str, Any]:
+def trajectory_metrics(drive: Drive, distance_m: float) -> dict[str, Any]:
+    """ATE and RPE of one drive by their names in metrics.json; empty with fewer than two frames to compare."""
     scored = known(drive.truth) & known(drive.estimate)
     if scored.sum() < 2:
         return {}
     estimate, truth = drive.estimate[scored], drive.truth[scored]
     starts, ends = pairs_apart(truth, distance_m)
-    result: dict[str, Any] = {"ate_m": _summary(absolute_trajectory_errors(estimate, truth)), "distance_m": distance_m}
+    result: dict[str, Any] = {"absolute_trajectory_error_m": _summary(absolute_trajectory_errors(estimate, truth))}
     if len(starts):
         metres, degrees = relative_pose_errors(estimate, truth, starts, ends)
-        result |= {"rpe_m": _summary(metres), "rpe_deg": _summary(degrees)}
+        result["relative_position_error_m"] = _summary(metres)
+        result["relative_heading_error_deg"] = _summary(degrees)
+        result["relative_error_distance_m"] = distance_m
     return result
 
 

@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 ESTIMATE, TRUTH, ODOMETRY = "#0072B2", "#111111", "#D55E00"
 REFERENCE, EDGE, MARK, PARTICLE = "#8a8f98", "#c9ccd1", "#009E73", "#CC79A7"
 
-RC: dict[str, Any] = {
+RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same picture on every machine
     "font.size": 9,
     "axes.titlesize": 10,
