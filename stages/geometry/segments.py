@@ -1,0 +1,191 @@
+"""Views described segment by segment around the robot: turning them, and how alike they are."""
+
+import functools
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
+
+LANES = 8
+"""Headings are padded to a multiple of this, so that the inner loops are whole vector instructions."""
+
+LARGEST_COLOUR_DISTANCE = float(np.sqrt(3.0) * 255.0)
+"""Distance of black and white in blue-green-red 0..255."""
+
+
+def turned_views(view: Floats, headings: int) -> Floats:
+    """A view as it would look to robots turned back by each heading: (segments, bins) -> (headings, segments, bins).
+
+    Row h compares with the view of a robot whose heading is 2 pi h / headings (counter-clockwise) *less*: a turn to
+    the left moves the scene to higher segments, so row h takes segment j from j + h segments / headings. Fractions of
+    a segment are interpolated between the two neighbours (erratum 24), so that histograms still sum to 1.
+    """
+    segments = len(view)
+    shift = np.arange(headings) * segments / headings
+    whole = np.floor(shift).astype(np.int64)
+    part = (shift - whole).astype(np.float32)[:, None, None]
+    first = (np.arange(segments) + whole[:, None]) % segments
+    turned: Floats = view[first] * (1 - part) + view[(first + 1) % segments] * part
+    return turned
+
+
+@functools.cache
+def sorting_network(length: int) -> Ints:
+    """Pairs (i, j), i < j, whose exchange in this order sorts `length` items: Batcher's odd-even merge sort. (P, 2)."""
+    pairs = []
+    p = 1
+    while p < length:
+        k = p
+        while k >= 1:
+            for j in range(k % p, length - k, 2 * k):
+                for i in range(min(k, length - j - k)):
+                    if (i + j) // (2 * p) == (i + j + k) // (2 * p):
+                        pairs.append((i + j, i + j + k))
+            k //= 2
+        p *= 2
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def penalties(segments: int, exponent: float) -> Floats:
+    """Factor of the sum of the k best segments, k = 1..segments: k^-exponent n^-(1-exponent); at k = n it is 1 / n."""
+    k = np.arange(1, segments + 1)
+    factors: Floats = (k**-exponent * float(segments) ** (exponent - 1.0)).astype(np.float32)
+    return factors
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc]
+def _compare(
+    references: Floats, chosen: Ints, query: Floats, histograms: bool, network: Ints, factors: Floats, out: Floats
+) -> None:
+    # Headings are the innermost axis throughout: each loop over them is vector instructions, the sorting too.
+    segments, bins, lanes = query.shape
+    headings = out.shape[1]
+    alike = np.empty((segments, lanes), np.float32)
+    total = np.empty(lanes, np.float32)
+    best = np.empty(lanes, np.float32)
+    largest = np.float32(np.sqrt(3.0) * 255.0)
+    for n in range(len(chosen)):
+        reference = references[chosen[n]]
+        for j in range(segments):
+            row = alike[j]
+            row[:] = np.float32(0)
+            for b in range(bins):
+                here = reference[j, b]
+                there = query[j, b]
+                if histograms:
+                    if here > 0:
+                        for h in range(lanes):
+                            row[h] += there[h] if there[h] < here else here
+                else:
+                    for h in range(lanes):
+                        gap = there[h] - here
+                        row[h] += gap * gap
+            if not histograms:
+                for h in range(lanes):
+                    row[h] = np.float32(1) - np.sqrt(row[h]) / largest
+        for p in range(len(network)):
+            high, low = alike[network[p, 0]], alike[network[p, 1]]
+            for h in range(lanes):
+                a, b_ = high[h], low[h]
+                high[h] = a if a > b_ else b_
+                low[h] = b_ if a > b_ else a
+        total[:] = np.float32(0)
+        best[:] = np.float32(0)
+        for k in range(segments):
+            row = alike[k]
+            factor = factors[k]
+            for h in range(lanes):
+                total[h] += row[h]
+                score = total[h] * factor
+                best[h] = score if score > best[h] else best[h]
+        for h in range(headings):
+            out[n, h] = best[h]
+
+
+def similarities(
+    references: Floats,
+    view: Floats,
+    headings: int,
+    histograms: bool,
+    selective: bool,
+    exponent: float = 0.5,
+    chosen: Ints | None = None,
+) -> Floats:
+    """Similarity of a view to references at equally spaced headings: (chosen, headings) float32 in [0, 1].
+
+    `references` (R, segments, bins) and `view` (segments, bins): histograms that sum to 1 per segment (compared by
+    intersection), or colours in 0..255 (s_j = 1 - |difference| / (sqrt(3) 255)). `selective`: S = max_k (sum of the k
+    largest s_j) k^-exponent n^-(1-exponent), all k tried, since S(k) is not unimodal (Gross & Koenig 2004, section 2;
+    errata 20, 21); otherwise the mean of all s_j. `chosen`: indices of the references to compare; None means all.
+    Column h is a robot heading 2 pi h / headings more than the reference's own.
+    """
+    chosen = np.arange(len(references)) if chosen is None else chosen
+    out = np.empty((len(chosen), headings), np.float32)
+    query = np.zeros((*view.shape, -(-headings // LANES) * LANES), np.float32)
+    query[..., :headings] = turned_views(view, headings).transpose(1, 2, 0)
+    segments = len(view)
+    network = sorting_network(segments) if selective else np.empty((0, 2), np.int64)
+    if selective:
+        factors = penalties(segments, exponent)
+    else:
+        factors = np.zeros(segments, np.float32)
+        factors[-1] = 1.0 / segments
+    _compare(np.ascontiguousarray(references, np.float32), chosen, query, histograms, network, factors, out)
+    return np.minimum(out, np.float32(1.0))
+
+
+def selective_similarity(expected: Floats, observed: Floats, exponent: float = 0.5) -> Floats:
+    """Selective similarity of many expected views with one observed: (N, segments, bins), (segments, bins) -> (N,).
+
+    Both are histograms that sum to 1 per segment. S as in `similarities`.
+    """
+    out = np.empty(len(expected), np.float32)
+    network, factors = sorting_network(len(observed)), penalties(len(observed), exponent)
+    _compare_many(expected, np.ascontiguousarray(observed, np.float32), network, factors, out)
+    return out
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc]
+def _compare_many(expected: Floats, observed: Floats, network: Ints, factors: Floats, out: Floats) -> None:
+    segments, bins = observed.shape
+    alike = np.empty(segments, np.float32)
+    for n in range(len(expected)):
+        for j in range(segments):
+            common = np.float32(0)
+            for b in range(bins):
+                e, o = expected[n, j, b], observed[j, b]
+                common += e if e < o else o
+            alike[j] = common
+        for p in range(len(network)):
+            i, j = network[p, 0], network[p, 1]
+            a, b_ = alike[i], alike[j]
+            alike[i] = a if a > b_ else b_
+            alike[j] = b_ if a > b_ else a
+        total = np.float32(0)
+        best = np.float32(0)
+        for k in range(segments):
+            total += alike[k]
+            score = total * factors[k]
+            best = score if score > best else best
+        out[n] = best
+
+
+def euclidean_similarities(
+    references: Floats, view: Floats, headings: int, histograms: bool, chosen: Ints | None = None
+) -> Floats:
+    """1 - |difference| / the largest possible one, over whole views: (chosen, headings) float32 in [0, 1].
+
+    The non-selective comparison by the L2 norm of the difference vector (Gross & Koenig 2004, section 2). The largest
+    difference is sqrt(2 n) for n histograms and sqrt(3 n) 255 for n colours.
+    """
+    some = references if chosen is None else references[chosen]
+    query = turned_views(view, headings).reshape(headings, -1)
+    flat = np.ascontiguousarray(some, np.float32).reshape(len(some), -1)
+    # |a - b|^2 = a.a + b.b - 2 a.b
+    squared = (flat * flat).sum(axis=1)[:, None] + (query * query).sum(axis=1) - 2 * (flat @ query.T)
+    largest = np.sqrt(2.0 * len(view)) if histograms else np.sqrt(len(view)) * LARGEST_COLOUR_DISTANCE
+    alike: Floats = (1.0 - np.sqrt(np.maximum(squared, 0.0)) / largest).astype(np.float32)
+    return np.clip(alike, 0.0, 1.0)

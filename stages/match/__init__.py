@@ -1,0 +1,1 @@
+"""How alike the present view and the views of the map are."""

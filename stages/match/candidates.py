@@ -1,0 +1,44 @@
+"""Which references of a map are worth comparing, and whether they can be compared at all."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from omninav.pipeline.problems import BadInput
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
+from omninav.stages.values.maps import ReferenceGraph
+
+Ints = npt.NDArray[np.int64]
+
+
+def near_belief(poses: npt.NDArray[np.float64], near: Particles | None, radius: float) -> Ints | None:
+    """Indices of the references within `radius` metres of any particle, ascending; None (all) where that is no gain.
+
+    All are compared too where there is no belief, where `radius` is 0 (never limit), and where no reference is near.
+    """
+    if near is None or radius <= 0.0 or not len(poses):
+        return None
+    cells = np.unique(np.floor(near.poses[:, :2] / (radius / 2)).astype(np.int64), axis=0)
+    if len(cells) > len(poses):
+        return None
+    # A particle lies within radius / 2 * sqrt(1/2) of its cell's centre: the reach grows by that much.
+    reach = radius * (1.0 + math.sqrt(0.5) / 2)
+    found = cKDTree((cells + 0.5) * (radius / 2)).query(poses[:, :2], distance_upper_bound=reach)[0]
+    chosen = np.flatnonzero(np.isfinite(found))
+    return chosen if 0 < len(chosen) < len(poses) else None
+
+
+def check_alike(features: SegmentFeatures, map: ReferenceGraph) -> bool:
+    """Whether view and map are histograms (else colours). Raises BadInput where they do not describe views alike."""
+    histograms = isinstance(features, SegmentHistograms)
+    kind = "histograms" if histograms else "colours"
+    shape = tuple(map.features.shape[1:])
+    if len(map) and (map.kind != kind or shape != features.values.shape):
+        raise BadInput(
+            f"map: its views are {map.kind} of {shape[0]} segments x {shape[1]} bins, the present one is {kind} of "
+            f"{features.values.shape[0]} x {features.values.shape[1]}; learn the map anew with these features"
+        )
+    return histograms

@@ -1,0 +1,43 @@
+"""Similarity from the best segments only."""
+
+from typing import Annotated, Literal
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.segments import similarities
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.features import SegmentFeatures
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.similarity import Similarities
+
+from .candidates import check_alike, near_belief
+
+EXPONENTS = {"sqrt": 0.5, "cube_root": 1.0 / 3.0, "none": 0.0}
+
+
+class SelectiveMatch(Stage):
+    """Similarity from the k best segments only, so that occluded ones do not count.
+
+    Gross & Koenig 2004, section 2: S = max_k (sum of the k largest s_j) sqrt(1 / (k n)); s_j is the intersection of
+    segment j's histograms, or 1 - |difference| / (sqrt(3) 255) of its colours. All k are tried (erratum 21).
+    `penalty`: sqrt as in the paper; cube_root: k^-1/3 n^-2/3, which wants more segments; none: the mean of all.
+    `headings`: how many turns of each reference are compared. `radius_m`: with `near` wired, only references within
+    this distance of a particle are compared; 0 compares all. Raises BadInput where map and view are of other kinds.
+    """
+
+    penalty: Literal["sqrt", "cube_root", "none"] = "sqrt"
+    headings: Annotated[int, Bounds(ge=1)] = 36
+    radius_m: Annotated[float, Bounds(ge=0)] = 2.0
+
+    class Out(Outputs):
+        """How alike view and references are."""
+
+        similarities: Similarities
+
+    def step(self, ctx: Context, features: SegmentFeatures, map: ReferenceGraph, near: Particles | None = None) -> Out:
+        """Compare one view."""
+        histograms = check_alike(features, map)
+        chosen = near_belief(map.poses, near, self.radius_m)
+        values = similarities(
+            map.features, features.values, self.headings, histograms, True, EXPONENTS[self.penalty], chosen
+        )
+        return self.Out(similarities=Similarities(values, chosen))
