@@ -37,11 +37,11 @@ def glow(material: str) -> float:
 
 def mip_levels(textures: U8) -> list[U8]:
     """Levels of textures (N, S, S, 3), S a power of two: each the mean of 2 x 2 texels of the one before, down to 1."""
-    levels = [textures]
-    while levels[-1].shape[1] > 1:
-        count, side = levels[-1].shape[:2]
-        blocks = levels[-1].reshape(count, side // 2, 2, side // 2, 2, 3).astype(np.uint16).sum(axis=(2, 4))
-        levels.append(((blocks + 2) // 4).astype(np.uint8))
+    levels, exact = [textures], textures.astype(np.float32)
+    while exact.shape[1] > 1:
+        count, side = exact.shape[:2]
+        exact = exact.reshape(count, side // 2, 2, side // 2, 2, 3).mean(axis=(2, 4))
+        levels.append(np.round(exact).astype(np.uint8))
     return levels
 
 

@@ -4,7 +4,7 @@ import math
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -56,6 +56,14 @@ def stream(seed: int, *names: str | int) -> np.random.Generator:
     return np.random.default_rng([seed, *(zlib.crc32(str(name).encode()) for name in names)])
 
 
+@lru_cache(maxsize=256)
+def _drawn(seed: int, material: str, name: str) -> npt.NDArray[np.uint8]:
+    """A texture, drawn once for all days of a world."""
+    texture = textures.draw(material, stream(seed, "texture", material, name))
+    texture.flags.writeable = False
+    return texture
+
+
 class World:
     """A world from its configuration, as it stands on a day.
 
@@ -85,7 +93,7 @@ class World:
         """Number of the texture of a material for a thing of that name, drawn when first asked for."""
         if (material, name) not in self._named:
             self._named[material, name] = len(self._textures)
-            self._textures.append(textures.draw(material, stream(self.config.seed, "texture", material, name)))
+            self._textures.append(_drawn(self.config.seed, material, name))
             self._glow.append(textures.glow(material))
         return self._named[material, name]
 
@@ -260,9 +268,9 @@ class World:
         members: list[list[int]] = [[] for _ in range(rows * columns)]
         top = np.zeros(rows * columns)
         for number, box in enumerate(self.boxes):
-            outline = footprint(box)
-            low = np.floor((outline.min(axis=0) - corner) / size - 1e-9).astype(int)
-            high = np.floor((outline.max(axis=0) - corner) / size + 1e-9).astype(int)
+            corners = outline(box)
+            low = np.floor((corners.min(axis=0) - corner) / size - 1e-9).astype(int)
+            high = np.floor((corners.max(axis=0) - corner) / size + 1e-9).astype(int)
             for row in range(max(low[1], 0), min(high[1], rows - 1) + 1):
                 for column in range(max(low[0], 0), min(high[0], columns - 1) + 1):
                     members[row * columns + column].append(number)
@@ -323,7 +331,7 @@ class World:
         return self.clearance(points) > radius
 
 
-def footprint(box: Box) -> F64:
+def outline(box: Box) -> F64:
     """The four corners (4, 2) of a box on the floor."""
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * np.array(box.half)
     return np.array([_place(box.centre, box.yaw, along, across) for along, across in corners])

@@ -1,0 +1,215 @@
+"""What the ray caster draws, against geometry worked out without it."""
+
+import dataclasses
+import math
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from omninav.stages.geometry.catadioptric import project
+from omninav.stages.simulator.cameras import camera_rays, turn
+from omninav.stages.simulator.config import Block, Lamp, WorldConfig
+from omninav.stages.simulator.renderer import Scene, render
+from omninav.stages.simulator.world import World
+from omninav.stages.source.simulated import mirror
+from omninav.stages.values.camera import Cylindrical, Equirectangular, Perspective
+
+EYE = 0.9
+PANORAMA = Equirectangular(
+    width=720,
+    height_px=180,
+    column_of_forward=360.0,
+    elevation_top=math.radians(40),
+    elevation_bottom=-math.radians(50),
+)
+
+
+@pytest.fixture(scope="module")
+def demo() -> Scene:
+    return World(WorldConfig()).scene
+
+
+@pytest.fixture(scope="module")
+def marker() -> tuple[Scene, npt.NDArray[np.float64]]:
+    """An otherwise bare, evenly lit room with one shining box, and the box's corners on the map (8, 3)."""
+    config = WorldConfig(
+        shelves=(),
+        hangings=(),
+        lamps=(Lamp((3.0, 2.0)),),
+        blocks=(Block(centre=(6.0, 5.0), size=(0.8, 0.5), height=0.7, bottom_z=0.4, yaw=0.4),),
+    )
+    world = World(config)
+    scene = world.scene
+    number = next(k for k, box in enumerate(world.boxes) if box.kind == "block")
+    texels, glow = np.zeros_like(scene.texels), np.zeros_like(scene.glow)
+    block = scene.tiles[scene.surface_table[scene.faces[number], 0]]
+    start, side = 0, scene.side
+    while side >= 1:
+        level = texels[start : start + len(glow) * side * side * 3].reshape(len(glow), -1)
+        level[block] = 255
+        start, side = start + level.size, side // 2
+    glow[block] = 1.0
+    cos, sin = math.cos(0.4), math.sin(0.4)
+    corners = [
+        (6.0 + cos * along - sin * across, 5.0 + sin * along + cos * across, z)
+        for along in (-0.4, 0.4)
+        for across in (-0.25, 0.25)
+        for z in (0.4, 1.1)
+    ]
+    return scene._replace(texels=texels, glow=glow), np.array(corners)
+
+
+def seen_from(points: npt.NDArray[np.float64], pose: tuple[float, float, float]) -> npt.NDArray[np.float64]:
+    """Points of the map in the robot's frame, from the eye."""
+    return turn(points - np.array([pose[0], pose[1], EYE]), -pose[2])
+
+
+FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
+"""Corners around each face, numbered 4 x + 2 y + z."""
+
+
+@pytest.mark.parametrize("pose", [(4.6, 4.2, 0.3), (7.2, 6.4, -2.0), (6.3, 3.2, 1.9)])
+def test_a_box_in_the_mirror_lies_within_half_a_pixel_of_where_its_edges_project(
+    marker: tuple[Scene, npt.NDArray[np.float64]], pose: tuple[float, float, float]
+) -> None:
+    """Its faces, with edges finely cut and projected, are filled at 8 times the size: there the outline is known."""
+    scene, corners = marker
+    camera = mirror(WorldConfig().camera)
+    picture = render(scene, camera_rays(camera), pose, EYE)[..., 0]
+    fine = np.zeros((480 * 8, 640 * 8), dtype=np.uint8)
+    for face in FACES:
+        edges = [
+            corners[a] + (corners[b] - corners[a]) * part
+            for a, b in zip(face, (*face[1:], face[0]), strict=True)
+            for part in np.linspace(0.0, 1.0, 100)
+        ]
+        rays = turn(seen_from(np.array(edges), pose), -camera.yaw)
+        pixels = project(
+            rays, camera.focal_x, camera.focal_y, camera.centre_x, camera.centre_y, camera.skew, camera.a, camera.b
+        )
+        cv2.fillPoly(fine, [np.round(pixels * 8).astype(np.int32)], 255)
+    assert (picture > 127).sum() > 100
+    inside = cv2.distanceTransform(fine, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[::8, ::8] / 8
+    outside = cv2.distanceTransform(255 - fine, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[::8, ::8] / 8
+    lit = picture > 127
+    assert lit[inside > 0.5].all()
+    assert not lit[outside > 0.5].any()
+
+
+@pytest.mark.parametrize("pose", [(4.6, 4.2, 0.3), (7.2, 6.4, -2.0), (6.3, 3.2, 1.9)])
+def test_the_corners_of_a_box_are_found_within_half_a_pixel(
+    marker: tuple[Scene, npt.NDArray[np.float64]], pose: tuple[float, float, float]
+) -> None:
+    """Seen through a lens straight lines stay straight: the convex hull of the picture against that of the corners."""
+    scene, corners = marker
+    centre = seen_from(np.array([[6.0, 5.0, 0.9]]), pose)[0]
+    camera = Perspective(
+        width=640,
+        height_px=480,
+        focal_x=500.0,
+        focal_y=500.0,
+        centre_x=320.0,
+        centre_y=240.0,
+        yaw=math.atan2(centre[1], centre[0]),
+    )
+    picture = render(scene, camera_rays(camera), pose, EYE)[..., 0]
+    ahead = turn(seen_from(corners, pose), -camera.yaw)
+    expected = np.stack([320.0 - 500.0 * ahead[:, 1] / ahead[:, 0], 240.0 - 500.0 * ahead[:, 2] / ahead[:, 0]], axis=1)
+    hull = cv2.convexHull(expected.astype(np.float32))[:, 0].astype(np.float64)
+    lit = picture > 127
+    inside = np.array(
+        [
+            [cv2.pointPolygonTest(hull.astype(np.float32), (float(u), float(v)), True) for u in range(640)]
+            for v in range(480)
+        ]
+    )
+    assert lit[inside > 0.5].all()
+    assert not lit[inside < -0.5].any()
+
+
+def test_a_turn_of_the_robot_is_a_shift_of_the_panorama(demo: Scene) -> None:
+    rays = camera_rays(PANORAMA)
+    before = render(demo, rays, (5.8, 4.5, 0.4), EYE)
+    columns = 37  # a turn counter-clockwise moves the scene to the right
+    after = render(demo, rays, (5.8, 4.5, 0.4 + columns * 2 * math.pi / 720), EYE)
+    differences = np.abs(np.roll(before, columns, axis=1).astype(int) - after)
+    # Rounding may flip what a ray at an edge meets; a shift by 0.1 column more would change far more pixels.
+    assert np.mean(differences.max(axis=-1) > 2) < 0.002
+    off = render(demo, rays, (5.8, 4.5, 0.4 + (columns + 0.1) * 2 * math.pi / 720), EYE)
+    wrong = np.abs(np.roll(before, columns, axis=1).astype(int) - off)
+    assert differences.mean() < 0.1 * wrong.mean()
+
+
+def test_the_panorama_has_no_seam(demo: Scene) -> None:
+    """First and last columns differ as neighbours inside do: with the seam put elsewhere the same pixels come out."""
+    rays = camera_rays(PANORAMA)
+    elsewhere = camera_rays(dataclasses.replace(PANORAMA, column_of_forward=180.0))
+    whole = render(demo, rays, (5.8, 4.5, 0.4), EYE)
+    moved = render(demo, elsewhere, (5.8, 4.5, 0.4), EYE)
+    assert np.mean(np.abs(np.roll(whole, -180, axis=1).astype(int) - moved).max(axis=-1) > 2) < 0.002
+
+
+def test_the_sense_of_a_strip_mirrors_it(demo: Scene) -> None:
+    strip = Cylindrical(width=360, height_px=80, column_of_forward=180.0, elevation_top=0.5, elevation_bottom=-0.6)
+    clockwise = render(demo, camera_rays(strip), (5.8, 4.5, 0.4), EYE)
+    counter = dataclasses.replace(strip, sense="counter_clockwise")
+    np.testing.assert_array_equal(clockwise[:, ::-1], render(demo, camera_rays(counter), (5.8, 4.5, 0.4), EYE))
+
+
+def test_what_lies_ahead_is_in_the_middle_and_what_lies_left_is_left_of_it(
+    marker: tuple[Scene, npt.NDArray[np.float64]],
+) -> None:
+    scene, _ = marker
+    rays = camera_rays(PANORAMA)
+    for bearing in (0.0, 0.5, -1.2):
+        heading = math.atan2(5.0 - 4.2, 6.0 - 3.6) - bearing
+        picture = render(scene, rays, (3.6, 4.2, heading), EYE)[..., 0]
+        column = np.nonzero(picture > 127)[1].mean() + 0.5
+        assert abs(column - (360.0 - bearing / (2 * math.pi) * 720)) < 3
+
+
+def test_a_bearing_in_the_mirror_is_the_angle_in_the_picture_plus_yaw(
+    marker: tuple[Scene, npt.NDArray[np.float64]],
+) -> None:
+    """Architecture, section 5: atan2(v - cy, u - cx) + yaw, counter-clockwise from the robot's forward."""
+    scene, _ = marker
+    camera = mirror(WorldConfig().camera)
+    heading = 0.7
+    picture = render(scene, camera_rays(camera), (3.6, 4.2, heading), EYE)[..., 0]
+    v, u = np.nonzero(picture > 127)
+    seen = math.atan2(v.mean() - camera.centre_y, u.mean() - camera.centre_x) + camera.yaw
+    assert abs(seen - (math.atan2(5.0 - 4.2, 6.0 - 3.6) - heading)) < math.radians(1)
+
+
+def test_a_low_shelf_is_looked_over(demo: Scene) -> None:
+    """From high above the shelves, the far wall is seen over them; from the floor it is not."""
+    rays = camera_rays(PANORAMA)
+    low, high = render(demo, rays, (5.8, 1.3, 1.57), 0.4), render(demo, rays, (5.8, 1.3, 1.57), 2.9)
+    above_horizon = slice(60, 78)  # a few degrees above to just above the horizon
+    assert np.abs(low[above_horizon].astype(int) - high[above_horizon]).mean() > 10
+
+
+def test_noise_follows_from_its_key_alone_and_has_the_stated_spread(demo: Scene) -> None:
+    rays = camera_rays(mirror(WorldConfig().camera), 0.1)
+    pose = (5.8, 4.5, 0.4)
+    clean = render(demo, rays, pose, EYE).astype(float)
+    noisy = [render(demo, rays, pose, EYE, noise=3.0, key=key) for key in (7, 7, 8)]
+    np.testing.assert_array_equal(noisy[0], noisy[1])
+    middle = (clean > 20) & (clean < 235)
+    for picture in (noisy[0], noisy[2]):
+        error = (picture - clean)[middle]
+        assert abs(error.mean()) < 0.05
+        assert abs(error.std() - math.sqrt(3.0**2 + 1 / 6)) < 0.05  # two roundings of variance 1/12
+    first, second = (noisy[0] - clean)[middle], (noisy[2] - clean)[middle]
+    assert abs(np.corrcoef(first, second)[0, 1]) < 0.01
+
+
+def test_the_ring_is_lit_and_the_robot_in_its_middle_is_black(demo: Scene) -> None:
+    camera = mirror(WorldConfig().camera)
+    picture = render(demo, camera_rays(camera), (5.8, 4.5, 0.4), EYE)
+    v, u = np.mgrid[0:480, 0:640]
+    radius = np.hypot(u - camera.centre_x, v - camera.centre_y)
+    assert picture[(radius < 34) | (radius > 238)].max() == 0
+    assert np.mean(picture[(radius > 35) & (radius < 237)].max(axis=-1) > 10) > 0.99

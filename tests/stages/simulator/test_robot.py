@@ -1,0 +1,91 @@
+"""The drive and what the wheels make of it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from omninav.stages.geometry.se2 import between
+from omninav.stages.simulator.config import OdometryNoise, Robot
+from omninav.stages.simulator.odometry import Bias, draw_bias, odometry
+from omninav.stages.simulator.robot import drive, wandered
+
+CORNER = ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0))
+EXACT = OdometryNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_BIAS = Bias(0.0, 0.0, 0.0)
+
+
+def test_a_drive_starts_at_rest_at_the_first_waypoint_and_ends_at_the_last() -> None:
+    times, poses = drive(CORNER, Robot(), rate=20.0)
+    np.testing.assert_allclose(np.diff(times), 0.05)
+    np.testing.assert_allclose(poses[0], [0.0, 0.0, 0.0])
+    assert math.hypot(poses[-1, 0] - 4.0, poses[-1, 1] - 3.0) < 0.15
+    assert math.hypot(poses[1, 0], poses[1, 1]) < 0.01
+
+
+def test_limits_of_speed_turning_and_acceleration_hold() -> None:
+    robot = Robot()
+    _, poses = drive(CORNER, robot, rate=20.0)
+    motion = between(poses[:-1], poses[1:]) * 20.0
+    speed = np.hypot(motion[:, 0], motion[:, 1])
+    assert speed.max() <= robot.speed * 1.001
+    assert np.abs(motion[:, 2]).max() <= robot.turn_speed * 1.001
+    assert np.abs(np.diff(speed)).max() * 20.0 <= robot.acceleration * 1.05
+
+
+def test_wheels_do_not_slip_sideways() -> None:
+    _, poses = drive(CORNER, Robot(), rate=20.0)
+    motion = between(poses[:-1], poses[1:])
+    # On an arc the chord leaves at half the turn; a second step may turn at another rate.
+    sideways = motion[:, 1] - motion[:, 0] * np.tan(motion[:, 2] / 2)
+    assert np.abs(sideways).max() < 1e-3
+
+
+@pytest.mark.parametrize("behind", [((0.0, 0.0), (2.0, 0.0), (0.0, 0.1)), ((0.0, 0.0), (1.0, 0.0), (1.0, 0.0))])
+def test_sharp_turns_and_repeated_waypoints_are_driven(behind: tuple[tuple[float, float], ...]) -> None:
+    _, poses = drive(behind, Robot(), rate=20.0)
+    assert np.isfinite(poses).all()
+    assert math.hypot(poses[-1, 0] - behind[-1][0], poses[-1, 1] - behind[-1][1]) < 0.2
+
+
+def test_waypoints_are_missed_by_two_spreads_at_most() -> None:
+    missed = wandered(CORNER * 50, 0.04, np.random.default_rng(1)) - np.array(CORNER * 50)
+    assert np.abs(missed).max() <= 0.08 + 1e-12
+    assert 0.03 < missed.std() < 0.045
+
+
+def test_odometry_without_noise_is_the_drive_itself() -> None:
+    _, poses = drive(CORNER, Robot(), rate=20.0)
+    seen = odometry(poses, EXACT, NO_BIAS, np.random.default_rng(0))
+    np.testing.assert_allclose(between(seen[:-1], seen[1:]), between(poses[:-1], poses[1:]), atol=1e-12)
+    np.testing.assert_allclose(seen[-1], between(poses[0], poses[-1]), atol=1e-9)
+
+
+def test_biases_scale_translation_and_rotation_and_bend_the_straight() -> None:
+    straight = np.stack([np.linspace(0.0, 10.0, 201), np.zeros(201), np.zeros(201)], axis=1)
+    spot = np.stack([np.zeros(101), np.zeros(101), np.linspace(0.0, 2.0, 101)], axis=1)
+    rng = np.random.default_rng(0)
+    assert odometry(straight, EXACT, Bias(0.03, 0.0, 0.0), rng)[-1, 0] == pytest.approx(10.3)
+    assert odometry(straight, EXACT, Bias(0.0, 0.0, 0.01), rng)[-1, 2] == pytest.approx(0.1)
+    assert odometry(spot, EXACT, Bias(0.0, 0.05, 0.0), rng)[-1, 2] == pytest.approx(2.1)
+
+
+def test_noise_grows_with_the_root_of_the_way_and_of_the_turn() -> None:
+    """One metre straight: sigma of length 0.02, of heading 0.7 degrees; a turn of 1 rad: 1.2 degrees."""
+    noise = OdometryNoise(scale_bias=0.0, rotation_bias=0.0, turn_bias=0.0)
+    straight = np.stack([np.linspace(0.0, 1.0, 21), np.zeros(21), np.zeros(21)], axis=1)
+    spot = np.stack([np.zeros(21), np.zeros(21), np.linspace(0.0, 1.0, 21)], axis=1)
+    rng = np.random.default_rng(3)
+    ends = np.array([odometry(straight, noise, NO_BIAS, rng)[-1] for _ in range(1500)])
+    turned = np.array([odometry(spot, noise, NO_BIAS, rng)[-1, 2] for _ in range(1500)])
+    assert ends[:, 0].std() == pytest.approx(0.02, rel=0.08)
+    assert math.degrees(ends[:, 2].std()) == pytest.approx(0.7, rel=0.08)
+    assert math.degrees(turned.std()) == pytest.approx(1.2, rel=0.08)
+
+
+def test_the_biases_of_many_days_have_the_stated_spread() -> None:
+    noise = OdometryNoise()
+    days = [draw_bias(noise, np.random.default_rng(day)) for day in range(800)]
+    assert np.std([day.translation for day in days]) == pytest.approx(noise.scale_bias, rel=0.1)
+    assert np.std([day.rotation for day in days]) == pytest.approx(noise.rotation_bias, rel=0.1)
+    assert np.std([day.turn for day in days]) == pytest.approx(noise.turn_bias, rel=0.1)
