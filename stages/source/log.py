@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
 from omninav.stages.geometry.se2 import between, compose
+from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.values.camera import Camera
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
@@ -37,7 +38,8 @@ class Position(State):
 class LogSource(Source):
     """Recorded drives, one after another: a tick for every picture that can be used.
 
-    `log` names one recording or several (see `open_recording`); `first`, `stop` and `stride` select frames of each.
+    `log` names one recording or several (see `open_recording`); without one, `route` of the simulated `world` is driven
+    on `day`. `first`, `stop` and `stride` select frames of each.
     Poses are metres and radians; stamps are header stamps. `motion` is the SE(2) increment of the odometry between
     the pictures' own times, absent at the first picture of each log; where pictures are left out it spans the gap.
 
@@ -46,7 +48,9 @@ class LogSource(Source):
     """
 
     log: str | tuple[str, ...] | None = None
+    world: WorldConfig = WorldConfig()
     route: str | None = None
+    day: int = 1
     topics: Topics = Topics()
     camera: str | None = None
     layouts: tuple[str, ...] = ()
@@ -150,9 +154,15 @@ class LogSource(Source):
         if getattr(self, "_recordings", None) is not None:
             return
         names = (self.log,) if isinstance(self.log, str) or self.log is None else self.log
-        if not names or None in names:
+        recordings: list[Recording]
+        if self.log is None and self.route is not None:
+            from .simulated import SimulatedRecording  # brings the compiler, which a log does not need
+
+            recordings = [SimulatedRecording(self.world, self.route, self.day)]
+        elif not names or None in names:
             raise UnreadableRecording("no recording is named; type log=PATH")
-        recordings = [open_recording(str(name), self.topics, self.camera, self.layouts) for name in names]
+        else:
+            recordings = [open_recording(str(name), self.topics, self.camera, self.layouts) for name in names]
         self._frames = [
             np.arange(len(recording.stamps))[self.first : self.stop : self.stride] for recording in recordings
         ]
