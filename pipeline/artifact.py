@@ -1,5 +1,6 @@
 """Static results as files: versioned, checksummed, never unpickled; and the cache in which they lie by content."""
 
+import dataclasses
 import fcntl
 import hashlib
 import io
@@ -27,8 +28,9 @@ def write_artifact(path: Path, value: Value, facts: dict[str, Any] | None = None
     `numpy.load` opens it. The header names the value's type, each field's array with its own sha256, and `facts`
     about how it was made. Top-level array fields are arrays of the file; everything else is encoded in one more.
     """
-    arrays = {name: field for name, field in vars(value).items() if isinstance(field, np.ndarray)}
-    rest = {name: field for name, field in vars(value).items() if name not in arrays}
+    fields = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}  # type: ignore[arg-type]
+    arrays = {name: field for name, field in fields.items() if isinstance(field, np.ndarray)}
+    rest = {name: field for name, field in fields.items() if name not in arrays}
     arrays["rest"] = np.frombuffer(encode(rest), dtype=np.uint8)
     header = {
         "format": FORMAT,

@@ -1,0 +1,122 @@
+"""What the engine costs per stage and tick, beside plain calls and beside a DAG library that runs the same graph."""
+
+import time
+
+from omninav.pipeline import Context, Outputs, Source, Stage, State, Tick, Value
+from omninav.pipeline.engine import Engine
+from omninav.pipeline.graph import build
+
+from .table import Row, medians
+
+TICKS = 2000
+STAGES = 10
+
+
+class Number(Value):
+    """A number."""
+
+    value: float
+
+
+class Ticks(Source):
+    """Ticks and a number."""
+
+    class Place(State):
+        next: int = 0
+
+    class Out(Outputs):
+        tick: Tick
+        number: Number
+
+    def step(self, ctx: Context, place: Place) -> Out | None:
+        if place.next == TICKS:
+            return None
+        place.next += 1
+        return self.Out(tick=Tick(place.next, place.next), number=Number(float(place.next)))
+
+
+class AddOne(Stage):
+    """One more."""
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, number: Number) -> Out:
+        return self.Out(number=Number(number.value + 1.0))
+
+
+def rows() -> list[Row]:
+    """A chain of ten stages over 2000 ticks: the engine, plain calls of the same stages, and Hamilton."""
+    here = __name__
+    nodes = {"source": {"_target_": f"{here}.Ticks"}} | {f"s{i}": {"_target_": f"{here}.AddOne"} for i in range(STAGES)}
+    wires = {f"s{i}": {"number": "source.number" if i == 0 else f"s{i - 1}.number"} for i in range(STAGES)}
+    graph = build({"nodes": nodes, "wires": wires})
+    stages = [AddOne() for _ in range(STAGES)]
+    ctx = Context("plain")
+
+    def engine() -> None:
+        Engine(graph, {}, 0).run()
+
+    def plain() -> None:
+        source, place = Ticks(), Ticks.Place()
+        while (out := source.step(ctx, place)) is not None:
+            number = out.number
+            for stage in stages:
+                number = stage.step(ctx, number=number).number
+
+    taken = medians({"engine": engine, "plain": plain}, rounds=7)
+    per = 1e6 / (TICKS * STAGES)
+    overhead = (taken["engine"] - taken["plain"]) * per
+    found = [
+        Row(
+            "engine overhead per stage and tick",
+            overhead,
+            "us",
+            "plain call of a stage",
+            taken["plain"] * per,
+            limit=20.0,
+        )
+    ]
+    hamilton = _hamilton()
+    if hamilton is not None:
+        found.append(
+            Row(
+                "engine, whole, per stage and tick",
+                taken["engine"] * per,
+                "us",
+                "sf-hamilton, same graph",
+                hamilton,
+                limit=1.0,
+                of_peer=True,
+            )
+        )
+    return found
+
+
+def _hamilton() -> float | None:
+    """Microseconds per stage and tick in Hamilton's driver, None where it is not installed."""
+    try:
+        from hamilton import ad_hoc_utils, driver
+    except ImportError:
+        return None
+
+    def make(i: int):
+        if i == 0:
+
+            def first(number: float) -> float:
+                return number + 1.0
+
+            first.__name__ = "s0"
+            return first
+        namespace: dict = {}
+        exec(f"def s{i}(s{i - 1}: float) -> float:\n    return s{i - 1} + 1.0", namespace)
+        return namespace[f"s{i}"]
+
+    module = ad_hoc_utils.create_temporary_module(*(make(i) for i in range(STAGES)), module_name="chain")
+    chain = driver.Builder().with_modules(module).build()
+    chain.execute([f"s{STAGES - 1}"], inputs={"number": 0.0})
+    ticks = 60
+    start = time.perf_counter()
+    for tick in range(ticks):
+        chain.execute([f"s{STAGES - 1}"], inputs={"number": float(tick)})
+    return (time.perf_counter() - start) * 1e6 / (ticks * STAGES)

@@ -1,0 +1,208 @@
+"""The command line: what it prints, what it leaves, and its exit codes."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_help_and_version_answer_without_configuration(omninav):
+    assert "omninav resume runs/latest" in omninav("--help", check=True).stdout
+    assert re.match(r"omninav \d", omninav("--version", check=True).stdout)
+
+
+def test_hydras_own_flags_are_intact(omninav):
+    shown = omninav("--cfg", "job", "--package", "wires.fusion", "match=l2", check=True).stdout
+    assert "likelihood: sensor.likelihood" in shown
+    assert "Powered by Hydra" in omninav("--hydra-help", check=True).stdout
+
+
+def test_an_unknown_command_names_the_nearest(omninav):
+    ended = omninav("chekc")
+    assert ended.returncode == 2
+    assert "did you mean 'omninav check'?" in ended.stderr
+
+
+def test_check_prints_every_problem_with_suggestions_and_makes_nothing(omninav, tmp_path: Path):
+    ended = omninav("check", "variant=omniview_mcl", "+nodes.match.headngs=72", "wires.sensor.map=nowhere.map")
+    assert ended.returncode == 2
+    assert "2 problems" in ended.stderr
+    assert "did you mean 'nodes.match.headings'?" in ended.stderr
+    assert "there is no node 'nowhere'" in ended.stderr
+    assert "artifacts.map" in ended.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_with_a_wrong_configuration_says_the_same_and_makes_nothing(omninav, tmp_path: Path):
+    ended = omninav("variant=omniview_mcl", "+nodes.match.headngs=72", "wires.sensor.map=nowhere.map", "seed=-1")
+    assert ended.returncode == 2
+    assert "3 problems" in ended.stderr
+    assert "Traceback" not in ended.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_check_says_who_reads_the_truth(omninav):
+    said = omninav("check", "variant=omniview_mcl", check=True).stdout
+    assert "nothing wrong" in said
+    readers = said.partition("ground truth is read by: ")[2].strip().split(", ")
+    assert set(readers) <= {
+        "start",
+        "errors",
+        "relative",
+        "error_view",
+        "path_view",
+        "belief_view",
+        "similarity_view",
+        "result_log",
+    }
+
+
+def test_an_unknown_option_of_a_group_names_those_that_exist(omninav, tmp_path: Path):
+    for words in (("match=selectve",), ("check", "match=selectve")):
+        ended = omninav(*words)
+        assert ended.returncode == 2
+        assert "selective" in ended.stderr + ended.stdout
+        assert "Traceback" not in ended.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_log_of_ones_own_without_a_map_says_what_to_type(omninav, tmp_path: Path):
+    ended = omninav("variant=omniview_mcl", "log=drive.mcap")
+    assert ended.returncode == 2
+    assert "this variant needs a map" in ended.stderr
+    assert "tour=LOG" in ended.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_log_is_one_line_that_names_it(omninav, tmp_path: Path):
+    ended = omninav("variant=omniview_mcl_map", "log=nowhere.mcap")
+    assert ended.returncode == 2
+    assert "nowhere.mcap" in ended.stderr
+    assert len(ended.stderr.strip().split("\n")) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_damaged_map_is_refused_by_name(omninav, demo: Path, tmp_path: Path):
+    content = bytearray((demo / "map.omap").read_bytes())
+    content[len(content) // 2] ^= 4
+    (tmp_path / "flipped.omap").write_bytes(content)
+    (tmp_path / "cut.omap").write_bytes(content[: len(content) // 3])
+    for name in ("flipped.omap", "cut.omap"):
+        ended = omninav("variant=omniview_mcl", f"map={name}")
+        assert ended.returncode == 2
+        assert name in ended.stderr
+        assert "Traceback" not in ended.stderr
+
+
+def test_stages_lists_ports_parameters_and_source(omninav):
+    listed = omninav("stages", check=True).stdout
+    selective = listed.partition("match.selective")[2].partition("\n\n")[0]
+    for part in (
+        "in   map: ReferenceGraph",
+        "out  similarities: Similarities",
+        "headings: int >= 1 = 36",
+        "Koenig 2004",
+    ):
+        assert part in selective, part
+
+
+def test_variants_and_doctor_answer(omninav):
+    said = omninav("variants", check=True).stdout
+    assert "omniview_mcl " in said
+    assert "Gross & Koenig 2004" in said
+    assert "0 unusable" in omninav("doctor", check=True).stdout
+
+
+def test_graph_draws_the_graph_and_that_of_its_map(omninav, tmp_path: Path):
+    omninav("graph", "variant=omniview_mcl", "out=drawn", check=True)
+    assert {path.name for path in (tmp_path / "drawn").iterdir()} == {
+        "omniview_mcl.svg",
+        "omniview_mcl.mmd",
+        "omniview_mcl.map.svg",
+        "omniview_mcl.map.mmd",
+    }
+
+
+def test_the_embedded_default_leaves_everything_a_run_should(demo: Path):
+    names = {path.name for path in demo.iterdir()}
+    assert names == {
+        "config.yaml",
+        "graph.mmd",
+        "graph.svg",
+        "manifest.json",
+        "map.omap",
+        "metrics.json",
+        "report.html",
+        "result.mcap",
+        "run.log",
+        "timing.json",
+        "trajectory.tum",
+    }
+    manifest = json.loads((demo / "manifest.json").read_text())
+    assert manifest["status"] == "complete"
+    assert manifest["facts"]["odometry"] == "measured"
+    metrics = json.loads((demo / "metrics.json").read_text())
+    assert metrics["frames"] == len((demo / "trajectory.tum").read_text().split("\n")) - 1
+    for name in ("position_error_m", "heading_error_deg"):
+        assert set(metrics[name]) == {"mean", "median", "p90", "max"}
+        assert metrics["after_convergence"][name]["median"] <= metrics["odometry_alone"][name]["median"]
+    assert metrics["map"]["references"] > 50
+
+
+def test_the_embedded_default_localises(demo: Path):
+    metrics = json.loads((demo / "metrics.json").read_text())
+    assert metrics["converged_after_frames"] is not None
+    assert metrics["after_convergence"]["position_error_m"]["median"] < 0.3
+    assert metrics["after_convergence"]["heading_error_deg"]["median"] < 5
+
+
+def test_compare_and_report_print_tables(omninav, demo: Path, tmp_path: Path):
+    said = omninav("compare", str(demo), str(demo), check=True).stdout
+    assert "position error" in said.lower()
+    assert "report.html" in omninav("report", str(demo), check=True).stdout
+    assert omninav("compare", str(demo)).returncode == 2
+    assert omninav("report", str(tmp_path)).returncode == 2
+
+
+def test_a_saved_map_gives_the_same_run_as_the_tour_it_was_made_from(
+    omninav, demo: Path, shared_cache: Path, tmp_path: Path
+):
+    omninav(f"map={demo / 'map.omap'}", f"cache={shared_cache}", check=True)
+    for name in ("trajectory.tum", "metrics.json", "map.omap"):
+        assert (tmp_path / "runs/latest" / name).read_bytes() == (demo / name).read_bytes(), name
+
+
+def test_another_seed_gives_another_run_and_without_cache_the_same_seed_the_same(
+    omninav, demo: Path, shared_cache: Path, tmp_path: Path
+):
+    omninav("seed=1", f"cache={shared_cache}", check=True)
+    assert (tmp_path / "runs/latest/trajectory.tum").read_bytes() != (demo / "trajectory.tum").read_bytes()
+    omninav("cache=null", check=True)
+    for name in ("trajectory.tum", "metrics.json", "map.omap"):
+        assert (tmp_path / "runs/latest" / name).read_bytes() == (demo / name).read_bytes(), name
+
+
+def test_resume_of_what_is_no_run_or_has_ended_says_so(omninav, demo: Path):
+    ended = omninav("resume", "nothing_here")
+    assert ended.returncode == 2
+    assert "not a run folder" in ended.stderr
+    assert "report.html" in omninav("resume", str(demo), check=True).stdout
+
+
+@pytest.mark.parametrize("word", ["nodes.match.headings=0", "nodes.match.headings=thirty", "nodes.fusion=null"])
+def test_wrong_parameters_are_refused_before_anything_runs(omninav, tmp_path: Path, word: str):
+    ended = omninav(word)
+    assert ended.returncode == 2
+    assert "problem" in ended.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_trajectory_is_in_tum_format_with_ascending_header_stamps(demo: Path):
+    rows = np.loadtxt(demo / "trajectory.tum")
+    assert rows.shape[1] == 8
+    assert np.all(np.diff(rows[:, 0]) > 0)
+    assert np.allclose(np.linalg.norm(rows[:, 4:], axis=1), 1.0)

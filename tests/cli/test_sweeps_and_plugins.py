@@ -1,0 +1,112 @@
+"""Sweeps, failing jobs, and the four ways to a third party's stage."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+EDGES = ROOT / "examples" / "edges"
+
+
+def test_a_sweep_runs_every_combination_and_has_one_page(omninav, shared_cache: Path, tmp_path: Path):
+    omninav("-m", "match=selective,l2", "seed=0,1,2", f"cache={shared_cache}", check=True)
+    (sweep,) = (tmp_path / "runs").glob("*_sweep")
+    manifests = [json.loads((sweep / str(n) / "manifest.json").read_text()) for n in range(6)]
+    assert [m["status"] for m in manifests] == ["complete"] * 6
+    assert manifests[0]["overrides"].startswith("match=selective seed=0")
+    assert all((sweep / str(n) / "report.html").exists() for n in range(6))
+    page = next(sweep.glob("*.html")).read_text()
+    assert all(m["overrides"].split()[0] in page for m in manifests)
+
+
+def test_a_failing_job_is_named_at_once_and_the_others_finish(omninav, shared_cache: Path, tmp_path: Path):
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    words = ("--config-dir", "examples/edges/conf", "features=raises_at_seed", "seed=0,1,2", f"cache={shared_cache}")
+    ended = omninav("-m", *words)
+    assert ended.returncode == 1
+    assert "job 1: stage 'features'" in ended.stderr
+    assert "raises at seed 1" in ended.stderr
+    (sweep,) = (tmp_path / "runs").glob("*_sweep")
+    statuses = [json.loads((sweep / str(n) / "manifest.json").read_text())["status"] for n in range(3)]
+    assert statuses == ["complete", "failed", "complete"]
+    assert "raises at seed 1" in next(sweep.glob("*.html")).read_text()
+    assert "Traceback" in (sweep / "1" / "run.log").read_text()
+
+
+def test_jobs_in_several_processes_give_the_same_and_leave_their_exit_code(
+    omninav, shared_cache: Path, demo: Path, tmp_path: Path
+):
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    words = (
+        "--config-dir",
+        "examples/edges/conf",
+        "hydra/launcher=joblib",
+        "hydra.launcher.n_jobs=2",
+        f"cache={shared_cache}",
+    )
+    ended = omninav("-m", *words, "features=hsv_histogram,raises_at_seed", "seed=0,1")
+    assert ended.returncode == 1, ended.stdout + ended.stderr
+    (sweep,) = (tmp_path / "runs").glob("*_sweep")
+    statuses = [json.loads((sweep / str(n) / "manifest.json").read_text())["status"] for n in range(4)]
+    assert statuses == ["complete", "complete", "complete", "failed"]
+    assert (sweep / "0" / "trajectory.tum").read_bytes() == (demo / "trajectory.tum").read_bytes()
+
+
+def test_a_stage_by_its_path_alone(omninav):
+    target = f"{EDGES / 'omninav_edges.py'}:EdgeHistogram"
+    assert "nothing wrong" in omninav("check", f'nodes.features={{_target_: "{target}"}}', check=True).stdout
+
+
+def test_a_stage_by_a_config_folder(omninav, tmp_path: Path):
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    words = ("--config-dir", "examples/edges/conf", "features=edge_directions", "nodes.features.directions=12")
+    assert "nothing wrong" in omninav("check", *words, check=True).stdout
+
+
+def test_a_stage_by_the_environment_runs_by_name(omninav, shared_cache: Path, tmp_path: Path):
+    named = f"features.edges={EDGES / 'omninav_edges.py'}:EdgeHistogram"
+    omninav("features=edges", f"cache={shared_cache}", check=True, OMNINAV_STAGES=named)
+    config = (tmp_path / "runs" / "latest" / "config.yaml").read_text()
+    assert "omninav_edges.py:EdgeHistogram" in config
+    listed = omninav("stages", "features", check=True, OMNINAV_STAGES=named).stdout
+    assert "features.edges  [environment]" in listed
+
+
+def test_a_stage_of_an_installed_package_by_name(omninav, tmp_path: Path):
+    place = tmp_path / "site"
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-build-isolation",
+        "--no-index",
+        "--target",
+        str(place),
+        str(EDGES),
+    ]
+    made = subprocess.run(command, capture_output=True, text=True)
+    if made.returncode != 0:  # no setuptools in this environment: what pip would have laid down, by hand
+        info = place / "omninav_edges-0.1.0.dist-info"
+        info.mkdir(parents=True, exist_ok=True)
+        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: omninav-edges\nVersion: 0.1.0\n")
+        (info / "entry_points.txt").write_text("[omninav.stages]\nfeatures.edges = omninav_edges:EdgeHistogram\n")
+        (place / "omninav_edges.py").write_text((EDGES / "omninav_edges.py").read_text())
+    listed = omninav("stages", "features", check=True, PYTHONPATH=str(place)).stdout
+    assert "features.edges  [installed]" in listed
+    assert "nothing wrong" in omninav("check", "features=edges", check=True, PYTHONPATH=str(place)).stdout
+
+
+def test_a_broken_plugin_is_a_row_and_never_a_crash(omninav, tmp_path: Path):
+    (tmp_path / "broken.py").write_text("import not_there\n")
+    settings = {"OMNINAV_STAGES": "features.broken=broken.py:Thing"}
+    ended = omninav("stages", "features", check=True, **settings)
+    assert "features.broken  [environment, cannot be used]" in ended.stdout
+    assert "features.hsv_histogram" in ended.stdout
+    assert omninav("check", check=True, **settings).returncode == 0
+    used = omninav("check", "features=broken", **settings)
+    assert used.returncode == 2
+    assert "No module named 'not_there'" in used.stderr

@@ -1,0 +1,50 @@
+"""What several tests need: a command line in its own process, and the built-in world's features computed once."""
+
+import fcntl
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+DATA = ROOT.parent / "shared" / "data"
+
+Command = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture(scope="session")
+def shared_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cache folder that all tests of a session share, in whichever process they run."""
+    return tmp_path_factory.getbasetemp().parent / "omninav-cache"
+
+
+@pytest.fixture
+def omninav(tmp_path: Path, shared_cache: Path) -> Command:
+    """Runs `omninav …` in an empty folder; runs share one cache so that the small world is rendered once."""
+
+    def run(*words: str, check: bool = False, **environment: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "omninav.pipeline", *words]
+        settings = {**os.environ, "COLUMNS": "120", **environment}
+        ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env=settings, timeout=600)
+        if check:
+            assert ended.returncode == 0, ended.stdout + ended.stderr
+        return ended
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def demo(shared_cache: Path) -> Path:
+    """A finished run of the embedded default, made once for all tests."""
+    place = shared_cache.parent / "omninav-demo"
+    place.mkdir(exist_ok=True)
+    with (place / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (place / "runs" / "latest" / "report.html").exists():
+            command = [sys.executable, "-m", "omninav.pipeline", f"cache={shared_cache}"]
+            ended = subprocess.run(command, cwd=place, capture_output=True, text=True, timeout=600)
+            assert ended.returncode == 0, ended.stdout + ended.stderr
+    return place / "runs" / "latest"
