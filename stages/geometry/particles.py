@@ -1,7 +1,9 @@
 """Weighted pose samples: moments and modes."""
 
+import numba
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from .se2 import wrap
 
@@ -47,3 +49,58 @@ def heaviest_mode(poses: Array, weights: Array, radius: float = 1.0) -> tuple[Ar
         members = np.ones(len(poses), dtype=bool)
     mean, covariance = weighted_moments(poses[members], weights[members])
     return mean, covariance, float(weights[members].sum() / weights.sum())
+
+
+def effective_size(weights: Array) -> float:
+    """How many equal particles carry as much information as these weights: (sum w)^2 / sum w^2."""
+    return float(weights.sum() ** 2 / np.square(weights).sum())
+
+
+def systematic(weights: Array, number: int, offset: float) -> npt.NDArray[np.int64]:
+    """Indices of `number` particles drawn by weight with one comb of equal teeth: (number,), ascending.
+
+    `offset` in [0, 1) places the comb. Particle i is drawn floor or ceil of number w_i times; unbiased for a uniform
+    offset.
+    """
+    return _comb(weights, number, offset)  # type: ignore[no-any-return]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc]
+def _comb(weights: Array, number: int, offset: float) -> npt.NDArray[np.int64]:
+    out = np.empty(number, np.int64)
+    step = weights.sum() / number
+    at, reached, last = 0, weights[0], len(weights) - 1
+    while weights[last] <= 0.0 and last > 0:  # rounding must not end on a particle without weight
+        last -= 1
+    for n in range(number):
+        tooth = (n + offset) * step
+        while reached <= tooth and at < last:
+            at += 1
+            reached += weights[at]
+        out[n] = at
+    return out
+
+
+def occupied_cells(poses: Array, cell: float, angle: float) -> int:
+    """Number of cells (`cell` metres square by about `angle` radians) that hold a pose."""
+    headings = max(1, round(2 * np.pi / angle))
+    x, y = np.floor(poses[:, 0] / cell).astype(np.int64), np.floor(poses[:, 1] / cell).astype(np.int64)
+    z = np.floor(np.mod(poses[:, 2], 2 * np.pi) * (headings / (2 * np.pi))).astype(np.int64) % headings
+    x, y = x - x.min(), y - y.min()
+    return len(np.unique((x * (int(y.max()) + 1) + y) * headings + z))
+
+
+def uniform_around(centres: Array, radius: float, number: int, rng: np.random.Generator) -> Array:
+    """Poses (number, 3) uniform over the area within `radius` metres of any centre (R, >= 2), all headings alike."""
+    tree = cKDTree(centres[:, :2])
+    low, high = centres[:, :2].min(axis=0) - radius, centres[:, :2].max(axis=0) + radius
+    cell = radius / 2
+    columns, rows = (int(n) for n in np.ceil((high - low) / cell))
+    corners = low + cell * np.stack(np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij"), -1).reshape(-1, 2)
+    reach = radius + cell * np.sqrt(0.5)
+    corners = corners[np.isfinite(tree.query(corners + cell / 2, distance_upper_bound=reach)[0])]
+    xy = np.empty((0, 2))
+    while len(xy) < number:
+        drawn = corners[rng.integers(len(corners), size=number)] + cell * rng.random((number, 2))
+        xy = np.concatenate([xy, drawn[np.isfinite(tree.query(drawn, distance_upper_bound=radius)[0])]])
+    return np.column_stack([xy[:number], rng.uniform(-np.pi, np.pi, number)])

@@ -189,3 +189,34 @@ def euclidean_similarities(
     largest = np.sqrt(2.0 * len(view)) if histograms else np.sqrt(len(view)) * LARGEST_COLOUR_DISTANCE
     alike: Floats = (1.0 - np.sqrt(np.maximum(squared, 0.0)) / largest).astype(np.float32)
     return np.clip(alike, 0.0, 1.0)
+
+
+def turned_view(view: Floats, turn: float) -> Floats:
+    """A view as it looks to a robot turned counter-clockwise by `turn` radians: segments move up by turn n / 2 pi."""
+    segments = len(view)
+    shift = -turn * segments / (2 * np.pi)
+    whole = int(np.floor(shift))
+    part = np.float32(shift - whole)
+    first = (np.arange(segments) + whole) % segments
+    turned: Floats = view[first] * (1 - part) + view[(first + 1) % segments] * part
+    return turned
+
+
+def similarity_at(
+    references: Floats, view: Floats, turns: npt.NDArray[np.float64], histograms: bool, exponent: float = 0.5
+) -> Floats:
+    """Selective similarity of a view to each reference at one heading each: (N, segments, bins), (N,) turns -> (N,).
+
+    `turns`: the robot's heading less the reference's own (radians).
+    """
+    segments = len(view)
+    out = np.empty(len(references), np.float32)
+    for n, turn in enumerate(turns):
+        expected = turned_view(references[n], float(turn))
+        if histograms:
+            alike = np.minimum(expected, view).sum(axis=1)
+        else:
+            alike = 1.0 - np.sqrt(np.square(expected - view).sum(axis=1)) / LARGEST_COLOUR_DISTANCE
+        best = np.cumsum(np.sort(alike)[::-1]) * penalties(segments, exponent)
+        out[n] = best.max()
+    return out

@@ -40,8 +40,8 @@ def radial_edges(grey: npt.NDArray[np.float32], centre: tuple[float, float], rad
 def find_ring(pixels: Pixels) -> Ring:
     """Centre and radii of the mirror's ring in a picture; raises RingNotFound where no circle stands out.
 
-    The outer radius belongs to the circle, around any centre near the picture's middle, that is an edge over most of its
-    length; the inner one to the strongest circle around the same centre within the inner 45 percent, where the camera
+    The outer radius belongs to the circle, around any centre near the picture's middle, that is an edge over most of
+    its length; the inner one to the strongest circle around the same centre within the inner 45 percent, where the camera
     sees itself.
     """
     height, width = pixels.shape[:2]
@@ -83,8 +83,10 @@ def find_ring(pixels: Pixels) -> Ring:
 
 def donut_table(camera: Donut, columns: int, rows: int) -> Table:
     """Rows are equal steps of radius from the outer one (top) to the inner one, columns equal steps of azimuth."""
-    assert camera.centre_x is not None and camera.centre_y is not None
-    assert camera.inner_radius_px is not None and camera.outer_radius_px is not None
+    assert camera.centre_x is not None
+    assert camera.centre_y is not None
+    assert camera.inner_radius_px is not None
+    assert camera.outer_radius_px is not None
     ring = camera.outer_radius_px - camera.inner_radius_px
     radius = camera.outer_radius_px - ring * (np.arange(rows) + 0.5) / rows
     bearing = column_azimuths(columns) - camera.yaw
@@ -104,7 +106,7 @@ class FoundRing(State):
 
 
 def with_ring(camera: Donut, image: Image, found: FoundRing, ctx: Context) -> Donut | None:
-    """The camera with centre and radii; what it leaves open is found in the picture, once, and remembered in `found`."""
+    """The camera with centre and radii; what it leaves open is found in the picture, once, and kept in `found`."""
     given = (camera.centre_x, camera.centre_y, camera.inner_radius_px, camera.outer_radius_px)
     if all(value is not None for value in given):
         return camera
@@ -130,8 +132,8 @@ def with_ring(camera: Donut, image: Image, found: FoundRing, ctx: Context) -> Do
 class DonutUnwarp(Stage):
     """Panorama from an uncalibrated mirror image, by centre and radii, found in the picture where not given.
 
-    Rows are equal steps of radius, the outer circle on top; elevations are not known. What is found in the first picture that shows a ring
-    is kept for all (State). Raises BadInput where the recording's camera is another one.
+    Rows are equal steps of radius, the outer circle on top; elevations are not known. What is found in the first picture
+    that shows a ring is kept for all (State). Raises BadInput where the recording's camera is another one.
     """
 
     columns: Annotated[int, Bounds(ge=8)] = 360

@@ -22,8 +22,8 @@ def elevation_range(camera: HyperbolicMirror) -> tuple[float, float]:
     )
     if np.isnan(rays).any():
         raise BadInput(
-            f"camera: the mask ({camera.inner_radius_px:g} to {camera.outer_radius_px:g} px) reaches beyond what a mirror "
-            f"with a={camera.a:g}, b={camera.b:g} shows; check mask, K and mirror in camera.yaml"
+            f"camera: the mask ({camera.inner_radius_px:g} to {camera.outer_radius_px:g} px) reaches beyond what a "
+            f"mirror with a={camera.a:g}, b={camera.b:g} shows; check mask, K and mirror in camera.yaml"
         )
     elevations = np.arcsin(np.clip(rays[:, 2], -1.0, 1.0))
     return float(elevations.max()), float(elevations.min())

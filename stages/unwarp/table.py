@@ -14,7 +14,7 @@ Array = npt.NDArray[np.float64]
 
 
 class Table(NamedTuple):
-    """A panorama's recipe: `whole` (rows, columns, 2) int16 and `part` (rows, columns) uint16, as `cv2.remap` takes them.
+    """A panorama's recipe: `whole` (rows, columns, 2) int16 and `part` (rows, columns) uint16, as for `cv2.remap`.
 
     The elevations are those of the panorama's upper and lower edge (radians), None where they are not known. `wraps`:
     columns beyond the picture's left or right edge continue at the other one (the picture is itself a full circle).

@@ -7,7 +7,9 @@ import numpy.typing as npt
 
 from omninav.pipeline import Value
 
-from .pose import PoseSource
+from .pose import Pose, PoseSource
+
+FeatureKind = Literal["histograms", "colours"]
 
 
 class ReferenceGraph(Value):
@@ -15,14 +17,69 @@ class ReferenceGraph(Value):
 
     `poses`: (R, 3) x, y (m), heading (rad) of the robot when the view was taken. `features`: (R, segments, bins) in
     the units of the features stage. `kind`: which features these are. `edges`: (E, 2) indices of neighbours along the
-    drive. `pose_source`: where the poses come from.
+    drive. `pose_source`: where the poses come from. Grows in place by `insert` and `join`.
     """
+
+    in_place = True
 
     poses: npt.NDArray[np.float64]
     features: npt.NDArray[np.float32]
-    kind: Literal["histograms", "colours"]
+    kind: FeatureKind
     edges: npt.NDArray[np.int64]
     pose_source: PoseSource
 
+    @classmethod
+    def empty(cls) -> "ReferenceGraph":
+        """A map with no reference yet; what its features are is settled by the first."""
+        features = np.empty((0, 0, 0), np.float32)
+        return cls(np.empty((0, 3)), features, "histograms", np.empty((0, 2), np.int64), "truth")
+
     def __len__(self) -> int:
         return len(self.poses)
+
+    def insert(self, pose: Pose, features: npt.NDArray[np.float32], kind: FeatureKind) -> int:
+        """Add a reference and give its index. Raises ValueError where the features are not of the map's shape."""
+        if not len(self):
+            self.kind = kind
+            self.features = np.empty((0, *features.shape), np.float32)
+        if kind != self.kind or features.shape != self.features.shape[1:]:
+            raise ValueError(
+                f"a {kind} view of shape {features.shape} in a map of {self.kind} {self.features.shape[1:]}"
+            )
+        self.poses = self._appended("poses", np.array([pose.x, pose.y, pose.heading]))
+        self.features = self._appended("features", features)
+        return len(self) - 1
+
+    def join(self, one: int, other: int) -> bool:
+        """Add the edge between two references; False where it was there."""
+        pair = np.array(sorted((one, other)), np.int64)
+        if one == other or bool((self.edges == pair).all(axis=1).any()):
+            return False
+        self.edges = self._appended("edges", pair)
+        return True
+
+    def _appended(self, name: str, row: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
+        # The field is a view of an array with room to grow, which doubles when it is full: R insertions copy O(R).
+        rows: npt.NDArray[np.generic] = getattr(self, name)
+        rooms: dict[str, npt.NDArray[np.generic]] = self.__dict__.setdefault("_rooms", {})
+        room = rooms.get(name)
+        if room is None or rows.base is not room or len(rows) == len(room):
+            room = np.empty((max(64, 2 * len(rows)), *rows.shape[1:]), rows.dtype)
+            room[: len(rows)] = rows
+            rooms[name] = room
+        room[len(rows)] = row
+        return room[: len(rows) + 1]
+
+
+class ReferenceEvent(Value):
+    """What a tick did to a reference graph: the index of the reference it added, and why."""
+
+    inserted: int
+    reason: Literal["first", "far", "unlike"]
+
+
+def within(poses: npt.NDArray[np.float64], x: float, y: float, radius: float) -> npt.NDArray[np.int64]:
+    """Indices of the poses within `radius` metres of a point, nearest first."""
+    gap = np.hypot(poses[:, 0] - x, poses[:, 1] - y)
+    near = np.flatnonzero(gap <= radius)
+    return near[np.argsort(gap[near], kind="stable")]

@@ -1,0 +1,1 @@
+"""Prediction and observation into one belief, and the first belief of a log."""

@@ -1,0 +1,32 @@
+"""The pose of the most similar reference: plain matching, no filter."""
+
+import numpy as np
+
+from omninav.pipeline import Context, Outputs, Stage
+from omninav.stages.geometry.se2 import wrap
+from omninav.stages.values.belief import SinglePose
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.similarity import Similarities
+
+
+class BestMatch(Stage):
+    """The pose of the reference most like the view, turned by the heading at which it is so: no memory, no motion.
+
+    What plain image matching gives, to stand beside a filter.
+    """
+
+    class Out(Outputs):
+        """One pose; absent where the map is empty."""
+
+        belief: SinglePose | None = None
+
+    def step(self, ctx: Context, similarities: Similarities, map: ReferenceGraph) -> Out:
+        """Pick the best reference and heading."""
+        if not similarities.values.size:
+            return self.Out()
+        row, column = divmod(int(np.argmax(similarities.values)), similarities.values.shape[1])
+        reference = row if similarities.candidates is None else int(similarities.candidates[row])
+        x, y, heading = map.poses[reference]
+        heading = float(wrap(heading + 2 * np.pi * column / similarities.values.shape[1]))
+        return self.Out(belief=SinglePose(Pose(float(x), float(y), heading)))

@@ -1,0 +1,74 @@
+"""Weighs predicted particles by the view and resamples them."""
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import ndtri
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.particles import effective_size, occupied_cells, systematic
+from omninav.stages.values.belief import Likelihood, Particles
+
+Array = npt.NDArray[np.float64]
+
+
+def kld_number(cells: int, error: float, confidence: float) -> int:
+    """Samples needed that the belief lies within `error` (K-L distance) with `confidence`, given the cells it fills.
+
+    Fox 2001: n = (k - 1) / (2 error) (1 - 2 / (9 (k - 1)) + sqrt(2 / (9 (k - 1))) z)^3, z the normal quantile.
+    """
+    if cells < 2:
+        return 1
+    part = 2.0 / (9.0 * (cells - 1))
+    return math.ceil((cells - 1) / (2.0 * error) * (1.0 - part + math.sqrt(part) * float(ndtri(confidence))) ** 3)
+
+
+class ImportanceResampling(Stage):
+    """Importance weights, then systematic resampling where few particles carry the weight.
+
+    Gross & Koenig 2004, section 2 (5000 samples for global localisation, 500 for tracking). Weights are multiplied by
+    the likelihood; below an effective size of `resample_below` times the number, particles are resampled. Of those,
+    `sensor_share` is replaced by `proposals` (poses the view itself suggests), so that a kidnapped robot is found
+    again. `adapt`: `kld` sets the number between `tracking` and `number` by the cells of `cell_m`, `cell_deg`
+    the belief fills (Fox 2001; `kld_error`, 99 % confidence); `none` keeps `number`.
+    """
+
+    number: Annotated[int, Bounds(ge=1)] = 5000
+    tracking: Annotated[int, Bounds(ge=1)] = 500
+    adapt: Literal["kld", "none"] = "none"
+    resample_below: Annotated[float, Bounds(ge=0, le=1)] = 0.5
+    sensor_share: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
+    kld_error: Annotated[float, Bounds(gt=0)] = 0.05
+    cell_m: Annotated[float, Bounds(gt=0)] = 0.25
+    cell_deg: Annotated[float, Bounds(gt=0)] = 10.0
+
+    class Out(Outputs):
+        """The belief after the picture."""
+
+        belief: Particles
+
+    def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:
+        """Fuse prediction and observation."""
+        weights = particles.weights * likelihood.values
+        total = float(weights.sum())
+        if not (math.isfinite(total) and total > 0.0):
+            ctx.count("belief_without_support", detail="fusion: no particle explains the picture; weights kept")
+            weights, total = particles.weights, float(particles.weights.sum())
+        weights = weights / total
+        wanted = self._wanted(particles.poses)
+        if wanted == len(weights) and effective_size(weights) >= self.resample_below * len(weights):
+            return self.Out(belief=Particles(particles.poses, weights))
+        poses = particles.poses[systematic(weights, wanted, float(ctx.rng.random()))]
+        if proposals is not None and self.sensor_share > 0.0:
+            number = min(round(self.sensor_share * wanted), len(proposals.poses))
+            # Instead of resampled ones, spread evenly over them, so that no part of the belief is thinned out.
+            poses[np.linspace(0, wanted, number, endpoint=False).astype(np.int64)] = proposals.poses[:number]
+        return self.Out(belief=Particles(poses, np.full(wanted, 1.0 / wanted)))
+
+    def _wanted(self, poses: Array) -> int:
+        if self.adapt == "none":
+            return self.number
+        cells = occupied_cells(poses, self.cell_m, math.radians(self.cell_deg))
+        return min(max(kld_number(cells, self.kld_error, 0.99), self.tracking), self.number)

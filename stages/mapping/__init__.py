@@ -1,0 +1,1 @@
+"""Maps learned along a drive."""

@@ -1,0 +1,102 @@
+"""Learns a graph of reference views while the robot is driven around."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.pipeline.problems import BadInput
+from omninav.stages.geometry.segments import similarity_at
+from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
+from omninav.stages.values.maps import FeatureKind, ReferenceEvent, ReferenceGraph, within
+from omninav.stages.values.pose import Pose, PoseSource
+
+
+class Along(State):
+    """The reference the drive is at: the next one is joined to it."""
+
+    reference: int = -1
+
+
+class LearnReferenceGraph(Stage):
+    """Reference views learned on the fly: a new one where the last are too far away or look too different.
+
+    Gross & Koenig 2004, section 2: a reference is inserted where no other lies within `distance_m`, or where the
+    similarity (selective, at the known relative heading) to all references within `vicinity_m` is below `similarity`; 0
+    switches that rule off. Edges join references in the order of the drive. Poses are the tour's truth; without it
+    (`supervised: auto`) its odometry; the map says which. Raises BadInput where `supervised: truth` finds none.
+    """
+
+    distance_m: Annotated[float, Bounds(gt=0)] = 0.2
+    vicinity_m: Annotated[float, Bounds(gt=0)] = 0.5
+    similarity: Annotated[float, Bounds(ge=0, le=1)] = 0.6
+    supervised: Literal["auto", "truth", "odometry"] = "auto"
+
+    class Out(Outputs):
+        """The grown map, and what this tick did to it."""
+
+        map: ReferenceGraph
+        events: ReferenceEvent | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        features: SegmentFeatures,
+        odometry: Pose | None,
+        truth: Pose | None,
+        map: ReferenceGraph,
+        along: Along,
+    ) -> Out:
+        """Take one view into the map, or not."""
+        if ctx.tick.first_of_log:
+            along.reference = -1
+        pose = self._pose(ctx, odometry, truth, map)
+        if pose is None:
+            return self.Out(map=map)
+        kind: FeatureKind = "histograms" if isinstance(features, SegmentHistograms) else "colours"
+        near = within(map.poses, pose.x, pose.y, max(self.distance_m, self.vicinity_m))
+        reason = self._reason(features, pose, map, near)
+        event = None
+        if reason is not None:
+            here = map.insert(pose, features.values, kind)
+            event = ReferenceEvent(here, reason)
+        else:
+            here = int(near[0])
+        if along.reference >= 0:
+            map.join(along.reference, here)
+        along.reference = here
+        return self.Out(map=map, events=event)
+
+    def _pose(self, ctx: Context, odometry: Pose | None, truth: Pose | None, map: ReferenceGraph) -> Pose | None:
+        if not len(map):
+            source: PoseSource = "truth" if truth is not None and self.supervised != "odometry" else "odometry"
+            if self.supervised == "truth" and truth is None:
+                raise BadInput(
+                    "mapping: the tour has no ground truth for its first picture; "
+                    "use a tour with /ground_truth/pose, or nodes.mapping.supervised=auto"
+                )
+            map.pose_source = source
+            ctx.fact("map_poses", source)
+        pose = truth if map.pose_source == "truth" else odometry
+        if pose is None:
+            ctx.count("view_without_pose", detail=f"mapping: pictures without {map.pose_source} are not mapped")
+        return pose
+
+    def _reason(
+        self,
+        features: SegmentFeatures,
+        pose: Pose,
+        map: ReferenceGraph,
+        near: np.ndarray[tuple[int], np.dtype[np.int64]],
+    ) -> Literal["first", "far", "unlike"] | None:
+        if not len(map):
+            return "first"
+        if not len(near) or np.hypot(*(map.poses[near[0], :2] - (pose.x, pose.y))) > self.distance_m:
+            return "far"
+        if self.similarity > 0.0:
+            turns = pose.heading - map.poses[near, 2]
+            histograms = map.kind == "histograms"
+            alike = similarity_at(map.features[near], features.values, turns, histograms)
+            if float(alike.max()) < self.similarity:
+                return "unlike"
+        return None

@@ -1,0 +1,1 @@
+"""How a belief moves when the robot does."""

@@ -1,0 +1,84 @@
+"""Moves particles by odometry: turn, go, turn, each with its own noise."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.se2 import wrap
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.pose import Motion
+
+Array = npt.NDArray[np.float64]
+
+
+def turn_go_turn(x: float, y: float, turn: float) -> tuple[float, float, float]:
+    """A motion as a turn towards its goal, a way along it (negative: backwards), and the rest of the turn.
+
+    Going backwards is kept as such, so that the first turn stays within 90 degrees.
+    """
+    way = math.hypot(x, y)
+    if way < 1e-9:
+        return 0.0, 0.0, turn
+    first = math.atan2(y, x)
+    if abs(first) > math.pi / 2:
+        first, way = float(wrap(first + math.pi)), -way
+    return first, way, float(wrap(turn - first))
+
+
+def moved(poses: Array, motion: tuple[float, float, float], sigmas: tuple[float, float, float], noise: Array) -> Array:
+    """Poses (N, 3) after turn, way, turn, with `noise` (3, N) of unit variance scaled by `sigmas`."""
+    first = poses[:, 2] + motion[0] + sigmas[0] * noise[0]
+    way = motion[1] + sigmas[1] * noise[1]
+    out = np.empty_like(poses)
+    out[:, 0] = poses[:, 0] + way * np.cos(first)
+    out[:, 1] = poses[:, 1] + way * np.sin(first)
+    out[:, 2] = wrap(first + motion[2] + sigmas[2] * noise[2])
+    return out
+
+
+class RotationTranslationRotation(Stage):
+    """Samples the motion model: turn, go, turn, with noise in proportion to each.
+
+    Each turn has sigma^2 = (rotation_per_rotation |turn|)^2 + (rotation_per_metre way)^2 / 2 + rotation_floor^2 / 2
+    (rad), the way sigma^2 = (translation_per_metre way)^2 + (translation_per_rotation |both turns|)^2 + translation_floor^2 (m).
+    Units: rad per rad, rad per metre, metre per metre, metre per rad; the floors hold per picture, also for a robot
+    that stands. Without motion (the first picture of a log) the belief stays as it is.
+    """
+
+    rotation_per_rotation: Annotated[float, Bounds(ge=0)] = 0.1
+    rotation_per_metre: Annotated[float, Bounds(ge=0)] = 0.1
+    translation_per_metre: Annotated[float, Bounds(ge=0)] = 0.1
+    translation_per_rotation: Annotated[float, Bounds(ge=0)] = 0.02
+    rotation_floor: Annotated[float, Bounds(ge=0)] = 0.005
+    translation_floor: Annotated[float, Bounds(ge=0)] = 0.005
+
+    class Out(Outputs):
+        """The belief after the motion, before the picture is looked at."""
+
+        belief: Particles
+
+    def step(self, ctx: Context, belief: Particles, motion: Motion | None) -> Out:
+        """Move all particles."""
+        if motion is None:
+            return self.Out(belief=belief)
+        way = turn_go_turn(motion.x, motion.y, motion.turn)
+        noise = ctx.rng.standard_normal((3, len(belief.poses)))
+        return self.Out(belief=Particles(moved(belief.poses, way, self.sigmas(way), noise), belief.weights))
+
+    def sigmas(self, way: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Standard deviations of first turn (rad), way (m), second turn (rad)."""
+        first, distance, second = abs(way[0]), abs(way[1]), abs(way[2])
+        shared = 0.5 * ((self.rotation_per_metre * distance) ** 2 + self.rotation_floor**2)
+        translation = math.sqrt(
+            (self.translation_per_metre * distance) ** 2
+            + (self.translation_per_rotation * (first + second)) ** 2
+            + self.translation_floor**2
+        )
+        return (
+            math.sqrt((self.rotation_per_rotation * first) ** 2 + shared),
+            translation,
+            math.sqrt((self.rotation_per_rotation * second) ** 2 + shared),
+        )

@@ -1,0 +1,1 @@
+"""How well poses explain what is seen."""

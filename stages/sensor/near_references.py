@@ -1,0 +1,149 @@
+"""How well each particle explains the view, from the similarities of the references near it."""
+
+from typing import Annotated, Literal
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.nearby import NearbyGrid, nearby_grid
+from omninav.stages.geometry.se2 import wrap
+from omninav.stages.values.belief import Likelihood, Particles
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.similarity import Similarities
+
+Array = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[misc]
+def _expected(
+    poses: Array,
+    references: Array,
+    rows: Ints,
+    similarity: Floats,
+    origin: Array,
+    cell: float,
+    columns: int,
+    lines: int,
+    starts: Ints,
+    points: npt.NDArray[np.int32],
+    radius: float,
+    elsewhere: float,
+    trust: float,
+) -> Array:
+    headings = similarity.shape[1]
+    per_radian = headings / (2 * np.pi)
+    out = np.empty(len(poses))
+    for n in range(len(poses)):
+        x, y, heading = poses[n, 0], poses[n, 1], poses[n, 2]
+        i, j = int(np.floor((x - origin[0]) / cell)), int(np.floor((y - origin[1]) / cell))
+        total = trust * elsewhere
+        mass = trust
+        if 0 <= i < columns and 0 <= j < lines:
+            for at in range(starts[i * lines + j], starts[i * lines + j + 1]):
+                r = points[at]
+                row = rows[r]
+                dx, dy = x - references[r, 0], y - references[r, 1]
+                far = (dx * dx + dy * dy) / (radius * radius)
+                if row < 0 or far >= 1.0:
+                    continue
+                weight = (1.0 - far) * (1.0 - far)
+                turn = (heading - references[r, 2]) * per_radian
+                whole = np.floor(turn)
+                part = turn - whole
+                h = int(whole) % headings
+                value = similarity[row, h] * (1.0 - part) + similarity[row, (h + 1) % headings] * part
+                total += weight * value
+                mass += weight
+        out[n] = total / mass
+    return out
+
+
+def expected_similarity(
+    poses: Array,
+    references: Array,
+    grid: NearbyGrid,
+    rows: Ints,
+    similarity: Floats,
+    radius: float,
+    elsewhere: float,
+    trust: float,
+) -> Array:
+    """Similarity of the present view to what is expected at poses: (N, 3) -> (N,).
+
+    The references within `radius` metres speak with weight (1 - d^2 / radius^2)^2, each at the pose's heading (linear
+    between the compared headings). `elsewhere` speaks with the weight `trust`: far from all references nothing is known
+    and the expectation fades to it. `rows` (R,): each reference's row in `similarity`, -1 where it was not compared.
+    """
+    return _expected(  # type: ignore[no-any-return]
+        np.ascontiguousarray(poses), references, rows, similarity, *grid, radius, elsewhere, trust
+    )
+
+
+class NearReferences(Stage):
+    """Likelihood of particles from the references near them: expected similarity to the power of `power`.
+
+    Gross & Koenig 2004, section 2, leave open how S becomes a weight (erratum 23a): w = S^power. The expected
+    similarity at a particle is interpolated between the references within `radius_m` and between compared headings.
+    Far from all references it fades to the mean similarity over all references and headings, that of a view of
+    somewhere else; `trust` says how fast. `proposals`: poses drawn from the similarity field (`propose: similarity`,
+    the same power; position spread over `spread_m` around a reference, heading over one step of the compared
+    headings) or anywhere around the references (`uniform`).
+    """
+
+    power: Annotated[float, Bounds(gt=0)] = 20.0
+    radius_m: Annotated[float, Bounds(gt=0)] = 0.5
+    trust: Annotated[float, Bounds(gt=0)] = 0.05
+    propose: Literal["similarity", "uniform", "none"] = "similarity"
+    proposals: Annotated[int, Bounds(ge=0)] = 100
+    spread_m: Annotated[float, Bounds(gt=0)] = 0.2
+
+    class Out(Outputs):
+        """Likelihood of each particle, and poses worth a try."""
+
+        likelihood: Likelihood
+        proposals: Particles | None = None
+
+    def setup(self, ctx: Context) -> None:
+        """No grid yet: the map comes with the first picture."""
+        self._map: ReferenceGraph | None = None
+        self._length = 0
+
+    def step(self, ctx: Context, similarities: Similarities, particles: Particles, map: ReferenceGraph) -> Out:
+        """Weigh all particles."""
+        if map is not self._map or len(map) != self._length:
+            self._grid = nearby_grid(map.poses, self.radius_m)
+            self._map, self._length = map, len(map)
+        rows = np.full(len(map), -1, np.int64)
+        candidates = np.arange(len(map)) if similarities.candidates is None else similarities.candidates
+        rows[candidates] = np.arange(len(candidates))
+        elsewhere = float(similarities.values.mean()) if similarities.values.size else 0.5
+        expected = expected_similarity(
+            particles.poses, map.poses, self._grid, rows, similarities.values, self.radius_m, elsewhere, self.trust
+        )
+        likelihood = Likelihood((expected / max(float(expected.max()), 1e-12)) ** self.power)
+        return self.Out(likelihood=likelihood, proposals=self._proposals(ctx, similarities, candidates, map))
+
+    def _proposals(
+        self, ctx: Context, similarities: Similarities, candidates: Ints, map: ReferenceGraph
+    ) -> Particles | None:
+        if self.propose == "none" or not self.proposals or not len(candidates):
+            return None
+        values = similarities.values
+        headings = values.shape[1]
+        if self.propose == "similarity":
+            mass = (values.astype(np.float64) / max(float(values.max()), 1e-12)) ** self.power
+            cumulative = np.cumsum(mass)
+            drawn = np.searchsorted(cumulative, ctx.rng.random(self.proposals) * cumulative[-1], side="right")
+            drawn = np.minimum(drawn, values.size - 1)
+            poses = map.poses[candidates[drawn // headings]].copy()
+            poses[:, 2] += 2 * np.pi * (drawn % headings + ctx.rng.random(self.proposals) - 0.5) / headings
+        else:
+            poses = map.poses[ctx.rng.integers(len(map), size=self.proposals)].copy()
+            poses[:, 2] = ctx.rng.uniform(-np.pi, np.pi, self.proposals)
+        poses[:, :2] += self.spread_m * ctx.rng.standard_normal((self.proposals, 2))
+        poses[:, 2] = wrap(poses[:, 2])
+        return Particles(poses, np.full(self.proposals, 1.0 / self.proposals))
