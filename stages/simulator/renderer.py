@@ -94,31 +94,52 @@ def _trace(
     lit: F32,
 ) -> None:
     """Colours (N, 3) of rays (N, 3), 0 to 255, before the chip."""
+    # Taken out of the scene once: each mention of an array inside a tuple counts references, and costs more than a test.
+    boxes, faces, tiles, texels, level_start = scene.boxes, scene.faces, scene.tiles, scene.texels, scene.level_start
+    table, size, glow, light, grid = scene.surface_table, scene.surface_size, scene.glow, scene.light, scene.grid
+    start, members, top = scene.cell_start, scene.cell_boxes, scene.cell_top
+    rows, columns, ceiling, side, step = scene.rows, scene.columns, scene.height, scene.side, scene.light_step
     for i in numba.prange(len(directions)):
         forward, left, up = float(directions[i, 0]), float(directions[i, 1]), float(directions[i, 2])
         dx, dy = cos * forward - sin * left, sin * forward + cos * left
-        distance, box, face = _hit(scene, x, y, z, dx, dy, up)
-        blue, green, red = _shade(scene, x, y, z, dx, dy, up, distance, box, face, float(footprint[i]))
+        distance, box, face = _hit(boxes, start, members, top, grid, rows, columns, ceiling, x, y, z, dx, dy, up)
+        angle = float(footprint[i])
+        blue, green, red = _shade(
+            boxes, faces, table, size, tiles, texels, level_start, side, glow, light, step, grid,
+            x, y, z, dx, dy, up, distance, box, face, angle,
+        )  # fmt: skip
         lit[i, 0] = blue
         lit[i, 1] = green
         lit[i, 2] = red
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _hit(scene: Scene, x: float, y: float, z: float, dx: float, dy: float, dz: float) -> tuple[float, int, int]:
+def _hit(
+    boxes: F64,
+    cell_start: I32,
+    cell_boxes: I32,
+    cell_top: F64,
+    grid: F64,
+    rows: int,
+    columns: int,
+    ceiling: float,
+    x: float,
+    y: float,
+    z: float,
+    dx: float,
+    dy: float,
+    dz: float,
+) -> tuple[float, int, int]:
     """Distance, box and face of what a ray meets first; box -1 is the floor (face 5) or the ceiling (face 4)."""
     far = 1e9
     face = 5
     if dz < 0.0:
         far = -z / dz
     elif dz > 0.0:
-        far = (scene.height - z) / dz
+        far = (ceiling - z) / dz
         face = 4
     box = -1
-    # Taken out of the scene once: each mention of an array of a tuple counts references, which costs as much as a test.
-    boxes, cell_start, cell_boxes, cell_top = scene.boxes, scene.cell_start, scene.cell_boxes, scene.cell_top
-    left, below, size = scene.grid[0], scene.grid[1], scene.grid[2]
-    rows, columns = scene.rows, scene.columns
+    left, below, size = grid[0], grid[1], grid[2]
     column = math.floor((x - left) / size)
     row = math.floor((y - below) / size)
     step_x = 1 if dx > 0.0 else -1
@@ -211,7 +232,18 @@ def _meet(boxes: F64, box: int, x: float, y: float, z: float, dx: float, dy: flo
 
 @numba.njit(cache=True, error_model="numpy")
 def _shade(
-    scene: Scene,
+    boxes: F64,
+    faces: I32,
+    surface_table: I32,
+    surface_size: F64,
+    tiles: I32,
+    texels: U8,
+    level_start: I64,
+    finest: int,
+    glows: F32,
+    light: F32,
+    light_step: float,
+    grid: F64,
     x: float,
     y: float,
     z: float,
@@ -226,10 +258,7 @@ def _shade(
     """Colour of the point a ray meets: texture at the level its size asks for, times the light that falls on it."""
     if distance >= 1e8:
         return 0.0, 0.0, 0.0
-    boxes, faces, tiles = scene.boxes, scene.faces, scene.tiles
-    surface_table, surface_size = scene.surface_table, scene.surface_size
-    texels, level_start, side, glows = scene.texels, scene.level_start, scene.side, scene.glow
-    light, light_step, corner_x, corner_y = scene.light, scene.light_step, scene.grid[0], scene.grid[1]
+    corner_x, corner_y = grid[0], grid[1]
     hx, hy, hz = x + distance * dx, y + distance * dy, z + distance * dz
     nx, ny = 0.0, 0.0
     if box < 0:
@@ -264,13 +293,13 @@ def _shade(
     texture = tiles[surface_table[surface, 0] + row * columns + column]
     u, v = u / width - column, v / height - row
     # The footprint is an ellipse, longer by 1 / slope: its mean radius is a fair middle between blur and flicker.
-    across = distance * footprint * side / math.sqrt(width * height * max(slope, 1e-3))
+    across = distance * footprint * finest / math.sqrt(width * height * max(slope, 1e-3))
     level = min(max(math.log2(max(across, 1e-6)), 0.0), len(level_start) - 1.001)
     fine = int(level)
     part = level - fine
-    blue, green, red = _texel(texels, level_start, side, texture, fine, u, v)
+    blue, green, red = _texel(texels, level_start, finest, texture, fine, u, v)
     if part > 0.0:
-        blue1, green1, red1 = _texel(texels, level_start, side, texture, fine + 1, u, v)
+        blue1, green1, red1 = _texel(texels, level_start, finest, texture, fine + 1, u, v)
         blue += part * (blue1 - blue)
         green += part * (green1 - green)
         red += part * (red1 - red)
