@@ -1,0 +1,170 @@
+import re
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass, field
+
+import pytest
+
+from omninav.pipeline.draw import mermaid, svg
+from omninav.pipeline.stage import Parameter, Port, Signature
+
+
+@dataclass
+class Node:
+    name: str
+    target: str
+    lifetime: str
+    signature: Signature
+    parameters: dict = field(default_factory=dict)
+
+
+@dataclass
+class Wire:
+    to_node: str
+    to_port: str
+    from_node: str
+    from_port: str
+    delay: int = 0
+    hold: bool = False
+    collect: bool = False
+    initial: str | None = None
+
+
+@dataclass
+class Graph:
+    nodes: dict
+    wires: list
+
+
+def graph(nodes: dict[str, tuple[str, str]], wires: list[str], **more: Wire) -> Graph:
+    """`nodes`: name -> (lifetime, outputs); `wires`: "to.port < from.port"."""
+    made = {}
+    for name, (lifetime, outputs) in nodes.items():
+        ports = {port: Port(port, int) for port in outputs.split()}
+        parameters = {"gain": Parameter("gain", float, 1.5)}
+        read = Signature({}, ports, parameters, None, f"Makes <{name}> & more.", name == "source")
+        made[name] = Node(name, f"robot.stages.{name.title()}", lifetime, read, {"gain": 2.5})
+    plain = [Wire(*to.split("."), *start.split(".")) for to, start in (wire.split(" < ") for wire in wires)]
+    return Graph(made, [*plain, *more.values()])
+
+
+def loop() -> Graph:
+    return graph(
+        {
+            "source": ("tick", "tick image truth"),
+            "start": ("tick", "belief"),
+            "see": ("tick", "seen"),
+            "move": ("tick", "belief"),
+            "fuse": ("tick", "belief"),
+            "score": ("after", "metrics"),
+        },
+        [
+            "start.truth < source.truth",
+            "see.image < source.image",
+            "see.map < artifacts.map",
+            "fuse.seen < see.seen",
+            "fuse.belief < move.belief",
+        ],
+        back=Wire("move", "belief", "fuse", "belief", delay=1, initial="start.belief"),
+        whole=Wire("score", "truth", "source", "truth", collect=True),
+        held=Wire("score", "beliefs", "fuse", "belief", collect=True),
+    )
+
+
+def boxes(text: str) -> dict[str, tuple[float, float, float, float]]:
+    """Where each node's box stands: x, y, width, height by name."""
+    found = {}
+    for group in ET.fromstring(text).iter("{http://www.w3.org/2000/svg}g"):
+        rect = group.find("{http://www.w3.org/2000/svg}rect")
+        name = group.find("{http://www.w3.org/2000/svg}text").text
+        found[name] = tuple(float(rect.get(key)) for key in ("x", "y", "width", "height"))
+    return found
+
+
+def test_wires_of_a_tick_lead_from_left_to_right():
+    placed = boxes(svg(loop()))
+    assert set(placed) == {"source", "start", "see", "move", "fuse", "score", "artifacts"}
+    for start, end in (
+        ("source", "see"),
+        ("see", "fuse"),
+        ("move", "fuse"),
+        ("source", "start"),
+        ("artifacts", "source"),
+    ):
+        assert placed[start][0] + placed[start][2] < placed[end][0], (start, end)
+
+
+def test_what_runs_after_the_loop_stands_below_it():
+    placed = boxes(svg(loop()))
+    lowest = max(y + height for name, (_, y, _, height) in placed.items() if name != "score")
+    assert placed["score"][1] > lowest
+
+
+@pytest.mark.parametrize("views", [0, 1, 9, 19])
+def test_boxes_never_overlap_and_lie_inside_the_picture(views):
+    made = loop()
+    for number in range(views):
+        read = Signature({}, {"figure": Port("figure", int)}, {}, None, "", False)
+        made.nodes[f"view_{number}"] = Node(f"view_{number}", "x.View", "after", read)
+        made.wires.append(Wire(f"view_{number}", "ticks", "source", "tick", collect=True))
+    text = svg(made)
+    placed = list(boxes(text).values())
+    width, height = (float(ET.fromstring(text).get(key)) for key in ("width", "height"))
+    for number, (x, y, w, h) in enumerate(placed):
+        assert x >= 0
+        assert y >= 0
+        assert x + w <= width
+        assert y + h <= height
+        for ox, oy, ow, oh in placed[:number]:
+            assert x + w <= ox or ox + ow <= x or y + h <= oy or oy + oh <= y
+
+
+def test_a_delayed_wire_is_dashed_and_says_how_much_later():
+    text = svg(loop())
+    assert "one tick later" in text
+    dashed = [line for line in text.splitlines() if 'stroke-dasharray="6 4"' in line and "<title>" in line]
+    assert len(dashed) == 1
+    assert "fuse.belief → move.belief, one tick later, first value: start.belief" in dashed[0]
+
+
+def test_whoever_reads_ground_truth_is_red():
+    text = svg(loop())
+    red = re.findall(r'<text[^>]*fill="#b3261e"[^>]*>([^<]*)</text>', text)
+    assert "truth" in red
+    assert "truth ← source.truth" in red
+    assert "class n_score,n_start truth" in mermaid(loop())
+
+
+def test_hovering_tells_class_summary_and_parameters_escaped():
+    text = svg(loop())
+    assert "see: robot.stages.See\nMakes &lt;see&gt; &amp; more.\ngain = 2.5" in text
+
+
+def test_the_same_graph_gives_the_same_picture_and_nothing_is_fetched():
+    assert svg(loop()) == svg(loop())
+    assert re.findall(r"https?://[^\"\s<]+", svg(loop())) == ["http://www.w3.org/2000/svg"]
+
+
+def test_chains_of_boxes_are_drawn_without_crossings():
+    two = graph(
+        {"source": ("tick", "a b"), "c": ("tick", "x"), "d": ("tick", "x"), "e": ("tick", "x"), "f": ("tick", "x")},
+        ["d.in < source.a", "c.in < source.b", "e.in < c.x", "f.in < d.x"],
+    )
+    placed = boxes(svg(two))
+    assert placed["d"][1] < placed["c"][1]
+    assert placed["f"][1] < placed["e"][1]
+
+
+def test_an_empty_graph_is_a_picture_too():
+    ET.fromstring(svg(Graph({}, [])))
+    assert mermaid(Graph({}, [])) == "flowchart LR\n"
+
+
+def test_mermaid_names_nodes_wires_bands_and_delays():
+    text = mermaid(loop())
+    assert text.startswith("flowchart LR\n")
+    assert 'n_source -- "image" --> n_see' in text
+    assert 'n_fuse -. "belief, one tick later" .-> n_move' in text
+    assert 'n_start -. "belief, first value" .-> n_move' in text
+    assert 'n_source == "truth" ==> n_score' in text
+    assert 'subgraph after_band["after the last tick"]' in text
+    assert text.count("subgraph") == text.count("\n  end\n")

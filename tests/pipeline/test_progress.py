@@ -1,0 +1,79 @@
+import io
+import json
+
+from omninav.pipeline.progress import Progress, live_line
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def drive(stream, frames, step_s, total=None, name="localise"):
+    clock = Clock()
+    with Progress(stream, clock) as progress:
+        for frame in range(1, frames + 1):
+            clock.now += step_s
+            progress.update(name, frame, total)
+    return stream.getvalue()
+
+
+def test_elsewhere_than_in_a_terminal_there_is_a_json_line_every_two_seconds_and_one_at_the_end():
+    lines = [json.loads(line) for line in drive(io.StringIO(), 65, 0.1, total=65).splitlines()]
+    assert [line["frames"] for line in lines] == [21, 41, 61, 65]
+    assert lines[0]["graph"] == "localise"
+    assert lines[0]["of"] == 65
+    assert abs(lines[1]["frames_per_second"] - 10) < 0.5
+    assert abs(lines[1]["seconds_left"] - 2.4) < 0.2
+    assert lines[-1]["seconds_left"] == 0
+
+
+def test_a_terminals_line_changes_at_most_ten_times_a_second():
+    text = drive(Terminal(), 2000, 0.001, total=2000)
+    assert 15 <= text.count("\r") <= 22
+    assert text.endswith("\n")
+    assert text.count("\n") == 1
+    assert "2000/2000 frames" in text
+
+
+def test_the_first_line_knows_its_rate_when_a_run_is_resumed():
+    stream, clock = io.StringIO(), Clock()
+    with Progress(stream, clock) as progress:
+        for frame in range(501, 540):
+            progress.update("localise", frame, 1000)
+            clock.now += 0.1
+    rates = [json.loads(line)["frames_per_second"] for line in stream.getvalue().splitlines()]
+    assert all(rate < 12 for rate in rates)
+
+
+def test_each_graph_ends_with_its_own_line():
+    stream, clock = io.StringIO(), Clock()
+    with Progress(stream, clock) as progress:
+        for name in ("map", "localise"):
+            for frame in (1, 2, 3):
+                clock.now += 0.1
+                progress.update(name, frame, 3)
+    lines = [json.loads(line) for line in stream.getvalue().splitlines()]
+    assert [(line["graph"], line["frames"]) for line in lines] == [("map", 3), ("localise", 3)]
+
+
+def test_nothing_is_said_of_a_run_without_frames():
+    stream = io.StringIO()
+    with Progress(stream):
+        pass
+    assert stream.getvalue() == ""
+
+
+def test_the_live_line_tells_name_frames_rate_and_time_left():
+    assert (
+        live_line("map", 50, 100, 25.0, 62.0) == f"map  {'━' * 12}{'─' * 12}  50/100 frames  25.0 frames/s  1:02 left"
+    )
+    assert live_line("map", 50, None, 25.0, None) == "map  50 frames  25.0 frames/s"

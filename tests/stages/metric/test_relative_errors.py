@@ -1,0 +1,101 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import minimize
+from small_run import eight, small_run
+
+from omninav.pipeline import Context
+from omninav.stages.geometry.se2 import between, compose
+from omninav.stages.metric.map_size import MapSize
+from omninav.stages.metric.pose_estimate import BeliefEstimate
+from omninav.stages.metric.relative_errors import (
+    RelativeErrors,
+    absolute_trajectory_errors,
+    align,
+    pairs_apart,
+    relative_pose_errors,
+)
+
+
+@given(st.floats(-3, 3), st.floats(-9, 9), st.floats(-9, 9))
+def test_a_trajectory_moved_as_a_whole_has_no_absolute_error(turn, x, y):
+    truth = eight(30)
+    moved = compose(np.array([x, y, turn]), truth)
+    np.testing.assert_allclose(absolute_trajectory_errors(moved, truth), 0.0, atol=1e-9)
+
+
+def test_the_alignment_is_the_best_that_a_search_finds():
+    rng = np.random.default_rng(3)
+    points, target = rng.normal(size=(20, 2)), rng.normal(size=(20, 2))
+
+    def left(p):
+        turn = np.array([[np.cos(p[0]), -np.sin(p[0])], [np.sin(p[0]), np.cos(p[0])]])
+        return ((points @ turn.T + p[1:] - target) ** 2).sum()
+
+    starts = [np.array([angle, 0.0, 0.0]) for angle in (-2.0, 0.0, 2.0)]
+    best = min(minimize(left, start, tol=1e-12).fun for start in starts)
+    rotation, translation = align(points, target)
+    assert ((points @ rotation.T + translation - target) ** 2).sum() == pytest.approx(best, rel=1e-6)
+
+
+def test_pairs_are_the_first_frames_that_lie_far_enough_apart_along_the_path():
+    truth = np.zeros((6, 3))
+    truth[:, 0] = [0.0, 0.4, 0.8, 1.2, 1.2, 2.2]
+    starts, ends = pairs_apart(truth, 1.0)
+    assert list(zip(starts.tolist(), ends.tolist(), strict=True)) == [(0, 3), (1, 5), (2, 5), (3, 5), (4, 5)]
+
+
+def test_relative_errors_agree_with_matrices_multiplied_one_by_one():
+    rng = np.random.default_rng(1)
+    truth, estimate = rng.normal(size=(12, 3)), rng.normal(size=(12, 3))
+    starts, ends = np.array([0, 3, 5]), np.array([2, 9, 11])
+    metres, degrees = relative_pose_errors(estimate, truth, starts, ends)
+
+    def matrix(p):
+        return np.array([[np.cos(p[2]), -np.sin(p[2]), p[0]], [np.sin(p[2]), np.cos(p[2]), p[1]], [0, 0, 1]])
+
+    for number, (i, j) in enumerate(zip(starts, ends, strict=True)):
+        true = np.linalg.inv(matrix(truth[i])) @ matrix(truth[j])
+        thought = np.linalg.inv(matrix(estimate[i])) @ matrix(estimate[j])
+        error = np.linalg.inv(true) @ thought  # Sturm et al. 2012, equation for E_i
+        assert metres[number] == pytest.approx(np.hypot(error[0, 2], error[1, 2]))
+        assert degrees[number] == pytest.approx(abs(np.degrees(np.arctan2(error[1, 0], error[0, 0]))))
+
+
+def test_odometry_five_percent_too_long_errs_by_five_centimetres_per_metre_and_its_steps_turn_too_far():
+    truth = np.zeros((50, 3))
+    truth[:, 0] = np.arange(50) * 0.1
+    estimate = truth * 1.05
+    metres, degrees = relative_pose_errors(estimate, truth, *pairs_apart(truth, 1.0))
+    np.testing.assert_allclose(metres, 0.05, atol=1e-12)
+    np.testing.assert_allclose(degrees, 0.0, atol=1e-12)
+    np.testing.assert_allclose(between(estimate[0], estimate[10])[0], 1.05)
+
+
+def test_the_stage_names_its_figures_and_gives_none_without_truth():
+    run = small_run(frames=40)
+    found = RelativeErrors().step(Context("relative"), *run.drive).metrics.values
+    assert set(found) == {
+        "absolute_trajectory_error_m",
+        "relative_position_error_m",
+        "relative_heading_error_deg",
+        "relative_error_distance_m",
+    }
+    blind = RelativeErrors().step(Context("relative"), run.ticks, run.estimates, [None] * 40, run.motion)
+    assert blind.metrics.values == {}
+
+
+def test_a_maps_size_is_that_of_its_arrays():
+    run, ctx = small_run(frames=2), Context("map_size")
+    found = MapSize().step(ctx, run.map).metrics.values["map"]
+    # 40 references of 10 x 20 float32 and 3 float64, 39 edges of 2 int64
+    assert found["size_bytes"] == 40 * (200 * 4 + 3 * 8) + 39 * 2 * 8
+    assert (found["references"], found["edges"]) == (40, 39)
+    assert ctx.facts["map_poses"] == "truth"
+
+
+def test_the_estimate_is_the_beliefs_own():
+    run = small_run(frames=1)
+    out = BeliefEstimate().step(Context("estimate"), run.beliefs[0])
+    assert out.estimate.pose.x == run.estimates[0].pose.x

@@ -1,0 +1,89 @@
+import numpy as np
+import pytest
+from small_run import small_run
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.metric.trajectory_errors import TrajectoryErrors
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.pose import Motion, Pose
+
+
+def at(x, y=0.0, heading=0.0):
+    return PoseEstimate(Pose(x, y, heading), np.eye(3), 1.0, Pose(x + 1.0, y, heading))
+
+
+def measured(estimates, truth, motion=None, logs=None, **parameters):
+    logs = logs or [0] * len(truth)
+    ticks = [Tick(i, i * 10**9, log, i) for i, log in enumerate(logs)]
+    motion = motion or [None] * len(truth)
+    return TrajectoryErrors(**parameters).step(Context("errors"), ticks, estimates, truth, motion).metrics.values
+
+
+def test_errors_of_five_frames_worked_by_hand():
+    found = measured([at(x) for x in (0.0, 1.0, 2.0, 3.0, 4.0)], [Pose(0, 0, np.radians(10))] * 5)
+    # distances 0, 1, 2, 3, 4: p90 lies 0.6 of the way from 3 to 4
+    assert found["position_error_m"] == pytest.approx({"mean": 2.0, "median": 2.0, "p90": 3.6, "max": 4.0})
+    assert found["heading_error_deg"] == pytest.approx({"mean": 10.0, "median": 10.0, "p90": 10.0, "max": 10.0})
+    assert found["loss_rate"] == 0.4  # 3 m and 4 m are above 2.5 m
+    assert found["mean_pose"]["position_error_m"]["mean"] == 3.0
+
+
+def test_lost_is_what_its_parameter_says():
+    assert measured([at(0.0), at(1.0)], [Pose(0, 0, 0)] * 2, lost_m=0.5)["loss_rate"] == 0.5
+
+
+def test_convergence_is_the_first_of_ten_good_frames_and_the_errors_after_it_stand_apart():
+    far, near = [at(5.0)] * 3, [at(0.5)] * 12
+    found = measured(far + near, [Pose(0, 0, 0)] * 15)
+    assert found["converged_after_frames"] == 3
+    assert found["after_convergence"]["position_error_m"]["max"] == 0.5
+    assert found["after_convergence"]["loss_rate"] == 0.0
+    assert found["loss_rate"] == pytest.approx(0.2)
+
+
+def test_a_filter_that_never_settles_says_so():
+    found = measured([at(5.0)] * 15, [Pose(0, 0, 0)] * 15)
+    assert found["converged_after_frames"] is None
+    assert found["after_convergence"] is None
+
+
+def test_frames_without_truth_or_estimate_are_left_out_and_counted():
+    found = measured([at(0.0), at(99.0), None, at(1.0)], [Pose(0, 0, 0), None, Pose(0, 0, 0), Pose(0, 0, 0)])
+    assert (found["frames"], found["frames_without_truth"], found["frames_without_estimate"]) == (4, 1, 1)
+    assert found["position_error_m"]["max"] == 1.0
+
+
+def test_convergence_counts_frames_of_the_log_also_where_truth_is_missing():
+    truth = [None] * 4 + [Pose(0, 0, 0)] * 10
+    assert measured([at(0.0)] * 14, truth)["converged_after_frames"] == 4
+
+
+def test_without_truth_only_frames_are_counted():
+    assert measured([at(0.0)] * 3, [None] * 3) == {"frames": 3}
+
+
+def test_odometry_alone_is_measured_like_the_estimate():
+    truth = [Pose(float(x), 0.0, 0.0) for x in range(4)]
+    motion = [None, *[Motion(1.5, 0.0, 0.0)] * 3]
+    found = measured([at(float(x)) for x in range(4)], truth, motion)
+    assert found["position_error_m"]["max"] == 0.0
+    assert found["odometry_alone"]["position_error_m"] == pytest.approx(
+        {"mean": 0.75, "median": 0.75, "p90": 1.35, "max": 1.5}
+    )
+
+
+def test_with_several_logs_the_top_is_the_last_and_each_has_an_entry():
+    found = measured([at(1.0), at(2.0)], [Pose(0, 0, 0)] * 2, logs=[0, 1])
+    assert found["position_error_m"]["mean"] == 2.0
+    assert [log["position_error_m"]["mean"] for log in found["logs"]] == [1.0, 2.0]
+
+
+def test_an_empty_run_has_no_frames():
+    assert measured([], []) == {"frames": 0}
+
+
+def test_a_filter_that_finds_itself_converges():
+    run = small_run(frames=60)
+    found = TrajectoryErrors().step(Context("errors"), *run.drive).metrics.values
+    assert found["converged_after_frames"] < 20
+    assert found["after_convergence"]["position_error_m"]["median"] < 0.2
