@@ -27,12 +27,12 @@ def drive(stream, frames, step_s, total=None, name="localise"):
 
 
 def test_elsewhere_than_in_a_terminal_there_is_a_json_line_every_two_seconds_and_one_at_the_end():
-    lines = [json.loads(line) for line in drive(io.StringIO(), 65, 0.1, total=65).splitlines()]
-    assert [line["frames"] for line in lines] == [21, 41, 61, 65]
+    lines = [json.loads(line) for line in drive(io.StringIO(), 67, 0.125, total=67).splitlines()]
+    assert [line["frames"] for line in lines] == [17, 33, 49, 65, 67]
     assert lines[0]["graph"] == "localise"
-    assert lines[0]["of"] == 65
-    assert abs(lines[1]["frames_per_second"] - 10) < 0.5
-    assert abs(lines[1]["seconds_left"] - 2.4) < 0.2
+    assert lines[0]["of"] == 67
+    assert lines[1]["frames_per_second"] == round(33 / 4, 1)  # 33 frames in the 32 steps of 1/8 s since the first
+    assert lines[1]["seconds_left"] == round((67 - 33) / (33 / 4), 1)
     assert lines[-1]["seconds_left"] == 0
 
 
