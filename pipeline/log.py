@@ -393,7 +393,8 @@ class LogReader:
                 store.register(
                     get_types_from_msg(text, msgtype) if schema.encoding == "ros2msg" else get_types_from_idl(text)
                 )
-            except Exception:  # no readable definition in the file: the standard one, where it is a standard type
+                store.get_msgdef(msgtype)  # fails where a part of the definition is missing
+            except Exception:  # no whole definition in the file: the standard one, where it is a standard type
                 store = standard_types()
             self._stores[msgtype] = store
         return self._stores[msgtype]
@@ -420,11 +421,12 @@ _STANDARD: "Typestore | None" = None
 class LogWriter:
     """Writes one MCAP file of ROS 2 messages; a context manager, the file appears when its block ends well.
 
-    The bytes follow from what is written alone: no clock, no machine, no library version.
+    The bytes follow from what is written alone: no clock, no machine, no library version. `chunk_bytes`: how much is
+    compressed and checksummed together, and so what a flipped bit costs at most.
     """
 
-    def __init__(self, path: Path | str) -> None:
-        self.path = Path(path)
+    def __init__(self, path: Path | str, chunk_bytes: int = 1 << 20) -> None:
+        self.path, self.chunk_bytes = Path(path), chunk_bytes
         self._stack = ExitStack()
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, tuple[int, str]] = {}
@@ -433,12 +435,7 @@ class LogWriter:
     def __enter__(self) -> "LogWriter":
         part = self._stack.enter_context(whole_file(self.path))
         file = self._stack.enter_context(part.open("wb"))
-        self._writer = Writer(
-            file,
-            compression=CompressionType.ZSTD,
-            enable_crcs=True,
-            enable_data_crcs=True,
-        )
+        self._writer = Writer(file, self.chunk_bytes, CompressionType.ZSTD, enable_crcs=True, enable_data_crcs=True)
         self._writer.start(profile="ros2", library="omninav")
         return self
 

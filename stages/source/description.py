@@ -29,7 +29,7 @@ def read_description(path: Path, layouts: Sequence[str] = ()) -> Description:
     description, problems = convert(content, Description, "")
     if problems:
         said = "; ".join(f"{p.where.lstrip('.')}: {p.what}" + (f" ({p.hint})" if p.hint else "") for p in problems)
-        raise UnreadableRecording(f"{path}: {said}")
+        raise UnreadableRecording(f"{path}: {said}".replace("'.", "'"))
     found: Description = description
     return found
 

@@ -21,7 +21,7 @@ from omninav.stages.values.image import Pixels
 from .camera_yaml import camera_from, parse_camera
 from .messages import Undecodable, decode_picture, is_blank
 from .recording import UnreadableRecording
-from .tables import Column, Table, read_table
+from .tables import Angle, Length, Table, Time, read_table
 from .topics import ascending, poses_at
 
 Array = npt.NDArray[np.float64]
@@ -56,7 +56,7 @@ class Frames:
     file: str | int | None = None
     images: str = ""
     rename: tuple[Rename, ...] = ()
-    time: Column | None = None
+    time: Time | None = None
     period: Annotated[float, Bounds(gt=0)] | None = None
 
 
@@ -69,12 +69,12 @@ class Positions:
     table's time, has no position. `offset_x`, `offset_y` (metres) are added to all positions.
     """
 
-    x: Column
-    y: Column
+    x: Length
+    y: Length
     csv: str | None = None
     header: bool = True
     delimiter: str = ","
-    time: Column | None = None
+    time: Time | None = None
     clock_offset: float = 0.0
     max_gap: Annotated[float, Bounds(gt=0)] = 1.0
     offset_x: float = 0.0
@@ -257,16 +257,18 @@ class ImageFolder:
         timed = [row for row, time in enumerate(times) if time is not None]
         shifted = np.array([times[row] for row in timed], dtype=np.int64) + round(positions.clock_offset * 1e9)
         sure = np.isfinite(track).all(axis=1)
+        if sure.sum() < 2:
+            raise UnreadableRecording(f"{table.path}: fewer than two rows with a heading")
         poses[timed] = poses_at(stamps[sure], track[sure], shifted)
         after = np.clip(np.searchsorted(stamps, shifted), 1, len(stamps) - 1)
         gap = np.minimum(np.abs(shifted - stamps[after - 1]), np.abs(stamps[after] - shifted))
-        poses[np.array(timed)[gap > positions.max_gap * 1e9]] = np.nan
+        poses[np.array(timed, dtype=np.int64)[gap > positions.max_gap * 1e9]] = np.nan
         return poses
 
     def _headings(self, table: Table, rows: npt.NDArray[np.int64], stamps: Stamps, x: Array, y: Array) -> Array:
         heading = self._description.heading
         if heading is not None:
-            measured = table.numbers(Column(heading.column, heading.unit))[rows]
+            measured = table.numbers(Angle(heading.column, heading.unit))[rows]
             turned = measured if heading.sense == "counter_clockwise" else -measured
             return wrap(turned + (pi / 2 if heading.zero == "y" else 0.0) + heading.offset)
         tangent = self._description.tangent
@@ -323,8 +325,9 @@ def track_directions(along: Array, positions: Array, window: float, lag: float =
     """Directions of a track: (N,) radians, counter-clockwise from x.
 
     `along` (N,): time or way at each of the `positions` (N, 2), never falling. At each point a straight line
-    p(s) = p0 + v (s - s0), s0 = `along` - `lag`, is fitted to all positions with weights exp(-((s - s0) / window)^2 / 2),
-    cut off at four windows; the direction is v's. Where nothing moves within the window, the direction is the last one known.
+    p(s) = p0 + v (s - s0), s0 = `along` - `lag`, is fitted to the positions within four windows with weights
+    exp(-((s - s0) / window)^2 / 2); the direction is v's. Where nothing moves within the window, it
+    is the last one known.
     """
     directions = np.full(len(along), np.nan)
     centres = np.clip(along - lag, along[0], along[-1])

@@ -16,7 +16,6 @@ from omninav.pipeline.problems import nearest
 from .recording import UnreadableRecording
 
 Array = npt.NDArray[np.float64]
-Unit = Literal["m", "cm", "mm", "in", "s", "ms", "us", "ns", "min", "deg", "rad"]
 
 T = TypeVar("T")
 PI = Decimal("3.14159265358979323846264338328")
@@ -40,14 +39,27 @@ _SPELLINGS = {
 
 
 @dataclass(frozen=True)
-class Column:
-    """A column by its name in the header, or its number from 0, and the unit of its numbers.
-
-    A unit written inside a cell (`21.3 deg`) goes before `unit`.
-    """
+class Length:
+    """A column of lengths, by its name in the header or its number from 0. A unit inside a cell (`5 cm`) goes first."""
 
     column: str | int
-    unit: Unit
+    unit: Literal["m", "cm", "mm", "in"]
+
+
+@dataclass(frozen=True)
+class Time:
+    """A column of times, as `Length`."""
+
+    column: str | int
+    unit: Literal["ns", "us", "ms", "s", "min"]
+
+
+@dataclass(frozen=True)
+class Angle:
+    """A column of angles, as `Length`."""
+
+    column: str | int
+    unit: Literal["rad", "deg"]
 
 
 @dataclass(frozen=True)
@@ -75,18 +87,18 @@ class Table:
         number = self.index(column)
         return [row[number].strip() if number < len(row) else "" for row in self.rows]
 
-    def numbers(self, column: Column) -> Array:
+    def numbers(self, column: Length | Angle) -> Array:
         """A column in metres or radians: (rows,), NaN where a cell holds no number."""
         return np.array([self._cell(text, column, float, float("nan")) for text in self.texts(column.column)])
 
-    def nanoseconds(self, column: Column) -> list[int | None]:
+    def nanoseconds(self, column: Time) -> list[int | None]:
         """A column of times in whole nanoseconds, None where a cell holds no number."""
         return [
             self._cell(text, column, lambda value: int(value.to_integral_value()), None)
             for text in self.texts(column.column)
         ]
 
-    def _cell(self, text: str, column: Column, finish: Callable[[Decimal], T], missing: T) -> T:
+    def _cell(self, text: str, column: Length | Time | Angle, finish: Callable[[Decimal], T], missing: T) -> T:
         try:
             value = _in_base_unit(text, column.unit)
         except UnreadableRecording as error:

@@ -1,0 +1,263 @@
+"""MCAP logs: what is written comes back, and damage costs what it must and no more."""
+
+import random
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from omninav.pipeline.log import MAGIC, BadMessage, LogError, LogReader, LogWriter, make_message, read_messages
+
+POSE = "geometry_msgs/msg/PoseStamped"
+COUNT = 60
+
+
+def written(path: Path, count: int = COUNT, chunk_bytes: int = 2000) -> Path:
+    """A small log in several chunks: poses and blobs, and an attachment in the middle."""
+    noise = np.random.default_rng(1)
+    with LogWriter(path, chunk_bytes) as log:
+        for number in range(count):
+            stamp = 1_700_000_000_000_000_000 + number * 1_000_000
+            log.write("/pose", POSE, stamp, {"pose": {"position": {"x": float(number)}}}, log_time=stamp + 5)
+            blob = noise.integers(0, 256, 150, dtype=np.uint8)
+            log.write("/blob", "sensor_msgs/msg/CompressedImage", stamp, {"format": "none", "data": blob})
+            if number == count // 2:
+                log.attach("note.txt", b"in the middle")
+    return path
+
+
+def keys(reader: LogReader) -> list[tuple[str, int, bytes]]:
+    return [(record.topic, record.stamp, bytes(record.data)) for record in reader.scan()]
+
+
+def chunk_places(path: Path) -> list[tuple[int, int]]:
+    """First byte and length of every chunk record's content, by walking the file."""
+    data, at, found = path.read_bytes(), len(MAGIC), []
+    while data[at] != 0x0F:
+        opcode, length = struct.unpack_from("<BQ", data, at)
+        if opcode == 0x06:
+            found.append((at + 9, length))
+        at += 9 + length
+    return found
+
+
+def flipped(path: Path, at: int, bit: int = 0) -> Path:
+    data = bytearray(path.read_bytes())
+    data[at] ^= 1 << bit
+    path.write_bytes(data)
+    return path
+
+
+def test_messages_come_back_in_the_order_of_their_header_stamps(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    with LogWriter(path) as log:
+        for log_time, stamp in ((1, 30), (2, 10), (3, 20)):
+            log.write("/pose", POSE, stamp, {"header": {"frame_id": "map"}}, log_time=log_time)
+    found = list(read_messages(path))
+    assert [(m.stamp, m.log_time) for m in found] == [(10, 2), (20, 3), (30, 1)]
+    assert found[0].content.header.frame_id == "map"
+
+
+def test_a_message_without_a_header_has_its_log_time_as_stamp(tmp_path: Path) -> None:
+    with LogWriter(tmp_path / "log.mcap") as log:
+        log.write("/text", "std_msgs/msg/String", 7, {"data": "seven"})
+    (message,) = read_messages(tmp_path / "log.mcap")
+    assert (message.stamp, message.content.data) == (7, "seven")
+
+
+def test_the_same_content_gives_the_same_bytes(tmp_path: Path) -> None:
+    assert written(tmp_path / "a.mcap").read_bytes() == written(tmp_path / "b.mcap").read_bytes()
+
+
+def test_no_file_appears_when_writing_fails(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="no such message type"), LogWriter(tmp_path / "log.mcap") as log:
+        log.write("/pose", "my/msg/Nothing", 1, {})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_topics_types_and_attachments_are_listed(tmp_path: Path) -> None:
+    reader = LogReader(written(tmp_path / "log.mcap"))
+    assert reader.topics == {"/blob": "sensor_msgs/msg/CompressedImage", "/pose": POSE}
+    assert reader.attachments == {"note.txt": b"in the middle"}
+    assert not reader.dropped
+
+
+def test_bytes_are_fetched_again_from_where_the_scan_found_them(tmp_path: Path) -> None:
+    reader = LogReader(written(tmp_path / "log.mcap"))
+    found = [(record.location, bytes(record.data)) for record in reader.scan(["/blob"])]
+    assert len(found) == COUNT
+    for location, data in random.Random(0).sample(found, COUNT):
+        assert reader.fetch(location) == data
+
+
+def test_a_cut_file_gives_every_whole_message_before_the_cut(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.mcap")
+    whole, data, chunks = keys(LogReader(path)), path.read_bytes(), chunk_places(path)
+    per_chunk = [len(whole) * (n + 1) // len(chunks) for n in range(len(chunks))]
+    end_of_data = data.rindex(b"\x0f" + struct.pack("<Q", 4))
+    for cut in sorted(random.Random(2).sample(range(len(MAGIC), end_of_data), 60)):
+        path.write_bytes(data[:cut])
+        reader = LogReader(path)
+        found = keys(reader)
+        assert found == whole[: len(found)]
+        assert reader.dropped == {"cut_file": 1}
+        complete = sum(1 for start, length in chunks if start + length <= cut)
+        assert len(found) >= (per_chunk[complete - 1] - per_chunk[0] if complete else 0)
+
+
+def test_a_log_cut_behind_its_messages_loses_nothing(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.mcap")
+    whole, data = keys(LogReader(path)), path.read_bytes()
+    path.write_bytes(data[:-30])
+    reader = LogReader(path)
+    assert keys(reader) == whole
+    assert reader.attachments == {"note.txt": b"in the middle"}
+
+
+@pytest.mark.parametrize("which", [0, 2, -1])
+def test_a_bad_chunk_costs_only_itself(tmp_path: Path, which: int) -> None:
+    path = written(tmp_path / "log.mcap")
+    whole, chunks = keys(LogReader(path)), chunk_places(path)
+    start, length = chunks[which]
+    reader = LogReader(flipped(path, start + length // 2))
+    found = keys(reader)
+    assert set(found) < set(whole)
+    assert len(whole) - len(found) <= 2 * len(whole) / len(chunks)
+    assert reader.dropped == {"bad_chunk": 1}
+    assert str(path) in reader.details["bad_chunk"]
+
+
+def test_a_chunk_whose_length_is_damaged_costs_only_itself(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.mcap")
+    whole, chunks = keys(LogReader(path)), chunk_places(path)
+    reader = LogReader(flipped(path, chunks[1][0] - 8 + 5))  # a high byte of the record's length
+    found = keys(reader)
+    assert found == [key for key in whole if key in set(found)]
+    assert len(whole) - len(found) <= 2 * len(whole) / len(chunks)
+    assert reader.dropped == {"bad_chunk": 1}
+
+
+def test_a_flipped_bit_anywhere_is_never_delivered_as_data(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.mcap", count=20)
+    whole, data = keys(LogReader(path)), path.read_bytes()
+    chance = random.Random(3)
+    for _ in range(150):
+        path.write_bytes(data)
+        flipped(path, chance.randrange(len(MAGIC), len(data)), chance.randrange(8))
+        reader = LogReader(path)
+        assert set(keys(reader)) <= set(whole)
+        assert reader.attachments in ({}, {"note.txt": b"in the middle"})
+
+
+def test_a_second_scan_counts_no_damage_twice(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.mcap")
+    start, length = chunk_places(path)[1]
+    reader = LogReader(flipped(path, start + length // 2))
+    assert keys(reader) == keys(reader)
+    assert reader.dropped == {"bad_chunk": 1}
+
+
+def test_a_message_that_its_definition_cannot_decode_is_counted(tmp_path: Path) -> None:
+    from mcap.writer import Writer
+
+    path = tmp_path / "log.mcap"
+    good = written(tmp_path / "good.mcap", count=1)
+    record = next(record for record in LogReader(good).scan(["/pose"]))
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2", library="test")
+        definition = "std_msgs/Header header\n" + "=" * 80 + "\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\n"
+        definition += "string frame_id\n" + "=" * 80 + "\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+        schema = writer.register_schema("my_robot/msg/Beat", "ros2msg", definition.encode())
+        channel = writer.register_channel("/beat", "cdr", schema)
+        writer.add_message(channel, 1, bytes(record.data)[:20], 1)
+        writer.add_message(channel, 2, bytes(record.data)[:9], 2)
+        writer.finish()
+    reader = LogReader(path)
+    assert [m.msgtype for m in reader.messages()] == ["my_robot/msg/Beat"]  # a type that no ROS release knows
+    assert reader.dropped == {"bad_message": 1}
+    with pytest.raises(BadMessage, match="/beat"):
+        reader.decode("/beat", b"\x00\x01\x00\x00\x01")
+
+
+def test_a_log_without_chunks_is_read_and_its_cut_found(tmp_path: Path) -> None:
+    from mcap.writer import Writer
+
+    source = written(tmp_path / "log.mcap", count=10)
+    records = list(LogReader(source).scan(["/pose"]))
+    path = tmp_path / "flat.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, use_chunking=False)
+        writer.start(profile="ros2", library="test")
+        definition = (
+            b"std_msgs/Header header\ngeometry_msgs/Pose pose\n"  # without its parts: the standard one is taken
+        )
+        channel = writer.register_channel("/pose", "cdr", writer.register_schema(POSE, "ros2msg", definition))
+        for record in records:
+            writer.add_message(channel, record.log_time, bytes(record.data), record.log_time)
+        writer.finish()
+    reader = LogReader(path)
+    assert [m.content.pose.position.x for m in reader.messages()] == [float(n) for n in range(10)]
+    last = next(iter(reversed(list(reader.scan()))))
+    path.write_bytes(path.read_bytes()[: last.location.start + 10])
+    cut = LogReader(path)
+    assert [m.content.pose.position.x for m in cut.messages()] == [float(n) for n in range(9)]
+    assert cut.dropped == {"cut_file": 1}
+
+
+@pytest.mark.parametrize(
+    ("content", "said"), [(b"", "not an MCAP file"), (b"\x89PNG\r\n\x1a\n" * 9, "not an MCAP file")]
+)
+def test_what_is_no_log_is_refused_by_name(tmp_path: Path, content: bytes, said: str) -> None:
+    path = tmp_path / "log.mcap"
+    path.write_bytes(content)
+    with pytest.raises(LogError, match=f"log.mcap.*{said}"):
+        LogReader(path)
+
+
+def test_a_missing_log_is_refused_by_name(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"gone\.mcap: No such file"):
+        LogReader(tmp_path / "gone.mcap")
+
+
+def test_a_wrong_field_or_type_is_refused_with_the_nearest_name(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="did you mean 'position'"):
+        make_message("geometry_msgs/msg/Pose", {"positon": {}})
+    with pytest.raises(LogError, match="did you mean 'geometry_msgs/msg/PoseStamped'"):
+        make_message("geometry_msgs/msg/PoseStampd", {})
+    with LogWriter(tmp_path / "log.mcap") as log:
+        log.write("/pose", POSE, 1, {})
+        with pytest.raises(LogError, match="use another topic"):
+            log.write("/pose", "std_msgs/msg/String", 1, {})
+
+
+def test_what_is_written_opens_with_mcap_ros2_message_by_message(tmp_path: Path) -> None:
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    path = written(tmp_path / "log.mcap")
+    ours = list(LogReader(path).messages(["/pose"]))
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        theirs = [message for *_, message in reader.iter_decoded_messages(["/pose"], log_time_order=False)]
+    assert len(theirs) == len(ours) == COUNT
+    for message, their in zip(ours, theirs, strict=True):
+        assert their.header.stamp.sec * 10**9 + their.header.stamp.nanosec == message.stamp
+        assert their.pose.position.x == message.content.pose.position.x
+
+
+def test_what_is_written_opens_with_rosbags_message_by_message(tmp_path: Path) -> None:
+    from rosbags.highlevel import AnyReader
+
+    path = written(tmp_path / "log.mcap")
+    ours = {(m.topic, m.log_time): m.content for m in LogReader(path).messages()}
+    with AnyReader([path]) as reader:
+        count = 0
+        for connection, time, data in reader.messages():
+            theirs, mine = reader.deserialize(data, connection.msgtype), ours[connection.topic, time]
+            assert theirs.header.stamp.nanosec == mine.header.stamp.nanosec
+            if connection.topic == "/blob":
+                assert np.array_equal(theirs.data, mine.data)
+            count += 1
+    assert count == len(ours) == 2 * COUNT

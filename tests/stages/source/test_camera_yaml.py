@@ -1,0 +1,94 @@
+"""camera.yaml: read, written back, and refused by key."""
+
+import dataclasses
+
+import pytest
+import yaml
+
+from omninav.pipeline.log import make_message
+from omninav.stages.source.camera_yaml import camera_from_info, parse_camera, write_camera
+from omninav.stages.source.recording import UnreadableRecording
+from omninav.stages.values.camera import (
+    Camera,
+    Cylindrical,
+    Donut,
+    Equirectangular,
+    Fisheye,
+    HyperbolicMirror,
+    Perspective,
+)
+
+SIZE = {"width": 640, "height_px": 480}
+PINHOLE = {"focal_x": 497.0, "focal_y": 496.0, "centre_x": 319.5, "centre_y": 239.5, "skew": 0.1}
+CAMERAS = [
+    HyperbolicMirror(
+        **SIZE, **PINHOLE, a=28.095, b=23.4125, inner_radius_px=34, outer_radius_px=238, height=0.9, yaw=0.3
+    ),
+    Donut(**SIZE),
+    Donut(
+        **SIZE, centre_x=320, centre_y=240, inner_radius_px=30, outer_radius_px=230, sense="counter_clockwise", yaw=1
+    ),
+    Cylindrical(**SIZE, column_of_forward=320),
+    Cylindrical(
+        **SIZE, column_of_forward=3, sense="counter_clockwise", height=1, elevation_top=0.4, elevation_bottom=-1
+    ),
+    Equirectangular(**SIZE, column_of_forward=320, elevation_top=1.5, elevation_bottom=-1.5),
+    Fisheye(**SIZE, focal_px=150, centre_x=320, centre_y=240, outer_radius_px=235, inner_radius_px=3, yaw=-1),
+    Perspective(**SIZE, **PINHOLE, height=0.4, yaw=0.1),
+]
+HOUSE = write_camera(CAMERAS[0])
+
+
+@pytest.mark.parametrize("camera", CAMERAS, ids=lambda camera: type(camera).__name__)
+def test_a_camera_that_is_written_reads_back_the_same(camera: Camera) -> None:
+    back = parse_camera(write_camera(camera), "camera.yaml")
+    assert type(back) is type(camera)
+    assert dataclasses.asdict(back) == dataclasses.asdict(camera)
+
+
+@pytest.mark.parametrize("key", ["projection", "K", "mirror", "mask", "image"])
+def test_a_missing_key_is_named_with_its_file(key: str) -> None:
+    content = yaml.safe_load(HOUSE)
+    del content[key]
+    with pytest.raises(UnreadableRecording, match=rf"robot/camera\.yaml: key '{key}' is missing"):
+        parse_camera(yaml.safe_dump(content), "robot/camera.yaml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("  a: 28.095", "  aa: 28.095", r"key 'mirror\.a' is missing"),
+        ("a: 28.095", "a: long", r"'mirror\.a' must be a number, not 'long'"),
+        ("a: 28.095", "a: -1", r"'mirror\.a' must be above 0"),
+        ("hyperbolic", "hyperbolik", "'projection' cannot be 'hyperbolik'; did you mean 'hyperbolic'"),
+        ("yaw:", "yaww:", "key 'yaww' is not known; did you mean 'yaw'"),
+        ("inner_radius_px: 34", "inner_radius_px: 340", "must be below"),
+        ("  width: 640", "  width: [", "not readable as YAML"),
+        ("497.0", "0", "'K' must be"),
+    ],
+)
+def test_a_wrong_key_is_named_with_what_to_write(old: str, new: str, said: str) -> None:
+    assert old in HOUSE
+    with pytest.raises(UnreadableRecording, match=said) as caught:
+        parse_camera(HOUSE.replace(old, new, 1), "camera.yaml")
+    assert "\n" not in str(caught.value)
+
+
+def test_remarks_in_a_camera_file_do_no_harm() -> None:
+    assert parse_camera(HOUSE + "serial_number: 7\n", "camera.yaml").width == 640
+
+
+def info(model: str, d: list[float]) -> object:
+    k = [497.0, 0, 319.5, 0, 496.0, 239.5, 0, 0, 1]
+    return make_message(
+        "sensor_msgs/msg/CameraInfo", {"width": 640, "height": 480, "distortion_model": model, "k": k, "d": d}
+    )
+
+
+def test_camera_info_stands_in_for_a_missing_camera_file() -> None:
+    mirror = camera_from_info(info("hyperbolic_mirror", [28.095, 23.4125]), "log.mcap")
+    assert isinstance(mirror, HyperbolicMirror)
+    assert (mirror.a, mirror.b, mirror.focal_y, mirror.outer_radius_px) == (28.095, 23.4125, 496.0, 239.5)
+    assert isinstance(camera_from_info(info("plumb_bob", [0.0] * 5), "log.mcap"), Perspective)
+    with pytest.raises(UnreadableRecording, match="give camera="):
+        camera_from_info(info("plumb_bob", [0.1] * 5), "log.mcap")

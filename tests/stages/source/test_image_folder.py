@@ -1,0 +1,205 @@
+"""Folders of images with CSVs, by configuration alone."""
+
+import math
+import textwrap
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from omninav.stages.source.image_folder import track_directions
+from omninav.stages.source.opening import open_recording
+from omninav.stages.source.recording import UnreadableRecording
+from omninav.stages.source.tables import Angle, Length, Time, read_table
+
+DATA = Path(__file__).parents[3].parent / "shared" / "data"
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"sample data is missing: {DATA}")
+
+DESCRIPTION = """
+frames:
+  csv: frames.csv
+  file: File
+  rename: [{replace: "^.*/", by: "", regex: true}]
+  images: pictures
+  time: {column: Clock, unit: ms}
+positions:
+  csv: track.csv
+  header: false
+  delimiter: ";"
+  time: {column: 0, unit: s}
+  x: {column: 1, unit: in}
+  y: {column: 2, unit: cm}
+  clock_offset: 10.0
+  offset_x: 5.0
+heading: {column: 3, unit: deg, zero: y, sense: clockwise, offset: 0.1}
+camera: {projection: cylindrical, column_of_forward: 8}
+"""
+
+
+def folder(tmp_path: Path, description: str = DESCRIPTION, skip: tuple[int, ...] = ()) -> Path:
+    """Six pictures 100 ms apart; a track 10 s later by its own clock, from 10.05 to 10.45 s, in a line along x."""
+    (tmp_path / "pictures").mkdir(exist_ok=True)
+    rows = ["File , Clock"]
+    for number in range(6):
+        rows.append(f"/home/robot/p{number}.png, {number * 100}")
+        pixels = np.random.default_rng(number).integers(0, 256, (4, 16, 3), dtype=np.uint8)
+        if number not in skip:
+            cv2.imwrite(str(tmp_path / "pictures" / f"p{number}.png"), pixels)
+    (tmp_path / "frames.csv").write_text("\n".join(rows))
+    track = [f"{10.05 + n * 0.1:.2f};{n};2.54 m;{20 * n} deg" for n in range(5)]
+    (tmp_path / "track.csv").write_text("\n".join(track))
+    (tmp_path / "recording.yaml").write_text(textwrap.dedent(description))
+    return tmp_path
+
+
+def test_columns_units_clock_and_heading_conventions_are_configuration(tmp_path: Path) -> None:
+    recording = open_recording(str(folder(tmp_path)))
+    assert recording.stamps.tolist() == [100_000_000, 200_000_000, 300_000_000, 400_000_000]
+    assert recording.dropped == {"no_position": 2}  # the track covers 10.05 to 10.45 s
+    halves = np.array([0.5, 1.5, 2.5, 3.5])  # pictures lie in the middle between two rows of the track
+    np.testing.assert_allclose(recording.truth[:, 0], 5 + halves * 0.0254)
+    np.testing.assert_allclose(recording.truth[:, 1], 2.54)
+    np.testing.assert_allclose(recording.truth[:, 2], math.pi / 2 - np.radians(20 * halves) + 0.1)
+    assert recording.odometry is None
+    assert (recording.camera.width, recording.camera.height_px) == (16, 4)
+    assert recording.image(0).shape == (4, 16, 3)
+
+
+def test_missing_pictures_are_counted(tmp_path: Path) -> None:
+    recording = open_recording(str(folder(tmp_path, skip=(2, 3))))
+    assert recording.dropped == {"no_position": 2, "missing_image": 2}
+    assert len(recording.stamps) == 2
+
+
+def test_pictures_without_a_clock_come_at_a_constant_rate(tmp_path: Path) -> None:
+    description = """
+    frames: {csv: frames.csv, file: 0, header: false, images: pictures, period: 0.5}
+    positions: {x: {column: 1, unit: m}, y: {column: 2, unit: m}}
+    tangent: {window: 0.5, unit: m}
+    camera: {projection: cylindrical, column_of_forward: 8}
+    """
+    path = folder(tmp_path, description)
+    (path / "frames.csv").write_text("".join(f"p{n}.png,{n},{n}\n" for n in range(6)))
+    recording = open_recording(str(path))
+    assert recording.stamps.tolist() == [round(n * 0.5e9) for n in range(6)]
+    np.testing.assert_allclose(recording.truth[:, 2], math.pi / 4)
+
+
+def test_a_layout_from_a_users_folder_may_change_another(tmp_path: Path) -> None:
+    layouts = tmp_path / "layouts"
+    layouts.mkdir()
+    (layouts / "mine.yaml").write_text(DESCRIPTION)
+    (layouts / "later.yaml").write_text("like: mine\npositions: {clock_offset: 10.1}\n")
+    path = folder(tmp_path)
+    assert open_recording(f"mine:{path}", layouts=(str(layouts),)).stamps[0] == 100_000_000
+    later = open_recording(f"later:{path}", layouts=[str(layouts)])
+    assert later.stamps.tolist() == [0, 100_000_000, 200_000_000, 300_000_000]
+    own = tmp_path / "own.yaml"
+    own.write_text(DESCRIPTION + f"folder: {path}\n")
+    assert open_recording(str(own)).stamps[0] == 100_000_000
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("file: File", "file: Fil", r"frames\.csv: no column 'Fil'; did you mean 'File'"),
+        ("column: 1,", "column: 9,", r"track\.csv: no column 9; it has 4"),
+        ("csv: track.csv", "csv: trak.csv", r"no file trak\.csv"),
+        ("unit: cm", "unit: miles", r"recording\.yaml: positions\.y\.unit: 'miles'"),
+        ("heading:", "heding:", "did you mean 'heading'"),
+        ("images: pictures", "images: pics", "no frame can be used .*missing_image"),
+        ("clock_offset: 10.0", "clock_offset: 99", "no frame can be used .*no_position"),
+        ("camera: {", "camera: {sense: left, ", "'sense' cannot be 'left'"),
+        ("time: {column: Clock", "time: {column: File", "no_time"),
+        ("unit: in", "unit: s", r"positions\.x\.unit: 's'"),
+    ],
+)
+def test_a_wrong_description_is_one_line_that_names_the_place(tmp_path: Path, old: str, new: str, said: str) -> None:
+    assert old in DESCRIPTION
+    with pytest.raises(UnreadableRecording, match=said) as caught:
+        open_recording(str(folder(tmp_path, DESCRIPTION.replace(old, new, 1))))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_wrong_layout_is_refused_with_the_nearest_name(tmp_path: Path) -> None:
+    with pytest.raises(UnreadableRecording, match="did you mean 'antworld'"):
+        open_recording(f"antwrld:{tmp_path}")
+    with pytest.raises(UnreadableRecording, match="type log=LAYOUT"):
+        open_recording(str(tmp_path))
+
+
+def test_units_in_cells_go_before_the_columns_unit(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text('a, b, c\n21.3559 deg, 5 cm, 1700000000.000000001\n0.5, 2", x\n\n')
+    table = read_table(path)
+    np.testing.assert_allclose(table.numbers(Angle("a", "rad")), [math.radians(21.3559), 0.5])
+    np.testing.assert_allclose(table.numbers(Length(1, "m")), [0.05, 0.0508])
+    assert table.nanoseconds(Time("c", "s")) == [1_700_000_000_000_000_001, None]
+    with pytest.raises(UnreadableRecording, match=r"table\.csv: column 'b': '5 cm' is not in rad or deg"):
+        table.numbers(Angle("b", "rad"))
+
+
+def test_the_tangent_of_a_circle_is_at_right_angles_to_its_radius() -> None:
+    angle = np.linspace(0, 2, 400)
+    noise = np.random.default_rng(4).normal(0, 0.01, (400, 2))
+    positions = np.column_stack([np.cos(angle), np.sin(angle)]) + noise
+    directions = track_directions(angle, positions, window=0.1)
+    inside = slice(40, -40)  # at the ends the fit is one-sided and turns too little
+    error = directions[inside] - (angle[inside] + math.pi / 2)
+    assert np.degrees(np.abs(np.angle(np.exp(1j * error)))).max() < 6
+    late = track_directions(angle, positions, window=0.1, lag=0.2)
+    lagging = np.angle(np.exp(1j * (directions - late)))[100:-100]
+    assert np.mean(lagging) == pytest.approx(0.2, abs=0.01)
+
+
+def test_a_track_that_stands_still_keeps_its_direction() -> None:
+    x = np.concatenate([np.arange(10.0), np.full(30, 9.0)])
+    directions = track_directions(np.arange(40.0), np.column_stack([x, x]), window=1.0)
+    np.testing.assert_allclose(directions, math.pi / 4)
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("log", "frames", "dropped"),
+    [
+        ("antworld:{}/antworld-rendered/ant1_route1", 406, {}),
+        ("antworld:{}/antworld-rendered/ant1_route2", 398, {}),
+        ("antworld:{}/antworld-rendered/grid_200mm", 391, {}),
+        ("sussex_training:{}/sussex-outdoor-route", 455, {}),
+        # the tracker ends at 126.69 s; pictures up to 4 s and after 130.69 s are without position
+        ("sussex_repeat:{}/sussex-outdoor-route", 96, {"no_position": 40}),
+        ("sussex_repeat:{}/sussex-outdoor-route:infomax_binary", 96, {"no_position": 40}),
+    ],
+)
+def test_the_sample_folders_are_read_by_configuration_alone(log: str, frames: int, dropped: dict[str, int]) -> None:
+    recording = open_recording(log.format(DATA))
+    assert len(recording.stamps) == frames
+    assert recording.dropped == dropped
+    assert recording.image(frames // 2) is not None
+    assert np.isfinite(recording.truth).all()
+
+
+@needs_data
+def test_antworld_headings_point_along_the_walk() -> None:
+    truth = open_recording(f"antworld:{DATA}/antworld-rendered/ant1_route1").truth
+    way = truth[4:, :2] - truth[:-4, :2]
+    error = truth[2:-2, 2] - np.arctan2(way[:, 1], way[:, 0])
+    assert np.degrees(np.percentile(np.abs(np.angle(np.exp(1j * error))), 90)) < 2
+
+
+@needs_data
+def test_sussex_pictures_turn_with_the_tangent_of_the_track() -> None:
+    recording = open_recording(f"sussex_training:{DATA}/sussex-outdoor-route")
+    spectra = np.fft.fft(
+        [
+            cv2.resize(cv2.cvtColor(recording.image(n), cv2.COLOR_BGR2GRAY).astype(float), (1200, 25))
+            for n in range(455)
+        ],
+        axis=2,
+    )
+    spectra[..., 0] = 0
+    match = np.fft.ifft(spectra[3:] * np.conj(spectra[:-3]), axis=2).real.sum(axis=1)
+    moved_right = (np.argmax(match, axis=1) + 600) % 1200 - 600
+    turn = np.angle(np.exp(1j * (recording.truth[3:, 2] - recording.truth[:-3, 2])))
+    assert np.corrcoef(turn, moved_right)[0, 1] < -0.6  # counter-clockwise columns: a turn to the left moves them left

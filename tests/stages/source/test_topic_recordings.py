@@ -1,0 +1,337 @@
+"""Recordings out of ROS topics: what is read, and what becomes of each kind of damage."""
+
+import random
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from omninav.pipeline.log import LogReader, make_message
+from omninav.pipeline.problems import BadInput
+from omninav.stages.source.messages import decode_picture, is_blank, pixels_of
+from omninav.stages.source.opening import open_recording
+from omninav.stages.source.recording import UnreadableRecording
+from omninav.stages.source.topics import Topics, ascending
+
+sys.path.insert(0, str(Path(__file__).parent))
+from made_logs import (
+    CAMERA,
+    FRAMES,
+    IMAGE,
+    ODOMETRY,
+    START,
+    TRUTH,
+    Made,
+    compressed,
+    encoded,
+    messages,
+    picture,
+    pose_at,
+    write_mcap,
+    write_rosbag1,
+    write_rosbag2,
+)
+
+
+def only(topic: str):
+    """A change that applies to the pictures (or poses) of one topic, by their number there."""
+
+    def decorate(function):
+        count = iter(range(10**6))
+        return lambda made: function(made, next(count)) if made.topic == topic else [made]
+
+    return decorate
+
+
+def test_a_whole_log_gives_every_picture_with_poses_at_its_own_stamp(tmp_path: Path) -> None:
+    recording = open_recording(str(write_mcap(tmp_path / "log.mcap")))
+    assert len(recording.stamps) == FRAMES
+    assert not recording.dropped
+    seconds = (recording.stamps - START) / 1e9
+    expected = np.array([pose_at(second) for second in seconds])
+    # a chord of 1 cm of a circle of 1 m lies at most 1.25e-5 m inside it
+    np.testing.assert_allclose(recording.odometry, expected, atol=1.3e-5)
+    np.testing.assert_allclose(recording.truth, expected, atol=1.3e-5)
+    for frame in range(FRAMES):
+        np.testing.assert_array_equal(recording.image(frame), picture(frame))
+
+
+def test_a_rosbag2_folder_and_a_ros1_bag_read_as_the_mcap_does(tmp_path: Path) -> None:
+    (tmp_path / "one").mkdir()
+    reference = open_recording(str(write_mcap(tmp_path / "log.mcap")))
+    for other in (
+        open_recording(str(write_rosbag2(tmp_path / "two"))),
+        open_recording(str(write_rosbag1(tmp_path / "one" / "log.bag"))),
+    ):
+        np.testing.assert_array_equal(other.stamps, reference.stamps)
+        np.testing.assert_array_equal(other.odometry, reference.odometry)
+        np.testing.assert_array_equal(other.truth, reference.truth)
+        for frame in random.Random(0).sample(range(FRAMES), FRAMES):
+            np.testing.assert_array_equal(other.image(frame), reference.image(frame))
+        assert type(other.camera) is type(reference.camera)
+
+
+def test_a_rosbag2_folder_of_mcap_parts_is_one_recording_and_a_lost_part_is_counted(tmp_path: Path) -> None:
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    half = START + 5_000_000_000
+    write_mcap(folder / "bag_0.mcap", (m for m in messages() if m.stamp < half))
+    write_mcap(folder / "bag_1.mcap", (m for m in messages() if m.stamp >= half))
+    names = "[bag_0.mcap, bag_1.mcap, bag_2.mcap]"
+    (folder / "metadata.yaml").write_text(f"rosbag2_bagfile_information: {{relative_file_paths: {names}}}")
+    recording = open_recording(str(folder))
+    assert len(recording.stamps) == FRAMES
+    assert recording.dropped == {"missing_file": 1}
+    np.testing.assert_array_equal(recording.image(15), picture(15))
+
+
+def test_a_cut_log_is_used_up_to_the_cut(tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / "log.mcap")
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) * 6 // 10])
+    recording = open_recording(str(path))
+    assert 5 <= len(recording.stamps) < FRAMES
+    assert recording.dropped["cut_file"] == 1
+    np.testing.assert_array_equal(recording.image(3), picture(3))
+
+
+def test_a_bad_chunk_costs_its_pictures_and_no_others(tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / "log.mcap")
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 4
+    path.write_bytes(data)
+    recording = open_recording(str(path))
+    assert recording.dropped["bad_chunk"] == 1
+    assert FRAMES - 5 <= len(recording.stamps) < FRAMES
+    for frame, stamp in enumerate(recording.stamps):
+        np.testing.assert_array_equal(recording.image(frame), picture(round((stamp - START) / 5e8 - 0.534)))
+
+
+def test_a_pose_that_is_no_number_is_counted(tmp_path: Path) -> None:
+    @only(ODOMETRY)
+    def broken(made: Made, number: int) -> list[Made]:
+        fields = {"pose": {"pose": {"position": {"x": float("nan")}}}}
+        nowhere = make_message("nav_msgs/msg/Odometry", fields, made.stamp)
+        return [made._replace(content=nowhere) if number == 7 else made]
+
+    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", messages(broken))))
+    assert recording.dropped == {"bad_message": 1}
+    assert len(recording.stamps) == FRAMES
+
+
+def test_a_picture_with_a_stamp_far_ahead_costs_only_itself(tmp_path: Path) -> None:
+    @only(IMAGE)
+    def late(made: Made, number: int) -> list[Made]:
+        if number != 4:
+            return [made]
+        stamp = made.stamp + 3_600_000_000_000
+        return [made._replace(stamp=stamp, content=compressed(stamp, encoded(picture(number))))]
+
+    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", messages(late))))
+    assert recording.dropped == {"backward_stamp": 1}
+    assert len(recording.stamps) == FRAMES - 1
+
+
+def test_stamps_that_jump_back_and_frames_that_come_twice_are_counted(tmp_path: Path) -> None:
+    @only(IMAGE)
+    def odd(made: Made, number: int) -> list[Made]:
+        if number == 5:
+            return [made, made._replace(log_time=made.log_time + 1)]
+        if number == 9:
+            stamp = made.stamp - 1_200_000_000
+            return [made._replace(stamp=stamp, content=compressed(stamp, encoded(picture(number))))]
+        return [made]
+
+    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", messages(odd))))
+    assert recording.dropped == {"duplicate_frame": 1, "backward_stamp": 1}
+    assert np.all(np.diff(recording.stamps) > 0)
+
+
+def test_undecodable_cut_off_and_blank_pictures_are_left_out_when_met(tmp_path: Path) -> None:
+    bad = {
+        3: b"no picture",
+        6: encoded(picture(6), ".jpg")[:-200],
+        8: encoded(np.full((16, 48, 3), 77, np.uint8), ".jpg"),
+        11: b"",
+        13: encoded(picture(13))[:-30],
+        14: encoded(np.zeros((8, 8, 3), np.uint8)),
+    }
+
+    @only(IMAGE)
+    def spoilt(made: Made, number: int) -> list[Made]:
+        return [made._replace(content=compressed(made.stamp, bad[number]))] if number in bad else [made]
+
+    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", messages(spoilt))))
+    seen = [frame for frame in range(FRAMES) if recording.image(frame) is not None]
+    assert seen == [frame for frame in range(FRAMES) if frame not in bad]
+    assert recording.dropped == {"undecodable_image": 4, "blank_image": 1, "wrong_size": 1}
+
+
+def test_pictures_outside_the_odometrys_time_are_counted(tmp_path: Path) -> None:
+    first, last = START + 2_000_000_000, START + 8_000_000_000
+    made = (m for m in messages() if m.topic != ODOMETRY or first <= m.stamp <= last)
+    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", made)))
+    assert recording.stamps[0] >= first
+    assert recording.stamps[-1] <= last
+    assert recording.dropped == {"outside_odometry": FRAMES - len(recording.stamps)}
+
+
+def test_without_odometry_pictures_without_a_position_are_counted(tmp_path: Path) -> None:
+    last = START + 8_000_000_000
+    made = (m for m in messages() if m.topic != ODOMETRY and not (m.topic == TRUTH and m.stamp > last))
+    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", made)))
+    assert recording.odometry is None
+    assert recording.dropped == {"no_position": FRAMES - len(recording.stamps)}
+    assert np.isfinite(recording.truth).all()
+
+
+def test_truth_that_ends_early_leaves_pictures_without_truth(tmp_path: Path) -> None:
+    last = START + 8_000_000_000
+    made = (m for m in messages() if m.topic != TRUTH or m.stamp <= last)
+    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", made)))
+    assert len(recording.stamps) == FRAMES
+    assert np.isnan(recording.truth[-1]).all()
+    assert np.isfinite(recording.truth[0]).all()
+
+
+def renamed(made: Made) -> list[Made]:
+    names = {IMAGE: "/omni/image", ODOMETRY: "/wheels/odom"}
+    return [made._replace(topic=names.get(made.topic, made.topic))]
+
+
+def test_a_missing_topic_is_refused_with_what_to_type(tmp_path: Path) -> None:
+    path = str(write_mcap(tmp_path / "log.mcap", messages(renamed)))
+    with pytest.raises(UnreadableRecording, match=r"log\.mcap: no topic /camera/image.*type topics\.image=/omni/image"):
+        open_recording(path)
+    with pytest.raises(UnreadableRecording, match=r"no topic /odom; type topics\.odometry=/wheels/odom, or"):
+        open_recording(path, Topics(image="/omni/image"))
+    recording = open_recording(path, Topics(image="/omni/image", odometry="/wheels/odom"))
+    assert len(recording.stamps) == FRAMES
+    assert open_recording(path, Topics(image="/omni/image", odometry=None)).odometry is None
+    with pytest.raises(UnreadableRecording, match=r"/wheels/odom carries nav_msgs/msg/Odometry, not pictures"):
+        open_recording(path, Topics(image="/wheels/odom"))
+
+
+def test_every_user_error_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "text.bag").write_text("no bag")
+    (tmp_path / "notes.txt").write_text("hello")
+    nothing = write_mcap(tmp_path / "nothing.mcap", (m for m in messages() if m.topic != IMAGE))
+    no_camera = write_mcap(tmp_path / "camera.mcap", camera=None)
+    wrong_camera = write_mcap(tmp_path / "wrong.mcap", camera=CAMERA.replace(b"48", b"64"))
+    for log, said in (
+        (tmp_path / "empty", "without metadata.yaml"),
+        (tmp_path / "text.bag", "not a readable bag"),
+        (tmp_path / "notes.txt", "not a recording"),
+        (tmp_path / "gone.mcap", "no such file"),
+        (nothing, "no pictures"),
+        (no_camera, "give camera="),
+        (wrong_camera, "48 x 16, but its camera says 64 x 16"),
+    ):
+        with pytest.raises(BadInput, match=said) as caught:
+            open_recording(str(log))
+        assert str(log) in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+def test_a_camera_beside_the_log_or_named_by_the_user_is_taken(tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / "log.mcap", camera=None)
+    (tmp_path / "camera.yaml").write_bytes(CAMERA)
+    assert open_recording(str(path)).camera.column_of_forward == 24
+    other = tmp_path / "other.yaml"
+    other.write_bytes(CAMERA.replace(b"forward: 24", b"forward: 12"))
+    named = open_recording(str(path), camera=str(other))
+    assert named.camera.column_of_forward == 12
+    assert named.digest() != open_recording(str(path)).digest()
+
+
+def test_the_digest_follows_the_content_and_not_the_name(tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / "log.mcap")
+    copy = tmp_path / "other.mcap"
+    shutil.copy(path, copy)
+    assert open_recording(str(path)).digest() == open_recording(str(copy)).digest()
+
+
+@pytest.mark.parametrize("encoding", ["bgr8", "rgb8", "bgra8", "mono8"])
+def test_raw_images_are_read_with_their_row_padding(encoding: str) -> None:
+    pixels, pad = picture(1), 5
+    if encoding == "mono8":
+        pixels = np.repeat(pixels[..., :1], 3, axis=2)
+    raw = {
+        "bgr8": pixels,
+        "rgb8": pixels[..., ::-1],
+        "bgra8": np.dstack([pixels, pixels[..., 0]]),
+        "mono8": pixels[..., :1],
+    }[encoding]
+    rows = np.hstack([raw.reshape(16, -1), np.zeros((16, pad), np.uint8)])
+    fields = {"height": 16, "width": 48, "encoding": encoding, "step": rows.shape[1], "data": rows.tobytes()}
+    np.testing.assert_array_equal(pixels_of(make_message("sensor_msgs/msg/Image", fields)), pixels)
+
+
+@pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
+def test_bayer_patterns_keep_their_colours(pattern: str) -> None:
+    colour = {"b": 200, "g": 100, "r": 20}
+    tile = np.array([[colour[c] for c in pattern[:2]], [colour[c] for c in pattern[2:]]], np.uint8)
+    raw = np.tile(tile, (8, 24))
+    fields = {"height": 16, "width": 48, "encoding": f"bayer_{pattern}8", "step": 48, "data": raw.tobytes()}
+    pixels = pixels_of(make_message("sensor_msgs/msg/Image", fields))
+    np.testing.assert_array_equal(pixels[4:12, 4:44].reshape(-1, 3), np.tile([200, 100, 20], (8 * 40, 1)))
+
+
+def test_a_picture_is_blank_only_when_it_is_constant() -> None:
+    assert is_blank(decode_picture(encoded(np.full((16, 48, 3), (10, 200, 90), np.uint8), ".jpg")))
+    one_pixel = np.zeros((16, 48, 3), np.uint8)
+    one_pixel[3, 5] = 255
+    assert not is_blank(one_pixel)
+
+
+def test_ascending_keeps_the_longest_run_by_brute_force() -> None:
+    from itertools import combinations
+
+    chance = random.Random(5)
+    for _ in range(60):
+        stamps = [chance.randrange(9) for _ in range(8)]
+        kept, repeated, backward = ascending(stamps)
+        values = [stamps[number] for number in kept]
+        assert values == sorted(set(values))
+        assert sorted(kept + repeated + backward) == list(range(8))
+        firsts = [number for number in range(8) if stamps.index(stamps[number]) == number]
+        best = max(
+            size
+            for size in range(1, 9)
+            for chosen in combinations(firsts, size)
+            if [stamps[n] for n in chosen] == sorted(stamps[n] for n in chosen)
+        )
+        assert len(kept) == best
+
+
+DATA = Path(__file__).parents[3].parent / "shared" / "data"
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"sample data is missing: {DATA}")
+
+
+@needs_data
+@pytest.mark.parametrize(("name", "pictures"), [("tour", 279), ("drive", 130)])
+def test_the_house_is_read_completely_and_its_truth_is_right(name: str, pictures: int) -> None:
+    folder = DATA / "photoreal-house"
+    recording = open_recording(str(folder / f"{name}.mcap"))
+    table = np.loadtxt(folder / f"{name}_truth.tum")
+    assert len(recording.stamps) == len(table) == pictures
+    assert sum(recording.image(frame) is not None for frame in range(pictures)) == pictures
+    assert not recording.dropped
+    np.testing.assert_allclose(recording.stamps / 1e9, table[:, 0], atol=1e-6)
+    # linear between truths 50 ms apart; the robot's acceleration makes that wrong by up to 0.3 mm and 0.07 degrees
+    np.testing.assert_allclose(recording.truth[:, :2], table[:, 1:3], atol=3e-4)
+    turn = recording.truth[:, 2] - 2 * np.arctan2(table[:, 6], table[:, 7])
+    np.testing.assert_allclose(np.sin(turn / 2), 0, atol=6e-4)
+
+
+@needs_data
+def test_a_robots_own_bag_is_read_by_header_time_not_by_log_time() -> None:
+    reader = LogReader(DATA / "nav2-turtlebot-mcap" / "nav2_turtlebot.mcap")
+    odometry = list(reader.messages(["/odom"]))
+    assert len(odometry) == 2639
+    assert 928e9 < odometry[0].stamp < odometry[-1].stamp < 1026e9  # simulation time (the set's notes)
+    assert odometry[0].log_time > 1.7e18  # wall time
+    assert not reader.dropped
