@@ -20,7 +20,7 @@ class Progress:
         self._clock = clock
         self._live = self._stream.isatty()
         self._every = 0.1 if self._live else 2.0
-        self._due = 0.0
+        self._due = self._now = 0.0
         self._name = ""
         self._started = 0.0
         self._first = self._done = 0
@@ -40,7 +40,7 @@ class Progress:
         if name != self._name:
             self._begin(name, done)
         self._done, self._total = done, total
-        now = self._clock()
+        self._now = now = self._clock()
         if now >= self._due:
             self._due = now + self._every
             self._show(now)
@@ -59,7 +59,7 @@ class Progress:
 
     def _close(self) -> None:
         if self._name and self._shown != self._done:
-            self._show(self._clock())
+            self._show(self._now)  # the last frame's time: what came after it was no frame
         if self._name and self._live:
             self._stream.write("\n")
             self._stream.flush()

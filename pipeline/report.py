@@ -276,7 +276,7 @@ def results_table(metrics: Mapping[str, Any]) -> "TerminalTable":
     """A run's figures with units, the estimate beside odometry alone."""
     from rich.table import Table as TerminalTable
 
-    results = _results(metrics)
+    results = _results({name: value for name, value in metrics.items() if name != "mean_pose"})
     table = TerminalTable(title="Results", title_justify="left", header_style="bold")
     table.add_column("")
     for column in results["columns"] or [""]:
