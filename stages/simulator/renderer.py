@@ -94,7 +94,7 @@ def _trace(
     lit: F32,
 ) -> None:
     """Colours (N, 3) of rays (N, 3), 0 to 255, before the chip."""
-    # Taken out of the scene once: each mention of an array inside a tuple counts references, and costs more than a test.
+    # Taken out of the scene once: each mention of an array in a tuple counts references, which costs more than a test.
     boxes, faces, tiles, texels, level_start = scene.boxes, scene.faces, scene.tiles, scene.texels, scene.level_start
     table, size, glow, light, grid = scene.surface_table, scene.surface_size, scene.glow, scene.light, scene.grid
     start, members, top = scene.cell_start, scene.cell_boxes, scene.cell_top

@@ -194,18 +194,17 @@ class World:
         return self._solid("block", block.centre, block.size, block.yaw, block.bottom_z, block.height, side, top, step)
 
     def _hanging(self, hanging: Hanging, number: int) -> Box:
-        texture = self._texture(hanging.material, f"hanging {number}")
+        front = self._plain(self._texture(hanging.material, f"hanging {number}"), hanging.width, hanging.height)
+        rim = self._plain(self._texture("concrete", "rim"), 1.0, 1.0)
         thick = 0.03
-        at = _place(hanging.centre, hanging.facing, thick / 2, 0.0)
-        return self._solid(
-            "hanging",
-            at,
-            (hanging.width, thick),
-            hanging.facing + math.pi / 2,
-            hanging.bottom_z,
-            hanging.height,
-            texture,
-            texture,
+        return Box(
+            kind="hanging",
+            centre=_place(hanging.centre, hanging.facing, thick / 2, 0.0),
+            half=(hanging.width / 2, thick / 2),
+            yaw=hanging.facing + math.pi / 2,
+            low=hanging.bottom_z,
+            high=hanging.bottom_z + hanging.height,
+            faces=(rim, rim, front, front, rim, rim),
         )
 
     def _lamp(self, number: int) -> Box:

@@ -4,6 +4,7 @@ import dataclasses
 import math
 
 import cv2
+import numba
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -14,7 +15,7 @@ from omninav.stages.simulator.config import Block, Lamp, WorldConfig
 from omninav.stages.simulator.renderer import Scene, render
 from omninav.stages.simulator.world import World
 from omninav.stages.source.simulated import mirror
-from omninav.stages.values.camera import Cylindrical, Equirectangular, Perspective
+from omninav.stages.values.camera import Cylindrical, Donut, Equirectangular, Perspective
 
 EYE = 0.9
 PANORAMA = Equirectangular(
@@ -213,3 +214,21 @@ def test_the_ring_is_lit_and_the_robot_in_its_middle_is_black(demo: Scene) -> No
     radius = np.hypot(u - camera.centre_x, v - camera.centre_y)
     assert picture[(radius < 34) | (radius > 238)].max() == 0
     assert np.mean(picture[(radius > 35) & (radius < 237)].max(axis=-1) > 10) > 0.99
+
+
+def test_the_number_of_threads_does_not_change_a_picture(demo: Scene) -> None:
+    rays = camera_rays(mirror(WorldConfig().camera), 0.1)
+    threads = numba.get_num_threads()
+    try:
+        pictures = []
+        for number in (1, threads):
+            numba.set_num_threads(number)
+            pictures.append(render(demo, rays, (5.8, 4.5, 0.4), EYE, noise=2.0, key=3))
+    finally:
+        numba.set_num_threads(threads)
+    np.testing.assert_array_equal(*pictures)
+
+
+def test_a_donut_without_a_mirror_model_has_no_rays() -> None:
+    with pytest.raises(TypeError, match="no rays are known for Donut; use HyperbolicMirror"):
+        camera_rays(Donut(width=10, height_px=10))
