@@ -72,8 +72,8 @@ class LogSource(Source):
     def setup(self, ctx: Context) -> None:
         """Open all logs; what is lost by then is counted."""
         self._open()
-        for recording in self._recordings:
-            for kind, number in sorted(recording.dropped.items()):
+        for recording, lost in zip(self._recordings, self._lost, strict=True):
+            for kind, number in sorted(lost.items()):
                 ctx.count(kind, number, recording.details.get(kind, ""))
         kinds = [_odometry_kind(recording) for recording in self._recordings]
         ctx.fact("odometry", ", ".join(dict.fromkeys(kinds)))
@@ -172,6 +172,7 @@ class LogSource(Source):
                     f"{recording.name}: first={self.first}, stop={self.stop} leaves none of its frames; "
                     "type nodes.source.first=0 nodes.source.stop=null"
                 )
+        self._lost = [recording.dropped.copy() for recording in recordings]
         self._recordings = recordings
 
 
