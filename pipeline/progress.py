@@ -45,12 +45,6 @@ class Progress:
             self._due = now + self._every
             self._show(now)
 
-    def stage(self, name: str) -> None:
-        """The loop is over and the stage `name` is at work (what may take a while afterwards)."""
-        if self._live:
-            self._stream.write(f"\r\x1b[K{self._name}: {name} …")
-            self._stream.flush()
-
     def _begin(self, name: str, done: int) -> None:
         self._close()
         now = self._clock()

@@ -50,6 +50,6 @@ def small_run(frames: int = 60, logs: int = 1, seed: int = 0) -> SmallRun:
 
 
 def reference_graph(references: int) -> ReferenceGraph:
-    edges = np.stack([np.arange(references - 1), np.arange(1, references)], axis=1)
+    edges = np.stack([np.arange(max(references - 1, 0)), np.arange(1, max(references, 1))], axis=1)
     features = np.zeros((references, 10, 20), dtype=np.float32)
     return ReferenceGraph(eight(references), features, "histograms", edges, "truth")

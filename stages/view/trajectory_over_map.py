@@ -106,7 +106,7 @@ def _draw(logs: Sequence[Drive], map: ReferenceGraph | None) -> bytes:
 def _shown(logs: Sequence[Drive], map: ReferenceGraph | None) -> tuple[float, float, float, float] | None:
     """Truth and map, or estimate and map: what strays (odometry, a lost filter) leaves the picture, not shrinks it."""
     kept = [drive.truth if drive.has_truth else drive.estimate for drive in logs]
-    return extent_of(*kept, *([map.poses] if map is not None else []), margin=0.15)
+    return extent_of(*kept, *([map.poses] if map is not None else []), margin=0.08)
 
 
 def _broken_at_jumps(drive: Drive) -> tuple[Array, Array]:

@@ -1,13 +1,14 @@
 import cv2
 import numpy as np
 import pytest
-from small_run import small_run
+from small_run import reference_graph, small_run
 
 from omninav.pipeline import Context
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.similarity import Similarities
 from omninav.stages.view.belief_snapshots import BeliefSnapshots
 from omninav.stages.view.error_over_time import ErrorOverTime
+from omninav.stages.view.map_plan import MapPlan
 from omninav.stages.view.moments import geometric_moments, is_moment, spread_out
 from omninav.stages.view.panorama_snapshot import PanoramaSnapshot
 from omninav.stages.view.panorama_strip import PanoramaStrip
@@ -36,6 +37,7 @@ def panoramas(run):
 def all_figures(run):
     yield TrajectoryOverMap().step(CTX, *run.drive, run.map).figure
     yield ErrorOverTime().step(CTX, *run.drive).figure
+    yield MapPlan().step(CTX, run.ticks, run.map).figure
     yield BeliefSnapshots().step(CTX, run.ticks, run.beliefs, run.estimates, run.truth, run.map).figure
     yield SimilarityHeatMap().step(CTX, run.map, run.ticks, list(similarities(run)), run.truth).figure
     yield PanoramaStrip().step(CTX, run.ticks, list(panoramas(run))).figure
@@ -90,7 +92,8 @@ def test_without_truth_there_is_a_trajectory_but_no_error():
 
 def test_an_empty_run_gives_no_pictures():
     run = small_run(frames=0)
-    assert list(all_figures(run)) == [None] * 5
+    run.map = reference_graph(0)
+    assert list(all_figures(run)) == [None] * 6
 
 
 def test_a_run_whose_estimates_are_all_absent_still_gives_a_picture():
