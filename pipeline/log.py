@@ -13,6 +13,7 @@ from collections import Counter, OrderedDict
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import cache
 from io import BytesIO
 from pathlib import Path
 from types import TracebackType
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 MAGIC = b"\x89MCAP0\r\n"
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
+_STAMP_LITTLE, _STAMP_BIG = struct.Struct("<iI").unpack_from, struct.Struct(">iI").unpack_from
 _FOOTER_SIZE = _RECORD.size + 20 + len(MAGIC)
 _DEFINITION_ENCODINGS = ("ros2msg", "ros2idl")
 _CHUNKS_IN_MEMORY = 4
@@ -107,6 +109,8 @@ class LogReader:
         self._chunks: list[_Chunk] = []
         self._unpacked: OrderedDict[int, bytes] = OrderedDict()
         self._stores: dict[str, Typestore] = {}
+        self._known_channels: dict[int, tuple[str, bool]] = {}
+        self._types: dict[str, str] = {}
         self._attachments: dict[str, bytes] = {}
         self._scanned = False
         try:
@@ -171,7 +175,7 @@ class LogReader:
 
     def decode(self, topic: str, data: bytes | memoryview) -> Any:
         """A message object (fields as attributes, as ROS names them). Raises `BadMessage`."""
-        msgtype = self._types()[topic]
+        msgtype = self._type_on(topic)
         try:
             return self._store(msgtype).deserialize_cdr(data, msgtype)
         except Exception as error:  # damaged bytes raise whatever the generated decoder stumbles over
@@ -180,14 +184,13 @@ class LogReader:
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Message]:
         """Decoded messages in the order of their stamps; equal stamps in the order of the file."""
         found = [(record.stamp, number, record) for number, record in enumerate(_without_data(self.scan(topics)))]
-        types = self._types()
         for stamp, _, record in sorted(found):
             try:
                 content = self.decode(record.topic, self.fetch(record.location))
             except BadMessage as error:
                 self.drop("bad_message", str(error))
                 continue
-            yield Message(record.topic, types[record.topic], stamp, record.log_time, content)
+            yield Message(record.topic, self._type_on(record.topic), stamp, record.log_time, content)
 
     def drop(self, kind: str, detail: str) -> None:
         """Count something lost."""
@@ -331,18 +334,17 @@ class LogReader:
         at: Location,
         topics: Collection[str] | None,
     ) -> Iterator[Record]:
-        channel = self._channels.get(number)
-        if channel is None:
-            self.drop(
-                "bad_message",
-                f"{self.path}: a message names channel {number}, which is not described",
-            )
-        elif topics is None or channel.topic in topics:
+        known = self._read_as(number)
+        if known is None:
+            self.drop("bad_message", f"{self.path}: a message names channel {number}, which is not described")
+            return
+        topic, has_header = known
+        if topics is None or topic in topics:
             stamp = log_time
-            if self._has_header(channel) and len(data) >= 12:
-                seconds, nanoseconds = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, 4)
+            if has_header and len(data) >= 12:
+                seconds, nanoseconds = _STAMP_LITTLE(data, 4) if data[1] & 1 else _STAMP_BIG(data, 4)
                 stamp = seconds * 1_000_000_000 + nanoseconds
-            yield Record(channel.topic, stamp, log_time, data, at)
+            yield Record(topic, stamp, log_time, data, at)
 
     def _attach(self, content: bytes, start: int) -> None:
         try:
@@ -356,47 +358,33 @@ class LogReader:
         except Exception as error:
             self.drop("bad_attachment", f"{self.path}: attachment at byte {start}: {error}")
 
+    def _type_on(self, topic: str) -> str:
+        if topic not in self._types:
+            self._types = {channel.topic: self._type_of(channel) for channel in self._channels.values()}
+        return self._types[topic]
+
     def _type_of(self, channel: Channel) -> str:
         schema = self._schemas.get(channel.schema_id)
         return schema.name if schema else ""
 
-    def _types(self) -> dict[str, str]:
-        return {channel.topic: self._type_of(channel) for channel in self._channels.values()}
-
-    def _has_header(self, channel: Channel) -> bool:
-        msgtype = self._type_of(channel)
-        try:
-            fields = self._store(msgtype).fielddefs[msgtype][1]
-        except KeyError:
-            return False
-        return bool(fields) and fields[0][1][1] == "std_msgs/msg/Header"
+    def _read_as(self, number: int) -> tuple[str, bool] | None:
+        """Topic of a channel and whether its messages begin with a header; None where nothing describes it."""
+        if number not in self._known_channels:
+            channel = self._channels.get(number)
+            if channel is None:
+                return None
+            msgtype = self._type_of(channel)
+            fields = self._store(msgtype).fielddefs.get(msgtype, ([], []))[1]
+            self._known_channels[number] = channel.topic, bool(fields) and fields[0][1][1] == "std_msgs/msg/Header"
+        return self._known_channels[number]
 
     def _store(self, msgtype: str) -> "Typestore":
         """The types that this file's own definition of a message type brings along."""
         if msgtype not in self._stores:
-            from rosbags.typesys import (
-                Stores,
-                get_types_from_idl,
-                get_types_from_msg,
-                get_typestore,
+            schema = next((schema for schema in self._schemas.values() if schema.name == msgtype), None)
+            self._stores[msgtype] = (
+                standard_types() if schema is None else types_of(msgtype, schema.encoding, schema.data)
             )
-
-            store = get_typestore(Stores.EMPTY)
-            schema = next(
-                (schema for schema in self._schemas.values() if schema.name == msgtype),
-                None,
-            )
-            try:
-                if schema is None or schema.encoding not in _DEFINITION_ENCODINGS:
-                    raise ValueError("no definition")
-                text = schema.data.decode()
-                store.register(
-                    get_types_from_msg(text, msgtype) if schema.encoding == "ros2msg" else get_types_from_idl(text)
-                )
-                store.get_msgdef(msgtype)  # fails where a part of the definition is missing
-            except Exception:  # no whole definition in the file: the standard one, where it is a standard type
-                store = standard_types()
-            self._stores[msgtype] = store
         return self._stores[msgtype]
 
 
@@ -405,17 +393,29 @@ def read_messages(path: Path | str, topics: Collection[str] | None = None) -> It
     yield from LogReader(path).messages(topics)
 
 
+@cache
 def standard_types() -> "Typestore":
     """The message types that come with ROS 2."""
-    global _STANDARD
-    if _STANDARD is None:
-        from rosbags.typesys import Stores, get_typestore
+    from rosbags.typesys import Stores, get_typestore
 
-        _STANDARD = get_typestore(Stores.ROS2_HUMBLE)
-    return _STANDARD
+    return get_typestore(Stores.ROS2_HUMBLE)
 
 
-_STANDARD: "Typestore | None" = None
+@cache
+def types_of(msgtype: str, encoding: str, definition: bytes) -> "Typestore":
+    """The message types in a definition; the standard ones where it is not whole or not readable."""
+    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+    if encoding not in _DEFINITION_ENCODINGS:
+        return standard_types()
+    store = get_typestore(Stores.EMPTY)
+    try:
+        text = definition.decode()
+        store.register(get_types_from_msg(text, msgtype) if encoding == "ros2msg" else get_types_from_idl(text))
+        store.get_msgdef(msgtype)  # fails where a part of the definition is missing
+    except Exception:
+        return standard_types()
+    return store
 
 
 class LogWriter:

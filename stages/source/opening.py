@@ -56,7 +56,7 @@ def open_recording(
 def _open_folder(log: str, path: Path, topics: Topics, camera: Path | None, layouts: Sequence[str]) -> Recording:
     if (path / "recording.yaml").is_file():
         return _described(log, path / "recording.yaml", path, "", camera, layouts)
-    if (path / "metadata.yaml").is_file() or any(path.glob("*.mcap")):
+    if (path / "metadata.yaml").is_file() or any(path.glob("*.mcap")) or any(path.glob("*.db3")):
         from .rosbag import open_rosbag
 
         return open_rosbag(log, path, topics, camera)

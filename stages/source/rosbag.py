@@ -52,14 +52,23 @@ class BagFeed:
         self.details: dict[str, str] = {}
         self.attachments: dict[str, bytes] = {}
         try:
-            self._reader = AnyReader([path], default_typestore=standard_types())
-            self._reader.open()
+            self._reader = self._open([path])
         except Exception as error:  # rosbags and the libraries under it raise many kinds for a damaged bag
-            repair = "rosbag reindex" if path.suffix == ".bag" else "ros2 bag reindex"
             said = " ".join(str(error).split()) or type(error).__name__
-            raise UnreadableRecording(
-                f"{path}: not a readable bag ({said}); if it was cut off, repair it with {repair}"
-            ) from None
+            try:
+                parts = sorted(path.glob("*.db3")) if path.is_dir() else []
+                self._reader = self._open(parts)  # each part can be read without the folder's metadata
+            except Exception:
+                repair = "rosbag reindex" if path.suffix == ".bag" else "ros2 bag reindex"
+                raise UnreadableRecording(
+                    f"{path}: not a readable bag ({said}); if it was cut off, repair it with {repair}"
+                ) from None
+            self.drop("bad_metadata", f"{path}: metadata.yaml cannot be used ({said})")
+
+    def _open(self, paths: list[Path]) -> AnyReader:
+        reader = AnyReader(paths, default_typestore=standard_types())
+        reader.open()
+        return reader
 
     @property
     def topics(self) -> dict[str, str]:
@@ -107,7 +116,7 @@ class BagFeed:
         self.details.setdefault(kind, detail)
 
     def _has_header(self, msgtype: str) -> bool:
-        fields = self._reader.typestore.fielddefs[msgtype][1]
+        fields = self._reader.typestore.fielddefs.get(msgtype, ([], []))[1]
         return bool(fields) and fields[0][1][1] == "std_msgs/msg/Header"
 
     def _stamp(self, data: bytes | memoryview) -> int:

@@ -261,3 +261,35 @@ def test_what_is_written_opens_with_rosbags_message_by_message(tmp_path: Path) -
                 assert np.array_equal(theirs.data, mine.data)
             count += 1
     assert count == len(ours) == 2 * COUNT
+
+
+@pytest.mark.parametrize("compression", ["LZ4", "NONE", "ZSTD"])
+def test_every_compression_is_read_whole_and_cut_inside_a_chunk(tmp_path: Path, compression: str) -> None:
+    from mcap.writer import CompressionType, Writer
+
+    definition = b"string data\n"
+    path = tmp_path / "log.mcap"
+    texts = [bytes(make_text(number)) for number in range(3000)]
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=1 << 24, compression=CompressionType[compression])
+        writer.start(profile="ros2", library="test")
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", definition)
+        channel = writer.register_channel("/text", "cdr", schema)
+        for number, text in enumerate(texts):
+            writer.add_message(channel, number, text, number)
+        writer.finish()
+    assert [bytes(record.data) for record in LogReader(path).scan()] == texts
+    ((start, length),) = chunk_places(path)
+    path.write_bytes(path.read_bytes()[: start + length * 9 // 10])
+    cut = LogReader(path)
+    found = [bytes(record.data) for record in cut.scan()]
+    assert 1000 < len(found) < len(texts)  # the part of the chunk that its compression lets through
+    assert found == texts[: len(found)]
+    assert cut.dropped == {"cut_file": 1}
+
+
+def make_text(number: int) -> memoryview:
+    from omninav.pipeline.log import standard_types
+
+    noise = "".join(chr(letter) for letter in np.random.default_rng(number).integers(33, 127, 200))
+    return standard_types().serialize_cdr(make_message("std_msgs/msg/String", {"data": noise}), "std_msgs/msg/String")

@@ -335,3 +335,13 @@ def test_a_robots_own_bag_is_read_by_header_time_not_by_log_time() -> None:
     assert 928e9 < odometry[0].stamp < odometry[-1].stamp < 1026e9  # simulation time (the set's notes)
     assert odometry[0].log_time > 1.7e18  # wall time
     assert not reader.dropped
+
+
+def test_a_rosbag2_folder_is_read_without_its_metadata(tmp_path: Path) -> None:
+    folder = write_rosbag2(tmp_path / "bag")
+    (folder / "metadata.yaml").write_text("rosbag2_bagfile_information: {version: 9}")
+    recording = open_recording(str(folder))
+    assert len(recording.stamps) == FRAMES
+    assert recording.dropped == {"bad_metadata": 1}
+    (folder / "metadata.yaml").unlink()
+    assert len(open_recording(str(folder)).stamps) == FRAMES
