@@ -1,7 +1,7 @@
 """Logs: MCAP files of ROS 2 messages, written whole and read as far as they are sound.
 
 What `LogWriter` writes opens with Foxglove, `mcap` and `ros2 bag play -s mcap FILE` as it is, and with rosbags as
-`AnyReader([Path("FILE.mcap")])`: the message definitions are inside, so no `metadata.yaml` is needed.
+`AnyReader([Path("FILE.mcap")])` (0.11 and later): message definitions are inside, so no `metadata.yaml` is needed.
 
 Reading trusts nothing: every chunk's checksum is verified, a damaged chunk costs only itself, and a file that was cut
 gives every whole message before the cut. What was lost is counted by kind.
