@@ -68,7 +68,7 @@ def leaves(metrics: Mapping[str, Any], place: tuple[str, ...] = ()) -> Iterator[
         value = metrics[name]
         if isinstance(value, Mapping):
             if value and all(key in STATISTICS for key in value):
-                yield Leaf(place, name, dict(value))
+                yield Leaf(place, name, {key: value[key] for key in STATISTICS if key in value})
             else:
                 deeper.append((name, value))
         elif not isinstance(value, list | tuple):

@@ -1,5 +1,7 @@
 """Weighted pose samples: moments and modes."""
 
+import itertools
+
 import numba
 import numpy as np
 import numpy.typing as npt
@@ -27,15 +29,21 @@ def heaviest_mode(poses: Array, weights: Array, radius: float = 1.0) -> tuple[Ar
     starts a mean shift with a flat kernel of `radius` metres and 30 degrees that stops when its members stay the same.
     """
     cell = radius / 2
-    keys = np.column_stack([np.floor(poses[:, :2] / cell), np.floor(np.mod(poses[:, 2], 2 * np.pi) / (np.pi / 6))])
-    keys[:, 2] = np.mod(keys[:, 2], 12)
-    cells, inverse = np.unique(keys.astype(np.int64), axis=0, return_inverse=True)
+    columns, rows = (np.floor(poses[:, axis] / cell).astype(np.int64) for axis in (0, 1))
+    turns = np.mod(np.floor(np.mod(poses[:, 2], 2 * np.pi) / (np.pi / 6)).astype(np.int64), 12)
+    left, low = columns.min() - 1, rows.min() - 1
+    width = rows.max() - low + 2
+    cells, inverse = np.unique(((columns - left) * width + rows - low) * 12 + turns, return_inverse=True)
     mass = np.bincount(inverse.ravel(), weights=weights, minlength=len(cells))
-    heaviest = np.argsort(-mass, kind="stable")[:64]  # a mode lighter than 64 others is not the heaviest
-    gap = np.abs(cells[heaviest, None, :] - cells[None, :, :])
-    gap[..., 2] = np.minimum(gap[..., 2], 12 - gap[..., 2])
-    around = (gap <= 1).all(axis=2) @ mass
-    start = cells[heaviest[int(np.argmax(around))]]
+    heaviest = cells[np.argsort(-mass, kind="stable")[:64]]  # a mode lighter than 64 others is not the heaviest
+    column, row, turn = heaviest // 12 // width, heaviest // 12 % width, heaviest % 12
+    around = np.zeros(len(heaviest))
+    for a, b, c in itertools.product((-1, 0, 1), repeat=3):
+        neighbour = ((column + a) * width + row + b) * 12 + (turn + c) % 12
+        found = np.minimum(np.searchsorted(cells, neighbour), len(cells) - 1)
+        around += np.where(cells[found] == neighbour, mass[found], 0.0)
+    best = int(np.argmax(around))
+    start = (column[best] + left, row[best] + low, turn[best])
     centre = np.array([(start[0] + 0.5) * cell, (start[1] + 0.5) * cell, wrap((start[2] + 0.5) * np.pi / 6)])
     members = np.zeros(len(poses), dtype=bool)
     for _ in range(20):

@@ -1,0 +1,59 @@
+import numpy as np
+import pytest
+
+from omninav.stages.geometry.particles import heaviest_mode, weighted_moments
+from omninav.stages.geometry.se2 import wrap
+
+
+def heaviest_start_by_brute_force(poses, weights, radius=1.0):
+    """Every cell of radius / 2 and 30 degrees with all 26 around it, headings circular: the heaviest sum wins."""
+    mass = {}
+    for pose, weight in zip(poses, weights, strict=True):
+        key = (
+            *(int(np.floor(pose[axis] / (radius / 2))) for axis in (0, 1)),
+            int(pose[2] % (2 * np.pi) // (np.pi / 6)),
+        )
+        mass[key] = mass.get(key, 0.0) + weight
+
+    def around(cell):
+        near = (other for other in mass if max(abs(other[0] - cell[0]), abs(other[1] - cell[1])) <= 1)
+        return sum(mass[other] for other in near if (other[2] - cell[2]) % 12 in (0, 1, 11))
+
+    return max(mass, key=around)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_mode_grows_from_the_cell_that_a_search_over_all_cells_finds(seed):
+    rng = np.random.default_rng(seed)
+    centres = np.array([[0.0, 0.0, 3.1], [7.0, -3.0, 0.0], [-40.0, 12.0, -1.0]])
+    poses = centres[rng.integers(0, 3, 300)] + rng.normal(0, [0.4, 0.4, 0.2], (300, 3))
+    weights = rng.random(300)
+    cell = heaviest_start_by_brute_force(poses, weights / weights.sum())
+    start = np.array([(cell[0] + 0.5) * 0.5, (cell[1] + 0.5) * 0.5])
+    mode, _, share = heaviest_mode(poses, weights)
+    assert np.hypot(*(mode[:2] - start)) < 1.5
+    assert 0.2 < share < 0.6
+
+
+def test_of_two_clusters_the_heavier_is_the_mode_and_not_the_mean_between():
+    poses = np.array([[0.0, 0.0, 0.0]] * 3 + [[10.0, 0.0, 0.0]] * 5)
+    mode, covariance, share = heaviest_mode(poses, np.full(8, 1 / 8))
+    np.testing.assert_allclose(mode, [10.0, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(covariance, 0.0, atol=1e-12)
+    assert share == pytest.approx(5 / 8)
+
+
+def test_headings_on_both_sides_of_the_cut_are_one_mode():
+    heading = np.concatenate([np.full(5, np.pi - 0.05), np.full(5, -np.pi + 0.05)])
+    poses = np.column_stack([np.zeros(10), np.zeros(10), heading])
+    mode, _, share = heaviest_mode(poses, np.full(10, 0.1))
+    assert abs(wrap(mode[2] - np.pi)) < 1e-9
+    assert share == pytest.approx(1.0)
+
+
+def test_a_mode_far_from_the_origin_is_found_as_well():
+    rng = np.random.default_rng(0)
+    poses = rng.normal([5e5, -4e6, 1.0], 0.1, (50, 3))
+    mode, _, share = heaviest_mode(poses, np.ones(50))
+    np.testing.assert_allclose(mode[:2], weighted_moments(poses, np.ones(50))[0][:2], atol=0.05)
+    assert share > 0.9
