@@ -374,7 +374,9 @@ def _variants(arguments: list[str]) -> int:
 
     for file in sorted(files(CONF).joinpath("variant").iterdir(), key=lambda path: path.name):
         if file.name.endswith(".yaml"):
-            comments = (line for line in file.read_text().split("\n") if line.startswith("# ") and "@package" not in line)
+            comments = (
+                line for line in file.read_text().split("\n") if line.startswith("# ") and "@package" not in line
+            )
             first = next(comments, "").lstrip("# ")
             print(f"{file.name.removesuffix('.yaml'):22} {first}")
     return 0
@@ -459,9 +461,7 @@ def _doctor(arguments: list[str]) -> int:
     from .catalog import entries
     from .run import LIBRARIES, _version
 
-    print(
-        f"omninav {_version('omninav')}, Python {platform.python_version()}, {os.cpu_count()} cores"
-    )
+    print(f"omninav {_version('omninav')}, Python {platform.python_version()}, {os.cpu_count()} cores")
     rows = list(entries())
     for name in LIBRARIES:
         print(f"  {name:26} {_version(name)}")

@@ -473,8 +473,11 @@ def _logged(run: Run) -> Iterator[None]:
     log.addHandler(handler)
     log.setLevel(logging.INFO)
     log.propagate = False
+    log.disabled = False  # Hydra's logging set-up silences loggers that were there before it
     try:
+        log.info("omninav %s", " ".join(run.manifest["argv"][1:]) or "(the embedded default)")
         yield
+        log.info("complete: %s ticks", run.manifest.get("ticks"))
     finally:
         log.removeHandler(handler)
         handler.close()

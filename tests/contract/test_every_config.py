@@ -14,7 +14,9 @@ from omninav.pipeline.run import plan
 from omninav.pipeline.stage import signature
 
 CONF = Path(__file__).resolve().parents[2] / "conf"
-FILES = [path for path in sorted(CONF.rglob("*.yaml")) if path.name != "config.yaml" and path.parent.name != "recording"]
+FILES = [
+    path for path in sorted(CONF.rglob("*.yaml")) if path.name != "config.yaml" and path.parent.name != "recording"
+]
 each = pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.stem}")
 
 
