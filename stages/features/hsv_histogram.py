@@ -109,8 +109,8 @@ class HsvHistogram(Stage):
     bins: Literal["separate", "joint"] = "separate"
     hue_bins: Annotated[int, Bounds(ge=1, le=180)] = 16
     value_bins: Annotated[int, Bounds(ge=1, le=256)] = 4
-    least_saturation: Annotated[int, Bounds(ge=0, le=255)] = 0
-    least_value: Annotated[int, Bounds(ge=0, le=255)] = 0
+    least_saturation: Annotated[int, Bounds(ge=0, le=255)] = 64
+    least_value: Annotated[int, Bounds(ge=0, le=255)] = 32
 
     class Out(Outputs):
         """The description of the view."""

@@ -29,9 +29,10 @@ class ImportanceResampling(Stage):
     """Importance weights, then systematic resampling where few particles carry the weight.
 
     Gross & Koenig 2004, section 2 (5000 samples for global localisation, 500 for tracking). Weights are multiplied by
-    the likelihood; below an effective size of `resample_below` times the number, particles are resampled. Of those,
-    `sensor_share` is replaced by `proposals` (poses the view itself suggests), so that a kidnapped robot is found
-    again. `adapt`: `kld` sets the number between `tracking` and `number` by the cells of `cell_m`, `cell_deg`
+    the likelihood; below an effective size of `resample_below` times the number, particles are resampled. Against
+    kidnapping, `kidnapped` is the probability per picture that the robot was put anywhere: the `proposals`, poses the
+    view itself suggests, then share the weight kidnapped x `likelihood.anywhere`, which is what a uniform belief
+    would get; so they win where the belief explains the view badly, and only there. `adapt`: `kld` sets the number between `tracking` and `number` by the cells of `cell_m`, `cell_deg`
     the belief fills (Fox 2001; `kld_error`, 99 % confidence); `none` keeps `number`.
     """
 
@@ -39,7 +40,7 @@ class ImportanceResampling(Stage):
     tracking: Annotated[int, Bounds(ge=1)] = 500
     adapt: Literal["kld", "none"] = "none"
     resample_below: Annotated[float, Bounds(ge=0, le=1)] = 0.5
-    sensor_share: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
+    kidnapped: Annotated[float, Bounds(ge=0, lt=1)] = 1e-5
     kld_error: Annotated[float, Bounds(gt=0)] = 0.05
     cell_m: Annotated[float, Bounds(gt=0)] = 0.25
     cell_deg: Annotated[float, Bounds(gt=0)] = 10.0
@@ -56,16 +57,21 @@ class ImportanceResampling(Stage):
         if not (math.isfinite(total) and total > 0.0):
             ctx.count("belief_without_support", detail="fusion: no particle explains the picture; weights kept")
             weights, total = particles.weights, float(particles.weights.sum())
+        poses = particles.poses
+        if proposals is not None and likelihood.anywhere is not None and self.kidnapped > 0.0:
+            # Drawn from the view itself, they carry the evidence for "anywhere" in equal parts.
+            number = len(proposals.poses)
+            elsewhere = np.full(number, self.kidnapped * likelihood.anywhere / number)
+            poses = np.concatenate([poses, proposals.poses])
+            weights = np.concatenate([weights * ((1.0 - self.kidnapped) / float(particles.weights.sum())), elsewhere])
+            total = float(weights.sum())
         weights = weights / total
         wanted = self._wanted(particles.poses)
-        if wanted == len(weights) and effective_size(weights) >= self.resample_below * len(weights):
-            return self.Out(belief=Particles(particles.poses, weights))
-        poses = particles.poses[systematic(weights, wanted, float(ctx.rng.random()))]
-        if proposals is not None and self.sensor_share > 0.0:
-            number = min(round(self.sensor_share * wanted), len(proposals.poses))
-            # Instead of resampled ones, spread evenly over them, so that no part of the belief is thinned out.
-            poses[np.linspace(0, wanted, number, endpoint=False).astype(np.int64)] = proposals.poses[:number]
-        return self.Out(belief=Particles(poses, np.full(wanted, 1.0 / wanted)))
+        known = weights[: len(particles.poses)]
+        if wanted == len(known) and effective_size(known) >= self.resample_below * wanted:
+            return self.Out(belief=Particles(particles.poses, known / known.sum()))
+        drawn = systematic(weights, wanted, float(ctx.rng.random()))
+        return self.Out(belief=Particles(poses[drawn], np.full(wanted, 1.0 / wanted)))
 
     def _wanted(self, poses: Array) -> int:
         if self.adapt == "none":

@@ -14,12 +14,13 @@ from omninav.stages.values.maps import ReferenceGraph
 Ints = npt.NDArray[np.int64]
 
 
-def near_belief(poses: npt.NDArray[np.float64], near: Particles | None, radius: float) -> Ints | None:
+def near_belief(poses: npt.NDArray[np.float64], near: Particles | None, radius: float, whole: int = 0) -> Ints | None:
     """Indices of the references within `radius` metres of any particle, ascending; None (all) where that is no gain.
 
-    All are compared too where there is no belief, where `radius` is 0 (never limit), and where no reference is near.
+    All are compared too where there is no belief, where `radius` is 0 (never limit), where no reference is near, and where there are
+    at most `whole` references.
     """
-    if near is None or radius <= 0.0 or not len(poses):
+    if near is None or radius <= 0.0 or len(poses) <= whole:
         return None
     cells = np.unique(np.floor(near.poses[:, :2] / (radius / 2)).astype(np.int64), axis=0)
     if len(cells) > len(poses):

@@ -15,12 +15,13 @@ from .candidates import check_alike, near_belief
 class HistogramIntersection(Stage):
     """Similarity as the mean intersection of all segments' histograms: nothing is left out.
 
-    The non-selective rival of Gross & Koenig 2004, section 2, over histograms. `headings`, `radius_m` as in
+    The non-selective rival of Gross & Koenig 2004, section 2, over histograms. `headings`, `radius_m`, `whole_up_to` as in
     selective.py. Raises BadInput where the map was learned with other features.
     """
 
     headings: Annotated[int, Bounds(ge=1)] = 36
     radius_m: Annotated[float, Bounds(ge=0)] = 2.0
+    whole_up_to: Annotated[int, Bounds(ge=0)] = 1000
 
     class Out(Outputs):
         """How alike view and references are."""
@@ -32,6 +33,6 @@ class HistogramIntersection(Stage):
     ) -> Out:
         """Compare one view."""
         check_alike(features, map)
-        chosen = near_belief(map.poses, near, self.radius_m)
+        chosen = near_belief(map.poses, near, self.radius_m, self.whole_up_to)
         values = similarities(map.features, features.values, self.headings, True, False, chosen=chosen)
         return self.Out(similarities=Similarities(values, chosen))

@@ -21,12 +21,13 @@ class SelectiveMatch(Stage):
     segment j's histograms, or 1 - |difference| / (sqrt(3) 255) of its colours. All k are tried (erratum 21).
     `penalty`: sqrt as in the paper; cube_root: k^-1/3 n^-2/3, which wants more segments; none: the mean of all.
     `headings`: how many turns of each reference are compared. `radius_m`: with `near` wired, only references within
-    this distance of a particle are compared; 0 compares all. Raises BadInput where map and view are of other kinds.
+    this distance of a particle are compared, and all in maps of up to `whole_up_to` references; 0 compares all. Raises BadInput where map and view are of other kinds.
     """
 
     penalty: Literal["sqrt", "cube_root", "none"] = "sqrt"
     headings: Annotated[int, Bounds(ge=1)] = 36
     radius_m: Annotated[float, Bounds(ge=0)] = 2.0
+    whole_up_to: Annotated[int, Bounds(ge=0)] = 1000
 
     class Out(Outputs):
         """How alike view and references are."""
@@ -36,7 +37,7 @@ class SelectiveMatch(Stage):
     def step(self, ctx: Context, features: SegmentFeatures, map: ReferenceGraph, near: Particles | None = None) -> Out:
         """Compare one view."""
         histograms = check_alike(features, map)
-        chosen = near_belief(map.poses, near, self.radius_m)
+        chosen = near_belief(map.poses, near, self.radius_m, self.whole_up_to)
         values = similarities(
             map.features, features.values, self.headings, histograms, True, EXPONENTS[self.penalty], chosen
         )

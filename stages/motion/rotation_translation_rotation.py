@@ -48,12 +48,12 @@ class RotationTranslationRotation(Stage):
     that stands. Without motion (the first picture of a log) the belief stays as it is.
     """
 
-    rotation_per_rotation: Annotated[float, Bounds(ge=0)] = 0.1
-    rotation_per_metre: Annotated[float, Bounds(ge=0)] = 0.1
+    rotation_per_rotation: Annotated[float, Bounds(ge=0)] = 0.05
+    rotation_per_metre: Annotated[float, Bounds(ge=0)] = 0.05
     translation_per_metre: Annotated[float, Bounds(ge=0)] = 0.1
-    translation_per_rotation: Annotated[float, Bounds(ge=0)] = 0.02
-    rotation_floor: Annotated[float, Bounds(ge=0)] = 0.005
-    translation_floor: Annotated[float, Bounds(ge=0)] = 0.005
+    translation_per_rotation: Annotated[float, Bounds(ge=0)] = 0.01
+    rotation_floor: Annotated[float, Bounds(ge=0)] = 0.003
+    translation_floor: Annotated[float, Bounds(ge=0)] = 0.002
 
     class Out(Outputs):
         """The belief after the motion, before the picture is looked at."""

@@ -1,5 +1,6 @@
 """How well each particle explains the view, from the similarities of the references near it."""
 
+import math
 from typing import Annotated, Literal
 
 import numba
@@ -11,6 +12,7 @@ from omninav.stages.geometry.nearby import NearbyGrid, nearby_grid
 from omninav.stages.geometry.se2 import wrap
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
 
 Array = npt.NDArray[np.float64]
@@ -83,20 +85,33 @@ def expected_similarity(
     )
 
 
+def ordinary_match(similarity: Floats, quantile: float) -> float:
+    """What an unremarkable reference reaches at its best heading: a quantile of (references, headings)."""
+    return float(np.quantile(similarity.max(axis=1), quantile))
+
+
 class NearReferences(Stage):
     """Likelihood of particles from the references near them: expected similarity to the power of `power`.
 
     Gross & Koenig 2004, section 2, leave open how S becomes a weight (erratum 23a): w = S^power. The expected
     similarity at a particle is interpolated between the references within `radius_m` and between compared headings.
-    Far from all references it fades to the mean similarity over all references and headings, that of a view of
-    somewhere else; `trust` says how fast. `proposals`: poses drawn from the similarity field (`propose: similarity`,
-    the same power; position spread over `spread_m` around a reference, heading over one step of the compared
-    headings) or anywhere around the references (`uniform`).
+    What falls below an ordinary match, the `ordinary` quantile over all references of their similarity at the best
+    heading, counts as an ordinary match, and so does a pose far from all references (`trust`: how fast the
+    expectation fades to it): a robot off the mapped ways resembles no reference, and a filter that prefers the least
+    unlike one would be torn from its odometry. Pictures taken at one place are no independent evidence: with `motion`
+    wired, the power is scaled by the way since the picture before over `independent_m`, down to `standing` of it.
+
+    `proposals`: poses drawn from the similarity field (`propose: similarity`, the same power; position spread over
+    `spread_m` around a reference, heading over one step of the compared headings) or anywhere around the references
+    (`uniform`). They carry no weight of their own: `likelihood.anywhere` says how well the view fits anywhere.
     """
 
-    power: Annotated[float, Bounds(gt=0)] = 20.0
+    power: Annotated[float, Bounds(gt=0)] = 80.0
+    ordinary: Annotated[float, Bounds(ge=0, le=1)] = 0.85
     radius_m: Annotated[float, Bounds(gt=0)] = 0.5
     trust: Annotated[float, Bounds(gt=0)] = 0.05
+    independent_m: Annotated[float, Bounds(ge=0)] = 0.2
+    standing: Annotated[float, Bounds(ge=0, le=1)] = 0.05
     propose: Literal["similarity", "uniform", "none"] = "similarity"
     proposals: Annotated[int, Bounds(ge=0)] = 100
     spread_m: Annotated[float, Bounds(gt=0)] = 0.2
@@ -112,33 +127,47 @@ class NearReferences(Stage):
         self._map: ReferenceGraph | None = None
         self._length = 0
 
-    def step(self, ctx: Context, similarities: Similarities, particles: Particles, map: ReferenceGraph) -> Out:
+    def step(
+        self,
+        ctx: Context,
+        similarities: Similarities,
+        particles: Particles,
+        map: ReferenceGraph,
+        motion: Motion | None = None,
+    ) -> Out:
         """Weigh all particles."""
         if map is not self._map or len(map) != self._length:
             self._grid = nearby_grid(map.poses, self.radius_m)
             self._map, self._length = map, len(map)
-        rows = np.full(len(map), -1, np.int64)
-        candidates = np.arange(len(map)) if similarities.candidates is None else similarities.candidates
-        rows[candidates] = np.arange(len(candidates))
-        elsewhere = float(similarities.values.mean()) if similarities.values.size else 0.5
-        expected = expected_similarity(
-            particles.poses, map.poses, self._grid, rows, similarities.values, self.radius_m, elsewhere, self.trust
-        )
-        likelihood = Likelihood((expected / max(float(expected.max()), 1e-12)) ** self.power)
-        return self.Out(likelihood=likelihood, proposals=self._proposals(ctx, similarities, candidates, map))
-
-    def _proposals(
-        self, ctx: Context, similarities: Similarities, candidates: Ints, map: ReferenceGraph
-    ) -> Particles | None:
-        if self.propose == "none" or not self.proposals or not len(candidates):
-            return None
         values = similarities.values
-        headings = values.shape[1]
+        if not values.size:
+            return self.Out(likelihood=Likelihood(np.ones(len(particles.poses))))
+        candidates = np.arange(len(map)) if similarities.candidates is None else similarities.candidates
+        rows = np.full(len(map), -1, np.int64)
+        rows[candidates] = np.arange(len(candidates))
+        floor = ordinary_match(values, self.ordinary)
+        expected = expected_similarity(
+            particles.poses, map.poses, self._grid, rows, values, self.radius_m, floor, self.trust
+        )
+        power, best = self.power * self._fresh(motion), max(float(values.max()), 1e-12)
+        field = (np.maximum(values, floor) / np.float32(best)).astype(np.float64) ** power
+        likelihood = Likelihood((np.maximum(expected, floor) / best) ** power, float(field.mean()))
+        return self.Out(likelihood=likelihood, proposals=self._proposals(ctx, field, candidates, map))
+
+    def _fresh(self, motion: Motion | None) -> float:
+        """Share of the picture's evidence that is new."""
+        if motion is None or self.independent_m <= 0.0:
+            return 1.0
+        return min(1.0, max(self.standing, math.hypot(motion.x, motion.y) / self.independent_m))
+
+    def _proposals(self, ctx: Context, field: Array, candidates: Ints, map: ReferenceGraph) -> Particles | None:
+        if self.propose == "none" or not self.proposals or not field.size:
+            return None
+        headings = field.shape[1]
         if self.propose == "similarity":
-            mass = (values.astype(np.float64) / max(float(values.max()), 1e-12)) ** self.power
-            cumulative = np.cumsum(mass)
+            cumulative = np.cumsum(field)
             drawn = np.searchsorted(cumulative, ctx.rng.random(self.proposals) * cumulative[-1], side="right")
-            drawn = np.minimum(drawn, values.size - 1)
+            drawn = np.minimum(drawn, field.size - 1)
             poses = map.poses[candidates[drawn // headings]].copy()
             poses[:, 2] += 2 * np.pi * (drawn % headings + ctx.rng.random(self.proposals) - 0.5) / headings
         else:

@@ -27,13 +27,19 @@ class RingNotFound(ValueError):
 def radial_edges(grey: npt.NDArray[np.float32], centre: tuple[float, float], radii: int, rays: int = 90) -> Array:
     """How much of a circle is an edge, per radius in whole pixels: (radii,) in [0, 1].
 
-    A ray counts at a radius where the step of brightness across it is large against the picture's ordinary steps;
-    a saturated measure, so that one bright window does not outweigh a circle.
+    A ray counts at a radius where the step of brightness across it is large against the steps along all rays; a
+    saturated measure, so that one bright window does not outweigh a circle. Circles may leave the picture with up to
+    40 percent of their length.
     """
-    polar = cv2.warpPolar(grey, (radii, rays), centre, radii, cv2.INTER_LINEAR | cv2.WARP_POLAR_LINEAR)
+    angle = 2 * np.pi * np.arange(rays)[:, None] / rays
+    u = (centre[0] + np.arange(radii) * np.cos(angle)).astype(np.float32)
+    v = (centre[1] + np.arange(radii) * np.sin(angle)).astype(np.float32)
+    polar = cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     step = np.abs(np.diff(polar, axis=1, append=polar[:, -1:]))
-    strength = step / (step + np.float32(8.0))
-    score: Array = strength.mean(axis=0).astype(np.float64)
+    inside = (u >= 0) & (u <= grey.shape[1] - 1) & (v >= 0) & (v <= grey.shape[0] - 1)
+    ordinary = float(step[inside].mean()) + 0.2
+    strength = np.where(inside, step / (step + 2.0 * ordinary), 0.0)
+    score: Array = strength.sum(axis=0) / np.maximum(inside.sum(axis=0), 0.6 * rays)
     return score
 
 
@@ -47,28 +53,25 @@ def find_ring(pixels: Pixels) -> Ring:
     height, width = pixels.shape[:2]
     scale = max(1.0, max(height, width) / 240.0)
     small = cv2.resize(pixels, None, fx=1.0 / scale, fy=1.0 / scale, interpolation=cv2.INTER_AREA)
-    grey = cv2.GaussianBlur(cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32), (0, 0), 1.2)
+    grey = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32)
     h, w = grey.shape
-    reach = int(0.62 * min(h, w))
-    least = int(0.28 * min(h, w))
-
-    def best(centre: tuple[float, float]) -> tuple[float, int]:
-        edges = radial_edges(grey, centre, reach)
-        radius = least + int(np.argmax(edges[least:-2]))
-        return float(edges[radius]), radius
-
-    middle, span, step = (w / 2.0, h / 2.0), 0.16 * min(h, w), 0.02 * min(h, w)
-    score, radius, centre = 0.0, 0, middle
+    least, reach = int(0.28 * min(h, w)), int(0.62 * min(h, w))
+    centre, span, step = (w / 2.0, h / 2.0), 0.16 * min(h, w), 0.02 * min(h, w)
     while step > 0.2:
+        # Blurred as wide as the step, so that the right circle is seen from the nearest centre that is tried.
+        blurred = cv2.GaussianBlur(grey, (0, 0), max(1.0, 0.7 * step))
+        middle, score, radius = centre, -1.0, least
         offsets = np.arange(-span, span + step / 2, step)
         for dy in offsets:
             for dx in offsets:
                 candidate = (middle[0] + float(dx), middle[1] + float(dy))
-                found, at = best(candidate)
-                if found > score:
-                    score, radius, centre = found, at, candidate
-        middle, span, step = centre, step, step / 3
-    if score < 0.35:
+                edges = radial_edges(blurred, candidate, reach)
+                at = least + int(np.argmax(edges[least:-2]))
+                if edges[at] > score:
+                    score, radius, centre = float(edges[at]), at, candidate
+        span, step = 1.5 * step, step / 3
+    grey = blurred
+    if score < 0.2:
         raise RingNotFound("no circle stands out")
     edges = radial_edges(grey, centre, reach)
     low, high = max(2, int(0.06 * radius)), int(0.45 * radius)

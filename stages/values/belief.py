@@ -56,6 +56,11 @@ class SinglePose(Belief):
 
 
 class Likelihood(Value):
-    """How well each particle explains the present view. `values`: (N,), not negative, any scale."""
+    """How well each particle explains the present view. `values`: (N,), not negative, any scale.
+
+    `anywhere`: on the same scale, the mean over all poses the map knows: what a robot put down anywhere would get.
+    None where it is not known.
+    """
 
     values: Array
+    anywhere: float | None = None

@@ -1,0 +1,147 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omninav.stages.geometry.segments import (
+    euclidean_similarities,
+    penalties,
+    selective_similarity,
+    similarities,
+    similarity_at,
+    sorting_network,
+    turned_view,
+    turned_views,
+)
+
+RNG = np.random.default_rng(0)
+
+
+def histograms(number: int, segments: int, bins: int, seed: int = 0) -> np.ndarray:
+    values = np.random.default_rng(seed).random((number, segments, bins)).astype(np.float32) ** 4
+    return values / values.sum(axis=2, keepdims=True)
+
+
+def score(alike: np.ndarray, exponent: float = 0.5) -> float:
+    """The paper's S by its words: rank, then try every k."""
+    n, ranked = len(alike), sorted(alike, reverse=True)
+    return max(sum(ranked[:k]) * k**-exponent * n ** (exponent - 1) for k in range(1, n + 1))
+
+
+@pytest.mark.parametrize("segments", [5, 10, 36])
+@pytest.mark.parametrize("headings", [1, 12, 36])
+def test_the_kernel_agrees_with_the_paper_s_words(segments: int, headings: int) -> None:
+    references, view = histograms(6, segments, 20), histograms(1, segments, 20, seed=1)[0]
+    found = similarities(references, view, headings, histograms=True, selective=True)
+    for h in range(headings):
+        shift = h * segments / headings
+        whole, part = int(shift), shift - int(shift)
+        turned = [
+            (1 - part) * view[(j + whole) % segments] + part * view[(j + whole + 1) % segments] for j in range(segments)
+        ]
+        for r, reference in enumerate(references):
+            alike = np.array([np.minimum(a, b).sum() for a, b in zip(turned, reference, strict=True)])
+            assert found[r, h] == pytest.approx(score(alike), abs=2e-6)
+
+
+def test_colours_are_compared_by_their_distance() -> None:
+    references = (RNG.random((4, 9, 3)) * 255).astype(np.float32)
+    view = (RNG.random((9, 3)) * 255).astype(np.float32)
+    alike = 1 - np.linalg.norm(references - view, axis=2) / (np.sqrt(3) * 255)
+    selective = similarities(references, view, 9, histograms=False, selective=True)[:, 0]
+    plain = similarities(references, view, 9, histograms=False, selective=False)[:, 0]
+    assert np.allclose(selective, [score(a) for a in alike], atol=1e-6)
+    assert np.allclose(plain, alike.mean(axis=1), atol=1e-6)
+
+
+def with_segment_similarities(alike: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Two views whose segments' histogram intersections are the given numbers."""
+    expected = np.array([[[s, 1 - s, 0] for s in alike]], np.float32)
+    observed = np.array([[s, 0, 1 - s] for s in alike], np.float32)
+    return expected, observed
+
+
+@pytest.mark.parametrize(("n", "k"), [(10, 1), (10, 4), (10, 10), (5, 2)])
+def test_k_perfect_segments_of_n_give_the_root_of_k_over_n(n: int, k: int) -> None:
+    # Erratum 20, worked by hand.
+    expected, observed = with_segment_similarities([1.0] * k + [0.0] * (n - k))
+    assert selective_similarity(expected, observed)[0] == pytest.approx(np.sqrt(k / n), abs=1e-6)
+    assert similarities(expected, observed, 1, True, True)[0, 0] == pytest.approx(np.sqrt(k / n), abs=1e-6)
+
+
+def test_equal_segments_give_their_own_similarity() -> None:
+    expected, observed = with_segment_similarities([0.37] * 8)
+    assert selective_similarity(expected, observed)[0] == pytest.approx(0.37, abs=1e-6)
+
+
+def test_all_k_are_tried_because_the_score_dips_on_its_way_up() -> None:
+    # Erratum 21: s = (1, .41, .41, .41, .41) has S(1) = .447, dips at k = 2, and ends at S(5) = .528.
+    expected, observed = with_segment_similarities([1.0, 0.41, 0.41, 0.41, 0.41])
+    assert selective_similarity(expected, observed)[0] == pytest.approx(0.528, abs=1e-6)
+    assert 1.41 * np.sqrt(1 / 10) < 1.0 * np.sqrt(1 / 5)
+
+
+@given(st.lists(st.floats(0, 1, width=32), min_size=1, max_size=40))
+def test_the_score_stays_within_zero_and_one(alike: list[float]) -> None:
+    expected, observed = with_segment_similarities(alike)
+    assert -1e-6 <= selective_similarity(expected, observed)[0] <= 1 + 1e-5
+
+
+@given(st.integers(1, 70), st.integers(0, 2**32 - 1))
+def test_the_network_sorts(length: int, seed: int) -> None:
+    items = list(np.random.default_rng(seed).random(length))
+    wanted = sorted(items)
+    for i, j in sorting_network(length):
+        if items[i] > items[j]:
+            items[i], items[j] = items[j], items[i]
+    assert items == wanted
+
+
+def test_a_penalty_without_exponent_is_the_mean_of_all() -> None:
+    references, view = histograms(3, 10, 20), histograms(1, 10, 20, seed=2)[0]
+    none = similarities(references, view, 10, True, True, exponent=0.0)
+    assert np.allclose(none, similarities(references, view, 10, True, False), atol=1e-6)
+    assert np.allclose(penalties(10, 0.0), 0.1)
+
+
+@pytest.mark.parametrize("turn", [1, 4, 17])
+def test_a_robot_turned_left_is_found_at_the_heading_it_turned_by(turn: int) -> None:
+    # Erratum 24: the reference's own view, with the scene moved to the right, is the view after a left turn.
+    reference = histograms(1, 18, 20)
+    turned = np.roll(reference[0], turn, axis=0)
+    for found in (similarities(reference, turned, 18, True, True), euclidean_similarities(reference, turned, 18, True)):
+        assert int(np.argmax(found[0])) == turn
+        assert found[0, turn] == pytest.approx(1.0, abs=2e-4)
+
+
+def test_a_fraction_of_a_segment_is_the_mixture_of_two() -> None:
+    view = histograms(1, 10, 20)[0]
+    turned = turned_views(view, 36)[1]  # 10 degrees of 36 per segment
+    assert np.allclose(turned, (1 - 10 / 36) * view + 10 / 36 * np.roll(view, -1, axis=0), atol=1e-6)
+    assert np.allclose(turned.sum(axis=1), 1.0, atol=1e-6)
+    assert np.allclose(turned_view(view, -2 * np.pi / 36), turned, atol=1e-5)
+
+
+def test_one_heading_each_agrees_with_all_headings() -> None:
+    references, view = histograms(5, 12, 20), histograms(1, 12, 20, seed=3)[0]
+    everywhere = similarities(references, view, 12, True, True)
+    picked = np.array([0, 3, 5, 11, 7])
+    one = similarity_at(references, view, 2 * np.pi * picked / 12, True)
+    assert np.allclose(one, everywhere[np.arange(5), picked], atol=1e-5)
+
+
+def test_chosen_references_are_compared_as_all_are() -> None:
+    references, view = histograms(9, 10, 20), histograms(1, 10, 20, seed=4)[0]
+    chosen = np.array([1, 4, 8])
+    for compare in (
+        lambda c: similarities(references, view, 36, True, True, chosen=c),
+        lambda c: euclidean_similarities(references, view, 36, True, c),
+    ):
+        assert np.allclose(compare(chosen), compare(None)[chosen], atol=1e-6)
+
+
+def test_distances_of_whole_views_agree_with_numpy() -> None:
+    references, view = histograms(5, 8, 20), histograms(1, 8, 20, seed=6)[0]
+    found = euclidean_similarities(references, view, 8, True)
+    gap = np.linalg.norm((references - view).reshape(5, -1), axis=1)
+    assert np.allclose(found[:, 0], 1 - gap / np.sqrt(16), atol=1e-4)
