@@ -1,6 +1,6 @@
 """HSV colour histogram per segment of the panorama."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
 import cv2
 import numba
@@ -16,7 +16,7 @@ from .segments import segment_edges
 Floats = npt.NDArray[np.float32]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc]
+@numba.njit(cache=True, nogil=True)
 def _count(
     hsv: Pixels,
     edges: npt.NDArray[np.int64],
@@ -81,10 +81,10 @@ def hsv_histograms(
     share to V. `joint` True: `hue_bins` x `value_bins` bins, hue slowest; such pixels are left out. OpenCV's hue is
     0..179 and circular: bins are equal arcs, of which the first starts at red (erratum 22).
     """
-    hsv = cv2.cvtColor(pixels, cv2.COLOR_BGR2HSV)
+    hsv = cast(Pixels, cv2.cvtColor(pixels, cv2.COLOR_BGR2HSV))
     hue_bin = np.arange(256) * hue_bins // 180
     value_bin = np.arange(256) * value_bins // 256
-    return _count(  # type: ignore[no-any-return]
+    return _count(
         hsv,
         segment_edges(pixels.shape[1], segments),
         hue_bin,

@@ -17,7 +17,8 @@ def mean_colours(pixels: Pixels, segments: int) -> npt.NDArray[np.float32]:
     edges = segment_edges(pixels.shape[1], segments)
     columns = pixels.sum(axis=0, dtype=np.uint32)
     sums = np.add.reduceat(columns, edges[:-1], axis=0)
-    return (sums / (np.diff(edges)[:, None] * pixels.shape[0])).astype(np.float32)
+    means: npt.NDArray[np.float32] = (sums / (np.diff(edges)[:, None] * pixels.shape[0])).astype(np.float32)
+    return means
 
 
 class MeanRgb(Stage):

@@ -32,15 +32,16 @@ class ImportanceResampling(Stage):
     the likelihood; below an effective size of `resample_below` times the number, particles are resampled. Against
     kidnapping, `kidnapped` is the probability per picture that the robot was put anywhere: the `proposals`, poses the
     view itself suggests, then share the weight kidnapped x `likelihood.anywhere`, which is what a uniform belief
-    would get; so they win where the belief explains the view badly, and only there. `adapt`: `kld` sets the number between `tracking` and `number` by the cells of `cell_m`, `cell_deg`
-    the belief fills (Fox 2001; `kld_error`, 99 % confidence); `none` keeps `number`.
+    would get; so they win where the belief explains the view badly, and only there.
+    `adapt`: `kld` sets the number between `tracking` and `number` by the cells of `cell_m`, `cell_deg` the belief fills
+    (Fox 2001; `kld_error`, 99 % confidence); `none` keeps `number`.
     """
 
     number: Annotated[int, Bounds(ge=1)] = 5000
     tracking: Annotated[int, Bounds(ge=1)] = 500
     adapt: Literal["kld", "none"] = "none"
     resample_below: Annotated[float, Bounds(ge=0, le=1)] = 0.5
-    kidnapped: Annotated[float, Bounds(ge=0, lt=1)] = 1e-5
+    kidnapped: Annotated[float, Bounds(ge=0, lt=1)] = 1e-7
     kld_error: Annotated[float, Bounds(gt=0)] = 0.05
     cell_m: Annotated[float, Bounds(gt=0)] = 0.25
     cell_deg: Annotated[float, Bounds(gt=0)] = 10.0

@@ -27,7 +27,7 @@ class NearbyGrid(NamedTuple):
     points: npt.NDArray[np.int32]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc]
+@numba.njit(cache=True, nogil=True)
 def _fill(
     xy: Array,
     origin: Array,

@@ -1,11 +1,12 @@
 """Weighted pose samples: moments and modes."""
 
 import itertools
+from typing import Any
 
 import numba
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from .se2 import wrap
 
@@ -70,10 +71,10 @@ def systematic(weights: Array, number: int, offset: float) -> npt.NDArray[np.int
     `offset` in [0, 1) places the comb. Particle i is drawn floor or ceil of number w_i times; unbiased for a uniform
     offset.
     """
-    return _comb(weights, number, offset)  # type: ignore[no-any-return]
+    return _comb(weights, number, offset)
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc]
+@numba.njit(cache=True, nogil=True)
 def _comb(weights: Array, number: int, offset: float) -> npt.NDArray[np.int64]:
     out = np.empty(number, np.int64)
     step = weights.sum() / number
@@ -100,7 +101,7 @@ def occupied_cells(poses: Array, cell: float, angle: float) -> int:
 
 def uniform_around(centres: Array, radius: float, number: int, rng: np.random.Generator) -> Array:
     """Poses (number, 3) uniform over the area within `radius` metres of any centre (R, >= 2), all headings alike."""
-    tree = cKDTree(centres[:, :2])
+    tree: Any = KDTree(centres[:, :2])  # type: ignore[no-untyped-call]
     low, high = centres[:, :2].min(axis=0) - radius, centres[:, :2].max(axis=0) + radius
     cell = radius / 2
     columns, rows = (int(n) for n in np.ceil((high - low) / cell))

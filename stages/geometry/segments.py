@@ -56,7 +56,7 @@ def penalties(segments: int, exponent: float) -> Floats:
     return factors
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc]
+@numba.njit(cache=True, nogil=True)
 def _compare(
     references: Floats, chosen: Ints, query: Floats, histograms: bool, network: Ints, factors: Floats, out: Floats
 ) -> None:
@@ -148,7 +148,7 @@ def selective_similarity(expected: Floats, observed: Floats, exponent: float = 0
     return out
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc]
+@numba.njit(cache=True, nogil=True)
 def _compare_many(expected: Floats, observed: Floats, network: Ints, factors: Floats, out: Floats) -> None:
     segments, bins = observed.shape
     alike = np.empty(segments, np.float32)

@@ -75,7 +75,7 @@ class LearnReferenceGraph(Stage):
                     "mapping: the tour has no ground truth for its first picture; "
                     "use a tour with /ground_truth/pose, or nodes.mapping.supervised=auto"
                 )
-            map.pose_source = source
+            map.take_poses_from(source)
             ctx.fact("map_poses", source)
         pose = truth if map.pose_source == "truth" else odometry
         if pose is None:

@@ -1,10 +1,11 @@
 """Which references of a map are worth comparing, and whether they can be compared at all."""
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from omninav.pipeline.problems import BadInput
 from omninav.stages.values.belief import Particles
@@ -17,8 +18,8 @@ Ints = npt.NDArray[np.int64]
 def near_belief(poses: npt.NDArray[np.float64], near: Particles | None, radius: float, whole: int = 0) -> Ints | None:
     """Indices of the references within `radius` metres of any particle, ascending; None (all) where that is no gain.
 
-    All are compared too where there is no belief, where `radius` is 0 (never limit), where no reference is near, and where there are
-    at most `whole` references.
+    All are compared too where there is no belief, where `radius` is 0 (never limit), where no reference is near, and where
+    there are at most `whole` references.
     """
     if near is None or radius <= 0.0 or len(poses) <= whole:
         return None
@@ -27,7 +28,8 @@ def near_belief(poses: npt.NDArray[np.float64], near: Particles | None, radius: 
         return None
     # A particle lies within radius / 2 * sqrt(1/2) of its cell's centre: the reach grows by that much.
     reach = radius * (1.0 + math.sqrt(0.5) / 2)
-    found = cKDTree((cells + 0.5) * (radius / 2)).query(poses[:, :2], distance_upper_bound=reach)[0]
+    tree: Any = KDTree((cells + 0.5) * (radius / 2))  # type: ignore[no-untyped-call]
+    found = tree.query(poses[:, :2], distance_upper_bound=reach)[0]
     chosen = np.flatnonzero(np.isfinite(found))
     return chosen if 0 < len(chosen) < len(poses) else None
 

@@ -15,8 +15,8 @@ from .candidates import check_alike, near_belief
 class HistogramIntersection(Stage):
     """Similarity as the mean intersection of all segments' histograms: nothing is left out.
 
-    The non-selective rival of Gross & Koenig 2004, section 2, over histograms. `headings`, `radius_m`, `whole_up_to` as in
-    selective.py. Raises BadInput where the map was learned with other features.
+    The non-selective rival of Gross & Koenig 2004, section 2, over histograms. `headings`, `radius_m`,
+    `whole_up_to` as in selective.py. Raises BadInput where the map was learned with other features.
     """
 
     headings: Annotated[int, Bounds(ge=1)] = 36

@@ -15,8 +15,8 @@ from .candidates import check_alike, near_belief
 class L2Match(Stage):
     """Similarity by the L2 norm of the whole difference vector: 1 is equal, 0 the largest possible difference.
 
-    The non-selective method of Gross & Koenig 2004, section 2. `headings`, `radius_m`, `whole_up_to` as in selective.py. Raises
-    BadInput where map and view are of other kinds.
+    The non-selective method of Gross & Koenig 2004, section 2. `headings`, `radius_m`, `whole_up_to` as in
+    selective.py. Raises BadInput where map and view are of other kinds.
     """
 
     headings: Annotated[int, Bounds(ge=1)] = 36

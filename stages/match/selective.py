@@ -21,7 +21,8 @@ class SelectiveMatch(Stage):
     segment j's histograms, or 1 - |difference| / (sqrt(3) 255) of its colours. All k are tried (erratum 21).
     `penalty`: sqrt as in the paper; cube_root: k^-1/3 n^-2/3, which wants more segments; none: the mean of all.
     `headings`: how many turns of each reference are compared. `radius_m`: with `near` wired, only references within
-    this distance of a particle are compared, and all in maps of up to `whole_up_to` references; 0 compares all. Raises BadInput where map and view are of other kinds.
+    this distance of a particle are compared, and all in maps of up to `whole_up_to` references; 0
+    compares all. Raises BadInput where map and view are of other kinds.
     """
 
     penalty: Literal["sqrt", "cube_root", "none"] = "sqrt"

@@ -20,7 +20,7 @@ Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[misc]
+@numba.njit(cache=True, nogil=True)
 def _expected(
     poses: Array,
     references: Array,
@@ -80,9 +80,7 @@ def expected_similarity(
     between the compared headings). `elsewhere` speaks with the weight `trust`: far from all references nothing is known
     and the expectation fades to it. `rows` (R,): each reference's row in `similarity`, -1 where it was not compared.
     """
-    return _expected(  # type: ignore[no-any-return]
-        np.ascontiguousarray(poses), references, rows, similarity, *grid, radius, elsewhere, trust
-    )
+    return _expected(np.ascontiguousarray(poses), references, rows, similarity, *grid, radius, elsewhere, trust)
 
 
 def ordinary_match(similarity: Floats, quantile: float) -> float:

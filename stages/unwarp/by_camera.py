@@ -36,8 +36,8 @@ def table_for(camera: Camera, columns: int, rows: int) -> Table:
             return fisheye_table(camera, columns, rows)
         case _:
             raise BadInput(
-                f"camera: a {type(camera).__name__} camera does not see the full circle, so that it makes no panorama; use a "
-                "recording of an omnidirectional camera (hyperbolic, donut, cylindrical, equirectangular, fisheye)"
+                f"camera: a {type(camera).__name__} camera does not see the full circle, so that it makes no panorama; "
+                "use a recording of an omnidirectional one (hyperbolic, donut, cylindrical, equirectangular, fisheye)"
             )
 
 

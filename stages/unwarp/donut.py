@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import cv2
 import numpy as np
@@ -16,6 +16,7 @@ from omninav.stages.values.image import Image, Panorama, Pixels, column_azimuths
 from .table import LastTable, Table, fixed_point
 
 Array = npt.NDArray[np.float64]
+Grey = npt.NDArray[np.float32]
 Ring = tuple[float, float, float, float]
 """Centre x, centre y, inner radius, outer radius, in pixels."""
 
@@ -24,7 +25,7 @@ class RingNotFound(ValueError):
     """No ring stands out in the picture."""
 
 
-def radial_edges(grey: npt.NDArray[np.float32], centre: tuple[float, float], radii: int, rays: int = 90) -> Array:
+def radial_edges(grey: Grey, centre: tuple[float, float], radii: int, rays: int = 90) -> Array:
     """How much of a circle is an edge, per radius in whole pixels: (radii,) in [0, 1].
 
     A ray counts at a radius where the step of brightness across it is large against the steps along all rays; a
@@ -47,19 +48,19 @@ def find_ring(pixels: Pixels) -> Ring:
     """Centre and radii of the mirror's ring in a picture; raises RingNotFound where no circle stands out.
 
     The outer radius belongs to the circle, around any centre near the picture's middle, that is an edge over most of
-    its length; the inner one to the strongest circle around the same centre within the inner 45 percent, where the camera
-    sees itself.
+    its length; the inner one to the strongest circle around the same centre within the inner 45 percent, where the
+    camera sees itself.
     """
     height, width = pixels.shape[:2]
     scale = max(1.0, max(height, width) / 240.0)
     small = cv2.resize(pixels, None, fx=1.0 / scale, fy=1.0 / scale, interpolation=cv2.INTER_AREA)
-    grey = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32)
+    grey = blurred = cast(Grey, cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32))
     h, w = grey.shape
     least, reach = int(0.28 * min(h, w)), int(0.62 * min(h, w))
     centre, span, step = (w / 2.0, h / 2.0), 0.16 * min(h, w), 0.02 * min(h, w)
     while step > 0.2:
         # Blurred as wide as the step, so that the right circle is seen from the nearest centre that is tried.
-        blurred = cv2.GaussianBlur(grey, (0, 0), max(1.0, 0.7 * step))
+        blurred = cast(Grey, cv2.GaussianBlur(grey, (0, 0), max(1.0, 0.7 * step)))
         middle, score, radius = centre, -1.0, least
         offsets = np.arange(-span, span + step / 2, step)
         for dy in offsets:
@@ -70,10 +71,9 @@ def find_ring(pixels: Pixels) -> Ring:
                 if edges[at] > score:
                     score, radius, centre = float(edges[at]), at, candidate
         span, step = 1.5 * step, step / 3
-    grey = blurred
     if score < 0.2:
         raise RingNotFound("no circle stands out")
-    edges = radial_edges(grey, centre, reach)
+    edges = radial_edges(blurred, centre, reach)
     low, high = max(2, int(0.06 * radius)), int(0.45 * radius)
     inner = low + int(np.argmax(edges[low:high]))
     return (
@@ -124,19 +124,16 @@ def with_ring(camera: Donut, image: Image, found: FoundRing, ctx: Context) -> Do
             return None
         found.centre_x, found.centre_y, found.inner_radius_px, found.outer_radius_px = ring
         ctx.fact("mirror_ring_px", list(ring))
-    values = (found.centre_x, found.centre_y, found.inner_radius_px, found.outer_radius_px)
     names = ("centre_x", "centre_y", "inner_radius_px", "outer_radius_px")
-    return dataclasses.replace(
-        camera,
-        **{name: ring if value is None else value for name, value, ring in zip(names, given, values, strict=True)},
-    )
+    missing: dict[str, Any] = {n: getattr(found, n) for n, value in zip(names, given, strict=True) if value is None}
+    return dataclasses.replace(camera, **missing)
 
 
 class DonutUnwarp(Stage):
     """Panorama from an uncalibrated mirror image, by centre and radii, found in the picture where not given.
 
-    Rows are equal steps of radius, the outer circle on top; elevations are not known. What is found in the first picture
-    that shows a ring is kept for all (State). Raises BadInput where the recording's camera is another one.
+    Rows are equal steps of radius, the outer circle on top; elevations are not known. What is found in the first
+    picture that shows a ring is kept for all (State). Raises BadInput where the recording's camera is another one.
     """
 
     columns: Annotated[int, Bounds(ge=8)] = 360

@@ -1,7 +1,7 @@
 """Remap tables: where in a picture each pixel of a panorama lies, in OpenCV's fixed point."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import cv2
 import numpy as np
@@ -11,6 +11,8 @@ from omninav.stages.values.camera import Camera
 from omninav.stages.values.image import Image, Panorama, Pixels
 
 Array = npt.NDArray[np.float64]
+Whole = npt.NDArray[np.int16]
+Part = npt.NDArray[np.uint16]
 
 
 class Table(NamedTuple):
@@ -20,8 +22,8 @@ class Table(NamedTuple):
     columns beyond the picture's left or right edge continue at the other one (the picture is itself a full circle).
     """
 
-    whole: npt.NDArray[np.int16]
-    part: npt.NDArray[np.uint16]
+    whole: Whole
+    part: Part
     elevation_top: float | None = None
     elevation_bottom: float | None = None
     wraps: bool = False
@@ -29,8 +31,8 @@ class Table(NamedTuple):
     def apply(self, pixels: Pixels) -> Panorama:
         """The panorama of a picture; what lies outside the picture is black."""
         border = cv2.BORDER_WRAP if self.wraps else cv2.BORDER_CONSTANT
-        mapped: Pixels = cv2.remap(pixels, self.whole, self.part, cv2.INTER_LINEAR, borderMode=border)
-        return Panorama(mapped, self.elevation_top, self.elevation_bottom)
+        mapped = cv2.remap(pixels, self.whole, self.part, cv2.INTER_LINEAR, borderMode=border)
+        return Panorama(cast(Pixels, mapped), self.elevation_top, self.elevation_bottom)
 
 
 def fixed_point(
@@ -39,7 +41,7 @@ def fixed_point(
     """A table from the picture's column `u` and row `v` (rows, columns) of each panorama pixel; NaN becomes black."""
     u, v = np.nan_to_num(u, nan=-10.0), np.nan_to_num(v, nan=-10.0)
     whole, part = cv2.convertMaps(u.astype(np.float32), v.astype(np.float32), cv2.CV_16SC2)
-    return Table(whole, part, top, bottom, wraps)
+    return Table(cast(Whole, whole), cast(Part, part), top, bottom, wraps)
 
 
 class LastTable:

@@ -1,4 +1,5 @@
 import colorsys
+import itertools
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ def picture(seed: int = 0) -> np.ndarray:
 def test_mean_colours_are_the_means_of_their_columns(segments: int) -> None:
     pixels = picture()
     edges = np.round(np.arange(segments + 1) * 36 / segments).astype(int)
-    expected = [pixels[:, a:b].reshape(-1, 3).mean(axis=0) for a, b in zip(edges, edges[1:], strict=False)]
+    expected = [pixels[:, a:b].reshape(-1, 3).mean(axis=0) for a, b in itertools.pairwise(edges)]
     assert np.allclose(mean_colours(pixels, segments), expected, atol=1e-3)
 
 

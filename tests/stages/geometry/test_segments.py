@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from omninav.stages.geometry.segments import (
@@ -81,6 +81,7 @@ def test_all_k_are_tried_because_the_score_dips_on_its_way_up() -> None:
     assert 1.41 * np.sqrt(1 / 10) < 1.0 * np.sqrt(1 / 5)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(st.lists(st.floats(0, 1, width=32), min_size=1, max_size=40))
 def test_the_score_stays_within_zero_and_one(alike: list[float]) -> None:
     expected, observed = with_segment_similarities(alike)

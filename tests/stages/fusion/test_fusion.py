@@ -1,0 +1,127 @@
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.pipeline.problems import BadInput
+from omninav.stages.fusion.importance_resampling import ImportanceResampling, kld_number
+from omninav.stages.fusion.start import Start
+from omninav.stages.values.belief import Likelihood, Particles
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
+
+
+def belief(number: int = 1000, spread: float = 1.0) -> Particles:
+    return Particles(np.random.default_rng(0).normal(0, spread, (number, 3)), np.full(number, 1 / number))
+
+
+def fuse(
+    stage: ImportanceResampling, particles: Particles, values: np.ndarray, seed: int = 0, **more: object
+) -> Particles:
+    ctx = Context("fusion", np.random.default_rng(seed))
+    likelihood = Likelihood(values, more.get("anywhere"))  # type: ignore[arg-type]
+    return stage.step(ctx, particles, likelihood, more.get("proposals")).belief  # type: ignore[arg-type]
+
+
+def test_weights_are_multiplied_where_many_particles_still_carry_them() -> None:
+    particles, values = belief(), np.linspace(1.0, 2.0, 1000)
+    out = fuse(ImportanceResampling(number=1000), particles, values)
+    assert np.array_equal(out.poses, particles.poses)
+    assert np.allclose(out.weights, values / values.sum())
+
+
+def test_few_particles_with_weight_are_resampled_to_the_same_mean() -> None:
+    # A Gaussian times a Gaussian likelihood: the posterior mean is worked by hand, (0 + 0.5 / 0.1^2) / (1 + 1 / 0.1^2).
+    particles = belief(50_000)
+    values = np.exp(-0.5 * ((particles.poses[:, 0] - 0.5) / 0.1) ** 2)
+    out = fuse(ImportanceResampling(number=5000), particles, values)
+    assert len(out.poses) == 5000
+    assert np.allclose(out.weights, 1 / 5000)
+    assert out.poses[:, 0].mean() == pytest.approx(50 / 101, abs=0.01)
+    assert out.poses[:, 0].std() == pytest.approx((1 / 101) ** 0.5, rel=0.1)
+
+
+@pytest.mark.parametrize("values", [np.zeros(1000), np.full(1000, np.nan), np.full(1000, np.inf)])
+def test_a_view_that_nothing_explains_changes_nothing(values: np.ndarray) -> None:
+    ctx, particles = Context("fusion", np.random.default_rng(0)), belief()
+    out = ImportanceResampling(number=1000).step(ctx, particles, Likelihood(values), None).belief
+    assert np.allclose(out.weights, particles.weights)
+    assert ctx.counts["belief_without_support"] == 1
+
+
+def share_of_proposals(anywhere: float, believed: float) -> float:
+    proposals = Particles(np.full((100, 3), 77.0), np.full(100, 0.01))
+    # A tenth of the particles explain the view, so that resampling is due.
+    values = np.where(np.arange(10_000) % 10 == 0, believed, 0.0)
+    stage = ImportanceResampling(number=10_000, kidnapped=0.01)
+    out = fuse(stage, belief(10_000), values, anywhere=anywhere, proposals=proposals)
+    return float((out.poses[:, 0] == 77.0).mean())
+
+
+def test_a_kidnapped_robot_is_where_the_evidence_says() -> None:
+    # Bayes by hand: 0.01 x anywhere against 0.99 x the mean likelihood of the belief (a tenth of `believed`).
+    for anywhere, believed in ((1.0, 1.0), (1.0, 0.01), (0.001, 1.0)):
+        expected = 0.01 * anywhere / (0.01 * anywhere + 0.99 * 0.1 * believed)
+        assert share_of_proposals(anywhere, believed) == pytest.approx(expected, abs=0.011)
+
+
+def test_the_number_follows_the_cells_the_belief_fills() -> None:
+    stage = ImportanceResampling(number=5000, tracking=500, adapt="kld")
+    narrow = fuse(stage, belief(5000, spread=0.01), np.ones(5000))
+    wide = fuse(stage, belief(5000, spread=5.0), np.ones(5000))
+    assert len(narrow.poses) == 500
+    assert len(wide.poses) == 5000
+
+
+def test_the_kld_bound_is_fox_s() -> None:
+    # Chi-square quantile by scipy, not the Wilson-Hilferty approximation: n = chi2_{k-1, 0.99} / (2 e).
+    from scipy.stats import chi2
+
+    for cells in (5, 50, 500):
+        assert kld_number(cells, 0.05, 0.99) == pytest.approx(chi2.ppf(0.99, cells - 1) / 0.1, rel=0.01)
+    assert kld_number(1, 0.05, 0.99) == 1
+
+
+def test_the_same_seed_gives_the_same_bytes() -> None:
+    values = np.random.default_rng(1).random(1000) ** 20
+    one, other = (fuse(ImportanceResampling(number=1000), belief(), values, seed=4) for _ in range(2))
+    assert one.poses.tobytes() == other.poses.tobytes()
+
+
+def a_map() -> ReferenceGraph:
+    poses = np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0]])
+    return ReferenceGraph(poses, np.zeros((2, 1, 1), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth")
+
+
+def start(
+    stage: Start, map: ReferenceGraph | None = None, truth: Pose | None = None, first: bool = True
+) -> Particles | None:
+    ctx = Context("start", np.random.default_rng(0))
+    ctx.tick = Tick(index=0, stamp=0, first_of_log=first)
+    return stage.step(ctx, map, truth).belief
+
+
+def test_a_belief_is_given_at_the_first_picture_only() -> None:
+    assert start(Start(), a_map(), first=False) is None
+    assert start(Start(), a_map()) is not None
+
+
+def test_the_uniform_start_covers_the_map() -> None:
+    particles = start(Start(number=4000, around_m=1.0), a_map())
+    assert particles is not None
+    assert (particles.poses[:, 0] < 4).mean() == pytest.approx(0.5, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("at", "mean"),
+    [("truth", (3.0, 4.0, 1.0)), ("origin", (0.0, 0.0, 0.0)), ((1.0, 2.0, -1.0, 0.2, 0.1), (1.0, 2.0, -1.0))],
+)
+def test_other_starts_lie_around_their_pose(at: str, mean: tuple[float, float, float]) -> None:
+    particles = start(Start(at=at, number=4000), None, Pose(3.0, 4.0, 1.0))  # type: ignore[arg-type]
+    assert particles is not None
+    assert np.allclose(particles.poses.mean(axis=0), mean, atol=0.02)
+
+
+@pytest.mark.parametrize("at", ["uniform", "truth"])
+def test_a_start_that_lacks_what_it_needs_says_what_to_type(at: str) -> None:
+    with pytest.raises(BadInput, match="start="):
+        start(Start(at=at))  # type: ignore[arg-type]

@@ -1,0 +1,102 @@
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.pipeline.problems import BadInput
+from omninav.stages.mapping.empty_reference_graph import EmptyReferenceGraph
+from omninav.stages.mapping.reference_graph import Along, LearnReferenceGraph
+from omninav.stages.values.features import SegmentColours, SegmentHistograms
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
+
+
+def view(bin_: int, segments: int = 8) -> SegmentHistograms:
+    values = np.zeros((segments, 20), np.float32)
+    values[:, bin_] = 1.0
+    return SegmentHistograms(values)
+
+
+def drive(stage: LearnReferenceGraph, places: list[tuple[float, float, int]], **poses: bool) -> ReferenceGraph:
+    ctx, along = Context("mapping"), Along()
+    map = EmptyReferenceGraph().step(ctx).map
+    for i, (x, y, looks) in enumerate(places):
+        ctx.tick = Tick(index=i, stamp=i, first_of_log=i == 0)
+        odometry, truth = Pose(x + 100, y, 0.0), Pose(x, y, 0.0) if poses.get("truth", True) else None
+        map = stage.step(ctx, view(looks), odometry, truth, map, along).map
+    return map
+
+
+def test_a_reference_is_inserted_where_the_last_is_farther_than_the_threshold() -> None:
+    map = drive(LearnReferenceGraph(distance_m=0.25), [(0.1 * i, 0.0, 3) for i in range(10)])
+    assert map.poses[:, 0] == pytest.approx([0.0, 0.3, 0.6, 0.9])
+
+
+def test_a_reference_is_inserted_where_the_view_is_unlike_those_around() -> None:
+    places = [(0.0, 0.0, 3), (0.05, 0.0, 3), (0.06, 0.0, 7), (0.07, 0.0, 7), (0.08, 0.0, 3)]
+    assert len(drive(LearnReferenceGraph(distance_m=1.0, similarity=0.5), places)) == 2
+    assert len(drive(LearnReferenceGraph(distance_m=1.0, similarity=0.0), places)) == 1
+
+
+def test_edges_follow_the_drive_and_close_loops_once() -> None:
+    square = [(0.0, 0.0, 1), (1.0, 0.0, 1), (1.0, 1.0, 1), (0.0, 0.0, 1), (1.0, 0.0, 1)]
+    map = drive(LearnReferenceGraph(distance_m=0.3, similarity=0.0), square)
+    assert map.edges.tolist() == [[0, 1], [1, 2], [0, 2]]
+
+
+def test_two_tours_are_not_joined_at_the_log_s_boundary() -> None:
+    ctx, along, stage = Context("mapping"), Along(), LearnReferenceGraph()
+    map = EmptyReferenceGraph().step(ctx).map
+    for i, x in enumerate((0.0, 5.0)):
+        ctx.tick = Tick(index=i, stamp=i, log=i, first_of_log=True)
+        stage.step(ctx, view(1), None, Pose(x, 0.0, 0.0), map, along)
+    assert len(map) == 2
+    assert len(map.edges) == 0
+
+
+@pytest.mark.parametrize(
+    ("supervised", "truth", "source", "x"),
+    [("auto", True, "truth", 0.0), ("auto", False, "odometry", 100.0), ("odometry", True, "odometry", 100.0)],
+)
+def test_poses_come_from_where_the_map_says(supervised: str, truth: bool, source: str, x: float) -> None:
+    map = drive(LearnReferenceGraph(supervised=supervised), [(0.0, 0.0, 1)], truth=truth)  # type: ignore[arg-type]
+    assert map.pose_source == source
+    assert map.poses[0, 0] == x
+
+
+def test_supervision_without_truth_is_refused() -> None:
+    with pytest.raises(BadInput, match="no ground truth"):
+        drive(LearnReferenceGraph(supervised="truth"), [(0.0, 0.0, 1)], truth=False)
+
+
+def test_a_growing_map_keeps_what_it_had() -> None:
+    map, rng = ReferenceGraph.empty(), np.random.default_rng(0)
+    features = rng.random((300, 6, 3)).astype(np.float32)
+    for i in range(300):
+        assert map.insert(Pose(i, -i, 0.0), features[i], "colours") == i
+        if i:
+            assert map.join(i - 1, i)
+    assert not map.join(5, 4)
+    assert np.array_equal(map.features, features)
+    assert np.array_equal(map.poses[:, 0], np.arange(300))
+    assert len(map.edges) == 299
+
+
+def test_a_map_that_was_loaded_grows_on() -> None:
+    one = np.ones((1, 6, 3), np.float32)
+    map = ReferenceGraph(np.zeros((1, 3)), one, "colours", np.zeros((0, 2), np.int64), "truth")
+    map.insert(Pose(1.0, 0.0, 0.0), one[0], "colours")
+    assert len(map) == 2
+    assert map.features.shape == (2, 6, 3)
+
+
+def test_views_of_another_kind_do_not_enter_a_map() -> None:
+    map = ReferenceGraph.empty()
+    map.insert(Pose(0, 0, 0), view(1).values, "histograms")
+    with pytest.raises(ValueError, match="colours view"):
+        map.insert(Pose(1, 0, 0), SegmentColours(np.zeros((8, 3), np.float32)).values, "colours")
+
+
+def test_a_reference_with_the_default_features_takes_less_than_4_kb() -> None:
+    map = ReferenceGraph.empty()
+    map.insert(Pose(0, 0, 0), view(1, segments=36).values, "histograms")
+    assert map.poses.nbytes + map.features.nbytes + 2 * 16 < 4000

@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.pipeline.problems import BadInput
+from omninav.stages.fusion.best_match import BestMatch
+from omninav.stages.match.candidates import near_belief
+from omninav.stages.match.histogram_intersection import HistogramIntersection
+from omninav.stages.match.l2 import L2Match
+from omninav.stages.match.selective import SelectiveMatch
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.features import SegmentColours, SegmentHistograms
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.similarity import Similarities
+
+SEGMENTS = 12
+
+
+def a_map(number: int = 30, spacing: float = 0.5, seed: int = 0) -> ReferenceGraph:
+    rng = np.random.default_rng(seed)
+    features = rng.random((number, SEGMENTS, 20)).astype(np.float32) ** 3
+    features /= features.sum(axis=2, keepdims=True)
+    poses = np.column_stack([spacing * np.arange(number), np.zeros(number), rng.uniform(-3, 3, number)])
+    return ReferenceGraph(poses, features, "histograms", np.zeros((0, 2), np.int64), "truth")
+
+
+def particles_at(x: float, y: float = 0.0, number: int = 50) -> Particles:
+    poses = np.random.default_rng(1).normal((x, y, 0.0), (0.05, 0.05, 0.1), (number, 3))
+    return Particles(poses, np.full(number, 1 / number))
+
+
+MATCHES = [SelectiveMatch(headings=SEGMENTS), HistogramIntersection(headings=SEGMENTS), L2Match(headings=SEGMENTS)]
+
+
+@pytest.mark.parametrize("match", MATCHES)
+def test_the_place_and_the_turn_are_found(match: SelectiveMatch) -> None:
+    map, turn = a_map(), 5
+    seen = SegmentHistograms(np.roll(map.features[7], turn, axis=0))
+    similarities = match.step(Context("match"), seen, map).similarities
+    assert np.unravel_index(int(np.argmax(similarities.values)), similarities.values.shape) == (7, turn)
+    pose = BestMatch().step(Context("fusion"), similarities, map).belief.pose  # type: ignore[union-attr]
+    expected = map.poses[7, 2] + 2 * np.pi * turn / SEGMENTS
+    assert pose.x == map.poses[7, 0]
+    assert np.exp(1j * pose.heading) == pytest.approx(np.exp(1j * expected))
+
+
+@pytest.mark.parametrize("match", MATCHES)
+def test_the_same_view_gives_the_same_bytes(match: SelectiveMatch) -> None:
+    map = a_map()
+    seen = SegmentHistograms(map.features[3])
+    one, other = (match.step(Context("match"), seen, map).similarities.values for _ in range(2))
+    assert one.tobytes() == other.tobytes()
+    assert one.dtype == np.float32
+
+
+@pytest.mark.parametrize("radius", [0.4, 1.0, 3.0])
+def test_near_a_belief_every_reference_within_the_radius_is_compared_and_few_others(radius: float) -> None:
+    map, belief = a_map(200, 0.1), particles_at(8.0)
+    chosen = near_belief(map.poses, belief, radius)
+    assert chosen is not None
+    gap = np.hypot(*(map.poses[:, None, :2] - belief.poses[:, :2]).transpose(2, 0, 1)).min(axis=1)
+    assert set(np.flatnonzero(gap <= radius)) <= set(chosen)
+    assert gap[chosen].max() <= 1.8 * radius
+    assert (np.diff(chosen) > 0).all()
+
+
+def test_what_is_compared_near_the_belief_is_what_it_is_everywhere() -> None:
+    map = a_map(200, 0.1)
+    seen, ctx = SegmentHistograms(map.features[80]), Context("match")
+    stage = SelectiveMatch(headings=SEGMENTS, radius_m=1.0, whole_up_to=0)
+    near, all_ = stage.step(ctx, seen, map, particles_at(8.0)).similarities, stage.step(ctx, seen, map).similarities
+    assert near.candidates is not None
+    assert len(near.candidates) < 50
+    assert np.array_equal(near.values, all_.values[near.candidates])
+    far = stage.step(ctx, seen, map, particles_at(500.0)).similarities  # no reference near: look everywhere
+    assert far.candidates is None
+
+
+def test_small_maps_are_always_compared_whole() -> None:
+    stage = SelectiveMatch(headings=SEGMENTS, whole_up_to=200)
+    map = a_map(200, 0.1)
+    out = stage.step(Context("match"), SegmentHistograms(map.features[0]), map, particles_at(8.0))
+    assert out.similarities.candidates is None
+
+
+def test_a_map_of_other_features_is_refused_in_one_line() -> None:
+    seen = SegmentColours(np.zeros((SEGMENTS, 3), np.float32))
+    with pytest.raises(BadInput, match="its views are histograms of 12 segments x 20 bins") as refused:
+        SelectiveMatch().step(Context("match"), seen, a_map())
+    assert "\n" not in str(refused.value)
+
+
+def test_the_best_match_counts_in_the_map_s_own_indices() -> None:
+    map = a_map()
+    similarities = Similarities(np.array([[0.1, 0.2], [0.9, 0.3]], np.float32), np.array([4, 11]))
+    pose = BestMatch().step(Context("fusion"), similarities, map).belief.pose  # type: ignore[union-attr]
+    assert pose.x == map.poses[11, 0]
+    assert BestMatch().step(Context("f"), Similarities(np.zeros((0, 36), np.float32)), map).belief is None
