@@ -18,8 +18,8 @@ Ints = npt.NDArray[np.int64]
 def near_belief(poses: npt.NDArray[np.float64], near: Particles | None, radius: float, whole: int = 0) -> Ints | None:
     """Indices of the references within `radius` metres of any particle, ascending; None (all) where that is no gain.
 
-    All are compared too where there is no belief, where `radius` is 0 (never limit), where no reference is near, and where
-    there are at most `whole` references.
+    All are compared too where there is no belief, where `radius` is 0 (never limit), where no reference is near,
+    and where there are at most `whole` references.
     """
     if near is None or radius <= 0.0 or len(poses) <= whole:
         return None

@@ -43,9 +43,9 @@ class RotationTranslationRotation(Stage):
     """Samples the motion model: turn, go, turn, with noise in proportion to each.
 
     Each turn has sigma^2 = (rotation_per_rotation |turn|)^2 + (rotation_per_metre way)^2 / 2 + rotation_floor^2 / 2
-    (rad), the way sigma^2 = (translation_per_metre way)^2 + (translation_per_rotation |both turns|)^2 +
-    translation_floor^2 (m). Units: rad per rad, rad per metre, metre per metre, metre per rad; the floors hold per picture, also for a robot
-    that stands. Without motion (the first picture of a log) the belief stays as it is.
+    (rad), the way sigma^2 = (translation_per_metre way)^2 + (translation_per_rotation |both turns|)^2
+    + translation_floor^2 (m). Units: rad per rad, rad per metre, metre per metre, metre per rad; the floors hold per
+    picture, also for a robot that stands. Without motion (the first picture of a log) the belief stays as it is.
     """
 
     rotation_per_rotation: Annotated[float, Bounds(ge=0)] = 0.05
