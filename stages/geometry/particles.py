@@ -12,15 +12,38 @@ from .se2 import wrap
 
 Array = npt.NDArray[np.float64]
 
+AROUND = np.array(list(itertools.product((-1, 0, 1), repeat=3)), np.int64).T
+"""Steps to a cell itself and its 26 neighbours: (3, 27)."""
+
 
 def weighted_moments(poses: Array, weights: Array) -> tuple[Array, Array]:
     """Mean pose (3,) and covariance (3, 3) of weighted poses (N, 3); the heading's mean is circular."""
-    share = weights / weights.sum()
-    heading = np.arctan2(share @ np.sin(poses[:, 2]), share @ np.cos(poses[:, 2]))
-    mean = np.array([share @ poses[:, 0], share @ poses[:, 1], heading])
-    spread = poses - mean
-    spread[:, 2] = wrap(spread[:, 2])
-    return mean, (spread * share[:, None]).T @ spread
+    return _moments(np.ascontiguousarray(poses, np.float64), np.ascontiguousarray(weights, np.float64))
+
+
+@numba.njit(cache=True, nogil=True)
+def _moments(poses: Array, weights: Array) -> tuple[Array, Array]:
+    mean, covariance = np.zeros(3), np.zeros((3, 3))
+    total = sine = cosine = 0.0
+    for n in range(len(poses)):
+        total += weights[n]
+        mean[0] += weights[n] * poses[n, 0]
+        mean[1] += weights[n] * poses[n, 1]
+        sine += weights[n] * np.sin(poses[n, 2])
+        cosine += weights[n] * np.cos(poses[n, 2])
+    mean[:2] /= total
+    mean[2] = np.arctan2(sine, cosine)
+    for n in range(len(poses)):
+        x, y, turn = poses[n, 0] - mean[0], poses[n, 1] - mean[1], poses[n, 2] - mean[2]
+        turn -= 2 * np.pi * np.floor((turn + np.pi) / (2 * np.pi))
+        covariance[0, 0] += weights[n] * x * x
+        covariance[0, 1] += weights[n] * x * y
+        covariance[0, 2] += weights[n] * x * turn
+        covariance[1, 1] += weights[n] * y * y
+        covariance[1, 2] += weights[n] * y * turn
+        covariance[2, 2] += weights[n] * turn * turn
+    covariance[1, 0], covariance[2, 0], covariance[2, 1] = covariance[0, 1], covariance[0, 2], covariance[1, 2]
+    return mean, covariance / total
 
 
 def heaviest_mode(poses: Array, weights: Array, radius: float = 1.0) -> tuple[Array, Array, float]:
@@ -29,35 +52,64 @@ def heaviest_mode(poses: Array, weights: Array, radius: float = 1.0) -> tuple[Ar
     The plane is cut into cells of `radius` / 2 (m) and 12 headings; the heaviest cell, summed with its neighbours,
     starts a mean shift with a flat kernel of `radius` metres and 30 degrees that stops when its members stay the same.
     """
+    poses, weights = np.ascontiguousarray(poses, np.float64), np.ascontiguousarray(weights, np.float64)
     cell = radius / 2
-    columns, rows = (np.floor(poses[:, axis] / cell).astype(np.int64) for axis in (0, 1))
-    turns = np.mod(np.floor(np.mod(poses[:, 2], 2 * np.pi) / (np.pi / 6)).astype(np.int64), 12)
-    left, low = columns.min() - 1, rows.min() - 1
-    width = rows.max() - low + 2
-    cells, inverse = np.unique(((columns - left) * width + rows - low) * 12 + turns, return_inverse=True)
+    left, low = (int(n) - 1 for n in np.floor(poses[:, :2].min(axis=0) / cell))
+    width = int(np.floor(poses[:, 1].max() / cell)) - low + 2
+    cells, inverse = np.unique(_cell_numbers(poses, cell, left, low, width), return_inverse=True)
     mass = np.bincount(inverse.ravel(), weights=weights, minlength=len(cells))
     heaviest = cells[np.argsort(-mass, kind="stable")[:64]]  # a mode lighter than 64 others is not the heaviest
     column, row, turn = heaviest // 12 // width, heaviest // 12 % width, heaviest % 12
-    around = np.zeros(len(heaviest))
-    for a, b, c in itertools.product((-1, 0, 1), repeat=3):
-        neighbour = ((column + a) * width + row + b) * 12 + (turn + c) % 12
-        found = np.minimum(np.searchsorted(cells, neighbour), len(cells) - 1)
-        around += np.where(cells[found] == neighbour, mass[found], 0.0)
+    a, b, c = AROUND
+    neighbour = ((column[:, None] + a) * width + row[:, None] + b) * 12 + (turn[:, None] + c) % 12
+    found = np.minimum(np.searchsorted(cells, neighbour), len(cells) - 1)
+    around = np.where(cells[found] == neighbour, mass[found], 0.0).sum(axis=1)
     best = int(np.argmax(around))
     start = (column[best] + left, row[best] + low, turn[best])
     centre = np.array([(start[0] + 0.5) * cell, (start[1] + 0.5) * cell, wrap((start[2] + 0.5) * np.pi / 6)])
-    members = np.zeros(len(poses), dtype=bool)
-    for _ in range(20):
-        near = np.hypot(poses[:, 0] - centre[0], poses[:, 1] - centre[1]) < radius
-        near &= np.abs(wrap(poses[:, 2] - centre[2])) < np.pi / 6
-        if not near.any() or np.array_equal(near, members) or weights[near].sum() <= 0:
-            break
-        members = near
-        centre, _ = weighted_moments(poses[members], weights[members])
-    if not members.any() or weights[members].sum() <= 0:
-        members = np.ones(len(poses), dtype=bool)
+    members = _climb(poses, weights, centre, radius)
     mean, covariance = weighted_moments(poses[members], weights[members])
     return mean, covariance, float(weights[members].sum() / weights.sum())
+
+
+@numba.njit(cache=True, nogil=True)
+def _cell_numbers(poses: Array, cell: float, left: int, low: int, width: int) -> npt.NDArray[np.int64]:
+    numbers = np.empty(len(poses), np.int64)
+    for n in range(len(poses)):
+        column, row = int(np.floor(poses[n, 0] / cell)) - left, int(np.floor(poses[n, 1] / cell)) - low
+        numbers[n] = (column * width + row) * 12 + int(np.floor(poses[n, 2] / (np.pi / 6))) % 12
+    return numbers
+
+
+@numba.njit(cache=True, nogil=True)
+def _climb(poses: Array, weights: Array, centre: Array, radius: float) -> npt.NDArray[np.bool_]:
+    # Mean shift with a flat kernel; the particles it ends with, or all of them where it finds none.
+    members = np.zeros(len(poses), np.bool_)
+    sines, cosines = np.sin(poses[:, 2]), np.cos(poses[:, 2])
+    least = np.cos(np.pi / 6)
+    x, y, sine, cosine = centre[0], centre[1], np.sin(centre[2]), np.cos(centre[2])
+    for _ in range(20):
+        changed = False
+        total = sum_x = sum_y = sum_sine = sum_cosine = 0.0
+        for n in range(len(poses)):
+            dx, dy = poses[n, 0] - x, poses[n, 1] - y
+            near = dx * dx + dy * dy < radius * radius and cosines[n] * cosine + sines[n] * sine > least
+            changed = changed or near != members[n]
+            members[n] = near
+            if near:
+                total += weights[n]
+                sum_x += weights[n] * poses[n, 0]
+                sum_y += weights[n] * poses[n, 1]
+                sum_sine += weights[n] * sines[n]
+                sum_cosine += weights[n] * cosines[n]
+        if total <= 0.0:
+            members[:] = True
+            break
+        if not changed:
+            break
+        x, y, length = sum_x / total, sum_y / total, np.hypot(sum_sine, sum_cosine)
+        sine, cosine = sum_sine / length, sum_cosine / length
+    return members
 
 
 def effective_size(weights: Array) -> float:

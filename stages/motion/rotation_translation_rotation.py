@@ -3,6 +3,7 @@
 import math
 from typing import Annotated
 
+import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -28,14 +29,17 @@ def turn_go_turn(x: float, y: float, turn: float) -> tuple[float, float, float]:
     return first, way, float(wrap(turn - first))
 
 
+@numba.njit(cache=True, nogil=True)
 def moved(poses: Array, motion: tuple[float, float, float], sigmas: tuple[float, float, float], noise: Array) -> Array:
     """Poses (N, 3) after turn, way, turn, with `noise` (3, N) of unit variance scaled by `sigmas`."""
-    first = poses[:, 2] + motion[0] + sigmas[0] * noise[0]
-    way = motion[1] + sigmas[1] * noise[1]
     out = np.empty_like(poses)
-    out[:, 0] = poses[:, 0] + way * np.cos(first)
-    out[:, 1] = poses[:, 1] + way * np.sin(first)
-    out[:, 2] = wrap(first + motion[2] + sigmas[2] * noise[2])
+    for n in range(len(poses)):
+        first = poses[n, 2] + motion[0] + sigmas[0] * noise[0, n]
+        way = motion[1] + sigmas[1] * noise[1, n]
+        last = first + motion[2] + sigmas[2] * noise[2, n]
+        out[n, 0] = poses[n, 0] + way * np.cos(first)
+        out[n, 1] = poses[n, 1] + way * np.sin(first)
+        out[n, 2] = last - 2 * np.pi * np.floor((last + np.pi) / (2 * np.pi))
     return out
 
 
