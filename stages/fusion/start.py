@@ -11,12 +11,14 @@ from omninav.stages.geometry.se2 import wrap
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
+from omninav.stages.values.reach import Reach
 
 
 class Start(Stage):
     """A belief at the first picture of each log, and none later.
 
-    `at`: `uniform` over the area within `around_m` of the map's references, all headings; `truth`, the log's first true
+    `at`: `uniform` over the area within `around` reaches (port `reach`, else of `reach_m`) of the map's references, all
+    headings; `truth`, the log's first true
     pose; `origin`; or x, y, heading, sigma of position, sigma of heading (m, m, rad, m, rad). `truth` and `origin` are
     spread by 0.1 m and 0.1 rad.
     Raises BadInput where `truth` or a map is asked for and there is none.
@@ -24,14 +26,15 @@ class Start(Stage):
 
     at: Literal["uniform", "truth", "origin"] | tuple[float, float, float, float, float] = "uniform"
     number: Annotated[int, Bounds(ge=1)] = 5000
-    around_m: Annotated[float, Bounds(gt=0)] = 0.5
+    around: Annotated[float, Bounds(gt=0)] = 2.0
+    reach_m: Annotated[float, Bounds(gt=0)] = 0.5
 
     class Out(Outputs):
         """The belief to begin with; absent at all later pictures."""
 
         belief: Particles | None = None
 
-    def step(self, ctx: Context, map: ReferenceGraph | None, truth: Pose | None) -> Out:
+    def step(self, ctx: Context, map: ReferenceGraph | None, truth: Pose | None, reach: Reach | None = None) -> Out:
         """Give the first belief."""
         if not ctx.tick.first_of_log:
             return self.Out()
@@ -40,7 +43,8 @@ class Start(Stage):
                 raise BadInput(
                     "start: `uniform` needs a map with references; use start=origin, start=truth, or give a map"
                 )
-            poses = uniform_around(map.poses, self.around_m, self.number, ctx.rng)
+            unit = self.reach_m if reach is None else reach.metres
+            poses = uniform_around(map.poses, self.around * unit, self.number, ctx.rng)
         else:
             if self.at == "truth":
                 if truth is None:

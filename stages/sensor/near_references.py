@@ -8,16 +8,21 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.nearby import NearbyGrid, nearby_grid
+from omninav.stages.geometry.nearby import NearestCells, nearest_cells
 from omninav.stages.geometry.se2 import wrap
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
+from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
+
+CELLS_PER_REACH = 4
+FADED = 3.0
+"""Beyond so many fading distances a reference says less than 1.2 % of what it says at its own place."""
 
 
 @numba.njit(cache=True, nogil=True)
@@ -30,89 +35,102 @@ def _expected(
     cell: float,
     columns: int,
     lines: int,
-    starts: Ints,
-    points: npt.NDArray[np.int32],
-    radius: float,
-    elsewhere: float,
-    trust: float,
+    nearest: npt.NDArray[np.int32],
+    fade: float,
+    ordinary: float,
 ) -> Array:
     headings = similarity.shape[1]
     per_radian = headings / (2 * np.pi)
     out = np.empty(len(poses))
     for n in range(len(poses)):
         x, y, heading = poses[n, 0], poses[n, 1], poses[n, 2]
+        out[n] = ordinary
         i, j = int(np.floor((x - origin[0]) / cell)), int(np.floor((y - origin[1]) / cell))
-        total = trust * elsewhere
-        mass = trust
-        if 0 <= i < columns and 0 <= j < lines:
-            for at in range(starts[i * lines + j], starts[i * lines + j + 1]):
-                r = points[at]
-                row = rows[r]
-                dx, dy = x - references[r, 0], y - references[r, 1]
-                far = (dx * dx + dy * dy) / (radius * radius)
-                if row < 0 or far >= 1.0:
-                    continue
-                weight = (1.0 - far) * (1.0 - far)
-                turn = (heading - references[r, 2]) * per_radian
-                whole = np.floor(turn)
-                part = turn - whole
-                h = int(whole) % headings
-                value = similarity[row, h] * (1.0 - part) + similarity[row, (h + 1) % headings] * part
-                total += weight * value
-                mass += weight
-        out[n] = total / mass
+        if not (0 <= i < columns and 0 <= j < lines):
+            continue
+        closest = np.inf
+        for r in nearest[i * lines + j]:
+            if r >= 0 and rows[r] >= 0:
+                closest = min(closest, (x - references[r, 0]) ** 2 + (y - references[r, 1]) ** 2)
+        if closest == np.inf:
+            continue
+        total, mass = 0.0, 0.0
+        for r in nearest[i * lines + j]:
+            if r < 0 or rows[r] < 0:
+                continue
+            far = (x - references[r, 0]) ** 2 + (y - references[r, 1]) ** 2
+            weight = 1.0 / (far + 0.25 * closest + 1e-4 * fade * fade)
+            turn = (heading - references[r, 2]) * per_radian
+            whole = np.floor(turn)
+            part = turn - whole
+            h = int(whole) % headings
+            value = similarity[rows[r], h] * (1.0 - part) + similarity[rows[r], (h + 1) % headings] * part
+            total += weight * value
+            mass += weight
+        known = math.exp(-0.5 * closest / (fade * fade))
+        out[n] = max(ordinary, known * total / mass + (1.0 - known) * ordinary)
     return out
 
 
 def expected_similarity(
-    poses: Array,
-    references: Array,
-    grid: NearbyGrid,
-    rows: Ints,
-    similarity: Floats,
-    radius: float,
-    elsewhere: float,
-    trust: float,
+    poses: Array, references: Array, cells: NearestCells, rows: Ints, similarity: Floats, fade: float, ordinary: float
 ) -> Array:
     """Similarity of the present view to what is expected at poses: (N, 3) -> (N,).
 
-    The references within `radius` metres speak with weight (1 - d^2 / radius^2)^2, each at the pose's heading (linear
-    between the compared headings). `elsewhere` speaks with the weight `trust`: far from all references nothing is known
-    and the expectation fades to it. `rows` (R,): each reference's row in `similarity`, -1 where it was not compared.
+    The references nearest to a pose speak with weight 1 / (d^2 + (d_min / 2)^2), each at the pose's heading (linear
+    between the compared headings). With the distance d_min of the nearest one the expectation fades to `ordinary`, by
+    exp(-d_min^2 / (2 fade^2)), and it is never below it. `rows` (R,): each reference's row in `similarity`, -1
+    where it was not compared.
     """
-    return _expected(np.ascontiguousarray(poses), references, rows, similarity, *grid, radius, elsewhere, trust)
+    poses = np.ascontiguousarray(poses)
+    return _expected(poses, references, rows, similarity, *cells, fade, ordinary)  # type: ignore[no-any-return]
 
 
-def ordinary_match(similarity: Floats, quantile: float) -> float:
-    """What an unremarkable reference reaches at its best heading: a quantile of (references, headings)."""
-    return float(np.quantile(similarity.max(axis=1), quantile))
+def ordinary_match(best: Floats, places: Array, strangers_from: float, quantile: float) -> float:
+    """What a reference of some other place reaches at its best heading.
+
+    `best` (R,): each reference's similarity at its best heading; `places` (R, >= 2) where they are (m). Of those
+    farther than `strangers_from` metres from the best of all, the `quantile`; where there are none, the median of all.
+    """
+    winner = places[int(np.argmax(best)), :2]
+    strangers = best[np.hypot(*(places[:, :2] - winner).T) > strangers_from]
+    return float(np.quantile(strangers, quantile)) if len(strangers) else float(np.median(best))
 
 
 class NearReferences(Stage):
     """Likelihood of particles from the references near them: expected similarity to the power of `power`.
 
-    Gross & Koenig 2004, section 2, leave open how S becomes a weight (erratum 23a): w = S^power. The expected
-    similarity at a particle is interpolated between the references within `radius_m` and between compared headings.
-    What falls below an ordinary match, the `ordinary` quantile over all references of their similarity at the best
-    heading, counts as an ordinary match, and so does a pose far from all references (`trust`: how fast the
-    expectation fades to it): a robot off the mapped ways resembles no reference, and a filter that prefers the least
-    unlike one would be torn from its odometry. Pictures taken at one place are no independent evidence: with `motion`
-    wired, the power is scaled by the way since the picture before over `independent_m`, down to `standing` of it.
+    Gross & Koenig 2004, section 2, leave open how S becomes a weight (erratum 23a): w = S^power. How much similarity
+    varies between places differs from world to world, so by default (`power` null) the power is taken from the view:
+    `contrast` nats for each standard deviation of log S over the references, each at its best heading.
 
-    `proposals`: poses drawn from the similarity field (`propose: similarity`, the same power; position spread over
-    `spread_m` around a reference, heading over one step of the compared headings) or anywhere around the references
-    (`uniform`). They carry no weight of their own: `likelihood.anywhere` says how well the view fits anywhere.
+    The expected similarity at a particle is interpolated between the nearest references and the compared headings, and
+    fades with distance to an ordinary match: the `ordinary` quantile over the references of other places. What lies
+    below counts as an ordinary match too. So a robot off the mapped ways, which resembles no reference, is not torn
+    from its odometry to the least unlike one. Pictures taken at one place are no independent evidence: with `motion`
+    wired the power is scaled by the way since the picture before over `independent`, down to `standing` of it.
+
+    Distances are in reaches, the distance at which the map's views have lost half of their excess similarity (port
+    `reach`, else `reach_m`): one configuration serves a room, a field and a lawn. `fade`; `strangers`: from how far
+    away a reference is of another place; `spread` of proposals around references.
+
+    `proposals`: poses drawn from the similarity field (`propose: similarity`, by the same weights) or anywhere around
+    the references (`uniform`). They carry no weight of their own: `likelihood.anywhere` says how well the view fits
+    anywhere. Defaults: docs/experiments/omniview_mcl_defaults.md.
     """
 
-    power: Annotated[float, Bounds(gt=0)] = 80.0
-    ordinary: Annotated[float, Bounds(ge=0, le=1)] = 0.85
-    radius_m: Annotated[float, Bounds(gt=0)] = 0.5
-    trust: Annotated[float, Bounds(gt=0)] = 0.05
-    independent_m: Annotated[float, Bounds(ge=0)] = 0.2
+    power: Annotated[float, Bounds(gt=0)] | None = None
+    contrast: Annotated[float, Bounds(gt=0)] = 3.0
+    ordinary: Annotated[float, Bounds(ge=0, le=1)] = 0.9
+    neighbours: Annotated[int, Bounds(ge=1)] = 4
+    fade: Annotated[float, Bounds(gt=0)] = 1.5
+    strangers: Annotated[float, Bounds(ge=0)] = 3.0
+    independent: Annotated[float, Bounds(ge=0)] = 0.5
     standing: Annotated[float, Bounds(ge=0, le=1)] = 0.05
+    reach_m: Annotated[float, Bounds(gt=0)] = 0.5
     propose: Literal["similarity", "uniform", "none"] = "similarity"
     proposals: Annotated[int, Bounds(ge=0)] = 100
-    spread_m: Annotated[float, Bounds(gt=0)] = 0.2
+    spread: Annotated[float, Bounds(gt=0)] = 0.4
 
     class Out(Outputs):
         """Likelihood of each particle, and poses worth a try."""
@@ -121,7 +139,7 @@ class NearReferences(Stage):
         proposals: Particles | None = None
 
     def setup(self, ctx: Context) -> None:
-        """No grid yet: the map comes with the first picture."""
+        """No cells yet: the map comes with the first picture."""
         self._map: ReferenceGraph | None = None
         self._length = 0
 
@@ -132,34 +150,43 @@ class NearReferences(Stage):
         particles: Particles,
         map: ReferenceGraph,
         motion: Motion | None = None,
+        reach: Reach | None = None,
     ) -> Out:
         """Weigh all particles."""
-        if map is not self._map or len(map) != self._length:
-            self._grid = nearby_grid(map.poses, self.radius_m)
-            self._map, self._length = map, len(map)
+        unit = self.reach_m if reach is None else reach.metres
         values = similarities.values
         if not values.size:
             return self.Out(likelihood=Likelihood(np.ones(len(particles.poses))))
+        if map is not self._map or len(map) != self._length:
+            self._cells = nearest_cells(map.poses, self.neighbours, unit / CELLS_PER_REACH, FADED * self.fade * unit)
+            self._map, self._length = map, len(map)
         candidates = np.arange(len(map)) if similarities.candidates is None else similarities.candidates
         rows = np.full(len(map), -1, np.int64)
         rows[candidates] = np.arange(len(candidates))
-        floor = ordinary_match(values, self.ordinary)
-        expected = expected_similarity(
-            particles.poses, map.poses, self._grid, rows, values, self.radius_m, floor, self.trust
-        )
-        power, best = self.power * self._fresh(motion), max(float(values.max()), 1e-12)
-        field = (np.maximum(values, floor) / np.float32(best)).astype(np.float64) ** power
-        likelihood = Likelihood((np.maximum(expected, floor) / best) ** power, float(field.mean()))
-        return self.Out(likelihood=likelihood, proposals=self._proposals(ctx, field, candidates, map))
+        best = values.max(axis=1)
+        floor = ordinary_match(best, map.poses[candidates], self.strangers * unit, self.ordinary)
+        expected = expected_similarity(particles.poses, map.poses, self._cells, rows, values, self.fade * unit, floor)
+        power, top = self._power(best) * self._fresh(motion, unit), max(float(best.max()), 1e-12)
+        field = (np.maximum(values, floor) / np.float32(top)).astype(np.float64) ** power
+        likelihood = Likelihood((np.maximum(expected, floor) / top) ** power, float(field.mean()))
+        return self.Out(likelihood=likelihood, proposals=self._proposals(ctx, field, candidates, map, unit))
 
-    def _fresh(self, motion: Motion | None) -> float:
+    def _power(self, best: Floats) -> float:
+        if self.power is not None:
+            return self.power
+        spread = float(np.log(np.maximum(best, 1e-12)).std())
+        return self.contrast / max(spread, 1e-6)
+
+    def _fresh(self, motion: Motion | None, unit: float) -> float:
         """Share of the picture's evidence that is new."""
-        if motion is None or self.independent_m <= 0.0:
+        if motion is None or self.independent <= 0.0:
             return 1.0
-        return min(1.0, max(self.standing, math.hypot(motion.x, motion.y) / self.independent_m))
+        return min(1.0, max(self.standing, math.hypot(motion.x, motion.y) / (self.independent * unit)))
 
-    def _proposals(self, ctx: Context, field: Array, candidates: Ints, map: ReferenceGraph) -> Particles | None:
-        if self.propose == "none" or not self.proposals or not field.size:
+    def _proposals(
+        self, ctx: Context, field: Array, candidates: Ints, map: ReferenceGraph, unit: float
+    ) -> Particles | None:
+        if self.propose == "none" or not self.proposals:
             return None
         headings = field.shape[1]
         if self.propose == "similarity":
@@ -171,6 +198,6 @@ class NearReferences(Stage):
         else:
             poses = map.poses[ctx.rng.integers(len(map), size=self.proposals)].copy()
             poses[:, 2] = ctx.rng.uniform(-np.pi, np.pi, self.proposals)
-        poses[:, :2] += self.spread_m * ctx.rng.standard_normal((self.proposals, 2))
+        poses[:, :2] += self.spread * unit * ctx.rng.standard_normal((self.proposals, 2))
         poses[:, 2] = wrap(poses[:, 2])
         return Particles(poses, np.full(self.proposals, 1.0 / self.proposals))

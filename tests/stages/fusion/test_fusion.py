@@ -106,7 +106,7 @@ def test_a_belief_is_given_at_the_first_picture_only() -> None:
 
 
 def test_the_uniform_start_covers_the_map() -> None:
-    particles = start(Start(number=4000, around_m=1.0), a_map())
+    particles = start(Start(number=4000, around=2.0, reach_m=0.5), a_map())
     assert particles is not None
     assert (particles.poses[:, 0] < 4).mean() == pytest.approx(0.5, abs=0.03)
 

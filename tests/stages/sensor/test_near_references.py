@@ -1,12 +1,15 @@
+"""Particles weighed by the references near them."""
+
 import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.nearby import nearby_grid
+from omninav.stages.geometry.nearby import nearest_cells
 from omninav.stages.sensor.near_references import NearReferences, expected_similarity, ordinary_match
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
+from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
 RNG = np.random.default_rng(0)
@@ -20,30 +23,39 @@ def a_map() -> ReferenceGraph:
     )
 
 
-def by_words(pose: np.ndarray, radius: float, elsewhere: float, trust: float) -> float:
-    total, mass = trust * elsewhere, trust
-    for reference, row in zip(REFERENCES, FIELD, strict=True):
-        gap = np.hypot(*(pose[:2] - reference[:2]))
-        if gap < radius:
-            weight = (1 - gap**2 / radius**2) ** 2
-            turn = np.mod((pose[2] - reference[2]) * 36 / (2 * np.pi), 36)
-            value = np.interp(turn, np.arange(37), np.append(row, row[0]))
-            total, mass = total + weight * value, mass + weight
-    return float(total / mass)
+def by_words(pose: np.ndarray, fade: float, ordinary: float, cell: float, neighbours: int, radius: float) -> float:
+    origin = REFERENCES[:, :2].min(axis=0) - radius
+    end = REFERENCES[:, :2].max(axis=0) + radius
+    centre = origin + (np.floor((pose[:2] - origin) / cell) + 0.5) * cell
+    gaps = np.hypot(*(REFERENCES[:, :2] - centre).T)
+    chosen = [n for n in np.argsort(gaps, kind="stable")[:neighbours] if gaps[n] < radius]
+    if not chosen or np.any(pose[:2] < origin) or np.any(pose[:2] > end):
+        return ordinary
+    squares = [float(np.sum((pose[:2] - REFERENCES[n, :2]) ** 2)) for n in chosen]
+    total = mass = 0.0
+    for n, square in zip(chosen, squares, strict=True):
+        weight = 1 / (square + min(squares) / 4 + 1e-4 * fade**2)
+        turn = np.mod((pose[2] - REFERENCES[n, 2]) * 36 / (2 * np.pi), 36)
+        total += weight * float(np.interp(turn, np.arange(37), np.append(FIELD[n], FIELD[n, 0])))
+        mass += weight
+    known = np.exp(-0.5 * min(squares) / fade**2)
+    return float(max(ordinary, known * total / mass + (1 - known) * ordinary))
 
 
-@pytest.mark.parametrize("radius", [0.3, 0.8, 2.0])
-def test_the_kernel_agrees_with_its_words(radius: float) -> None:
+@pytest.mark.parametrize("fade", [0.2, 0.5, 1.0])
+def test_the_kernel_agrees_with_its_words(fade: float) -> None:
     poses = np.column_stack([RNG.uniform(-1, 5, (60, 2)), RNG.uniform(-9, 9, 60)])
-    grid = nearby_grid(REFERENCES, radius)
-    found = expected_similarity(poses, REFERENCES, grid, np.arange(40), FIELD, radius, 0.3, 0.05)
-    assert np.allclose(found, [by_words(pose, radius, 0.3, 0.05) for pose in poses], atol=1e-6)
+    cells = nearest_cells(REFERENCES, 4, 0.1, 3 * fade)
+    found = expected_similarity(poses, REFERENCES, cells, np.arange(40), FIELD, fade, 0.3)
+    words = [by_words(pose, fade, 0.3, cells.cell, 4, 3 * fade) for pose in poses]
+    assert np.allclose(found, words, atol=1e-6)
+    assert (found > 0.3).any()
 
 
 def test_references_that_were_not_compared_say_nothing() -> None:
     poses = REFERENCES[:5].copy()
-    grid = nearby_grid(REFERENCES, 0.5)
-    found = expected_similarity(poses, REFERENCES, grid, np.full(40, -1), FIELD, 0.5, 0.3, 0.05)
+    cells = nearest_cells(REFERENCES, 4, 0.1, 1.5)
+    found = expected_similarity(poses, REFERENCES, cells, np.full(40, -1), FIELD, 0.5, 0.3)
     assert np.allclose(found, 0.3)
 
 
@@ -64,7 +76,7 @@ def one_good_match() -> np.ndarray:
 def test_the_particle_at_the_matching_reference_and_heading_wins() -> None:
     right = REFERENCES[3] + np.array([0.0, 0.0, np.pi / 2])
     poses = np.array([right, REFERENCES[3] - (0.0, 0.0, np.pi / 2), REFERENCES[7], [50.0, 50.0, 0.0]])
-    likelihood = step(NearReferences(radius_m=0.2), poses, one_good_match()).likelihood.values
+    likelihood = step(NearReferences(reach_m=0.1), poses, one_good_match()).likelihood.values
     assert np.argmax(likelihood) == 0
     assert likelihood[0] > 100 * likelihood[1:].max()
 
@@ -72,20 +84,43 @@ def test_the_particle_at_the_matching_reference_and_heading_wins() -> None:
 def test_off_the_map_is_as_likely_as_any_ordinary_match() -> None:
     field = RNG.uniform(0.3, 0.5, (40, 36)).astype(np.float32)
     poses = np.concatenate([REFERENCES, [[50.0, 50.0, 0.0]]])
-    values = step(NearReferences(ordinary=0.5), poses, field).likelihood.values
+    values = step(NearReferences(ordinary=0.5, reach_m=0.2), poses, field).likelihood.values
     assert values.min() > 0
     assert values[-1] == pytest.approx(values.min())
     assert np.isclose(values, values[-1]).sum() > len(poses) / 4
 
 
-def test_the_ordinary_match_is_a_quantile_over_references_at_their_best_headings() -> None:
-    field = np.array([[0.1, 0.5], [0.7, 0.2], [0.3, 0.3]], np.float32)
-    assert ordinary_match(field, 0.5) == pytest.approx(0.5)
-    assert ordinary_match(field, 1.0) == pytest.approx(0.7)
+def test_the_ordinary_match_is_a_quantile_over_the_references_of_other_places() -> None:
+    best = np.array([0.9, 0.8, 0.3, 0.5, 0.4], np.float32)
+    places = np.array([[0, 0], [0.5, 0], [3, 0], [4, 0], [5, 0]], float)
+    assert ordinary_match(best, places, 1.0, 0.5) == pytest.approx(0.4)
+    assert ordinary_match(best, places, 1.0, 1.0) == pytest.approx(0.5)
+    assert ordinary_match(best, places, 9.0, 1.0) == pytest.approx(0.5)  # no strangers: the median of all
+
+
+def test_the_power_follows_from_how_much_similarity_varies_between_places() -> None:
+    best = np.exp(RNG.normal(-0.5, 0.02, 500)).astype(np.float32)
+    flat, steep = NearReferences()._power(best), NearReferences()._power(best**3)
+    assert flat == pytest.approx(3.0 / 0.02, rel=0.1)
+    assert flat == pytest.approx(3 * steep, rel=1e-3)  # a world of thrice the contrast: the same weights
+    assert NearReferences(power=7.0)._power(best) == 7.0
+
+
+def test_distances_are_meant_in_reaches() -> None:
+    poses = REFERENCES + np.array([0.3, 0.0, np.pi / 2])
+    ctx, stage = Context("sensor"), NearReferences()
+    belief = Particles(poses, np.full(40, 1 / 40))
+
+    def at(reach: float) -> np.ndarray:
+        stage.setup(ctx)
+        return stage.step(ctx, Similarities(one_good_match()), belief, a_map(), None, Reach(reach)).likelihood.values
+
+    assert at(1.0)[3] > 100 * np.median(at(1.0))  # 0.3 m is near where views change slowly
+    assert at(0.05)[3] < 1.01 * np.median(at(0.05))  # and far where they change quickly
 
 
 def test_a_robot_that_stands_learns_little_from_the_next_picture() -> None:
-    poses, stage = REFERENCES + (0.0, 0.0, np.pi / 2), NearReferences(independent_m=0.2, standing=0.1)
+    poses, stage = REFERENCES + np.array([0.0, 0.0, np.pi / 2]), NearReferences(independent=0.4, standing=0.1)
     moving = step(stage, poses, one_good_match(), Motion(0.5, 0.0, 0.0)).likelihood.values
     standing = step(stage, poses, one_good_match(), Motion(0.0, 0.0, 1.0)).likelihood.values
     half = step(stage, poses, one_good_match(), Motion(0.06, 0.08, 0.0)).likelihood.values
@@ -95,9 +130,7 @@ def test_a_robot_that_stands_learns_little_from_the_next_picture() -> None:
 
 @pytest.mark.parametrize("propose", ["similarity", "uniform"])
 def test_proposals_are_drawn_from_the_field_and_around_the_references(propose: str) -> None:
-    proposals = step(
-        NearReferences(propose=propose, proposals=400, spread_m=0.05), REFERENCES, one_good_match()
-    ).proposals  # type: ignore[arg-type]
+    proposals = step(NearReferences(propose=propose, proposals=400, spread=0.1), REFERENCES, one_good_match()).proposals  # type: ignore[arg-type]
     assert proposals is not None
     assert proposals.weights.sum() == pytest.approx(1.0)
     gap = np.hypot(*(proposals.poses[:, None, :2] - REFERENCES[:, :2]).transpose(2, 0, 1))
