@@ -19,7 +19,9 @@ def rows() -> list[Row]:
         with LogWriter(odometry) as log:
             for number in range(MESSAGES):
                 pose = {"pose": {"pose": {"position": {"x": number * 0.01}, "orientation": {"w": 1.0}}}}
-                log.write("/odom", "nav_msgs/msg/Odometry", number * 50_000_000, {"header": {"frame_id": "odom"}, **pose})
+                log.write(
+                    "/odom", "nav_msgs/msg/Odometry", number * 50_000_000, {"header": {"frame_id": "odom"}, **pose}
+                )
         noise = np.random.default_rng(0).integers(0, 255, 60_000, dtype=np.uint8)
         with LogWriter(pictures) as log:
             for number in range(300):

@@ -29,7 +29,7 @@ def compose(pose: npt.ArrayLike, motion: npt.ArrayLike) -> Array:
 
 
 def between(start: npt.ArrayLike, end: npt.ArrayLike) -> Array:
-    """The motion that leads from `start` to `end`, in the frame of `start`: `compose(start, between(start, end)) = end`."""
+    """The motion that leads from `start` to `end`, in the frame of `start`: the inverse of `compose`."""
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     cos, sin = np.cos(start[..., 2]), np.sin(start[..., 2])
     dx, dy = end[..., 0] - start[..., 0], end[..., 1] - start[..., 1]

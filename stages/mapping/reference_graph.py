@@ -27,7 +27,7 @@ class LearnReferenceGraph(Stage):
     (`supervised: auto`) its odometry; the map says which. Raises BadInput where `supervised: truth` finds none.
     """
 
-    distance_m: Annotated[float, Bounds(gt=0)] = 0.1
+    distance_m: Annotated[float, Bounds(gt=0)] = 0.02
     vicinity_m: Annotated[float, Bounds(gt=0)] = 0.5
     similarity: Annotated[float, Bounds(ge=0, le=1)] = 0.6
     supervised: Literal["auto", "truth", "odometry"] = "auto"

@@ -15,11 +15,15 @@ from omninav.stages.values.maps import ReferenceGraph
 Ints = npt.NDArray[np.int64]
 
 
-def near_belief(poses: npt.NDArray[np.float64], near: Particles | None, radius: float, whole: int = 0) -> Ints | None:
-    """Indices of the references within `radius` metres of any particle, ascending; None (all) where that is no gain.
+STRANGERS = 64
+"""References compared wherever the belief is, spread evenly over the map: what "alike" is worth is judged by them."""
 
-    All are compared too where there is no belief, where `radius` is 0 (never limit), where no reference is near,
-    and where there are at most `whole` references.
+
+def near_belief(poses: npt.NDArray[np.float64], near: Particles | None, radius: float, whole: int = 0) -> Ints | None:
+    """Indices of the references to compare, ascending; None for all of them.
+
+    Those within `radius` metres of any particle, and `STRANGERS` spread over the map. All are compared where there is
+    no belief, where `radius` is 0, where none is near, and where there are at most `whole` references.
     """
     if near is None or radius <= 0.0 or len(poses) <= whole:
         return None
@@ -29,9 +33,11 @@ def near_belief(poses: npt.NDArray[np.float64], near: Particles | None, radius: 
     # A particle lies within radius / 2 * sqrt(1/2) of its cell's centre: the reach grows by that much.
     reach = radius * (1.0 + math.sqrt(0.5) / 2)
     tree: Any = KDTree((cells + 0.5) * (radius / 2))  # type: ignore[no-untyped-call]
-    found = tree.query(poses[:, :2], distance_upper_bound=reach)[0]
-    chosen = np.flatnonzero(np.isfinite(found))
-    return chosen if 0 < len(chosen) < len(poses) else None
+    near_any = np.isfinite(tree.query(poses[:, :2], distance_upper_bound=reach)[0])
+    if not near_any.any():
+        return None
+    near_any[np.linspace(0, len(poses) - 1, min(STRANGERS, len(poses))).astype(np.int64)] = True
+    return None if near_any.all() else np.flatnonzero(near_any)
 
 
 def check_alike(features: SegmentFeatures, map: ReferenceGraph) -> bool:

@@ -83,7 +83,7 @@ def expected_similarity(
     where it was not compared.
     """
     poses = np.ascontiguousarray(poses)
-    return _expected(poses, references, rows, similarity, *cells, fade, ordinary)  # type: ignore[no-any-return]
+    return _expected(poses, references, rows, similarity, *cells, fade, ordinary)
 
 
 def ordinary_match(best: Floats, places: Array, strangers_from: float, quantile: float) -> float:
@@ -121,11 +121,11 @@ class NearReferences(Stage):
 
     power: Annotated[float, Bounds(gt=0)] | None = None
     contrast: Annotated[float, Bounds(gt=0)] = 3.0
-    ordinary: Annotated[float, Bounds(ge=0, le=1)] = 0.9
+    ordinary: Annotated[float, Bounds(ge=0, le=1)] = 0.8
     neighbours: Annotated[int, Bounds(ge=1)] = 4
     fade: Annotated[float, Bounds(gt=0)] = 1.5
     strangers: Annotated[float, Bounds(ge=0)] = 3.0
-    independent: Annotated[float, Bounds(ge=0)] = 0.5
+    independent: Annotated[float, Bounds(ge=0)] = 0.75
     standing: Annotated[float, Bounds(ge=0, le=1)] = 0.05
     reach_m: Annotated[float, Bounds(gt=0)] = 0.5
     propose: Literal["similarity", "uniform", "none"] = "similarity"
@@ -167,8 +167,8 @@ class NearReferences(Stage):
         floor = ordinary_match(best, map.poses[candidates], self.strangers * unit, self.ordinary)
         expected = expected_similarity(particles.poses, map.poses, self._cells, rows, values, self.fade * unit, floor)
         power, top = self._power(best) * self._fresh(motion, unit), max(float(best.max()), 1e-12)
-        field = (np.maximum(values, floor) / np.float32(top)).astype(np.float64) ** power
-        likelihood = Likelihood((np.maximum(expected, floor) / top) ** power, float(field.mean()))
+        field = Field(values, floor, top, power)
+        likelihood = Likelihood((expected / top) ** power, field.mean)
         return self.Out(likelihood=likelihood, proposals=self._proposals(ctx, field, candidates, map, unit))
 
     def _power(self, best: Floats) -> float:
@@ -184,20 +184,44 @@ class NearReferences(Stage):
         return min(1.0, max(self.standing, math.hypot(motion.x, motion.y) / (self.independent * unit)))
 
     def _proposals(
-        self, ctx: Context, field: Array, candidates: Ints, map: ReferenceGraph, unit: float
+        self, ctx: Context, field: "Field", candidates: Ints, map: ReferenceGraph, unit: float
     ) -> Particles | None:
         if self.propose == "none" or not self.proposals:
             return None
-        headings = field.shape[1]
         if self.propose == "similarity":
-            cumulative = np.cumsum(field)
-            drawn = np.searchsorted(cumulative, ctx.rng.random(self.proposals) * cumulative[-1], side="right")
-            drawn = np.minimum(drawn, field.size - 1)
-            poses = map.poses[candidates[drawn // headings]].copy()
-            poses[:, 2] += 2 * np.pi * (drawn % headings + ctx.rng.random(self.proposals) - 0.5) / headings
+            references, turns = np.divmod(field.draw(ctx.rng, self.proposals), field.headings)
+            poses = map.poses[candidates[references]].copy()
+            poses[:, 2] += 2 * np.pi * (turns + ctx.rng.random(self.proposals) - 0.5) / field.headings
         else:
             poses = map.poses[ctx.rng.integers(len(map), size=self.proposals)].copy()
             poses[:, 2] = ctx.rng.uniform(-np.pi, np.pi, self.proposals)
         poses[:, :2] += self.spread * unit * ctx.rng.standard_normal((self.proposals, 2))
         poses[:, 2] = wrap(poses[:, 2])
         return Particles(poses, np.full(self.proposals, 1.0 / self.proposals))
+
+
+class Field:
+    """Weights (max(S, floor) / top)^power over references and headings, most of which lie on the floor.
+
+    Only what rises above the floor is raised to the power: in a large map that is a few in a hundred.
+    """
+
+    def __init__(self, values: Floats, floor: float, top: float, power: float) -> None:
+        flat = values.ravel()
+        self.headings = values.shape[1]
+        self._size = flat.size
+        self._above = np.flatnonzero(flat > floor)
+        self._cumulative = np.cumsum((flat[self._above].astype(np.float64) / top) ** power)
+        self._raised = float(self._cumulative[-1]) if len(self._above) else 0.0
+        self._flat = (self._size - len(self._above)) * (floor / top) ** power
+        self.mean = (self._raised + self._flat) / self._size
+        """Mean weight: how well the view fits anywhere."""
+
+    def draw(self, rng: np.random.Generator, number: int) -> Ints:
+        """Cells drawn by weight: (number,) flat indices. What falls to the floor is any cell."""
+        chance = rng.random(number) * (self._raised + self._flat)
+        anywhere = rng.integers(self._size, size=number)
+        if not len(self._above):
+            return anywhere
+        at = np.searchsorted(self._cumulative, chance, side="right")
+        return np.where(chance < self._raised, self._above[np.minimum(at, len(self._above) - 1)], anywhere)
