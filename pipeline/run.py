@@ -182,7 +182,8 @@ def start(planned: Plan, argv: Sequence[str], folder: Path | None = None) -> Run
     write_whole(folder / "graph.svg", svg(planned.graph))
     write_whole(folder / "graph.mmd", mermaid(planned.graph))
     run.save()
-    _point_latest(folder)
+    if not folder.name.isdigit():  # a sweep's jobs have numbers, and no latest among them
+        _point_latest(folder)
     return run
 
 
