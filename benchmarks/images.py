@@ -1,5 +1,7 @@
 """What a picture costs: unwarping, comparing with a map, comparing with what particles expect."""
 
+import itertools
+
 import cv2
 import numpy as np
 
@@ -71,7 +73,7 @@ def _features() -> Row:
 
     def peer() -> None:
         hsv = cv2.cvtColor(pixels, cv2.COLOR_BGR2HSV)
-        for start, end in zip(edges[:-1], edges[1:], strict=True):
+        for start, end in itertools.pairwise(edges):
             part = np.ascontiguousarray(hsv[:, start:end])
             cv2.calcHist([part], [0], None, [16], [0, 180])
             cv2.calcHist([part], [2], None, [4], [0, 256])

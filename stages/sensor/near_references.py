@@ -111,8 +111,8 @@ class NearReferences(Stage):
     wired the power is scaled by the way since the picture before over `independent`, down to `standing` of it.
 
     Distances are in reaches, the distance at which the map's views have lost half of their excess similarity (port
-    `reach`, else `reach_m`): one configuration serves a room, a field and a lawn. `fade`: over which what a
-    reference says is lost; `strangers`: from how far away a reference is of another place; `spread` of proposals around references.
+    `reach`, else `reach_m`): one configuration serves a room, a field and a lawn. `fade`: over which what a reference
+    says is lost; `strangers`: from how far away a reference is of another place; `spread`: of proposals.
 
     `proposals`: poses drawn from the similarity field (`propose: similarity`, by the same weights) or anywhere around
     the references (`uniform`). They carry no weight of their own: `likelihood.anywhere` says how well the view fits
