@@ -53,23 +53,23 @@ class ImportanceResampling(Stage):
 
     def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:
         """Fuse prediction and observation."""
-        weights = particles.weights * likelihood.values
-        total = float(weights.sum())
-        if not (math.isfinite(total) and total > 0.0):
-            ctx.count("belief_without_support", detail="fusion: no particle explains the picture; weights kept")
-            weights, total = particles.weights, float(particles.weights.sum())
-        poses = particles.poses
+        poses, weights = particles.poses, particles.weights * likelihood.values * (1.0 - self.kidnapped)
         if proposals is not None and likelihood.anywhere is not None and self.kidnapped > 0.0:
             # Drawn from the view itself, they carry the evidence for "anywhere" in equal parts.
             number = len(proposals.poses)
-            elsewhere = np.full(number, self.kidnapped * likelihood.anywhere / number)
+            anywhere = self.kidnapped * likelihood.anywhere * float(particles.weights.sum())
             poses = np.concatenate([poses, proposals.poses])
-            weights = np.concatenate([weights * ((1.0 - self.kidnapped) / float(particles.weights.sum())), elsewhere])
-            total = float(weights.sum())
+            weights = np.concatenate([weights, np.full(number, anywhere / number)])
+        total = float(weights.sum())
+        if not (math.isfinite(total) and total > 0.0):
+            ctx.count("belief_without_support", detail="fusion: no particle explains the picture; weights kept")
+            poses, weights, total = particles.poses, particles.weights, float(particles.weights.sum())
         weights = weights / total
         wanted = self._wanted(particles.poses)
         known = weights[: len(particles.poses)]
-        if wanted == len(known) and effective_size(known) >= self.resample_below * wanted:
+        moved_away = 1.0 - float(known.sum())
+        rich = effective_size(known) >= self.resample_below * wanted
+        if wanted == len(known) and rich and moved_away * wanted < 1.0:
             return self.Out(belief=Particles(particles.poses, known / known.sum()))
         drawn = systematic(weights, wanted, float(ctx.rng.random()))
         return self.Out(belief=Particles(poses[drawn], np.full(wanted, 1.0 / wanted)))

@@ -44,20 +44,22 @@ def moved(poses: Array, motion: tuple[float, float, float], sigmas: tuple[float,
 
 
 class RotationTranslationRotation(Stage):
-    """Samples the motion model: turn, go, turn, with noise in proportion to each.
+    """Samples the motion model: turn, go, turn, with noise that grows with the way and with the turn.
 
-    Each turn has sigma^2 = (rotation_per_rotation |turn|)^2 + (rotation_per_metre way)^2 / 2 + rotation_floor^2 / 2
-    (rad), the way sigma^2 = (translation_per_metre way)^2 + (translation_per_rotation |both turns|)^2
-    + translation_floor^2 (m). Units: rad per rad, rad per metre, metre per metre, metre per rad; the floors hold per
-    picture, also for a robot that stands. Without motion (the first picture of a log) the belief stays as it is.
+    Variances grow with the way and the turn, so that many small motions are as uncertain as the one they make up,
+    whatever the camera's rate: each turn has sigma^2 = (rotation_per_rotation^2 |turn| + rotation_per_metre^2 way) / 2
+    + rotation_floor^2 / 2 (rad^2), the way sigma^2 = translation_per_metre^2 way + translation_per_rotation^2 |turn| +
+    translation_floor^2 (m^2). The parameters are the standard deviations after 1 m or 1 rad: rad, rad, m, m; the floors
+    hold per picture, also for a robot that stands. `turn` is the whole turn: a jitter of the wheels sideways
+    is no turn. Without motion (the first picture of a log) the belief stays as it is.
     """
 
     rotation_per_rotation: Annotated[float, Bounds(ge=0)] = 0.05
     rotation_per_metre: Annotated[float, Bounds(ge=0)] = 0.05
     translation_per_metre: Annotated[float, Bounds(ge=0)] = 0.1
     translation_per_rotation: Annotated[float, Bounds(ge=0)] = 0.01
-    rotation_floor: Annotated[float, Bounds(ge=0)] = 0.003
-    translation_floor: Annotated[float, Bounds(ge=0)] = 0.002
+    rotation_floor: Annotated[float, Bounds(ge=0)] = 0.001
+    translation_floor: Annotated[float, Bounds(ge=0)] = 0.001
 
     class Out(Outputs):
         """The belief after the motion, before the picture is looked at."""
@@ -74,15 +76,14 @@ class RotationTranslationRotation(Stage):
 
     def sigmas(self, way: tuple[float, float, float]) -> tuple[float, float, float]:
         """Standard deviations of first turn (rad), way (m), second turn (rad)."""
-        first, distance, second = abs(way[0]), abs(way[1]), abs(way[2])
-        shared = 0.5 * ((self.rotation_per_metre * distance) ** 2 + self.rotation_floor**2)
+        distance, turn = abs(way[1]), abs(float(wrap(way[0] + way[2])))
+        rotation = math.sqrt(
+            0.5
+            * (self.rotation_per_rotation**2 * turn + self.rotation_per_metre**2 * distance + self.rotation_floor**2)
+        )
         translation = math.sqrt(
-            (self.translation_per_metre * distance) ** 2
-            + (self.translation_per_rotation * (first + second)) ** 2
+            self.translation_per_metre**2 * distance
+            + self.translation_per_rotation**2 * turn
             + self.translation_floor**2
         )
-        return (
-            math.sqrt((self.rotation_per_rotation * first) ** 2 + shared),
-            translation,
-            math.sqrt((self.rotation_per_rotation * second) ** 2 + shared),
-        )
+        return rotation, translation, rotation
