@@ -59,7 +59,8 @@ def test_jobs_in_several_processes_give_the_same_and_leave_their_exit_code(
 
 def test_a_stage_by_its_path_alone(omninav):
     target = f"{EDGES / 'omninav_edges.py'}:EdgeHistogram"
-    assert "nothing wrong" in omninav("check", f'nodes.features={{_target_: "{target}"}}', check=True).stdout
+    words = ("~nodes.features", f'+nodes.features={{_target_: "{target}"}}')
+    assert "nothing wrong" in omninav("check", *words, check=True).stdout
 
 
 def test_a_stage_by_a_config_folder(omninav, tmp_path: Path):

@@ -64,6 +64,15 @@ def test_a_kidnapped_robot_is_where_the_evidence_says() -> None:
         assert share_of_proposals(anywhere, believed) == pytest.approx(expected, abs=0.011)
 
 
+def test_a_belief_that_explains_nothing_anywhere_gives_way_to_the_evidence() -> None:
+    # All particles alike unlikely: nothing would have to be resampled, were it not for the proposals' share.
+    proposals = Particles(np.full((100, 3), 77.0), np.full(100, 0.01))
+    stage = ImportanceResampling(number=5000, kidnapped=1e-7)
+    for believed, share in ((1e-3, 0.0), (1e-9, 0.1 / 1.1), (1e-12, 100 / 101)):
+        out = fuse(stage, belief(5000), np.full(5000, believed), anywhere=1e-3, proposals=proposals)
+        assert (out.poses[:, 0] == 77.0).mean() == pytest.approx(share, abs=0.02)
+
+
 def test_the_number_follows_the_cells_the_belief_fills() -> None:
     stage = ImportanceResampling(number=5000, tracking=500, adapt="kld")
     narrow = fuse(stage, belief(5000, spread=0.01), np.ones(5000))

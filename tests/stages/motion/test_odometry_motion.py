@@ -48,9 +48,9 @@ def test_samples_have_the_spread_that_the_parameters_say() -> None:
     ctx = Context("motion", np.random.default_rng(3))
     start = Particles(np.zeros((number, 3)), np.full(number, 1 / number))
     poses = stage.step(ctx, start, Motion(1.0, 0.0, 0.5)).belief.poses
-    way = math.sqrt(0.05**2 + (0.04 * 0.5) ** 2 + 0.02**2)
-    first = math.sqrt(0.02**2 / 2 + 0.01**2 / 2)
-    heading = math.sqrt(first**2 + (0.1 * 0.5) ** 2 + 0.02**2 / 2 + 0.01**2 / 2)
+    way = math.sqrt(0.05**2 + 0.04**2 * 0.5 + 0.02**2)
+    first = math.sqrt((0.1**2 * 0.5 + 0.02**2 + 0.01**2) / 2)
+    heading = math.sqrt(2) * first
     assert poses[:, 0].mean() == pytest.approx(math.exp(-(first**2) / 2), abs=1e-3)
     assert poses[:, 0].std() == pytest.approx(way, rel=0.01)
     assert poses[:, 1].std() == pytest.approx(first, rel=0.01)
@@ -70,3 +70,24 @@ def test_weights_pass_unchanged_and_the_input_is_not_written_to() -> None:
     )
     assert np.array_equal(out.weights, weights)
     assert not poses.any()
+
+
+def test_many_small_motions_are_as_uncertain_as_the_one_they_make_up() -> None:
+    stage = RotationTranslationRotation(rotation_floor=0.0, translation_floor=0.0)
+    number = 50_000
+    start = Particles(np.zeros((number, 3)), np.full(number, 1 / number))
+
+    def spread(parts: int) -> np.ndarray:
+        ctx, belief = Context("motion", np.random.default_rng(1)), start
+        for _ in range(parts):
+            belief = stage.step(ctx, belief, Motion(1.0 / parts, 0.0, 0.3 / parts)).belief
+        return belief.poses[:, [0, 2]].std(axis=0)
+
+    assert spread(50)[1] == pytest.approx(spread(1)[1], rel=0.02)
+    assert spread(50)[0] == pytest.approx(spread(1)[0], rel=0.1)
+
+
+def test_a_jitter_sideways_is_no_turn() -> None:
+    _, way, _ = sigmas = RotationTranslationRotation().sigmas(turn_go_turn(0.0, 1e-5, 0.0))
+    assert max(sigmas) < 0.0015
+    assert way < 0.0015
