@@ -157,7 +157,9 @@ def test_the_embedded_default_localises(demo: Path):
     metrics = json.loads((demo / "metrics.json").read_text())
     assert metrics["converged_after_frames"] is not None
     assert metrics["after_convergence"]["position_error_m"]["median"] < 0.35
-    assert metrics["after_convergence"]["position_error_m"]["p90"] < metrics["odometry_alone"]["position_error_m"]["p90"]
+    assert (
+        metrics["after_convergence"]["position_error_m"]["p90"] < metrics["odometry_alone"]["position_error_m"]["p90"]
+    )
     assert metrics["after_convergence"]["heading_error_deg"]["median"] < 5
 
 
