@@ -50,8 +50,14 @@ class LearnReferenceGraph(Stage):
         """Take one view into the map, or not."""
         if ctx.tick.first_of_log:
             along.reference = -1
+            if ctx.tick.log and len(map) and map.pose_source == "odometry":
+                raise BadInput(
+                    "mapping: each log's odometry has a frame of its own, so several logs without ground truth make no "
+                    "one map; give one tour, or tours with ground truth"
+                )
         pose = self._pose(ctx, odometry, truth, map)
         if pose is None:
+            along.reference = -1  # no edge across a gap
             return self.Out(map=map)
         kind: FeatureKind = "histograms" if isinstance(features, SegmentHistograms) else "colours"
         near = within(map.poses, pose.x, pose.y, max(self.distance_m, self.vicinity_m))

@@ -100,3 +100,14 @@ def test_a_reference_with_the_default_features_takes_less_than_4_kb() -> None:
     map = ReferenceGraph.empty()
     map.insert(Pose(0, 0, 0), view(1, segments=36).values, "histograms")
     assert map.poses.nbytes + map.features.nbytes + 2 * 16 < 4000
+
+
+def test_two_logs_without_truth_make_no_map() -> None:
+    stage, ctx, along = LearnReferenceGraph(), Context("mapping"), Along()
+    view = SegmentHistograms(np.full((4, 2), 0.5, np.float32))
+    map = EmptyReferenceGraph().step(ctx).map
+    ctx.tick = Tick(0, 0, log=0, first_of_log=True)
+    stage.step(ctx, view, Pose(0.0, 0.0, 0.0), None, map, along)
+    ctx.tick = Tick(1, 1, log=1, first_of_log=True)
+    with pytest.raises(BadInput, match="frame of its own"):
+        stage.step(ctx, view, Pose(0.0, 0.0, 0.0), None, map, along)
