@@ -56,6 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     from .problems import BadInput, ProblemsFound
 
     try:
+        _refuse_null_groups(arguments)
         return command(arguments[1:]) if command else _launch(arguments)
     except ProblemsFound as found:
         print(found, file=sys.stderr)
@@ -68,6 +69,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("stopped; `omninav resume runs/latest` goes on", file=sys.stderr)
         return 130
+
+
+def _refuse_null_groups(arguments: Sequence[str]) -> None:
+    """`match=null`, on which Hydra stumbles without a word about what to type."""
+    from importlib.resources import files
+
+    from .problems import Problem, ProblemsFound
+
+    for word in arguments:
+        name, _, value = word.partition("=")
+        if value == "null" and name.isidentifier() and files(CONF).joinpath(name).is_dir():
+            hint = f"to take the node out, type '~nodes.{name}' '~wires.{name}'"
+            raise ProblemsFound([Problem(name, "a stage cannot be swapped for nothing", hint)])
 
 
 def _unknown_command(name: str) -> int:
@@ -225,9 +239,18 @@ def complete(config: Any) -> dict[str, Any]:
     try:
         plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
         for name, spec in (plain.get("artifacts") or {}).items():
-            if not isinstance(spec, Mapping) or spec.get("file") is not None or spec.get("variant") is None:
+            if not isinstance(spec, Mapping) or spec.get("variant") is None:
                 continue
-            if (spec.get("log") is None) != (plain.get("log") is None):
+            if spec.get("file") is not None:
+                if spec.get("log") is not None:
+                    hint = f"leave one of them away: {name}=FILE uses a saved one, tour=LOG makes one"
+                    raise ProblemsFound([Problem(str(name), "both a file and a log to make it from are given", hint)])
+                # a link like runs/latest will soon point elsewhere
+                plain["artifacts"][name]["file"] = str(Path(str(spec["file"])).resolve())
+                continue
+            if spec.get("log") is not None and plain.get("log") is None:
+                raise ProblemsFound([Problem("log", "a tour is given, but no log to localise", "type log=LOG")])
+            if spec.get("log") is None and plain.get("log") is not None:
                 continue  # a log of one's own, but nothing to make the artifact from: `plan` says what is missing
             other = compose("config", overrides=[f"variant={spec['variant']}"])
             OmegaConf.set_struct(other, False)
@@ -297,10 +320,11 @@ def _offer_plugins() -> None:
 
 def _check(arguments: list[str]) -> int:
     from .graph import LIFETIMES
-    from .run import plan
+    from .run import input_digests, plan
 
     with _composed(arguments) as config:
         planned = plan(complete(config))
+    input_digests(planned)  # opens every log and map
     graph = planned.graph
     before, tick, after = (len(graph.of_lifetime(kind)) for kind in LIFETIMES)
     print(f"{planned.variant}: nothing wrong with it. {len(graph.nodes)} nodes, {len(graph.wires)} wires")
@@ -331,10 +355,16 @@ def _graph(arguments: list[str]) -> int:
 def _stages(arguments: list[str]) -> int:
     from .catalog import entries, resolve
     from .ports import type_name
+    from .problems import suggest
     from .stage import signature
 
     broken = 0
-    for entry in entries():
+    known = list(entries())
+    for word in arguments:
+        if word not in {entry.role for entry in known} | {entry.name for entry in known}:
+            print(suggest(word, {entry.role for entry in known}, "roles", prefix="omninav stages "), file=sys.stderr)
+            return 2
+    for entry in known:
         if arguments and entry.role not in arguments and entry.name not in arguments:
             continue
         if entry.problem:

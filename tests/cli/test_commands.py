@@ -78,6 +78,31 @@ def test_a_log_of_ones_own_without_a_map_says_what_to_type(omninav, tmp_path: Pa
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("tour=tour.mcap",), "type log=LOG"),
+        (("tour=tour.mcap", "map=m.omap", "log=d.mcap"), "leave one of them away"),
+        (("match=null",), "'~nodes.match' '~wires.match'"),
+        (("check", "tour=nowhere.mcap", "log=nowhere.mcap"), "nowhere.mcap"),
+        (("stages", "matsch"), "did you mean 'omninav stages match'?"),
+    ],
+)
+def test_what_a_newcomer_gets_wrong_is_answered_with_what_to_type(omninav, tmp_path: Path, words, said: str):
+    ended = omninav(*words)
+    assert ended.returncode == 2
+    assert said in ended.stderr
+    assert "Traceback" not in ended.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_map_of_the_latest_run_can_be_named(omninav, demo: Path, shared_cache: Path, tmp_path: Path):
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "latest").symlink_to(demo.resolve())
+    omninav("map=runs/latest/map.omap", "nodes.source.stop=5", f"cache={shared_cache}", check=True)
+    assert (tmp_path / "runs" / "latest").resolve() != demo.resolve()
+
+
 def test_a_missing_log_is_one_line_that_names_it(omninav, tmp_path: Path):
     ended = omninav("variant=omniview_mcl_map", "log=nowhere.mcap")
     assert ended.returncode == 2
