@@ -1,6 +1,5 @@
 """Static results as files: versioned, checksummed, never unpickled; and the cache in which they lie by content."""
 
-import dataclasses
 import fcntl
 import hashlib
 import io
@@ -13,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .codec import BadEncoding, decode, encode
+from .codec import BadEncoding, decode, encode, field_names
 from .files import write_whole
 from .problems import BadInput
 from .value import VALUE_TYPES, Value, value_name
@@ -28,7 +27,7 @@ def write_artifact(path: Path, value: Value, facts: dict[str, Any] | None = None
     `numpy.load` opens it. The header names the value's type, each field's array with its own sha256, and `facts`
     about how it was made. Top-level array fields are arrays of the file; everything else is encoded in one more.
     """
-    fields = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}  # type: ignore[arg-type]
+    fields = {name: getattr(value, name) for name in field_names(value)}
     arrays = {name: field for name, field in fields.items() if isinstance(field, np.ndarray)}
     rest = {name: field for name, field in fields.items() if name not in arrays}
     arrays["rest"] = np.frombuffer(encode(rest), dtype=np.uint8)

@@ -61,7 +61,7 @@ def _describe(thing: Any, arrays: list[bytes]) -> Any:
         arrays.append(thing)
         return ["bytes", len(thing), sum(map(len, arrays[:-1]))]
     if isinstance(thing, Value):
-        fields = [_describe(getattr(thing, f.name), arrays) for f in dataclasses.fields(thing)]  # type: ignore[arg-type]
+        fields = [_describe(getattr(thing, name), arrays) for name in field_names(thing)]
         return ["value", value_name(type(thing)), *fields]
     if isinstance(thing, tuple):
         return ["tuple", *[_describe(item, arrays) for item in thing]]
@@ -94,7 +94,7 @@ def _restore(header: Any, data: memoryview) -> Any:
         cls = VALUE_TYPES.get(rest[0])
         if cls is None:
             raise BadEncoding(f"unknown value type '{rest[0]}': is the module that defines it loaded?")
-        names = [f.name for f in dataclasses.fields(cls)]  # type: ignore[arg-type]
+        names = field_names(cls)
         if len(names) != len(rest) - 1:
             raise BadEncoding(f"'{rest[0]}' has {len(names)} fields now, {len(rest) - 1} in the file")
         return cls(**{name: _restore(item, data) for name, item in zip(names, rest[1:], strict=True)})
@@ -111,14 +111,19 @@ def _restore(header: Any, data: memoryview) -> Any:
     raise BadEncoding(f"unknown form '{form}'")
 
 
+def field_names(thing: Any) -> list[str]:
+    """The fields of a value or a state (or of its class), which their base classes make dataclasses of."""
+    return [field.name for field in dataclasses.fields(thing)]
+
+
 def encode_state(state: State) -> dict[str, Any]:
     """A state's fields as plain data for `encode`. Dataclasses inside a state must be Values."""
-    return {f.name: getattr(state, f.name) for f in dataclasses.fields(state)}  # type: ignore[arg-type]
+    return {name: getattr(state, name) for name in field_names(state)}
 
 
 def restore_state(state: State, fields: dict[str, Any]) -> None:
     """Put decoded fields back into a fresh state. Raises `BadEncoding` where the names have changed."""
-    names = {f.name for f in dataclasses.fields(state)}  # type: ignore[arg-type]
+    names = set(field_names(state))
     if names != set(fields):
         raise BadEncoding(f"{type(state).__qualname__} has fields {sorted(names)}, the file has {sorted(fields)}")
     for name, value in fields.items():

@@ -308,7 +308,7 @@ def _usable(front: CachedFront | None) -> CachedFront | None:
 def _keep_front(engine: Engine, front: CachedFront | None, cache: Cache | None, seed: int) -> None:
     if cache is not None and front is not None and front.key and front.replay is None:
         spool = engine.spools["front"]
-        spool.size  # noqa: B018 - hands what is buffered to the operating system
+        spool.flush()
         keep(front, cache, seed, spool.path, {name: engine.calls[name].ctx.notes() for name in sorted(front.nodes)})
 
 

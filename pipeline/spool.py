@@ -23,10 +23,14 @@ class Spool(Sequence[Any]):
         self._file = path.open("a+b")
         self._offsets: list[int] | None = None
 
+    def flush(self) -> None:
+        """Hand what is buffered to the operating system."""
+        self._file.flush()
+
     @property
     def size(self) -> int:
         """Length in bytes, with everything handed to the operating system."""
-        self._file.flush()
+        self.flush()
         self._file.seek(0, 2)
         return self._file.tell()
 
