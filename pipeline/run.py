@@ -419,6 +419,8 @@ def resume(folder: Path, progress: Any = None) -> tuple[Run, dict[str, Any]]:
     if not manifest_file.is_file() or not config_file.is_file():
         raise BadInput(f"{folder}: not a run folder (no manifest.json and config.yaml); `ls runs` shows what there is")
     run = Run(folder.resolve(), json.loads(manifest_file.read_text()))
+    for half_written in folder.glob("*.part"):  # by the process that was killed; it is written anew
+        half_written.unlink()
     if run.manifest["status"] == "complete":
         shutil.rmtree(run.memory, ignore_errors=True)
         return run, json.loads((folder / "metrics.json").read_text())

@@ -17,8 +17,9 @@ Command = Callable[..., subprocess.CompletedProcess[str]]
 
 @pytest.fixture(scope="session")
 def shared_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A cache folder that all tests of a session share, in whichever process they run."""
-    return tmp_path_factory.getbasetemp().parent / "omninav-cache"
+    """A cache folder that all tests of a session share, in whichever process they run, and none of another session."""
+    place = tmp_path_factory.getbasetemp()
+    return (place.parent if "PYTEST_XDIST_WORKER" in os.environ else place) / "omninav-cache"
 
 
 @pytest.fixture

@@ -42,6 +42,7 @@ def test_a_killed_run_resumes_to_the_same_bytes(tmp_path: Path, demo: Path, shar
         if process.poll() is None:
             stop(process)
             kills += 1
+            (runs / "latest" / "result.mcap.1.part").write_bytes(b"half")  # as if killed while that file was written
             process = start(tmp_path, "resume", "runs/latest")
     assert kills > 0
     assert process.wait() == 0
