@@ -18,7 +18,7 @@ from typing import Any
 import yaml
 
 from .artifact import Cache, read_artifact, read_header, write_artifact
-from .catalog import UnknownStage, resolve
+from .catalog import UnknownStage, entries, resolve
 from .engine import Engine, StageFailed
 from .files import digest_file, digest_text, write_whole
 from .front import CachedFront, cached_front, keep, seeded
@@ -89,6 +89,10 @@ def plan(config: Mapping[str, Any]) -> Plan:
         graph = build(config, types)
     except ProblemsFound as found:
         problems += found.problems
+    for made in artifacts if graph is not None else ():
+        if made.file is not None and graph is not None:
+            alike = config["artifacts"][made.name].get("alike") or ()
+            problems += unlike(made.name, read_header(made.file)["facts"].get("stages") or {}, graph, alike)
     saves = config.get("saves") or {}
     for name, origin in saves.items() if graph is not None else ():
         port = graph.port(str(origin)) if graph is not None else None
@@ -134,6 +138,39 @@ def _plan_artifact(name: str, spec: Any) -> ArtifactPlan:
             [Problem(f"{where}.from", f"there is no output '{origin}'", suggest(origin, outputs, "outputs"))]
         )
     return ArtifactPlan(name, graph=graph.leading_to([origin]), origin=origin, variant=str(spec.get("variant")))
+
+
+def stages_of(graph: Graph) -> dict[str, Any]:
+    """Class and parameters of every node but the source, as plain data: what a file says of the graph that made it."""
+    found = {}
+    for node in graph.nodes.values():
+        if not node.signature.is_source:
+            parameters = {name: getattr(node.stage, name) for name in node.signature.parameters}
+            found[node.name] = {"_target_": node.target, **json.loads(json.dumps(parameters, default=str))}
+    return found
+
+
+def unlike(name: str, made_by: Mapping[str, Any], graph: Graph, alike: Sequence[str]) -> Iterator[Problem]:
+    """Where an artifact's file was made by other stages than this graph has, among the nodes that must be alike.
+
+    `made_by` is what `stages_of` gave then. What it does not know (an older file) is not compared.
+    """
+    present = stages_of(graph)
+    for node in alike:
+        then, now = made_by.get(node), present.get(node)
+        if then is None or now is None:
+            continue
+        again = f"or learn the {name} anew (tour=LOG instead of {name}=FILE)"
+        before, after = (spec["_target_"].replace(":", ".").rpartition(".")[2] for spec in (then, now))
+        if before != after:
+            what = f"it was made with {before} as '{node}', and this run has {after}"
+            same = next((entry for entry in entries() if entry.target == then["_target_"]), None)
+            use = f"type {same.name.replace('.', '=', 1)}" if same else f"give that stage: {then['_target_']}"
+            yield Problem(name, what, f"{use}, {again}")
+            continue
+        for key in [key for key in then if key in now and key != "_target_" and then[key] != now[key]]:
+            what = f"it was made with nodes.{node}.{key}={then[key]}, and this run has {now[key]}"
+            yield Problem(name, what, f"type nodes.{node}.{key}={then[key]}, {again}")
 
 
 @dataclass
@@ -237,7 +274,11 @@ def _execute(run: Run, planned: Plan, progress: Any) -> dict[str, Any]:
     for name, origin in planned.saves.items():
         value = last[origin]
         if isinstance(value, Value):
-            write_artifact(run.folder / f"{name}.omap", value, {"variant": planned.variant})
+            write_artifact(
+                run.folder / f"{name}.omap",
+                value,
+                _provenance(planned.graph.leading_to([origin]), engine, planned.variant),
+            )
     return _finish(run, planned, engine, front)
 
 
@@ -249,7 +290,8 @@ def _artifact(
     if artifact.file is not None:
         value = read_artifact(artifact.file)
         shutil.copyfile(artifact.file, target)
-        return value, {"file": str(artifact.file), "sha256": digest_file(target), "said": "loaded from a file"}
+        loaded = {"file": str(artifact.file), "sha256": digest_file(target), "said": "loaded from a file"}
+        return value, {**loaded, **read_header(artifact.file)["facts"]}
     graph = artifact.graph
     assert graph is not None
     place = cache or Cache(run.memory / "artifacts")
@@ -298,7 +340,13 @@ def _make(
         raise BadInput(
             f"'{artifact.variant}' ran to its end and gave no {artifact.name}: was there anything usable in its log?"
         )
-    return value, {**_notes(engine), "variant": artifact.variant}, any(call.ctx.drew for call in engine.calls.values())
+    drew = any(call.ctx.drew for call in engine.calls.values())
+    return value, _provenance(graph, engine, artifact.variant), drew
+
+
+def _provenance(graph: Graph, engine: Engine, variant: str) -> dict[str, Any]:
+    """How an artifact was made, for its file's header: what was dropped and stated, the variant, and its stages."""
+    return {**_notes(engine), "variant": variant, "stages": stages_of(graph)}
 
 
 def _usable(front: CachedFront | None) -> CachedFront | None:

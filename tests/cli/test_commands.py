@@ -123,6 +123,24 @@ def test_a_damaged_map_is_refused_by_name(omninav, demo: Path, tmp_path: Path):
         assert "Traceback" not in ended.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "what", "type_"),
+    [
+        (("features=mean_rgb",), "made with HsvHistogram as 'features'", "type features=hsv_histogram"),
+        (("nodes.features.segments=18",), "made with nodes.features.segments=36", "type nodes.features.segments=36"),
+    ],
+)
+def test_a_map_of_other_features_is_refused_before_a_folder_is_made(
+    omninav, demo: Path, tmp_path: Path, words, what: str, type_: str
+):
+    ended = omninav(f"map={demo / 'map.omap'}", *words)
+    assert ended.returncode == 2
+    assert what in ended.stderr
+    assert type_ in ended.stderr
+    assert list(tmp_path.iterdir()) == []
+    omninav("check", f"map={demo / 'map.omap'}", *words, "artifacts.map.alike=[]", check=True)
+
+
 def test_stages_lists_ports_parameters_and_source(omninav):
     listed = omninav("stages", check=True).stdout
     selective = listed.partition("match.selective")[2].partition("\n\n")[0]
