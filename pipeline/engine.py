@@ -28,12 +28,13 @@ class StageFailed(Exception):
 
 
 class Front(Protocol):
-    """The cached front of a graph: what its boundary gave, tick by tick (see `front.py`)."""
+    """The front of a graph: what its boundary gave, tick by tick, and before the loop (see `front.py`)."""
 
     nodes: frozenset[str]
     boundary: tuple[str, ...]
     replay: Sequence[Mapping[str, Any]] | None
     notes: Mapping[str, Mapping[str, Any]]
+    before: Mapping[str, Any]
 
 
 class Present(Sequence[Any]):
@@ -124,7 +125,8 @@ class Engine:
 
     `artifacts` are the static values that wires name `artifacts.x`. `folder` is where "after" stages may write;
     `memory` is where checkpoints and spools live (None: nothing is kept, and nothing can be collected). `wanted` are
-    outputs whose last value is returned by `run`.
+    outputs whose last value is returned by `run`. `recorded` outputs are spooled together, tick by tick, under the name
+    `shared`.
     """
 
     def __init__(
@@ -139,6 +141,7 @@ class Engine:
         every_s: float = 5.0,
         front: Front | None = None,
         progress: Callable[[int, int | None], None] = lambda done, total: None,
+        recorded: Sequence[str] = (),
     ) -> None:
         self.graph, self.memory, self.wanted, self.every_s = graph, memory, wanted, every_s
         self.identity, self.front, self.progress = identity, front, progress
@@ -158,11 +161,15 @@ class Engine:
         }
         self.kept |= {origin for origin in wanted if origin.partition(".")[0] in ticking}
         self.spools: dict[str, Spool] = {}
+        self.together: dict[str, tuple[str, ...]] = {}
         if memory is not None:
             collected = {wire.origin for wire in graph.wires if wire.collect and wire.from_node in ticking}
             self.spools = {origin: Spool(memory / f"{origin}.spool") for origin in sorted(collected)}
             if front is not None and front.replay is None:
-                self.spools["front"] = Spool(memory / "front.spool")
+                self.together["front"] = tuple(front.boundary)
+            if recorded:
+                self.together["shared"] = tuple(recorded)
+            self.spools |= {name: Spool(memory / f"{name}.spool") for name in self.together}
         self.ticks = 0
         self.ended = False
 
@@ -173,7 +180,10 @@ class Engine:
             if name not in replaying:
                 call.node.stage.setup(call.ctx)
         for node in self.graph.of_lifetime("before"):
-            self.calls[node.name].run(self.values)
+            if node.name not in replaying:
+                self.calls[node.name].run(self.values)
+        if replaying and self.front is not None:
+            self.values.update(self.front.before)
         self._fill_channels()
         self._resume()
         for name in replaying:
@@ -240,7 +250,8 @@ class Engine:
                 value = channel.waiting[-1]
             channel.waiting.append(value)
         for origin, spool in self.spools.items():
-            spool.append(values[origin] if origin != "front" else {key: values[key] for key in self.front.boundary})  # type: ignore[union-attr]
+            together = self.together.get(origin)
+            spool.append(values[origin] if together is None else {key: values[key] for key in together})
         self.ticks += 1
 
     def _fill_channels(self) -> None:

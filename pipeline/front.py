@@ -32,10 +32,15 @@ class CachedFront:
     said: str
     replay: Sequence[Mapping[str, Any]] | None = None
     notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    before: Mapping[str, Any] = field(default_factory=dict)
 
 
-def front_nodes(graph: Graph) -> frozenset[str]:
-    """The names of the front's nodes; empty where the source listens to the graph (a simulator in a closed loop)."""
+def front_nodes(graph: Graph, artifacts: bool = False) -> frozenset[str]:
+    """The names of the front's nodes; empty where the source listens to the graph (a simulator in a closed loop).
+
+    With `artifacts`, what follows from the logs and the artifacts: the front that runs share which differ in their
+    seed only.
+    """
     source = graph.source
     if source is None or graph.inputs_of(source.name):
         return frozenset()
@@ -45,12 +50,22 @@ def front_nodes(graph: Graph) -> frozenset[str]:
         wires = graph.inputs_of(node.name)
         ready = all(
             not w.delay
-            and (w.from_node in front or (w.from_node in before and not _draws_on_artifacts(graph, w.from_node)))
+            and (
+                w.from_node in front
+                or (artifacts and w.from_node == ARTIFACTS)
+                or (w.from_node in before and (artifacts or not _draws_on_artifacts(graph, w.from_node)))
+            )
             for w in wires
         )
         if wires and ready:
             front.add(node.name)
     return frozenset(front)
+
+
+def front_boundary(graph: Graph, nodes: frozenset[str]) -> list[str]:
+    """What other nodes read of the front, and the source's tick."""
+    read = {wire.origin for wire in graph.wires if wire.from_node in nodes and wire.to_node not in nodes}
+    return sorted(read | ({f"{graph.source.name}.tick"} if graph.source else set()))
 
 
 def _draws_on_artifacts(graph: Graph, name: str) -> bool:
@@ -80,7 +95,7 @@ def cached_front(graph: Graph, cache: Cache | None, seed: int) -> Iterator[Cache
         yield None
         return
     readers = [wire for wire in graph.wires if wire.from_node in nodes and wire.to_node not in nodes]
-    boundary = sorted({wire.origin for wire in readers} | {f"{graph.source.name}.tick"})
+    boundary = front_boundary(graph, nodes)
     bulky = [origin for origin in boundary if getattr(getattr(graph.port(origin), "type", None), "bulky", False)]
     if bulky:
         who = ", ".join(sorted({wire.to_node for wire in readers if wire.origin == bulky[0]}))

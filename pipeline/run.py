@@ -251,7 +251,7 @@ def _execute(run: Run, planned: Plan, progress: Any) -> dict[str, Any]:
     artifacts: dict[str, Value] = {}
     made: dict[str, Any] = {}
     for artifact in planned.artifacts:
-        artifacts[artifact.name], made[artifact.name] = _artifact(run, artifact, seed, cache, every_s, progress)
+        artifacts[artifact.name], made[artifact.name] = obtain(run, artifact, seed, cache, every_s, progress)
     run.manifest["artifacts"] = made
     run.save()
     identity = _identity(planned.graph, seed, *(fact["sha256"] for fact in made.values()))
@@ -282,7 +282,7 @@ def _execute(run: Run, planned: Plan, progress: Any) -> dict[str, Any]:
     return _finish(run, planned, engine, front)
 
 
-def _artifact(
+def obtain(
     run: Run, artifact: ArtifactPlan, seed: int, cache: Cache | None, every_s: float, progress: Any
 ) -> tuple[Value, dict[str, Any]]:
     """The artifact's value, from its file, the cache or its graph's run, with what the manifest says of it."""
@@ -295,7 +295,7 @@ def _artifact(
     graph = artifact.graph
     assert graph is not None
     place = cache or Cache(run.memory / "artifacts")
-    key = digest_text("artifact", graph.digest(), artifact.origin, *_digests_of(graph).values())
+    key = digest_text("artifact", graph.digest(), artifact.origin, *digests_of(graph).values())
     with place.lock(key):
         found = next((path for k in (key, seeded(key, seed)) if (path := place.path(k, ".omap")).exists()), None)
         said = "found: the same graph over the same log had made it before"
@@ -346,7 +346,7 @@ def _make(
 
 def _provenance(graph: Graph, engine: Engine, variant: str) -> dict[str, Any]:
     """How an artifact was made, for its file's header: what was dropped and stated, the variant, and its stages."""
-    return {**_notes(engine), "variant": variant, "stages": stages_of(graph)}
+    return {**notes_of(engine), "variant": variant, "stages": stages_of(graph)}
 
 
 def _usable(front: CachedFront | None) -> CachedFront | None:
@@ -360,7 +360,7 @@ def _keep_front(engine: Engine, front: CachedFront | None, cache: Cache | None, 
         keep(front, cache, seed, spool.path, {name: engine.calls[name].ctx.notes() for name in sorted(front.nodes)})
 
 
-def _notes(engine: Engine) -> dict[str, Any]:
+def notes_of(engine: Engine) -> dict[str, Any]:
     """What the stages counted and stated, as the manifest holds it."""
     dropped: dict[str, Any] = {}
     facts: dict[str, Any] = {}
@@ -390,7 +390,7 @@ def _finish(run: Run, planned: Plan, engine: Engine, front: CachedFront | None) 
                     figures.append(value)
                 elif isinstance(value, Table):
                     tables.append(value)
-    notes = _notes(engine)
+    notes = notes_of(engine)
     timing = stage_times(engine)
     write_whole(run.folder / "metrics.json", json.dumps(metrics, indent=1, sort_keys=True) + "\n")
     write_whole(run.folder / "timing.json", json.dumps(timing, indent=1) + "\n")
@@ -487,22 +487,22 @@ def resume(folder: Path, progress: Any = None) -> tuple[Run, dict[str, Any]]:
 
 def input_digests(planned: Plan) -> dict[str, str]:
     """The content hash of every file that the run reads, by node. Raises `BadInput` where one cannot be read."""
-    digests = _digests_of(planned.graph)
+    digests = digests_of(planned.graph)
     for artifact in planned.artifacts:
         if artifact.graph is not None:
-            digests |= {f"{artifact.name}.{name}": digest for name, digest in _digests_of(artifact.graph).items()}
+            digests |= {f"{artifact.name}.{name}": digest for name, digest in digests_of(artifact.graph).items()}
         elif artifact.file is not None:
             digests[artifact.name] = digest_file(artifact.file)
     return digests
 
 
-def _digests_of(graph: Graph) -> dict[str, str]:
+def digests_of(graph: Graph) -> dict[str, str]:
     found = {node.name: node.stage.inputs_digest() for node in graph.nodes.values()}
     return {name: digest for name, digest in found.items() if digest is not None}
 
 
 def _identity(graph: Graph, seed: int, *more: str) -> str:
-    return digest_text(graph.digest(), str(seed), *_digests_of(graph).values(), *more)
+    return digest_text(graph.digest(), str(seed), *digests_of(graph).values(), *more)
 
 
 def _stepper(progress: Any, name: str) -> Any:
