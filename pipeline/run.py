@@ -377,19 +377,7 @@ def notes_of(engine: Engine) -> dict[str, Any]:
 def _finish(run: Run, planned: Plan, engine: Engine, front: CachedFront | None) -> dict[str, Any]:
     from .report import write_report
 
-    metrics: dict[str, Any] = {}
-    figures: list[Figure] = []
-    tables: list[Table] = []
-    for node in planned.graph.nodes.values():
-        for port in node.signature.outputs:
-            origin = f"{node.name}.{port}"
-            for value in _flat(engine.values.get(f"{origin}#held", engine.values.get(origin))):
-                if isinstance(value, Metrics):
-                    merge(metrics, value.values)
-                elif isinstance(value, Figure):
-                    figures.append(value)
-                elif isinstance(value, Table):
-                    tables.append(value)
+    metrics, figures, tables = results_of(engine)
     notes = notes_of(engine)
     timing = stage_times(engine)
     write_whole(run.folder / "metrics.json", json.dumps(metrics, indent=1, sort_keys=True) + "\n")
@@ -417,6 +405,24 @@ def _finish(run: Run, planned: Plan, engine: Engine, front: CachedFront | None) 
         spool.close()
     shutil.rmtree(run.memory, ignore_errors=True)
     return metrics
+
+
+def results_of(engine: Engine) -> tuple[dict[str, Any], list[Figure], list[Table]]:
+    """What the stages of a graph that has run gave as results: metrics merged into one, figures, tables."""
+    metrics: dict[str, Any] = {}
+    figures: list[Figure] = []
+    tables: list[Table] = []
+    for node in engine.graph.nodes.values():
+        for port in node.signature.outputs:
+            origin = f"{node.name}.{port}"
+            for value in _flat(engine.values.get(f"{origin}#held", engine.values.get(origin))):
+                if isinstance(value, Metrics):
+                    merge(metrics, value.values)
+                elif isinstance(value, Figure):
+                    figures.append(value)
+                elif isinstance(value, Table):
+                    tables.append(value)
+    return metrics, figures, tables
 
 
 def _map_facts(artifact: Mapping[str, Any]) -> dict[str, Any]:
@@ -497,6 +503,7 @@ def input_digests(planned: Plan) -> dict[str, str]:
 
 
 def digests_of(graph: Graph) -> dict[str, str]:
+    """The content hash of the files that each node of a graph reads, where it reads any."""
     found = {node.name: node.stage.inputs_digest() for node in graph.nodes.values()}
     return {name: digest for name, digest in found.items() if digest is not None}
 
