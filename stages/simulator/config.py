@@ -1,6 +1,8 @@
-"""What a world is made of, as typed configuration. `WorldConfig()` is the embedded demo, a small home store.
+"""What a world is made of, as typed configuration. `WorldConfig()` is an empty hall, `demo.DEMO` a small home store.
 
-Metres and radians in the map frame (x right and y up on the map, z up, the floor at 0) unless a field says otherwise.
+Bodies are listed one by one (shelves, blocks, hangings, lamps) or by the dozen (aisle blocks, rooms, a lamp grid);
+`layout.expand` turns these into such lists. Metres and radians in the map frame (x right and y up on the map, z up, the
+floor at 0) unless a field says otherwise.
 """
 
 from dataclasses import dataclass, field
@@ -27,6 +29,26 @@ Material = Literal[
     "poster",
     "carton",
     "goods",
+    "plaster",
+    "brick",
+    "facade",
+    "carpet",
+    "parquet",
+    "linoleum",
+    "asphalt",
+    "paving",
+    "grass",
+    "hedge",
+    "leaves",
+    "bark",
+    "sky",
+    "curtain",
+    "books",
+    "cabinet",
+    "steel",
+    "fabric",
+    "screen",
+    "board",
 ]
 """What a face may look like; `textures.MATERIALS` draws them."""
 
@@ -43,6 +65,8 @@ class Shelf:
     yaw: float = 0.0
     stock: bool = True
     """Cartons stand on top."""
+    department: str = ""
+    """Whose goods stand here: shelves of one department choose among the same few."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +80,10 @@ class Block:
     top: Material = "wood"
     bottom_z: float = 0.0
     yaw: float = 0.0
+    bottom: Material | None = None
+    """Look of its underside; that of its top where null."""
+    look: str = ""
+    """Bodies of one material and one look are alike; every body has its own where it is empty."""
 
 
 @dataclass(frozen=True)
@@ -78,13 +106,134 @@ class Lamp:
     centre: Point
     size: Point = (1.2, 0.3)
     light: tuple[float, float, float] = (0.96, 1.0, 1.0)
+    z: float | None = None
+    """Height (m) that it hangs at; under the ceiling where null."""
+    name: str = ""
+    """What switches it: the name of its room, or its own."""
+
+
+@dataclass(frozen=True)
+class LampGrid:
+    """Lamps all over the hall, the same distances apart in x and in y."""
+
+    spacing: Point = (3.0, 3.0)
+    size: Point = (1.2, 0.3)
+    light: tuple[float, float, float] = (0.96, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class AisleBlock:
+    """Rows of shelves with aisles between them: they fill a rectangle, and aisles take what the shelves leave.
+
+    `cross_aisles` cut all rows, as wide as an aisle. Each stretch between two rows is an aisle; of the inner ones a
+    share `dead_ends` is closed by a shelf at one end, drawn by the seed.
+    """
+
+    corner: Point
+    """Lower left."""
+    size: Point
+    name: str = ""
+    along: Literal["x", "y"] = "y"
+    """Which way the aisles run."""
+    aisle: Positive = 2.0
+    """Least width of an aisle."""
+    depth: Positive = 1.0
+    height: Positive = 2.0
+    levels: Annotated[int, Bounds(ge=1)] = 4
+    stock: bool = True
+    cross_aisles: Annotated[int, Bounds(ge=0)] = 0
+    dead_ends: Share = 0.0
+    pillars: Spread = 0.0
+    """Distance of pillars that stand in every other row; none where 0."""
+    department: str = ""
+    """Whose goods they hold; the block's own where empty."""
+
+
+Side = Literal["east", "north", "west", "south"]
+Furniture = Literal[
+    "none", "office", "meeting", "kitchen", "lab", "lounge", "library", "store", "copy", "lobby", "trees", "park"
+]
+
+
+@dataclass(frozen=True)
+class Door:
+    """A way through a wall of a room and whatever wall lies behind: its middle is `at` m from the wall's low end."""
+
+    side: Side
+    at: float
+    width: Positive = 1.0
+    leaf: bool = True
+    """A leaf opens and closes it; else it is a mere opening."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """A named rectangle: inner walls with doors and windows, its own floor, furniture along the walls, lamps.
+
+    Without walls it is a part of the hall or of the open: a corridor, a lawn.
+    """
+
+    name: str
+    corner: Point
+    size: Point
+    doors: tuple[Door, ...] = ()
+    windows: tuple[Side, ...] = ()
+    """Sides with a row of windows; each has a curtain."""
+    furniture: Furniture = "none"
+    amount: Share = 0.6
+    """Share of the places for furniture that are taken."""
+    walls: bool = True
+    wall: Material = "plaster"
+    facade: Material | None = None
+    """Look of the walls from outside, where the room stands in the open."""
+    floor: Material | None = None
+    """The hall's where null."""
+    height: float | None = None
+    """Of a ceiling of its own; the hall's where null."""
+    lamps: Spread = 2.5
+    """Distance between its lamps; none where 0."""
 
 
 @dataclass(frozen=True)
 class Route:
-    """Waypoints that the robot is steered along, one after the other; it starts at the first, facing the second."""
+    """A way through a world; `tours.plan` makes it a line of points around whatever stands in between.
 
-    waypoints: tuple[Point, ...]
+    `waypoints` goes through the given points, `laps` round them. `aisles` goes through every aisle of the blocks named
+    in `through` (all where empty), `rooms` to every room named there that can be reached, `random` from one free
+    place to another. The robot starts at the first point, facing the second.
+    """
+
+    waypoints: tuple[Point, ...] = ()
+    """Of a tour that finds its own way, only the first is kept: where it starts."""
+    kind: Literal["waypoints", "aisles", "laps", "rooms", "random"] = "waypoints"
+    through: tuple[str, ...] = ()
+    laps: Annotated[int, Bounds(ge=1)] = 1
+    """Of `laps`: times around; of `aisles`: times through each, there and back by turns."""
+    length: Positive | None = None
+    """Metres after which it ends; all the way where null."""
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Day:
+    """What a day is like. Goods are rearranged against the seed's order, furniture is shifted by about `furniture` m.
+
+    Which goods, doors, curtains or lamps it hits follows from the world's seed and the day's number.
+    """
+
+    people: Annotated[int, Bounds(ge=0)] = 0
+    """Walkers in the whole world."""
+    rearranged: Share = 0.0
+    """Share of the shelves' compartments that hold something else."""
+    furniture: Spread = 0.0
+    light: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Factors of all light: blue, green, red."""
+    lamps_off: Share | tuple[str, ...] = 0.0
+    """Share of the lamps, or the names of lamps or rooms."""
+    curtains: Share = 0.0
+    """Share of the windows whose curtains are closed."""
+    doors: Share = 1.0
+    """Share of the doors that are open."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +249,8 @@ class Robot:
     """Distance (m) along the route of the point that is steered for."""
     wander: Spread = 0.04
     """Spread (m) by which each day's line misses the inner waypoints."""
+    contact: Literal["slide", "hold"] = "slide"
+    """What a robot does that is steered into an obstacle: it slides along it, or is held where it is."""
 
 
 @dataclass(frozen=True)
@@ -120,6 +271,9 @@ class OdometryNoise:
     """Share by which rotation is misjudged."""
     turn_bias: Spread = 0.0044
     """Rotation (rad) added per metre, 0.25 degrees."""
+    added: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Noise on top, as in Wolf, Burgard & Burkhardt 2005: mm per sqrt(m), degrees per sqrt(360 degrees) and per
+    sqrt(m); `conf/odometry_noise` holds their nine levels."""
 
 
 @dataclass(frozen=True)
@@ -158,94 +312,84 @@ class Timing:
     odometry: Positive = 20.0
 
 
-def _shelves() -> tuple[Shelf, ...]:
-    return (
-        Shelf(centre=(3.7, 2.9), length=3.2, depth=1.0),
-        Shelf(centre=(7.7, 2.9), length=2.8, depth=1.0, height=1.5, levels=3),
-        Shelf(centre=(3.5, 6.1), length=2.8, depth=1.0, height=1.5, levels=3),
-        Shelf(centre=(7.5, 6.1), length=3.2, depth=1.0),
-        Shelf(centre=(5.6, 8.8), length=4.8, depth=0.4, height=2.2, levels=5, stock=False),
-    )
+@dataclass(frozen=True)
+class Ranges:
+    """A ring of range readings like ultrasound: the nearest echo within each cone, from the robot's middle.
+
+    The first looks backwards, the others follow counter-clockwise at equal steps.
+    """
+
+    readings: Annotated[int, Bounds(ge=1)] = 16
+    beam: Positive = 0.26
+    """Opening angle (rad) of a cone, 15 degrees."""
+    farthest: Positive = 4.0
+    """Metres; there is no echo from further away."""
+    noise: Spread = 0.01
+    """Standard deviation (m) of an echo."""
+    lost: Share = 0.02
+    """Share of readings without an echo though something is there."""
+    rate: Positive = 10.0
+    """Readings (Hz) of the whole ring in a log."""
 
 
-def _blocks() -> tuple[Block, ...]:
-    return (
-        Block(centre=(10.6, 3.0), size=(0.4, 0.4), height=3.2, material="concrete"),
-        Block(centre=(10.6, 6.1), size=(0.4, 0.4), height=3.2, material="stripes"),
-        Block(centre=(11.4, 1.6), size=(0.6, 1.8), height=1.0, material="counter"),
-        Block(centre=(0.45, 6.6), size=(0.6, 1.2), height=0.8, material="wood"),
-        Block(centre=(11.3, 7.9), size=(0.9, 0.9), height=0.55, material="carton", yaw=0.35),
-        Block(centre=(1.2, 4.5), size=(1.4, 1.4), height=0.01, top="mat"),
-    )
+@dataclass(frozen=True)
+class Delivery:
+    """What happens to pictures on their way into the log: a share is lost, a share arrives `late_by` seconds late."""
+
+    dropped: Share = 0.0
+    late: Share = 0.0
+    late_by: Spread = 0.7
 
 
-def _hangings() -> tuple[Hanging, ...]:
-    east, north, west, south = 0.0, 1.5707963267948966, 3.141592653589793, -1.5707963267948966
-    return (
-        Hanging((0.0, 1.9), east, 1.0, 0.0, 2.1, "door"),
-        Hanging((0.0, 4.2), east, 1.2, 1.0, 1.0),
-        Hanging((0.0, 8.0), east, 0.8, 1.1, 1.1),
-        Hanging((1.6, 0.0), north, 1.0, 1.0, 1.2),
-        Hanging((3.6, 0.0), north, 1.4, 1.1, 0.9),
-        Hanging((5.4, 0.0), north, 0.8, 0.9, 1.3),
-        Hanging((7.6, 0.0), north, 1.6, 0.8, 1.4, "window"),
-        Hanging((9.9, 0.0), north, 1.0, 0.0, 2.1, "door"),
-        Hanging((12.0, 3.6), west, 1.2, 1.1, 1.2),
-        Hanging((12.0, 5.6), west, 1.8, 0.0, 2.2, "door"),
-        Hanging((1.4, 9.0), south, 1.0, 1.0, 1.3),
-        Hanging((9.4, 9.0), south, 1.4, 0.9, 1.2, "window"),
-        Hanging((10.9, 9.0), south, 0.7, 1.2, 1.0),
-    )
+@dataclass(frozen=True)
+class Event:
+    """Somebody lifts the robot, `at` seconds into a drive; odometry does not see it.
 
+    It is put down where it was, or at `to` (x, y, heading: a kidnapping), turned by `turn` (rad).
+    """
 
-def _lamps() -> tuple[Lamp, ...]:
-    return tuple(Lamp(centre=(x, y)) for y in (1.3, 4.5, 7.6) for x in (1.5, 4.5, 7.5, 10.5))
-
-
-def _routes() -> dict[str, Route]:
-    return {
-        "tour": Route(
-            waypoints=(
-                (1.2, 1.2),
-                (9.4, 1.2),
-                (9.75, 4.0),
-                (9.2, 4.5),
-                (1.5, 4.5),
-                (1.25, 5.2),
-                (1.4, 7.2),
-                (2.0, 7.6),
-                (9.0, 7.6),
-                (9.75, 6.8),
-                (9.5, 4.9),
-            )
-        ),
-        "drive": Route(
-            waypoints=((2.4, 1.5), (9.0, 1.5), (9.7, 2.4), (9.75, 6.6), (9.0, 7.3), (2.2, 7.3), (1.5, 6.4), (1.7, 5.0))
-        ),
-    }
+    at: Positive
+    turn: float = 0.0
+    to: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)
 class WorldConfig:
     """A world: one hall of `size` with what stands in it, the robot that drives there and what it perceives.
 
-    `seed` decides goods, textures, the line of each day and all noise. On day 0 the goods stand as the seed places
-    them; on another day a share `rearranged` of the shelves' compartments holds something else.
+    `seed` decides goods, textures, the line of each day and all noise. Day k is like `days[k]`, and days after the last
+    are like the last. A ceiling of material `sky` is none: the world lies in the open, and rooms have roofs.
     """
 
-    name: str = "home_store_demo"
+    name: str = "empty"
     seed: int = 1
     size: Point = (12.0, 9.0)
     height: Positive = 3.2
-    shelves: tuple[Shelf, ...] = field(default_factory=_shelves)
-    blocks: tuple[Block, ...] = field(default_factory=_blocks)
-    hangings: tuple[Hanging, ...] = field(default_factory=_hangings)
-    lamps: tuple[Lamp, ...] = field(default_factory=_lamps)
+    wall: Material = "wall"
+    floor: Material = "floor"
+    ceiling: Material = "ceiling"
+    aisle_blocks: tuple[AisleBlock, ...] = ()
+    rooms: tuple[Room, ...] = ()
+    lamp_grid: LampGrid | None = None
+    shelves: tuple[Shelf, ...] = ()
+    blocks: tuple[Block, ...] = ()
+    hangings: tuple[Hanging, ...] = ()
+    lamps: tuple[Lamp, ...] = ()
     ambient: Spread = 0.45
-    rearranged: Share = 0.1
-    routes: dict[str, Route] = field(default_factory=_routes)
+    goods: Annotated[int, Bounds(ge=1)] = 56
+    """Different goods in the whole world."""
+    assortment: Annotated[int, Bounds(ge=1)] = 56
+    """Different goods that one department has."""
+    days: tuple[Day, ...] = (Day(), Day(rearranged=0.1))
+    routes: dict[str, Route] = field(default_factory=dict)
     robot: Robot = Robot()
     odometry: OdometryNoise = OdometryNoise()
     camera: MirrorCamera = MirrorCamera()
     sensor: Sensor = Sensor()
     timing: Timing = Timing()
+    ranges: Ranges = Ranges()
+    delivery: Delivery = Delivery()
+
+    def day(self, number: int) -> Day:
+        """What day `number` (from 0) is like."""
+        return self.days[min(number, len(self.days) - 1)] if self.days else Day()

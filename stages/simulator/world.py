@@ -1,7 +1,6 @@
 """A world on one day: its bodies, its textures and lights as a scene to render, and where there is room to drive."""
 
 import math
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -11,6 +10,7 @@ import numpy.typing as npt
 
 from . import textures
 from .config import Block, Hanging, Shelf, WorldConfig
+from .layout import expand, stream
 from .renderer import Scene
 
 F64 = npt.NDArray[np.float64]
@@ -22,8 +22,6 @@ LOW = 0.03
 """What is no higher (m) can be driven over."""
 HEADROOM = 1.4
 """What hangs higher (m) can be driven under."""
-GOODS = 56
-"""Textures of goods in a world; a shelf's compartments choose among them."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +49,6 @@ class Box:
     faces: tuple[Tiling, Tiling, Tiling, Tiling, Tiling, Tiling]
 
 
-def stream(seed: int, *names: str | int) -> np.random.Generator:
-    """A generator of its own for each purpose: no draw for one thing can change another."""
-    return np.random.default_rng([seed, *(zlib.crc32(str(name).encode()) for name in names)])
-
-
 @lru_cache(maxsize=256)
 def _drawn(seed: int, material: str, name: str) -> npt.NDArray[np.uint8]:
     """A texture, drawn once for all days of a world."""
@@ -73,16 +66,17 @@ class World:
     def __init__(self, config: WorldConfig, day: int = 0) -> None:
         self.config = config
         self.day = day
+        self.layout = expand(config, day)
         self._textures: list[npt.NDArray[np.uint8]] = []
         self._glow: list[float] = []
         self._named: dict[tuple[str, str], int] = {}
-        self._goods = [self._texture("goods", f"goods {k}") for k in range(GOODS)]
+        self._goods = [self._texture("goods", f"goods {k}") for k in range(config.goods)]
         self.boxes: list[Box] = [
             *self._walls(),
-            *(box for k, shelf in enumerate(config.shelves) for box in self._shelf(shelf, k)),
-            *(self._block(block, k) for k, block in enumerate(config.blocks)),
-            *(self._hanging(hanging, k) for k, hanging in enumerate(config.hangings)),
-            *(self._lamp(k) for k in range(len(config.lamps))),
+            *(box for k, shelf in enumerate(self.layout.shelves) for box in self._shelf(shelf, k)),
+            *(self._block(block, k) for k, block in enumerate(self.layout.blocks)),
+            *(self._hanging(hanging, k) for k, hanging in enumerate(self.layout.hangings)),
+            *(self._lamp(k) for k in range(len(self.layout.lamps))),
         ]
         self.floor = self._ground("floor", 6)
         self.ceiling = self._ground("ceiling", 6)
@@ -143,16 +137,24 @@ class World:
     def _goods_on(self, shelf: Shelf, number: int) -> list[I64]:
         """Textures (levels, compartments) on each of a shelf's four sides, about one compartment a metre."""
         rng = stream(self.config.seed, "goods", number)
+        here = self._assortment(shelf.department)
         sides = []
         for extent in (shelf.depth, shelf.depth, shelf.length, shelf.length):
             shape = (shelf.levels, max(1, round(extent)))
-            sides.append(np.array(self._goods)[rng.integers(GOODS, size=shape)])
-        if self.day:
+            sides.append(here[rng.integers(len(here), size=shape)])
+        rearranged = self.config.day(self.day).rearranged
+        if rearranged:
             anew = stream(self.config.seed, "goods", number, "day", self.day)
             for side in sides:
-                changed = anew.uniform(size=side.shape) < self.config.rearranged
-                side[changed] = np.array(self._goods)[anew.integers(GOODS, size=int(changed.sum()))]
+                changed = anew.uniform(size=side.shape) < rearranged
+                side[changed] = here[anew.integers(len(here), size=int(changed.sum()))]
         return sides
+
+    def _assortment(self, department: str) -> I64:
+        """Textures of the goods that a department has."""
+        count = min(self.config.assortment, self.config.goods)
+        chosen = stream(self.config.seed, "assortment", department).permutation(self.config.goods)[:count]
+        return np.array(self._goods)[np.sort(chosen)]
 
     def _stock(self, shelf: Shelf, number: int) -> list[Box]:
         """Cartons on top of a shelf, one here and there."""
@@ -188,8 +190,9 @@ class World:
         return Box(kind, centre, half, yaw, low, low + height, (ends, ends, fronts, fronts, cap, cap))
 
     def _block(self, block: Block, number: int) -> Box:
-        side = self._texture(block.material, f"block {number}")
-        top = self._texture(block.top, f"block {number} top")
+        look = block.look or f"block {number}"
+        side = self._texture(block.material, look)
+        top = self._texture(block.top, f"{look} top")
         step = 1.0 if min(block.size) < 1.0 and block.height > 1.5 else math.inf
         return self._solid("block", block.centre, block.size, block.yaw, block.bottom_z, block.height, side, top, step)
 
@@ -208,7 +211,7 @@ class World:
         )
 
     def _lamp(self, number: int) -> Box:
-        lamp = self.config.lamps[number]
+        lamp = self.layout.lamps[number]
         texture = self._texture("lamp", "lamp")
         low = self.config.height - 0.08
         return self._solid("lamp", lamp.centre, lamp.size, 0.0, low, 0.06, texture, texture)
@@ -289,7 +292,7 @@ class World:
         normals = np.array([(0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], dtype=float)
         heights = np.array([0.0, 1.0, 1.0, 1.0, 1.0])
         light = np.zeros((rows, columns, 5, 3))
-        for lamp in self.config.lamps:
+        for lamp in self.layout.lamps:
             for side in range(5):
                 across = np.array(lamp.centre) - points
                 rise = self.config.height - heights[side]

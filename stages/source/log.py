@@ -11,6 +11,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
 from omninav.stages.geometry.se2 import between, compose
 from omninav.stages.simulator.config import WorldConfig
+from omninav.stages.simulator.demo import DEMO
 from omninav.stages.values.camera import Camera
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
@@ -48,7 +49,7 @@ class LogSource(Source):
     """
 
     log: str | tuple[str, ...] | None = None
-    world: WorldConfig = WorldConfig()
+    world: WorldConfig = DEMO
     route: str | None = None
     day: int = 1
     topics: Topics = Topics()

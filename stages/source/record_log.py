@@ -6,6 +6,7 @@ from typing import Annotated
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.problems import BadInput
 from omninav.stages.simulator.config import WorldConfig
+from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.occupancy import write_grid
 from omninav.stages.simulator.plan import draw_plan
 from omninav.stages.simulator.world import World
@@ -21,7 +22,7 @@ class RecordLog(Stage):
     Raises `BadInput` where `log` is no .mcap name and `UnreadableRecording` for an unknown route.
     """
 
-    world: WorldConfig = WorldConfig()
+    world: WorldConfig = DEMO
     route: str = "drive"
     day: Annotated[int, Bounds(ge=0)] = 1
     log: str | None = None

@@ -12,6 +12,7 @@ import pytest
 from omninav.stages.geometry.catadioptric import project
 from omninav.stages.simulator.cameras import camera_rays, turn
 from omninav.stages.simulator.config import Block, Lamp, WorldConfig
+from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import Scene, render
 from omninav.stages.simulator.world import World
 from omninav.stages.source.simulated import mirror
@@ -29,7 +30,7 @@ PANORAMA = Equirectangular(
 
 @pytest.fixture(scope="module")
 def demo() -> Scene:
-    return World(WorldConfig()).scene
+    return World(DEMO).scene
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +78,7 @@ def test_a_box_in_the_mirror_lies_within_half_a_pixel_of_where_its_edges_project
 ) -> None:
     """Its faces, with edges finely cut and projected, are filled at 8 times the size: there the outline is known."""
     scene, corners = marker
-    camera = mirror(WorldConfig().camera)
+    camera = mirror(DEMO.camera)
     picture = render(scene, camera_rays(camera), pose, EYE)[..., 0]
     fine = np.zeros((480 * 8, 640 * 8), dtype=np.uint8)
     for face in FACES:
@@ -176,7 +177,7 @@ def test_a_bearing_in_the_mirror_is_the_angle_in_the_picture_plus_yaw(
 ) -> None:
     """Architecture, section 5: atan2(v - cy, u - cx) + yaw, counter-clockwise from the robot's forward."""
     scene, _ = marker
-    camera = mirror(WorldConfig().camera)
+    camera = mirror(DEMO.camera)
     heading = 0.7
     picture = render(scene, camera_rays(camera), (3.6, 4.2, heading), EYE)[..., 0]
     v, u = np.nonzero(picture > 127)
@@ -193,7 +194,7 @@ def test_a_low_shelf_is_looked_over(demo: Scene) -> None:
 
 
 def test_noise_follows_from_its_key_alone_and_has_the_stated_spread(demo: Scene) -> None:
-    rays = camera_rays(mirror(WorldConfig().camera), 0.1)
+    rays = camera_rays(mirror(DEMO.camera), 0.1)
     pose = (5.8, 4.5, 0.4)
     clean = render(demo, rays, pose, EYE).astype(float)
     noisy = [render(demo, rays, pose, EYE, noise=3.0, key=key) for key in (7, 7, 8)]
@@ -208,7 +209,7 @@ def test_noise_follows_from_its_key_alone_and_has_the_stated_spread(demo: Scene)
 
 
 def test_the_ring_is_lit_and_the_robot_in_its_middle_is_black(demo: Scene) -> None:
-    camera = mirror(WorldConfig().camera)
+    camera = mirror(DEMO.camera)
     picture = render(demo, camera_rays(camera), (5.8, 4.5, 0.4), EYE)
     v, u = np.mgrid[0:480, 0:640]
     radius = np.hypot(u - camera.centre_x, v - camera.centre_y)
@@ -217,7 +218,7 @@ def test_the_ring_is_lit_and_the_robot_in_its_middle_is_black(demo: Scene) -> No
 
 
 def test_the_number_of_threads_does_not_change_a_picture(demo: Scene) -> None:
-    rays = camera_rays(mirror(WorldConfig().camera), 0.1)
+    rays = camera_rays(mirror(DEMO.camera), 0.1)
     threads = numba.get_num_threads()
     try:
         pictures = []

@@ -9,7 +9,8 @@ import yaml
 
 from omninav.pipeline.ports import convert
 from omninav.stages.simulator import textures
-from omninav.stages.simulator.config import Block, WorldConfig
+from omninav.stages.simulator.config import Block, Day, WorldConfig
+from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.occupancy import occupancy, write_grid
 from omninav.stages.simulator.plan import draw_plan
 from omninav.stages.simulator.world import World
@@ -19,13 +20,16 @@ CONF = Path(__file__).parents[3] / "conf" / "world"
 
 @pytest.fixture(scope="module")
 def demo() -> World:
-    return World(WorldConfig())
+    return World(DEMO)
 
 
-def test_the_demo_file_says_what_the_code_defaults_to() -> None:
-    world, problems = convert(yaml.safe_load((CONF / "home_store_demo.yaml").read_text()), WorldConfig, "world")
+@pytest.mark.parametrize(("file", "said_in_code"), [("empty", WorldConfig()), ("home_store_demo", DEMO)])
+def test_files_of_worlds_say_what_the_code_defaults_to(file: str, said_in_code: WorldConfig) -> None:
+    described = yaml.safe_load((CONF / f"{file}.yaml").read_text())
+    described.pop("defaults", None)
+    world, problems = convert(described, WorldConfig, "world")
     assert not problems
-    assert world == WorldConfig()
+    assert world == said_in_code
 
 
 def test_clearance_is_the_distance_to_the_nearest_face(demo: World) -> None:
@@ -67,8 +71,8 @@ def test_the_grid_agrees_with_clearance_and_is_what_map_server_reads(demo: World
 
 
 def test_the_seed_decides_the_looks() -> None:
-    one, same = World(WorldConfig()).scene, World(WorldConfig()).scene
-    other = World(WorldConfig(seed=2)).scene
+    one, same = World(DEMO).scene, World(DEMO).scene
+    other = World(dataclasses.replace(DEMO, seed=2)).scene
     for first, second in zip(one, same, strict=True):
         np.testing.assert_array_equal(first, second)
     assert not np.array_equal(one.texels, other.texels)
@@ -76,7 +80,7 @@ def test_the_seed_decides_the_looks() -> None:
 
 
 def test_another_day_moves_the_stated_share_of_the_goods() -> None:
-    config = dataclasses.replace(WorldConfig(), rearranged=0.3)
+    config = dataclasses.replace(DEMO, days=(Day(), Day(rearranged=0.3)))
     first, later = World(config), World(config, day=3)
     pairs = [
         (a.faces[k].tiles, b.faces[k].tiles)

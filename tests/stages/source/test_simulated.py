@@ -1,11 +1,13 @@
 """Drives through the demo world as recordings, and as logs."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from omninav.stages.simulator.config import WorldConfig
+from omninav.stages.simulator.config import Route
+from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.world import World
 from omninav.stages.source import simulated
 from omninav.stages.source.recording import Recording, UnreadableRecording
@@ -14,7 +16,7 @@ from omninav.stages.source.simulated import SimulatedRecording, record
 
 @pytest.fixture(scope="module")
 def tour() -> SimulatedRecording:
-    return SimulatedRecording(WorldConfig(), "tour", 0)
+    return SimulatedRecording(DEMO, "tour", 0)
 
 
 def test_a_simulated_drive_is_a_recording(tour: SimulatedRecording) -> None:
@@ -28,7 +30,7 @@ def test_a_simulated_drive_is_a_recording(tour: SimulatedRecording) -> None:
 @pytest.mark.parametrize(("route", "least", "most"), [("tour", 120, 160), ("drive", 80, 105)])
 @pytest.mark.parametrize("day", [0, 1, 2, 5])
 def test_routes_have_their_length_and_never_touch_anything(route: str, least: int, most: int, day: int) -> None:
-    config = WorldConfig()
+    config = DEMO
     recording = SimulatedRecording(config, route, day)
     assert least <= len(recording.stamps) <= most
     assert World(config, day).is_free(recording.driven[:, :2], config.robot.radius).all()
@@ -38,7 +40,7 @@ def test_routes_have_their_length_and_never_touch_anything(route: str, least: in
 
 
 def test_the_same_drive_gives_the_same_pictures_in_any_order(tour: SimulatedRecording) -> None:
-    again = SimulatedRecording(WorldConfig(), "tour", 0)
+    again = SimulatedRecording(DEMO, "tour", 0)
     later, earlier = again.image(9), again.image(4)
     np.testing.assert_array_equal(earlier, tour.image(4))
     np.testing.assert_array_equal(later, tour.image(9))
@@ -48,9 +50,9 @@ def test_the_same_drive_gives_the_same_pictures_in_any_order(tour: SimulatedReco
 
 def test_another_day_seed_or_route_is_another_drive(tour: SimulatedRecording) -> None:
     others = [
-        SimulatedRecording(WorldConfig(), "tour", 1),
-        SimulatedRecording(WorldConfig(seed=2), "tour", 0),
-        SimulatedRecording(WorldConfig(), "drive", 0),
+        SimulatedRecording(DEMO, "tour", 1),
+        SimulatedRecording(dataclasses.replace(DEMO, seed=2), "tour", 0),
+        SimulatedRecording(DEMO, "drive", 0),
     ]
     assert len({tour.digest(), *(other.digest() for other in others)}) == 4
     for other in others:
@@ -62,7 +64,7 @@ def test_odometry_drifts_but_not_away(tour: SimulatedRecording) -> None:
     """In the spirit of photoreal-house: a few per cent of the way over stretches of ten metres."""
     shares = []
     for day in range(6):
-        recording = SimulatedRecording(WorldConfig(), "drive", day)
+        recording = SimulatedRecording(DEMO, "drive", day)
         truth, seen = recording.truth, recording.odometry
         way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T))])
         for start in range(0, len(way), 10):
@@ -100,15 +102,13 @@ def _distance(one: np.ndarray, other: np.ndarray) -> float:
 
 def test_a_route_that_is_not_there_is_refused_with_those_that_are() -> None:
     with pytest.raises(UnreadableRecording, match="home_store_demo' has no route 'aisles'; it has: drive, tour"):
-        SimulatedRecording(WorldConfig(), "aisles", 0)
+        SimulatedRecording(DEMO, "aisles", 0)
 
 
 def test_a_written_log_reads_back_as_the_same_drive_and_twice_as_the_same_bytes(tmp_path: Path) -> None:
     from omninav.stages.source.opening import open_recording
 
-    config = WorldConfig(
-        routes={"short": simulated.WorldConfig().routes["drive"].__class__(((2.0, 1.5), (3.5, 1.5)))},
-    )
+    config = dataclasses.replace(DEMO, routes={"short": Route(((2.0, 1.5), (3.5, 1.5)))})
     recording = SimulatedRecording(config, "short", 2)
     record(recording, tmp_path / "one.mcap")
     record(SimulatedRecording(config, "short", 2), tmp_path / "two.mcap")
