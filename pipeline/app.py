@@ -99,19 +99,59 @@ def _launch(arguments: list[str]) -> int:
     import tempfile
 
     import hydra
+    from hydra.errors import HydraException
 
+    words, folders = _words(arguments)
     _offer_plugins()
+    if {"-m", "--multirun"} & set(arguments):
+        _refuse_misspelled_sweep(words, folders)
     with tempfile.TemporaryDirectory() as place:
         outcomes = Path(place) / "outcomes"
         os.environ[OUTCOMES] = str(outcomes)
+        os.environ["HYDRA_FULL_ERROR"] = "1"  # what Hydra does not understand is raised, and said by us
         sys.argv = ["omninav", *arguments]
         try:
             hydra.main(config_path=f"pkg://{CONF}", config_name="config", version_base="1.3")(_job)()
-        except SystemExit as stop:  # Hydra has said what it did not understand
+        except SystemExit as stop:  # a flag that Hydra does not know
             if stop.code:
                 return 2
+        except HydraException as error:
+            from hydra import initialize_config_module
+
+            from .overrides import misfits
+            from .problems import ProblemsFound
+
+            with initialize_config_module(CONF, version_base="1.3"):
+                raise ProblemsFound(misfits(words, folders, str(error))) from None
         codes = [int(line) for line in outcomes.read_text().split()] if outcomes.exists() else []
     return max(codes, default=0)
+
+
+def _refuse_misspelled_sweep(words: Sequence[str], folders: Sequence[str]) -> None:
+    """Hydra makes a sweep's folder before it reads the words; so they are read before."""
+    from hydra import initialize_config_module
+
+    from .overrides import jobs_to_try
+
+    with initialize_config_module(CONF, version_base="1.3"):
+        jobs = list(jobs_to_try(words, folders))
+    for job in jobs:
+        with _composed([*job, *(f"--config-dir={folder}" for folder in folders)], offer=False):
+            pass
+
+
+def _words(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The overrides among arguments that may hold Hydra's flags, and the folders of `--config-dir`."""
+    from hydra._internal.utils import get_args_parser
+
+    from .problems import BadInput
+
+    read = get_args_parser().parse_args(list(arguments))
+    if read.config_dir and not Path(read.config_dir).is_dir():
+        raise BadInput(
+            f"--config-dir: there is no folder {read.config_dir}; it holds groups, as FOLDER/match/mine.yaml"
+        )
+    return read.overrides, [read.config_dir] if read.config_dir else []
 
 
 def _job(config: Any) -> None:
@@ -272,32 +312,22 @@ def complete(config: Any) -> dict[str, Any]:
 
 
 @contextmanager
-def _composed(arguments: Sequence[str]) -> Iterator[Any]:
+def _composed(arguments: Sequence[str], offer: bool = True) -> Iterator[Any]:
     """The configuration that overrides (and --config-dir) describe, for commands that run nothing."""
     from hydra import compose, initialize_config_module
     from hydra.errors import HydraException
 
-    from .problems import Problem, ProblemsFound
+    from .overrides import misfits, search
+    from .problems import ProblemsFound
 
-    overrides, folders, waiting = [], [], list(arguments)
-    while waiting:
-        word = waiting.pop(0)
-        if word in ("--config-dir", "-cd"):
-            folders.append(waiting.pop(0) if waiting else "")
-        elif word.startswith("--config-dir="):
-            folders.append(word.partition("=")[2])
-        else:
-            overrides.append(word)
-    _offer_plugins()
-    if folders:
-        paths = ",".join(f"file://{Path(folder).resolve()}" for folder in folders)
-        overrides.append(f"hydra.searchpath=[{paths}]")
+    words, folders = _words(arguments)
+    if offer:
+        _offer_plugins()
     with initialize_config_module(CONF, version_base="1.3"):
         try:
-            config = compose("config", overrides=overrides)
+            config = compose("config", overrides=[*search(folders), *words])
         except HydraException as error:
-            said = " ".join(str(error).partition("Config search path")[0].split())
-            raise ProblemsFound([Problem("command line", said)]) from None
+            raise ProblemsFound(misfits(words, folders, str(error))) from None
         yield config
 
 
@@ -489,12 +519,12 @@ def _doctor(arguments: list[str]) -> int:
     import platform
 
     from .catalog import entries
-    from .run import LIBRARIES, _version
+    from .run import LIBRARIES, version
 
-    print(f"omninav {_version('omninav')}, Python {platform.python_version()}, {os.cpu_count()} cores")
+    print(f"omninav {version('omninav')}, Python {platform.python_version()}, {os.cpu_count()} cores")
     rows = list(entries())
     for name in LIBRARIES:
-        print(f"  {name:26} {_version(name)}")
+        print(f"  {name:26} {version(name)}")
     broken = [entry for entry in rows if entry.problem]
     others = [entry for entry in rows if entry.origin != "built in" and not entry.problem]
     print(f"{len(rows) - len(others) - len(broken)} built-in stages, {len(others)} from others, {len(broken)} unusable")

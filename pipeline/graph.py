@@ -236,11 +236,10 @@ class _Builder:
                 )
             elif name not in self.nodes:
                 if name not in self.broken:
-                    self._problem(
-                        f"wires.{name}",
-                        f"there is no node '{name}'",
-                        suggest(str(name), self.nodes, "nodes", prefix="wires."),
-                    )
+                    near = nearest(str(name), self.nodes, 0.7)
+                    hint = f"did you mean 'wires.{near}'? " if near else ""
+                    hint += f"if the node was taken out, type '~wires.{name}' too"
+                    self._problem(f"wires.{name}", f"this feeds the node '{name}', and there is none", hint)
             else:
                 for port, spec in ports.items():
                     if spec is not None:
@@ -310,9 +309,10 @@ class _Builder:
             )
             return None
         if node not in self.nodes:
-            near = nearest(node, self.nodes)
+            near = nearest(node, self.nodes, 0.7)
             hint = f"did you mean '{near}.{port}'? " if near else ""
-            self._problem(where, f"there is no node '{node}'", hint + self._givers(wanted))
+            hint += f"type '~{where}' if it can do without; " if wanted.optional and not near else ""
+            self._problem(where, f"this reads {origin}, and there is no node '{node}'", hint + self._givers(wanted))
             return None
         outputs = self.nodes[node].signature.outputs
         if port not in outputs:

@@ -40,9 +40,9 @@ def format_problems(problems: Iterable[Problem]) -> str:
     return "\n".join([f"{head}:", *(f"  {line}" for problem in problems for line in str(problem).split("\n"))])
 
 
-def nearest(name: str, options: Iterable[str]) -> str | None:
-    """The option most like `name`, None where none is like it."""
-    found = difflib.get_close_matches(name, list(options), n=1, cutoff=0.5)
+def nearest(name: str, options: Iterable[str], least: float = 0.5) -> str | None:
+    """The option most like `name`, None where none is like it (`least`: how much, from 0 to 1)."""
+    found = difflib.get_close_matches(name, list(options), n=1, cutoff=least)
     return found[0] if found else None
 
 

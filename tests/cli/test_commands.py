@@ -32,7 +32,7 @@ def test_check_prints_every_problem_with_suggestions_and_makes_nothing(omninav, 
     assert ended.returncode == 2
     assert "2 problems" in ended.stderr
     assert "did you mean 'nodes.match.headings'?" in ended.stderr
-    assert "there is no node 'nowhere'" in ended.stderr
+    assert "this reads nowhere.map, and there is no node 'nowhere'" in ended.stderr
     assert "artifacts.map" in ended.stderr
     assert list(tmp_path.iterdir()) == []
 
@@ -86,6 +86,23 @@ def test_a_log_of_ones_own_without_a_map_says_what_to_type(omninav, tmp_path: Pa
         (("match=null",), "'~nodes.match' '~wires.match'"),
         (("check", "tour=nowhere.mcap", "log=nowhere.mcap"), "nowhere.mcap"),
         (("stages", "matsch"), "did you mean 'omninav stages match'?"),
+        (
+            ("nodes.match.headngs=72",),
+            "SelectiveMatch has no parameter 'headngs'\n      did you mean 'nodes.match.headings=72'?",
+        ),
+        (("nodes.mtch.headings=72",), "did you mean 'nodes.match.headings=72'?"),
+        (("mach=l2",), "did you mean 'match=l2'?"),
+        (("match=l3",), "match: there is no 'l3'\n      did you mean 'match=l2'?"),
+        (("tuor=x", "sead=3"), "did you mean 'seed=3'?"),
+        (("-m", "match=selective,l3", "seed=range(50)"), "did you mean 'match=l2'?"),
+        (("-m", "nodes.match.headngs=18,36"), "did you mean 'nodes.match.headings=18'?"),
+        (("check", "nodes.source.stop=[1"), "nodes.source.stop=[1: cannot be read"),
+        (("check", "~nodes.macth"), "did you mean '~nodes.match'?"),
+        (("check", "+nodes.match.headings=18"), "it is there already\n      type nodes.match.headings=18"),
+        (("check", "wires.sensor.mapp=artifacts.map"), "did you mean 'wires.sensor.map=artifacts.map'?"),
+        (("check", "~nodes.reach"), "if the node was taken out, type '~wires.reach' too"),
+        (("check", "~nodes.reach"), "type '~wires.sensor.reach' if it can do without"),
+        (("--config-dir=nowhere",), "there is no folder nowhere"),
     ],
 )
 def test_what_a_newcomer_gets_wrong_is_answered_with_what_to_type(omninav, tmp_path: Path, words, said: str):
@@ -94,6 +111,13 @@ def test_what_a_newcomer_gets_wrong_is_answered_with_what_to_type(omninav, tmp_p
     assert said in ended.stderr
     assert "Traceback" not in ended.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_makes_a_stage_complete_without_being_listed_is_added_with_a_plus(omninav):
+    plugin = f"features.edges={ROOT / 'examples' / 'edges' / 'omninav_edges.py'}:EdgeHistogram"
+    ended = omninav("check", "features=edges", "nodes.features.segments=18", OMNINAV_STAGES=plugin)
+    assert "type +nodes.features.segments=18" in ended.stderr
+    omninav("check", "features=edges", "+nodes.features.segments=18", OMNINAV_STAGES=plugin, check=True)
 
 
 def test_the_map_of_the_latest_run_can_be_named(omninav, demo: Path, shared_cache: Path, tmp_path: Path):
