@@ -3,29 +3,31 @@
 import dataclasses
 import json
 from collections import Counter
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.files import digest_file, digest_text
-from omninav.pipeline.log import LogWriter
 from omninav.stages import simulator
-from omninav.stages.geometry import catadioptric, se2
+from omninav.stages.geometry import catadioptric, odometry_noise, se2
 from omninav.stages.simulator.cameras import Rays, camera_rays
-from omninav.stages.simulator.config import MirrorCamera, WorldConfig
+from omninav.stages.simulator.config import Event, MirrorCamera, WorldConfig
+from omninav.stages.simulator.layout import stream
+from omninav.stages.simulator.obstacles import Obstacles, gather
 from omninav.stages.simulator.odometry import draw_bias, odometry
+from omninav.stages.simulator.ranges import azimuths, measure
 from omninav.stages.simulator.renderer import render
-from omninav.stages.simulator.robot import drive, wandered
-from omninav.stages.simulator.world import World, stream
+from omninav.stages.simulator.robot import drive, reach, wandered
+from omninav.stages.simulator.world import World
 from omninav.stages.values.camera import HyperbolicMirror
 from omninav.stages.values.image import Pixels
+from omninav.stages.values.scan import Scan
 
-from .camera_yaml import write_camera
 from .recording import UnreadableRecording
+from .topics import ascending
 
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
@@ -34,39 +36,77 @@ EPOCH = 1_767_571_200 * 10**9
 """Midnight before day 0, 2026-01-05 UTC, in nanoseconds."""
 OFFSET = 0.52
 """Seconds from the start of a drive to its first picture: odometry reaches back before it."""
+TRANSIT = 42_000_000
+"""Nanoseconds from a picture's stamp to its arrival."""
 
 
 class SimulatedRecording:
-    """One drive along a named route of a world, on a day: the same seed, route and day give the same bytes.
+    """One drive along a named route of a world, on a day: the same seed, route, day and events give the same bytes.
 
     A `Recording`. Pictures come in any order at the same price and with the same noise. The day decides the line that
-    is driven, the odometry's errors, the noise and which goods were moved. Raises `UnreadableRecording` for a route
-    that the world does not have.
+    is driven, the odometry's errors, the noise and which goods were moved. `collisions` counts what the robot touched.
+    Raises `UnreadableRecording` for a route that the world does not have.
     """
 
-    def __init__(self, world: WorldConfig, route: str, day: int) -> None:
+    def __init__(self, world: WorldConfig, route: str, day: int, events: Sequence[Event] = ()) -> None:
         if route not in world.routes:
             raise UnreadableRecording(
                 f"world '{world.name}' has no route '{route}'; it has: {', '.join(sorted(world.routes)) or 'none'}"
             )
-        self.world = world
-        self.route = route
-        self.day = day
+        self.world, self.route, self.day = world, route, day
+        self.events = tuple(sorted(events, key=lambda event: event.at))
         self.camera = mirror(world.camera)
         self.dropped: Counter[str] = Counter()
         self.details: dict[str, str] = {}
-        start = EPOCH + day * 86400 * 10**9 + (9 + sorted(world.routes).index(route)) * 3600 * 10**9
-        line = wandered(world.routes[route].waypoints, world.robot.wander, self._stream("line"))
-        times, self.driven = drive(line, world.robot, world.timing.odometry)
-        self.times: I64 = start + np.round(times * 1e9).astype(np.int64)
-        noise = self._stream("odometry")
-        bias = draw_bias(world.odometry, stream(world.seed, "odometry bias", day))
-        self.rolled = odometry(self.driven, world.odometry, bias, noise)
-        count = max(0, int(np.floor((times[-1] - OFFSET) * world.timing.pictures + 1e-9)) + 1)
-        self._seconds = OFFSET + np.arange(count) / world.timing.pictures
-        self.stamps: I64 = start + np.round(self._seconds * 1e9).astype(np.int64)
-        self.truth = se2.interpolate(times, self.driven, self._seconds)
-        self.odometry = se2.interpolate(times, self.rolled, self._seconds)
+        self._start = EPOCH + day * 86400 * 10**9 + (9 + sorted(world.routes).index(route)) * 3600 * 10**9
+        self._drive()
+        self._take_pictures()
+
+    def _drive(self) -> None:
+        world = self.world
+        line = wandered(world.routes[self.route].waypoints, world.robot.wander, self._stream("line"))
+        driven = drive(line, world.robot, world.timing.odometry, room=self._room, events=self.events)
+        self._seconds, self.driven, self.collisions = driven.times, driven.poses, driven.collisions
+        bias = draw_bias(world.odometry, stream(world.seed, "odometry bias", self.day))
+        self.rolled = odometry(driven.poses, world.odometry, bias, self._stream("odometry"), driven.rolled_to)
+        self.times = self._stamps(driven.times)
+        put = np.flatnonzero((driven.poses != driven.rolled_to).any(axis=1))
+        self.put = self.times[put]
+        """Stamps (ns) of the moments at which somebody had lifted the robot."""
+        # Up to that moment it was where its wheels had brought it: nobody flies from one place to the other
+        self._true_seconds = np.insert(driven.times, put, driven.times[put])
+        self.true_poses = np.insert(driven.poses, put, driven.rolled_to[put], axis=0)
+        self.true_times: I64 = np.insert(self.times, put, self.times[put] - 1)
+
+    def _take_pictures(self) -> None:
+        timing, delivery = self.world.timing, self.world.delivery
+        count = max(0, int(np.floor((self._seconds[-1] - OFFSET) * timing.pictures + 1e-9)) + 1)
+        self._shots = OFFSET + np.arange(count) / timing.pictures
+        fate = self._stream("delivery").uniform(size=(count, 2))
+        stamps = self._stamps(self._shots)
+        late = np.where(fate[:, 1] < delivery.late, round(delivery.late_by * 1e9), 0)
+        arrivals = stamps + TRANSIT + late
+        sent = np.flatnonzero(fate[:, 0] >= delivery.dropped)
+        self.sent: list[tuple[int, int, int]] = sorted(
+            (int(arrivals[shot]), int(stamps[shot]), int(shot)) for shot in sent
+        )
+        """What leaves the camera, in the order of arrival: time of arrival, stamp (ns), number of the picture."""
+        kept, _, overtaken = ascending([stamp for _, stamp, _ in self.sent])  # as whoever reads the log will find them
+        if overtaken:
+            self.dropped["backward_stamp"] = len(overtaken)
+            stamp = self.sent[overtaken[0]][1]
+            self.details["backward_stamp"] = f"{self.name}: a picture was overtaken, stamp {stamp} ns"
+        self._taken: I64 = np.array([self.sent[number][2] for number in kept], dtype=np.int64)
+        self.stamps: I64 = stamps[self._taken]
+        self.truth = self._true(self._shots[self._taken])
+        self.odometry = se2.interpolate(self._seconds, self.rolled, self._shots[self._taken])
+
+    def _stamps(self, seconds: F64) -> I64:
+        stamps: I64 = self._start + np.round(seconds * 1e9).astype(np.int64)
+        return stamps
+
+    def _true(self, seconds: F64) -> F64:
+        return se2.interpolate(self._true_seconds, self.true_poses, seconds)
 
     @property
     def name(self) -> str:
@@ -78,6 +118,10 @@ class SimulatedRecording:
         return World(self.world, self.day)
 
     @cached_property
+    def _room(self) -> Obstacles:
+        return gather(self._world.obstacles, self.world.size, reach(self.world.robot))
+
+    @cached_property
     def _key(self) -> int:
         return int(self._stream("pixels").integers(2**62))
 
@@ -86,74 +130,59 @@ class SimulatedRecording:
 
     def image(self, frame: int) -> Pixels:
         """The picture of a frame, (height, width, 3) uint8 blue-green-red, rendered now."""
-        sensor = self.world.sensor
-        swing = np.sin(2 * np.pi * self._seconds[frame] / sensor.exposure_period)
+        return self.picture(int(self._taken[frame]))
+
+    def picture(self, shot: int) -> Pixels:
+        """A picture by its number among all that were taken, also those that nobody received."""
+        sensor, at = self.world.sensor, self._shots[shot]
+        swing = np.sin(2 * np.pi * at / sensor.exposure_period)
         return render(
             self._world.scene,
             self._rays,
-            self.truth[frame],
+            self._true(at[None])[0],
             self.world.camera.height,
             exposure=sensor.exposure * (1.0 + sensor.exposure_drift * float(swing)),
             noise=sensor.noise,
-            key=self._key + frame,
+            key=self._key + shot,
         )
 
     @cached_property
     def _rays(self) -> Rays:
         return camera_rays(self.camera, self.world.sensor.vignetting)
 
+    @cached_property
+    def scans(self) -> tuple[I64, F64]:
+        """All turns of the range ring: stamps (S,) in ns, and metres (S, readings), infinite without an echo."""
+        ring = self.world.ranges
+        seconds = np.arange(int(np.floor(self._seconds[-1] * ring.rate + 1e-9)) + 1) / ring.rate
+        people = np.zeros((len(seconds), 0, 3))
+        metres = measure(self._room, people, self._true(seconds), ring, self._stream("ranges"))
+        return self._stamps(seconds), metres.astype(np.float32).astype(np.float64)  # as a message holds them
+
+    def scan(self, frame: int) -> Scan | None:
+        """The last turn of the range ring before a frame."""
+        times, metres = self.scans
+        return ring_scan(self.world, metres[np.searchsorted(times, self.stamps[frame], side="right") - 1])
+
     def digest(self) -> str:
-        """sha256 over the world, the route, the day and the code that renders it."""
-        folder = Path(simulator.__file__).parent
-        code = [*sorted(folder.glob("*.py")), Path(__file__), Path(catadioptric.__file__), Path(se2.__file__)]
-        described = json.dumps(dataclasses.asdict(self.world), sort_keys=True)
-        return digest_text(described, self.route, str(self.day), *(digest_file(path) for path in code))
+        """sha256 over the world, the route, the day, the events and the code that renders it."""
+        events = json.dumps([dataclasses.asdict(event) for event in self.events])
+        return digest_text(simulation_digest(self.world), self.route, str(self.day), events)
 
 
-def record(recording: SimulatedRecording, path: Path, quality: int = 90) -> None:
-    """Write a simulated drive as an MCAP log: JPEG pictures, camera information, odometry, truth, and camera.yaml.
-
-    Topics as every recording has them; odometry and truth at their own rate. Log times run behind header stamps as a
-    camera's and a wheel's do (42 and 2 ms). The same recording gives the same bytes.
-    """
-    camera = recording.camera
-    matrix = [camera.focal_x, camera.skew, camera.centre_x, 0.0, camera.focal_y, camera.centre_y, 0.0, 0.0, 1.0]
-    info = {
-        "header": {"frame_id": "omni_camera"},
-        "width": camera.width,
-        "height": camera.height_px,
-        "distortion_model": "hyperbolic_mirror",
-        "d": [camera.a, camera.b],
-        "k": matrix,
-    }
-    events = [(int(stamp) + 2_000_000, 0, number) for number, stamp in enumerate(recording.times)]
-    events += [(int(stamp) + 42_000_000, 1, number) for number, stamp in enumerate(recording.stamps)]
-    with LogWriter(path) as log:
-        log.attach("camera.yaml", write_camera(camera).encode(), "application/yaml")
-        for time, kind, number in sorted(events):
-            if kind == 0:
-                stamp = int(recording.times[number])
-                rolled = {
-                    "header": {"frame_id": "odom"},
-                    "child_frame_id": "base_link",
-                    "pose": {"pose": _pose(recording.rolled[number])},
-                }
-                truth = {"header": {"frame_id": "map"}, "pose": _pose(recording.driven[number])}
-                log.write("/odom", "nav_msgs/msg/Odometry", stamp, rolled, time)
-                log.write("/ground_truth/pose", "geometry_msgs/msg/PoseStamped", stamp, truth, time)
-            else:
-                stamp = int(recording.stamps[number])
-                _, packed = cv2.imencode(".jpg", recording.image(number), [cv2.IMWRITE_JPEG_QUALITY, quality])
-                picture = {"header": {"frame_id": "omni_camera"}, "format": "jpeg", "data": packed.ravel()}
-                log.write("/camera/camera_info", "sensor_msgs/msg/CameraInfo", stamp, info, time)
-                log.write("/camera/image/compressed", "sensor_msgs/msg/CompressedImage", stamp, picture, time)
+def simulation_digest(world: WorldConfig) -> str:
+    """sha256 over a world and the code that simulates it."""
+    folder = Path(simulator.__file__).parent
+    used = [Path(str(module.__file__)) for module in (catadioptric, odometry_noise, se2)]
+    code = [*sorted(folder.glob("*.py")), Path(__file__), *used]
+    described = json.dumps(dataclasses.asdict(world), sort_keys=True)
+    return digest_text(described, *(digest_file(path) for path in code))
 
 
-def _pose(pose: F64) -> dict[str, Any]:
-    """A pose (x, y, heading) as the fields of a geometry_msgs/Pose."""
-    x, y, heading = (float(value) for value in pose)
-    turned = {"z": float(np.sin(heading / 2)), "w": float(np.cos(heading / 2))}
-    return {"position": {"x": x, "y": y}, "orientation": turned}
+def ring_scan(world: WorldConfig, metres: F64) -> Scan:
+    """A turn of a world's range ring as the value that travels on wires."""
+    first, step = azimuths(world.ranges)
+    return Scan(metres, first, step, nearest=0.0, farthest=world.ranges.farthest)
 
 
 def mirror(camera: MirrorCamera) -> HyperbolicMirror:
