@@ -5,11 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.geometry.se2 import between, compose, wrap
+from omninav.stages.geometry.odometry_noise import disturbed
+from omninav.stages.geometry.se2 import between, chain, wrap
 
 from .config import OdometryNoise
 
 F64 = npt.NDArray[np.float64]
+
+DRAWS = 6
+"""Standard normal numbers that an increment takes."""
 
 
 @dataclass(frozen=True)
@@ -31,29 +35,43 @@ def draw_bias(noise: OdometryNoise, rng: np.random.Generator) -> Bias:
     )
 
 
-def odometry(poses: npt.ArrayLike, noise: OdometryNoise, bias: Bias, rng: np.random.Generator) -> F64:
-    """Odometry poses (N, 3), the first at 0, 0, 0, of a drive through true poses (N, 3).
+def measured(motions: npt.ArrayLike, noise: OdometryNoise, bias: Bias, rng: np.random.Generator) -> F64:
+    """True increments of motion (N, 3) as the wheels measure them.
 
     Each increment is taken as rotation, translation, rotation (Thrun, Burgard & Fox 2005, section 5.4) and each part is
-    disturbed: sigma_trans = translation sqrt(m), sigma_rot^2 = rotation^2 |rad| + drift^2 m. A robot that turns on the
-    spot or rolls back is not thought to swing round: the first rotation is then split from the translation's sign.
+    disturbed: sigma_trans = translation sqrt(m), sigma_rot^2 = rotation^2 |rad| + drift^2 m; then comes the noise that
+    is `added`. A robot that turns on the spot or rolls back is not thought to swing round: the first rotation is split
+    from the translation's sign.
     """
-    poses = np.asarray(poses, dtype=np.float64)
-    motion = between(poses[:-1], poses[1:])
-    length = np.hypot(motion[:, 0], motion[:, 1])
-    forward = np.where(motion[:, 0] < 0.0, -1.0, 1.0)
-    first = np.where(length > 1e-6, np.arctan2(forward * motion[:, 1], forward * motion[:, 0]), 0.0)
-    second = wrap(motion[:, 2] - first)
-    drawn = rng.normal(size=(len(motion), 3))
+    motions = np.asarray(motions, dtype=np.float64)
+    length = np.hypot(motions[:, 0], motions[:, 1])
+    forward = np.where(motions[:, 0] < 0.0, -1.0, 1.0)
+    first = np.where(length > 1e-6, np.arctan2(forward * motions[:, 1], forward * motions[:, 0]), 0.0)
+    second = wrap(motions[:, 2] - first)
+    drawn = rng.normal(size=(len(motions), DRAWS))
     half = 0.5 * noise.drift**2 * length
     first_seen = _misjudged(first, length, noise, half, bias, drawn[:, 0])
     second_seen = _misjudged(second, length, noise, half, bias, drawn[:, 2])
     rolled = forward * (length * (1.0 + bias.translation) + noise.translation * np.sqrt(length) * drawn[:, 1])
-    seen = np.zeros((len(poses), 3))
-    for k in range(len(motion)):
-        step = (rolled[k] * np.cos(first_seen[k]), rolled[k] * np.sin(first_seen[k]), first_seen[k] + second_seen[k])
-        seen[k + 1] = compose(seen[k], step)
-    return seen
+    seen = np.stack([rolled * np.cos(first_seen), rolled * np.sin(first_seen), first_seen + second_seen], axis=1)
+    return disturbed(seen, noise.added, drawn[:, 3:]) if any(noise.added) else seen
+
+
+def odometry(
+    poses: npt.ArrayLike,
+    noise: OdometryNoise,
+    bias: Bias,
+    rng: np.random.Generator,
+    rolled_to: npt.ArrayLike | None = None,
+) -> F64:
+    """Odometry poses (N, 3), the first at 0, 0, 0, of a drive through true poses (N, 3).
+
+    `rolled_to` (N, 3): where the wheels brought the robot, where that was not where it went on from (it was lifted).
+    """
+    poses = np.asarray(poses, dtype=np.float64)
+    ends = poses if rolled_to is None else np.asarray(rolled_to, dtype=np.float64)
+    motions = measured(between(poses[:-1], ends[1:]), noise, bias, rng)
+    return np.concatenate([np.zeros((1, 3)), chain(motions)])
 
 
 def _misjudged(rotation: F64, length: F64, noise: OdometryNoise, half: F64, bias: Bias, drawn: F64) -> F64:

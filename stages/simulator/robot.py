@@ -1,13 +1,17 @@
-"""A differential drive steered along waypoints as a hand on a joystick would steer it."""
+"""A differential drive: steered by commands, or along a route as a hand on a joystick would steer it."""
 
 import math
-from bisect import bisect_left
-from itertools import accumulate, pairwise
+from collections.abc import Sequence
+from dataclasses import dataclass
 
+import numba
 import numpy as np
 import numpy.typing as npt
 
-from .config import Point, Robot
+from omninav.stages.geometry.se2 import compose
+
+from .config import Event, Point, Robot
+from .obstacles import Obstacles, gather, nearest
 
 F64 = npt.NDArray[np.float64]
 
@@ -15,79 +19,238 @@ STEP = 0.01
 """Seconds of one step of the simulation."""
 ARRIVED = 0.05
 """Metres from the last waypoint at which a drive ends."""
+LOOSE = 0.02
+"""Metres from an obstacle at which a contact has ended and another one counts anew."""
+NOBODY: F64 = np.zeros((0, 3))
+"""No people in the way."""
+
+X, Y, HEADING, SPEED, TURNING, TOUCHING, COLLISIONS, WAY = range(8)
+"""What a robot's state (8,) holds: pose, m/s, rad/s, 1 in contact, contacts so far, metres driven so far."""
 
 
-class _Route:
-    """A line of straight legs, by the distance along it."""
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """A drive: `times` (N,) s, `poses` (N, 3), and where the wheels had brought the robot by then, `rolled_to` (N, 3).
 
-    def __init__(self, waypoints: npt.ArrayLike) -> None:
-        points: list[tuple[float, float]] = np.asarray(waypoints, dtype=np.float64).tolist()
-        self._points = [points[0], *(b for a, b in pairwise(points) if a != b)]
-        self._ends = list(accumulate((math.dist(a, b) for a, b in pairwise(self._points)), initial=0.0))
-        self.length = self._ends[-1]
+    The last two differ only where somebody lifted the robot. `collisions`: how often it came into contact.
+    """
 
-    def at(self, along: float) -> tuple[float, float]:
-        """The point `along` metres from the start."""
-        if self.length == 0.0:
-            return self._points[0][0], self._points[0][1]
-        leg = min(max(bisect_left(self._ends, along), 1), len(self._points) - 1)
-        (ax, ay), (bx, by) = self._points[leg - 1], self._points[leg]
-        part = (along - self._ends[leg - 1]) / (self._ends[leg] - self._ends[leg - 1])
-        return ax + part * (bx - ax), ay + part * (by - ay)
-
-    def advance(self, along: float, x: float, y: float) -> float:
-        """Where on the next stretch of the line a robot is that was `along` metres on it: never back."""
-        candidates = [min(along + 0.02 * step, self.length) for step in range(16)]
-        return min(candidates, key=lambda at: math.dist(self.at(at), (x, y)))
+    times: F64
+    poses: F64
+    rolled_to: F64
+    collisions: int
 
 
-def drive(waypoints: npt.ArrayLike, robot: Robot, rate: float, start_heading: float | None = None) -> tuple[F64, F64]:
-    """Drive along waypoints (W, 2): times (N,) in seconds from 0 at `rate` (Hz), and poses (N, 3) x, y, heading.
+def at_rest(pose: npt.ArrayLike) -> F64:
+    """The state (8,) of a robot that stands at a pose."""
+    state = np.zeros(8)
+    state[:3] = pose
+    return state
+
+
+def limits(robot: Robot) -> F64:
+    """What bounds a robot's motion, (6,): radius, speed, turning, both accelerations, and 1 where it slides."""
+    slides = float(robot.contact == "slide")
+    return np.array([robot.radius, robot.speed, robot.turn_speed, robot.acceleration, robot.turn_acceleration, slides])
+
+
+def reach(robot: Robot) -> float:
+    """How far (m) from an obstacle a robot needs to know of it."""
+    return robot.radius + 2 * LOOSE
+
+
+def steer(
+    state: F64, speed: float, turning: float, robot: F64, seconds: float, room: Obstacles, people: F64 = NOBODY
+) -> None:
+    """Drive on for some time under one command (m/s, rad/s): `state` (8,) changes, within the `limits` (6,) of a robot.
+
+    A robot that would get closer to an obstacle or a person than its radius does not: it slides along, or is held,
+    while its wheels stand still against it, and each new contact is counted. It can always turn, and always back away.
+    """
+    _steer(state, speed, turning, robot, round(seconds / STEP), room, people)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _steer(state: F64, speed: float, turning: float, robot: F64, steps: int, room: Obstacles, people: F64) -> None:
+    for _ in range(steps):
+        _step(state, speed, turning, robot, room, people)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _step(state: F64, speed: float, turning: float, robot: F64, room: Obstacles, people: F64) -> None:
+    wanted = _within(speed, robot[1])
+    state[SPEED] += _within(wanted - state[SPEED], robot[3] * STEP)
+    state[TURNING] += _within(_within(turning, robot[2]) - state[TURNING], robot[4] * STEP)
+    middle = state[HEADING] + 0.5 * state[TURNING] * STEP
+    dx, dy = state[SPEED] * math.cos(middle) * STEP, state[SPEED] * math.sin(middle) * STEP
+    turned = state[HEADING] + state[TURNING] * STEP
+    state[HEADING] = turned - 2 * math.pi * math.floor((turned + math.pi) / (2 * math.pi))
+    if robot[0] > 0.0 and (dx != 0.0 or dy != 0.0):
+        dx, dy = _kept_off(state, dx, dy, robot, room, people)
+    state[X] += dx
+    state[Y] += dy
+    state[WAY] += math.hypot(dx, dy)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _kept_off(state: F64, dx: float, dy: float, robot: F64, room: Obstacles, people: F64) -> tuple[float, float]:
+    """A small motion, or what obstacles leave of it."""
+    now, away_x, away_y = nearest(room, people, state[X], state[Y])
+    then = nearest(room, people, state[X] + dx, state[Y] + dy)[0]
+    if then >= robot[0] or then >= now:
+        if then > robot[0] + LOOSE:
+            state[TOUCHING] = 0.0
+        return dx, dy
+    state[COLLISIONS] += 1.0 - state[TOUCHING]
+    state[TOUCHING] = 1.0
+    before = math.hypot(dx, dy)
+    into = min(dx * away_x + dy * away_y, 0.0)
+    dx, dy = dx - into * away_x, dy - into * away_y
+    then = nearest(room, people, state[X] + dx, state[Y] + dy)[0]
+    if robot[5] == 0.0 or (then < robot[0] and then < now - 1e-12):
+        dx = dy = 0.0
+    state[SPEED] *= math.hypot(dx, dy) / before
+    return dx, dy
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _within(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))
+
+
+def drive(
+    waypoints: npt.ArrayLike,
+    robot: Robot,
+    rate: float,
+    start_heading: float | None = None,
+    room: Obstacles | None = None,
+    events: Sequence[Event] = (),
+) -> Drive:
+    """Drive along waypoints (W, 2), recorded at `rate` (Hz) from time 0.
 
     Pure pursuit: the robot steers for the point of the route `look_ahead` metres on, slower the more it must turn, and
     turns on the spot where it would have to look back. Speed and turning change no faster than the limits allow. The
-    robot starts at rest at the first waypoint, facing the second unless `start_heading` is given.
+    robot starts at rest at the first waypoint, facing the second unless `start_heading` is given. Obstacles stop it
+    where `room` is given. After an event it goes on from the point of the route that is nearest to where it was put.
     """
-    route = _Route(waypoints)
-    x, y = route.at(0.0)
-    ahead = route.at(min(0.01, route.length))
-    heading = math.atan2(ahead[1] - y, ahead[0] - x) if start_heading is None else start_heading
-    goal = route.at(route.length)
-    speed = turning = along = time = 0.0
+    points, ends = _legs(waypoints)
+    length = float(ends[-1])
+    start = points[0]
+    ahead = points[min(1, len(points) - 1)] - start
+    heading = math.atan2(ahead[1], ahead[0]) if start_heading is None else start_heading
+    state = at_rest((*start, heading))
+    able = limits(robot)
+    if room is None:
+        able[0], room = 0.0, gather([], (1.0, 1.0), 0.0)
     every = round(1.0 / (rate * STEP))
-    poses = [(x, y, heading)]
-    step = 0
-    patience = 4.0 * route.length / robot.speed + 60.0
-    while time < patience:
-        along = route.advance(along, x, y)
-        remaining = math.hypot(goal[0] - x, goal[1] - y)
-        if along >= route.length - robot.look_ahead and remaining < ARRIVED and speed < 0.05:
+    most = math.ceil((4.0 * length / robot.speed + 60.0) * rate) + 1
+    poses = np.empty((most, 3))
+    poses[0] = state[:3]
+    rolled_to: dict[int, F64] = {}
+    done, along = 1, 0.0
+    for event in [*sorted(events, key=lambda event: event.at), None]:
+        until = most if event is None else min(most, round(event.at * rate) + 1)
+        filled, along, arrived = _pursue(
+            points, ends, along, state, able, robot.look_ahead, every, room, poses[done:until]
+        )
+        done += filled
+        if arrived or event is None:
             break
-        aim = route.at(min(along + robot.look_ahead, route.length))
-        off = math.remainder(math.atan2(aim[1] - y, aim[0] - x) - heading, 2 * math.pi)
-        brake = math.sqrt(2 * 0.5 * robot.acceleration * max(route.length - along - 0.6 * ARRIVED, 0.0))
-        wanted_speed = min(robot.speed * max(math.cos(off), 0.0) ** 2 if abs(off) < 1.0 else 0.0, brake)
-        wanted_turning = max(-robot.turn_speed, min(robot.turn_speed, 2.0 * off))
-        if remaining < 2 * ARRIVED:
-            wanted_turning = 0.0
-        speed += _limited(wanted_speed - speed, robot.acceleration * STEP)
-        turning += _limited(wanted_turning - turning, robot.turn_acceleration * STEP)
-        middle = heading + 0.5 * turning * STEP
-        x, y = x + speed * math.cos(middle) * STEP, y + speed * math.sin(middle) * STEP
-        heading = math.remainder(heading + turning * STEP, 2 * math.pi)
-        step += 1
-        time = step * STEP
-        if step % every == 0:
-            poses.append((x, y, heading))
-    return np.arange(len(poses)) / rate, np.array(poses)
+        rolled_to[done - 1] = poses[done - 1].copy()
+        state[:3] = lifted(poses[done - 1], event)
+        state[SPEED] = state[TURNING] = 0.0
+        poses[done - 1] = state[:3]
+        if event.to is not None:
+            along = _nearest_along(points, ends, state[:2])
+    poses = poses[:done]
+    before = poses.copy()
+    for number, pose in rolled_to.items():
+        before[number] = pose
+    return Drive(np.arange(done) / rate, poses, before, int(state[COLLISIONS]))
 
 
-def wandered(waypoints: tuple[Point, ...], spread: float, rng: np.random.Generator) -> F64:
+def lifted(pose: npt.ArrayLike, event: Event) -> F64:
+    """Where a robot stands that was lifted from a pose (3,)."""
+    return compose(pose if event.to is None else event.to, (0.0, 0.0, event.turn))
+
+
+def _legs(waypoints: npt.ArrayLike) -> tuple[F64, F64]:
+    """Points of a line of straight legs without repetitions, and their distances along it."""
+    points = np.asarray(waypoints, dtype=np.float64).reshape(-1, 2)
+    keep = np.concatenate([[True], (np.diff(points, axis=0) != 0.0).any(axis=1)])
+    points = np.ascontiguousarray(points[keep])
+    return points, np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+
+
+def _nearest_along(points: F64, ends: F64, at: F64) -> float:
+    """Distance along the line of the point nearest to a place."""
+    if len(points) == 1:
+        return 0.0
+    legs = np.diff(points, axis=0)
+    part = np.clip(((at - points[:-1]) * legs).sum(axis=1) / (legs**2).sum(axis=1), 0.0, 1.0)
+    leg = int(np.argmin(np.hypot(*(points[:-1] + part[:, None] * legs - at).T)))
+    return float(ends[leg] + part[leg] * (ends[leg + 1] - ends[leg]))
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _point(points: F64, ends: F64, along: float) -> tuple[float, float]:
+    """The point `along` metres from the start of a line."""
+    if len(points) == 1:
+        return points[0, 0], points[0, 1]
+    leg = min(max(_leg(ends, along), 1), len(points) - 1)
+    part = (along - ends[leg - 1]) / (ends[leg] - ends[leg - 1])
+    return (
+        points[leg - 1, 0] + part * (points[leg, 0] - points[leg - 1, 0]),
+        points[leg - 1, 1] + part * (points[leg, 1] - points[leg - 1, 1]),
+    )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _leg(ends: F64, along: float) -> int:
+    return np.searchsorted(ends, along)  # type: ignore[return-value]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _pursue(
+    points: F64,
+    ends: F64,
+    along: float,
+    state: F64,
+    robot: F64,
+    look_ahead: float,
+    every: int,
+    room: Obstacles,
+    poses: F64,
+) -> tuple[int, float, bool]:
+    """Follow a line until `poses` (N, 3) is full or the robot is there: rows filled, metres along, whether it is."""
+    length = ends[-1]
+    goal_x, goal_y = points[-1, 0], points[-1, 1]
+    for row in range(len(poses)):
+        for _ in range(every):
+            best = np.inf
+            ahead = along
+            for step in range(16):  # on the next stretch of the line, never back
+                at = min(ahead + 0.02 * step, length)
+                x, y = _point(points, ends, at)
+                off = math.hypot(x - state[X], y - state[Y])
+                if off < best:
+                    best, along = off, at
+            remaining = math.hypot(goal_x - state[X], goal_y - state[Y])
+            if along >= length - look_ahead and remaining < ARRIVED and state[SPEED] < 0.05:
+                return row, along, True
+            x, y = _point(points, ends, min(along + look_ahead, length))
+            off = math.atan2(y - state[Y], x - state[X]) - state[HEADING]
+            off -= 2 * math.pi * math.floor((off + math.pi) / (2 * math.pi))
+            brake = math.sqrt(robot[3] * max(length - along - 0.6 * ARRIVED, 0.0))
+            speed = min(robot[1] * max(math.cos(off), 0.0) ** 2 if abs(off) < 1.0 else 0.0, brake)
+            turning = 0.0 if remaining < 2 * ARRIVED else 2.0 * off
+            _step(state, speed, turning, robot, room, NOBODY)
+        poses[row] = state[:3]
+    return len(poses), along, False
+
+
+def wandered(waypoints: Sequence[Point], spread: float, rng: np.random.Generator) -> F64:
     """Waypoints (W, 2), each missed by a Gaussian of `spread` metres, cut off at two."""
     miss = np.clip(rng.normal(0.0, spread, (len(waypoints), 2)), -2 * spread, 2 * spread)
     wandering: F64 = np.asarray(waypoints, dtype=np.float64) + miss
     return wandering
-
-
-def _limited(change: float, limit: float) -> float:
-    return max(-limit, min(limit, change))

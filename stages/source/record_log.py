@@ -12,7 +12,8 @@ from omninav.stages.simulator.plan import draw_plan
 from omninav.stages.simulator.world import World
 
 from .camera_yaml import write_camera
-from .simulated import SimulatedRecording, record
+from .simulated import SimulatedRecording
+from .simulated_log import record
 
 
 class RecordLog(Stage):

@@ -16,7 +16,8 @@ NO_BIAS = Bias(0.0, 0.0, 0.0)
 
 
 def test_a_drive_starts_at_rest_at_the_first_waypoint_and_ends_at_the_last() -> None:
-    times, poses = drive(CORNER, Robot(), rate=20.0)
+    driven = drive(CORNER, Robot(), rate=20.0)
+    times, poses = driven.times, driven.poses
     np.testing.assert_allclose(np.diff(times), 0.05)
     np.testing.assert_allclose(poses[0], [0.0, 0.0, 0.0])
     assert math.hypot(poses[-1, 0] - 4.0, poses[-1, 1] - 3.0) < 0.15
@@ -25,7 +26,7 @@ def test_a_drive_starts_at_rest_at_the_first_waypoint_and_ends_at_the_last() -> 
 
 def test_limits_of_speed_turning_and_acceleration_hold() -> None:
     robot = Robot()
-    _, poses = drive(CORNER, robot, rate=20.0)
+    poses = drive(CORNER, robot, rate=20.0).poses
     motion = between(poses[:-1], poses[1:]) * 20.0
     speed = np.hypot(motion[:, 0], motion[:, 1])
     assert speed.max() <= robot.speed * 1.001
@@ -34,7 +35,7 @@ def test_limits_of_speed_turning_and_acceleration_hold() -> None:
 
 
 def test_wheels_do_not_slip_sideways() -> None:
-    _, poses = drive(CORNER, Robot(), rate=20.0)
+    poses = drive(CORNER, Robot(), rate=20.0).poses
     motion = between(poses[:-1], poses[1:])
     # On an arc the chord leaves at half the turn; a second step may turn at another rate.
     sideways = motion[:, 1] - motion[:, 0] * np.tan(motion[:, 2] / 2)
@@ -43,7 +44,7 @@ def test_wheels_do_not_slip_sideways() -> None:
 
 @pytest.mark.parametrize("behind", [((0.0, 0.0), (2.0, 0.0), (0.0, 0.1)), ((0.0, 0.0), (1.0, 0.0), (1.0, 0.0))])
 def test_sharp_turns_and_repeated_waypoints_are_driven(behind: tuple[tuple[float, float], ...]) -> None:
-    _, poses = drive(behind, Robot(), rate=20.0)
+    poses = drive(behind, Robot(), rate=20.0).poses
     assert np.isfinite(poses).all()
     assert math.hypot(poses[-1, 0] - behind[-1][0], poses[-1, 1] - behind[-1][1]) < 0.2
 
@@ -55,7 +56,7 @@ def test_waypoints_are_missed_by_two_spreads_at_most() -> None:
 
 
 def test_odometry_without_noise_is_the_drive_itself() -> None:
-    _, poses = drive(CORNER, Robot(), rate=20.0)
+    poses = drive(CORNER, Robot(), rate=20.0).poses
     seen = odometry(poses, EXACT, NO_BIAS, np.random.default_rng(0))
     np.testing.assert_allclose(between(seen[:-1], seen[1:]), between(poses[:-1], poses[1:]), atol=1e-12)
     np.testing.assert_allclose(seen[-1], between(poses[0], poses[-1]), atol=1e-9)

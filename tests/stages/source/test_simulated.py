@@ -3,6 +3,7 @@
 import dataclasses
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -11,7 +12,8 @@ from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.world import World
 from omninav.stages.source import simulated
 from omninav.stages.source.recording import Recording, UnreadableRecording
-from omninav.stages.source.simulated import SimulatedRecording, record
+from omninav.stages.source.simulated import SimulatedRecording
+from omninav.stages.source.simulated_log import record
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +94,7 @@ def _ring(recording: SimulatedRecording, frame: int) -> np.ndarray:
     picture = recording.image(frame).astype(float)
     camera = recording.camera
     u, v = camera.centre_x + radius * np.cos(azimuth), camera.centre_y + radius * np.sin(azimuth)
-    smooth = simulated.cv2.blur(picture, (9, 9))
+    smooth = cv2.blur(picture, (9, 9))
     return smooth[np.round(v).astype(int), np.round(u).astype(int)]
 
 

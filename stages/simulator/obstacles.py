@@ -1,0 +1,155 @@
+"""What a robot can bump into, for quick questions: how far is the nearest obstacle, and what does a beam hit."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
+
+CELL = 1.0
+"""Size (m) of the cells in which boxes are looked up."""
+
+
+class Body(Protocol):
+    """A box that stands on the floor: centre, half length and half depth (m), yaw (rad)."""
+
+    @property
+    def centre(self) -> tuple[float, float]: ...
+    @property
+    def half(self) -> tuple[float, float]: ...
+    @property
+    def yaw(self) -> float: ...
+
+
+class Obstacles(NamedTuple):
+    """Boxes by the cells they are near to.
+
+    `boxes` (B, 6): centre x, y, cosine and sine of the yaw, half length, half depth. `start` (cells + 1,) and
+    `members`: which boxes lie within `reach` m of each cell. `rows`, `columns`: of cells, the first at 0, 0. `width`,
+    `depth`: of the floor; what lies beyond is no room to drive.
+    """
+
+    boxes: F64
+    start: I32
+    members: I32
+    rows: int
+    columns: int
+    width: float
+    depth: float
+    reach: float
+
+
+def gather(bodies: Sequence[Body], size: tuple[float, float], reach: float) -> Obstacles:
+    """Obstacles from boxes on a floor of `size` m; distances are known up to `reach` m."""
+    boxes = np.array([(*b.centre, math.cos(b.yaw), math.sin(b.yaw), *b.half) for b in bodies]).reshape(-1, 6)
+    rows, columns = max(1, math.ceil(size[1] / CELL)), max(1, math.ceil(size[0] / CELL))
+    across = np.abs(boxes[:, 2:3]) * boxes[:, 4:5] + np.abs(boxes[:, 3:4]) * boxes[:, 5:6]
+    upward = np.abs(boxes[:, 3:4]) * boxes[:, 4:5] + np.abs(boxes[:, 2:3]) * boxes[:, 5:6]
+    extent = np.hstack([across, upward]) + reach
+    low = np.clip(np.floor((boxes[:, :2] - extent) / CELL).astype(int), 0, None)
+    high = np.minimum(np.floor((boxes[:, :2] + extent) / CELL).astype(int), [columns - 1, rows - 1])
+    lists: list[list[int]] = [[] for _ in range(rows * columns)]
+    for number in range(len(boxes)):
+        for row in range(low[number, 1], high[number, 1] + 1):
+            for column in range(low[number, 0], high[number, 0] + 1):
+                lists[row * columns + column].append(number)
+    start = np.cumsum([0, *(len(cell) for cell in lists)]).astype(np.int32)
+    members = np.array([number for cell in lists for number in cell], dtype=np.int32)
+    return Obstacles(boxes, start, members, rows, columns, float(size[0]), float(size[1]), reach)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def nearest(obstacles: Obstacles, people: F64, x: float, y: float) -> tuple[float, float, float]:
+    """Distance (m) of a point to the nearest obstacle, at most `reach`, and the direction x, y that leads away from it.
+
+    `people` (M, 3): x, y, radius of round bodies. Inside an obstacle the distance is negative; the direction there
+    leads out over the nearest side.
+    """
+    least, away_x, away_y = obstacles.reach, 0.0, 0.0
+    for distance, nx, ny in (
+        (x, 1.0, 0.0),
+        (obstacles.width - x, -1.0, 0.0),
+        (y, 0.0, 1.0),
+        (obstacles.depth - y, 0.0, -1.0),
+    ):
+        if distance < least:
+            least, away_x, away_y = distance, nx, ny
+    column = min(max(int(x / CELL), 0), obstacles.columns - 1)
+    row = min(max(int(y / CELL), 0), obstacles.rows - 1)
+    cell = row * obstacles.columns + column
+    for k in range(obstacles.start[cell], obstacles.start[cell + 1]):
+        box = obstacles.boxes[obstacles.members[k]]
+        cos, sin = box[2], box[3]
+        along = cos * (x - box[0]) + sin * (y - box[1])
+        across = cos * (y - box[1]) - sin * (x - box[0])
+        over, beside = abs(along) - box[4], abs(across) - box[5]
+        if over > 0.0 or beside > 0.0:
+            u, v = max(over, 0.0), max(beside, 0.0)
+            distance = math.hypot(u, v)
+        else:
+            distance = max(over, beside)
+            u, v = (1.0, 0.0) if over > beside else (0.0, 1.0)
+        if distance < least:
+            size = math.hypot(u, v)
+            u, v = math.copysign(u, along) / size, math.copysign(v, across) / size
+            least, away_x, away_y = distance, cos * u - sin * v, sin * u + cos * v
+    for k in range(len(people)):
+        dx, dy = x - people[k, 0], y - people[k, 1]
+        far = math.hypot(dx, dy)
+        if far - people[k, 2] < least:
+            least = far - people[k, 2]
+            away_x, away_y = (dx / far, dy / far) if far > 0.0 else (1.0, 0.0)
+    return least, away_x, away_y
+
+
+@numba.njit(cache=True, error_model="numpy")
+def beam(obstacles: Obstacles, people: F64, x: float, y: float, dx: float, dy: float, farthest: float) -> float:
+    """Distance (m) along a unit direction to the first box or person, infinite beyond `farthest`."""
+    best = np.inf
+    for k in range(len(people)):
+        px, py = people[k, 0] - x, people[k, 1] - y
+        along = px * dx + py * dy
+        square = people[k, 2] ** 2 - (px * px + py * py - along * along)
+        if square >= 0.0:
+            enter = along - math.sqrt(square)
+            if along + math.sqrt(square) >= 0.0:
+                best = min(best, max(enter, 0.0))
+    column, row = math.floor(x / CELL), math.floor(y / CELL)
+    travelled = 0.0
+    limit = min(farthest, best)
+    while travelled <= limit and 0 <= row < obstacles.rows and 0 <= column < obstacles.columns:
+        cell = row * obstacles.columns + column
+        for k in range(obstacles.start[cell], obstacles.start[cell + 1]):
+            best = min(best, _enter(obstacles.boxes[obstacles.members[k]], x, y, dx, dy))
+        limit = min(farthest, best)
+        next_x = ((column + (dx > 0.0)) * CELL - x) / dx if dx != 0.0 else np.inf
+        next_y = ((row + (dy > 0.0)) * CELL - y) / dy if dy != 0.0 else np.inf
+        if next_x < next_y:
+            travelled = next_x
+            column += 1 if dx > 0.0 else -1
+        else:
+            travelled = next_y
+            row += 1 if dy > 0.0 else -1
+    return best if best <= farthest else np.inf
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _enter(box: F64, x: float, y: float, dx: float, dy: float) -> float:
+    """Distance at which a ray enters a box; 0 inside, infinite where it misses."""
+    cos, sin = box[2], box[3]
+    u, v = cos * (x - box[0]) + sin * (y - box[1]), cos * (y - box[1]) - sin * (x - box[0])
+    du, dv = cos * dx + sin * dy, cos * dy - sin * dx
+    first, last = 0.0, np.inf
+    for position, slope, half in ((u, du, box[4]), (v, dv, box[5])):
+        if abs(slope) < 1e-12:
+            if abs(position) > half:
+                return np.inf
+        else:
+            one, other = (-half - position) / slope, (half - position) / slope
+            first, last = max(first, min(one, other)), min(last, max(one, other))
+    return first if first <= last else np.inf

@@ -1,0 +1,46 @@
+"""A ring of ultrasound-like range readings."""
+
+import math
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from .config import Ranges
+from .obstacles import Obstacles, beam
+
+F64 = npt.NDArray[np.float64]
+
+RAYS = 5
+"""Rays that stand for a cone."""
+
+
+def azimuths(ring: Ranges) -> tuple[float, float]:
+    """Azimuth of the first reading and the step to the next (rad): the first looks backwards."""
+    return -math.pi, 2 * math.pi / ring.readings
+
+
+def measure(room: Obstacles, people: F64, poses: npt.ArrayLike, ring: Ranges, rng: np.random.Generator) -> F64:
+    """Turns of the ring at poses (N, 3): (N, readings) metres from the robot's middle, infinite without an echo.
+
+    `people` (N, M, 3): x, y and radius of who is about at each.
+    """
+    poses = np.ascontiguousarray(poses, dtype=np.float64)
+    echoes = _echoes(room, people, poses, ring.readings, ring.beam, ring.farthest)
+    seen = np.maximum(echoes + ring.noise * rng.normal(size=echoes.shape), 0.0)
+    lost = rng.uniform(size=echoes.shape) < ring.lost
+    return np.where(lost | (seen > ring.farthest), np.inf, seen)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _echoes(room: Obstacles, people: F64, poses: F64, readings: int, opening: float, farthest: float) -> F64:
+    """The nearest hit within each cone, (N, readings)."""
+    echoes = np.full((len(poses), readings), np.inf)
+    for n in range(len(poses)):
+        for k in range(readings):
+            for ray in range(RAYS):
+                azimuth = poses[n, 2] - math.pi + 2 * math.pi * k / readings + opening * (ray / (RAYS - 1) - 0.5)
+                dx, dy = math.cos(azimuth), math.sin(azimuth)
+                hit = beam(room, people[n], poses[n, 0], poses[n, 1], dx, dy, farthest)
+                echoes[n, k] = min(echoes[n, k], hit)
+    return echoes
