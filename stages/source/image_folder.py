@@ -170,6 +170,9 @@ class ImageFolder:
             return None
         return pixels
 
+    def scan(self, frame: int) -> None:
+        """A folder of images holds no range readings."""
+
     def digest(self) -> str:
         """sha256 over the tables, the description and every picture that is used."""
         whole = hashlib.sha256(repr(self._description).encode())

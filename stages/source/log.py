@@ -10,11 +10,12 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
 from omninav.stages.geometry.se2 import between, compose
-from omninav.stages.simulator.config import WorldConfig
+from omninav.stages.simulator.config import Event, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.values.camera import Camera
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.scan import Scan
 
 from .opening import open_recording
 from .recording import Recording, UnreadableRecording
@@ -40,7 +41,7 @@ class LogSource(Source):
     """Recorded drives, one after another: a tick for every picture that can be used.
 
     `log` names one recording or several (see `open_recording`); without one, `route` of the simulated `world` is driven
-    on `day`. `first`, `stop` and `stride` select frames of each.
+    on `day`, with `events` on its way. `first`, `stop` and `stride` select frames of each.
     Poses are metres and radians; stamps are header stamps. `motion` is the SE(2) increment of the odometry between
     the pictures' own times, absent at the first picture of each log; where pictures are left out it spans the gap.
 
@@ -52,6 +53,7 @@ class LogSource(Source):
     world: WorldConfig = DEMO
     route: str | None = None
     day: int = 1
+    events: tuple[Event, ...] = ()
     topics: Topics = Topics()
     camera: str | None = None
     layouts: tuple[str, ...] = ()
@@ -69,6 +71,7 @@ class LogSource(Source):
         odometry: Pose | None = None
         motion: Motion | None = None
         truth: Pose | None = None
+        scan: Scan | None = None
 
     def setup(self, ctx: Context) -> None:
         """Open all logs; what is lost by then is counted."""
@@ -140,6 +143,7 @@ class LogSource(Source):
             odometry=_pose(odometry),
             motion=None if increment is None else Motion(*(float(value) for value in increment)),
             truth=_pose(truth),
+            scan=recording.scan(frame),
         )
 
     def _disturbed(self, ctx: Context, increment: Array) -> Array:
@@ -159,7 +163,7 @@ class LogSource(Source):
         if self.log is None and self.route is not None:
             from .simulated import SimulatedRecording  # brings the compiler, which a log does not need
 
-            recordings = [SimulatedRecording(self.world, self.route, self.day)]
+            recordings = [SimulatedRecording(self.world, self.route, self.day, self.events)]
         elif not names or None in names:
             raise UnreadableRecording("no recording is named; type log=PATH")
         else:

@@ -8,8 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.stages.values.image import Pixels
+from omninav.stages.values.scan import Scan
 
 POSE_TYPES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped")
+SCAN_TYPE = "sensor_msgs/msg/LaserScan"
 IMAGE_TYPES = ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image")
 LEVELS_OF_A_BLANK = 2
 """A constant picture may differ by this much after JPEG compression (rounding of one level to either side)."""
@@ -46,6 +48,19 @@ def pose_of(message: Any) -> tuple[float, float, float]:
     if not math.isfinite(position.x + position.y + heading):
         raise ValueError("its pose is not finite")
     return float(position.x), float(position.y), heading
+
+
+def scan_of(message: Any) -> Scan:
+    """A LaserScan message as a `Scan`: what is no number, or out of its bounds, is no echo."""
+    ranges = np.asarray(message.ranges, dtype=np.float64)
+    heard = np.isfinite(ranges) & (ranges >= message.range_min) & (ranges <= message.range_max)
+    return Scan(
+        ranges=np.where(heard, ranges, np.inf),
+        first=float(message.angle_min),
+        step=float(message.angle_increment),
+        nearest=float(message.range_min),
+        farthest=float(message.range_max),
+    )
 
 
 def pixels_of(message: Any) -> Pixels:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.problems import BadInput
-from omninav.stages.simulator.config import WorldConfig
+from omninav.stages.simulator.config import Event, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.occupancy import write_grid
 from omninav.stages.simulator.plan import draw_plan
@@ -19,7 +19,8 @@ from .simulated_log import record
 class RecordLog(Stage):
     """Writes one simulated drive: the log, and beside it camera.yaml, a floor plan and an occupancy grid.
 
-    `log`: the .mcap file to write; the others are named after it. The same world, route and day give the same bytes.
+    `log`: the .mcap file to write; the others are named after it. The same world, route, day
+    and events give the same bytes.
     Raises `BadInput` where `log` is no .mcap name and `UnreadableRecording` for an unknown route.
     """
 
@@ -27,6 +28,7 @@ class RecordLog(Stage):
     route: str = "drive"
     day: Annotated[int, Bounds(ge=0)] = 1
     log: str | None = None
+    events: tuple[Event, ...] = ()
 
     class Out(Outputs):
         """Files are all it gives."""
@@ -36,7 +38,7 @@ class RecordLog(Stage):
         path = Path(self.log or "")
         if path.suffix != ".mcap":
             raise BadInput("simulate: name the log to write: log=out.mcap")
-        recording = SimulatedRecording(self.world, self.route, self.day)
+        recording = SimulatedRecording(self.world, self.route, self.day, self.events)
         record(recording, path)
         path.with_suffix(".camera.yaml").write_text(write_camera(recording.camera))
         world = World(self.world, self.day)

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from omninav.pipeline.problems import BadInput
 from omninav.stages.values.camera import Camera
 from omninav.stages.values.image import Pixels
+from omninav.stages.values.scan import Scan
 
 Array = npt.NDArray[np.float64]
 
@@ -47,6 +48,9 @@ class Recording(Protocol):
 
         What is wrong with it is counted in `dropped` at that moment, under `undecodable_image` or `blank_image`.
         """
+
+    def scan(self, frame: int) -> Scan | None:
+        """The last range readings at or before a frame; None where it has none."""
 
     def digest(self) -> str:
         """sha256 over all content that the frames are made from."""

@@ -15,12 +15,12 @@ from omninav.stages import simulator
 from omninav.stages.geometry import catadioptric, odometry_noise, se2
 from omninav.stages.simulator.cameras import Rays, camera_rays
 from omninav.stages.simulator.config import Event, MirrorCamera, WorldConfig
-from omninav.stages.simulator.layout import stream
 from omninav.stages.simulator.obstacles import Obstacles, gather
 from omninav.stages.simulator.odometry import draw_bias, odometry
 from omninav.stages.simulator.ranges import azimuths, measure
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.robot import drive, reach, wandered
+from omninav.stages.simulator.streams import stream
 from omninav.stages.simulator.world import World
 from omninav.stages.values.camera import HyperbolicMirror
 from omninav.stages.values.image import Pixels

@@ -17,14 +17,17 @@ from omninav.pipeline.problems import nearest
 from omninav.stages.geometry.se2 import interpolate
 from omninav.stages.values.camera import Camera
 from omninav.stages.values.image import Pixels
+from omninav.stages.values.scan import Scan
 
 from .camera_yaml import camera_from_info, parse_camera
-from .messages import IMAGE_TYPES, POSE_TYPES, Undecodable, is_blank, pixels_of, pose_of
+from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, Undecodable, is_blank, pixels_of, pose_of, scan_of
 from .recording import UnreadableRecording
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
 IMAGE_TOPICS = ("/camera/image/compressed", "/camera/image")
+STALE = 1_000_000_000
+"""Nanoseconds after which range readings say nothing any more."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,7 @@ class Topics:
     camera_info: str | None = "/camera/camera_info"
     odometry: str | None = "/odom"
     truth: str | None = "/ground_truth/pose"
+    scan: str | None = "/scan"
 
 
 class Feed(Protocol):
@@ -67,9 +71,11 @@ class TopicRecording:
         feed: Feed,
         picture: Callable[[int], Pixels],
         files: Sequence[Path],
+        scans: Sequence[Record] = (),
     ) -> None:
         self.name, self.camera, self.stamps, self.odometry, self.truth = name, camera, stamps, odometry, truth
-        self._feed, self._picture, self._files = feed, picture, files
+        self._feed, self._picture, self._files, self._scans = feed, picture, files, scans
+        self._scan_stamps = np.array([record.stamp for record in scans], dtype=np.int64)
 
     @property
     def dropped(self) -> Counter[str]:
@@ -101,6 +107,18 @@ class TopicRecording:
                 return pixels
         return None
 
+    def scan(self, frame: int) -> Scan | None:
+        """The last ring of ranges before a frame, read now; None where the last second has none, or a broken one."""
+        number = int(np.searchsorted(self._scan_stamps, self.stamps[frame], side="right")) - 1
+        if number < 0 or self.stamps[frame] - self._scan_stamps[number] > STALE:
+            return None
+        record = self._scans[number]
+        try:
+            return scan_of(self._feed.decode(record.topic, self._feed.fetch(record.location)))
+        except BadMessage as error:
+            self._feed.drop("bad_message", str(error))
+            return None
+
     def digest(self) -> str:
         """sha256 over the bytes of all files that were read."""
         whole = hashlib.sha256()
@@ -115,7 +133,7 @@ def record_topics(name: str, feed: Feed, topics: Topics, camera: Path | None, fi
     `camera`: a camera.yaml named by the user; else one attached, else one beside the file, else CameraInfo.
     Raises `UnreadableRecording` where a topic is missing, or nothing usable remains.
     """
-    wanted = {topic for topic in (topics.camera_info, topics.odometry, topics.truth) if topic}
+    wanted = {topic for topic in (topics.camera_info, topics.odometry, topics.truth, topics.scan) if topic}
     wanted |= {topics.image} if topics.image else set(IMAGE_TOPICS)
     found: dict[str, list[Record]] = {topic: [] for topic in wanted}
     poses: dict[str, list[tuple[float, float, float]]] = {topic: [] for topic in wanted}
@@ -163,6 +181,7 @@ def record_topics(name: str, feed: Feed, topics: Topics, camera: Path | None, fi
         feed=feed,
         picture=picture,
         files=[*files, *camera_files],
+        scans=_scans(name, feed, topics.scan, found),
     )
     _check_size(recording, picture)
     return recording
@@ -303,6 +322,21 @@ def _track(
     chosen = [order[number] for number in kept]
     stamps = np.array([records[number].stamp for number in chosen], dtype=np.int64)
     return stamps, np.array([poses[topic][number] for number in chosen], dtype=np.float64)
+
+
+def _scans(name: str, feed: Feed, topic: str | None, found: dict[str, list[Record]]) -> list[Record]:
+    """Records of a topic of range readings in ascending order; none where the recording does not have it."""
+    if topic is None or topic not in feed.topics:
+        if topic not in (None, Topics.scan):
+            raise UnreadableRecording(f"{name}: no topic {topic}; type topics.scan=null to do without it")
+        return []
+    if feed.topics[topic] != SCAN_TYPE:
+        if topic == Topics.scan:  # nobody asked for it
+            return []
+        raise UnreadableRecording(
+            f"{name}: {topic} carries {feed.topics[topic]}, not {SCAN_TYPE}; type topics.scan=null"
+        )
+    return _in_order(feed, name, topic, found[topic], "duplicate_stamp")
 
 
 def _in_order(feed: Feed, name: str, topic: str, records: list[Record], repeats: str) -> list[Record]:
