@@ -18,6 +18,7 @@ omninav: finding the way with an omnidirectional camera
   omninav variant=omniview_mcl tour=T log=L      learn the map from a tour, localise a drive with it
   omninav variant=omniview_mcl map=M log=L       the same with a map that was saved before
   omninav -m match=selective,l2 seed=0,1,2       a sweep: every combination, one page
+  omninav +experiment=omniview_mcl/table_1       a paper's table, its figures beside ours (profile=quick: small)
   omninav resume runs/latest                     go on with a run that was stopped
   omninav compare runs/A runs/B                  figures side by side
 
@@ -162,7 +163,10 @@ def _job(config: Any) -> None:
     sweep = _sweep_folder()
     code, error = 0, ""
     try:
-        _run(config, sweep)
+        if config.get("experiment") is not None:
+            code = _experiment(config, sweep)
+        else:
+            _run(config, sweep)
     except ProblemsFound as found:
         code, error = 2, str(found)
     except BadInput as bad:
@@ -203,6 +207,27 @@ def _run(config: Any, sweep: tuple[Path, str, str] | None) -> None:
     if sweep is None:
         _print(results_table(metrics))
     print(f"report: {_shown(run.folder / 'report.html')}", flush=True)
+
+
+def _experiment(config: Any, sweep: tuple[Path, str, str] | None) -> int:
+    """An experiment: every condition and repetition of its file, and its page. 1 where a job failed."""
+    from hydra import compose
+    from hydra.core.hydra_config import HydraConfig
+    from omegaconf import OmegaConf
+
+    from .experiment_run import run_experiment
+    from .problems import BadInput
+
+    if sweep is not None:
+        raise BadInput("an experiment has its own sweep: leave out -m, and write what varies into its file")
+    typed = list(HydraConfig.get().overrides.task)
+    own = [w for w in typed if not w.lstrip("+").startswith(("experiment=", "experiment/", "experiment.", "profile="))]
+    plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
+    run, well = run_experiment(
+        plain, lambda words: complete(compose("config", overrides=list(words))), own, ["omninav", *sys.argv[1:]]
+    )
+    print(f"page: {_shown(run.folder / (run.experiment.name + '.html'))}", flush=True)
+    return 0 if well else 1
 
 
 def _print(renderable: Any) -> None:
@@ -378,7 +403,7 @@ def _graph(arguments: list[str]) -> int:
     for name, graph in drawn.items():
         write_whole(out / f"{name}.svg", svg(graph))
         write_whole(out / f"{name}.mmd", mermaid(graph))
-        print(f"{out / name}.svg and .mmd")
+        print(f"{name}.svg and {name}.mmd (Mermaid), {len(graph.nodes)} nodes, written to {out.resolve()}")
     return 0
 
 
@@ -413,7 +438,7 @@ def _stages(arguments: list[str]) -> int:
             for p in read.outputs.values()
         ]
         lines += [f"    set  {p.name}: {type_name(p.type)} = {p.default!r}" for p in read.parameters.values()]
-        lines += [f"    from {_paper(cls)}"] if _paper(cls) else []
+        lines += [f"    from {_papers(cls)}"] if _papers(cls) else []
         lines += [f"    use  {entry.role}={entry.name.partition('.')[2]}  or  _target_: {entry.target}", ""]
         print("\n".join(lines))
     if broken:
@@ -421,12 +446,13 @@ def _stages(arguments: list[str]) -> int:
     return 0
 
 
-def _paper(cls: type) -> str:
-    """The line of a stage's docstring that names its source, where it has one."""
+def _papers(cls: type) -> str:
+    """The works that a stage's docstring names, with the sections it is from."""
     import re
 
-    found = re.search(r"[^.\n]*\b(?:19|20)\d\d\b[^\n]*", cls.__doc__ or "")
-    return " ".join(found.group().split()) if found else ""
+    author, part = r"[A-Z][\w-]+", r"(?:section|equation|chapter|figure|table)s? [\w.]*\w"
+    pattern = rf"{author}(?:(?:, | & | and ){author}| et al\.)* (?:19|20)\d\d(?:, {part})*"
+    return "; ".join(dict.fromkeys(re.findall(pattern, " ".join((cls.__doc__ or "").split()))))
 
 
 def _variants(arguments: list[str]) -> int:
@@ -500,16 +526,22 @@ def _resume(arguments: list[str]) -> int:
     from .problems import BadInput
     from .progress import Progress
     from .report import results_table
-    from .run import resume
+    from .run import resume, status
 
     if len(arguments) != 1:
         raise BadInput("resume: give one run folder: omninav resume runs/latest")
+    here, folder = Path.cwd(), Path(arguments[0]).resolve()
+    ended = status(folder) == "complete"
     try:
         with Progress() as progress:
-            run, metrics = resume(Path(arguments[0]), progress)
+            run, metrics = resume(folder, progress)
     except StageFailed as failed:
-        print(f"{failed}\nthe traceback is in {Path(arguments[0]) / 'run.log'}", file=sys.stderr)
+        print(f"{failed}\nthe traceback is in {folder / 'run.log'}", file=sys.stderr)
         return 1
+    finally:
+        os.chdir(here)  # a run goes on where it was started
+    if ended:
+        print(f"{arguments[0]} was complete: there was nothing to go on with. Its results:")
     _print(results_table(metrics))
     print(f"report: {_shown(run.folder / 'report.html')}")
     return 0

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
+from string import ascii_uppercase
 from typing import TYPE_CHECKING, Any
 
 from .files import write_whole
@@ -24,6 +25,8 @@ SWEEP_COLUMNS = (
     "loss_rate",
     "converged_after_frames",
 )
+WIDEST_NAME = 24
+"""Of a run at the head of a column, in characters."""
 BESIDE = ("mean_pose.", "odometry_alone.after_convergence.")
 """What a comparison leaves out, because it says little about which run is better."""
 Rows = list[dict[str, Any]]
@@ -62,7 +65,7 @@ def write_report(
         {"title": t.title, "caption": t.caption, "columns": t.columns, "rows": [[_cell(c) for c in r] for r in t.rows]}
         for t in sorted(tables, key=lambda table: (table.order, table.name))
     ]
-    page = _render(
+    page = render(
         "report.html",
         title=folder.resolve().name,
         manifest=manifest,
@@ -203,13 +206,16 @@ def _cell(value: Any) -> str:
     return "" if value is None else str(value)
 
 
-def _render(template: str, **values: Any) -> str:
+def render(template: str, **values: Any) -> str:
+    """A page from a template of ours; text is escaped in HTML and stays as it is elsewhere."""
     from jinja2 import Environment, FunctionLoader
     from markupsafe import Markup
 
     folder = files(__package__).joinpath("templates")
     loader = FunctionLoader(lambda name: folder.joinpath(name).read_text(encoding="utf-8"))
-    environment = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        loader=loader, autoescape=template.endswith(".html"), trim_blocks=True, lstrip_blocks=True
+    )
     css = Markup(folder.joinpath("page.css").read_text(encoding="utf-8"))
     return environment.get_template(template).render(css=css, **values)
 
@@ -244,7 +250,7 @@ def write_sweep_page(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
             }
         )
     counts = Counter(str(line["status"]) for line in lines)
-    page = _render(
+    page = render(
         "sweep.html",
         title=folder.resolve().name,
         counts=f"{len(lines)} jobs: " + ", ".join(f"{number} {status}" for status, number in sorted(counts.items())),
@@ -300,12 +306,21 @@ def compare_table(runs: Sequence[Mapping[str, Any]]) -> "TerminalTable":
     """
     from rich.table import Table as TerminalTable
 
+    heads, below = [str(run["name"]) for run in runs], ["* the best of its line"]
+    if max(map(len, heads)) > WIDEST_NAME:  # folded names are hard to tell apart: letters, and what they stand for
+        letters = [ascii_uppercase[n % 26] * (n // 26 + 1) for n in range(len(runs))]
+        below = [*(f"{letter}: {name}" for letter, name in zip(letters, heads, strict=True)), *below]
+        heads = letters
     table = TerminalTable(
-        title="Comparison", title_justify="left", header_style="bold", caption="* the best of its line"
+        title="Comparison",
+        title_justify="left",
+        header_style="bold",
+        caption="\n".join(below),
+        caption_justify="left",
     )
     table.add_column("")
-    for run in runs:
-        table.add_column(str(run["name"]), justify="right", overflow="fold")
+    for head in heads:
+        table.add_column(head, justify="right", overflow="fold")
     table.add_row("variant", *(str(run["manifest"].get("variant", "")) for run in runs))
     table.add_row("status", *(str(run["manifest"].get("status", "")) for run in runs))
     table.add_section()

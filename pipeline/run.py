@@ -200,18 +200,18 @@ def start(planned: Plan, argv: Sequence[str], folder: Path | None = None) -> Run
     folder.mkdir(parents=True, exist_ok=True)
     run = Run(folder)
     run.manifest = {
-        "omninav": _version("omninav"),
+        "omninav": version("omninav"),
         "status": "running",
         "variant": planned.variant,
         "argv": list(argv),
         "cwd": os.getcwd(),
         "started": datetime.now().isoformat(timespec="seconds"),
-        "git_commit": _git_commit(),
+        "git_commit": git_commit(),
         "graph": planned.graph.digest(),
         "inputs": inputs,
         "seed": planned.seed,
         "python": platform.python_version(),
-        "libraries": {name: _version(name) for name in LIBRARIES},
+        "libraries": {name: version(name) for name in LIBRARIES},
     }
     write_whole(folder / "config.yaml", yaml.safe_dump(dict(config), sort_keys=False, allow_unicode=True, width=120))
     from .draw import mermaid, svg  # drawing is not needed to start the command line
@@ -266,11 +266,11 @@ def _execute(run: Run, planned: Plan, progress: Any) -> dict[str, Any]:
             wanted,
             identity,
             every_s,
-            _usable(front),
+            usable(front),
             _stepper(progress, planned.variant),
         )
         last = engine.run()
-        _keep_front(engine, front, cache, seed)
+        keep_front(engine, front, cache, seed)
     for name, origin in planned.saves.items():
         value = last[origin]
         if isinstance(value, Value):
@@ -331,11 +331,11 @@ def _make(
             [artifact.origin],
             identity,
             every_s,
-            _usable(front),
+            usable(front),
             _stepper(progress, artifact.variant),
         )
         value = engine.run()[artifact.origin]
-        _keep_front(engine, front, cache, seed)
+        keep_front(engine, front, cache, seed)
     if not isinstance(value, Value):
         raise BadInput(
             f"'{artifact.variant}' ran to its end and gave no {artifact.name}: was there anything usable in its log?"
@@ -349,11 +349,13 @@ def _provenance(graph: Graph, engine: Engine, variant: str) -> dict[str, Any]:
     return {**notes_of(engine), "variant": variant, "stages": stages_of(graph)}
 
 
-def _usable(front: CachedFront | None) -> CachedFront | None:
+def usable(front: CachedFront | None) -> CachedFront | None:
+    """A front that is found or may be recorded; None where it is too large to keep."""
     return front if front is not None and front.key else None
 
 
-def _keep_front(engine: Engine, front: CachedFront | None, cache: Cache | None, seed: int) -> None:
+def keep_front(engine: Engine, front: CachedFront | None, cache: Cache | None, seed: int) -> None:
+    """Put the front that an engine recorded into the cache, where it was not found there."""
     if cache is not None and front is not None and front.key and front.replay is None:
         spool = engine.spools["front"]
         spool.flush()
@@ -467,6 +469,12 @@ def stage_times(engine: Engine) -> dict[str, Any]:
     return {"ticks": engine.ticks, "ticks_per_second": 1e3 / per_tick if per_tick else None, "stages": stages}
 
 
+def status(folder: Path) -> str | None:
+    """What a run folder's manifest says of the run (`running`, `complete`, `failed`, …); None where there is none."""
+    file = folder / "manifest.json"
+    return str(json.loads(file.read_text()).get("status")) if file.is_file() else None
+
+
 def resume(folder: Path, progress: Any = None) -> tuple[Run, dict[str, Any]]:
     """Go on with a run that was stopped, from its last checkpoint, to the bytes it would have given unbroken."""
     manifest_file, config_file = folder / "manifest.json", folder / "config.yaml"
@@ -564,14 +572,15 @@ def _point_latest(folder: Path) -> None:
         part.unlink(missing_ok=True)
 
 
-def _version(distribution: str) -> str:
+def version(distribution: str) -> str:
+    """The installed version of a distribution, or that there is none."""
     try:
         return importlib.metadata.version(distribution)
     except importlib.metadata.PackageNotFoundError:
         return "not installed"
 
 
-def _git_commit() -> str | None:
+def git_commit() -> str | None:
     """The commit of omninav's own checkout, with a mark where files differ from it; None where there is none."""
     here = Path(__file__).resolve().parent
     try:

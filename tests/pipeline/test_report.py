@@ -206,6 +206,13 @@ def test_a_comparison_marks_the_best_and_shows_differing_settings():
     assert not any("m.k" in line for line in lines)
 
 
+def test_runs_with_long_names_stand_under_letters_that_are_explained():
+    names = [f"runs/2026-01-0{day}_10-00-00_omniview_mcl" for day in (1, 2, 3)]
+    said = printed(compare_table([{"name": n, "metrics": METRICS, "config": {}, "manifest": {}} for n in names]))
+    assert [said.count(name) for name in names] == [1, 1, 1]
+    assert f"B: {names[1]}" in said
+
+
 def test_settings_that_one_run_does_not_have_differ_too():
     assert differing_settings([{"a": 1, "b": {"c": 2}}, {"a": 1}]) == [("b.c", ["2", "–"])]
 
