@@ -84,6 +84,8 @@ class Block:
     """Look of its underside; that of its top where null."""
     look: str = ""
     """Bodies of one material and one look are alike; every body has its own where it is empty."""
+    kind: Literal["block", "wall", "door", "furniture", "plant", "roof"] = "block"
+    """What a floor plan shows it as."""
 
 
 @dataclass(frozen=True)

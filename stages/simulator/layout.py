@@ -1,12 +1,11 @@
 """What stands where on a day: aisle blocks, rooms and lamp grids of a world, laid out into single bodies."""
 
 import math
-import zlib
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from .config import AisleBlock, Block, Hanging, Lamp, LampGrid, Point, Shelf, WorldConfig
+from .config import AisleBlock, Block, Hanging, Lamp, LampGrid, Point, Room, Shelf, WorldConfig
+from .rooms import doors, furnish, openings, roof, walls, windows
+from .streams import stream
 
 
 @dataclass(frozen=True)
@@ -30,11 +29,6 @@ class Layout:
     aisles: tuple[Aisle, ...]
 
 
-def stream(seed: int, *names: str | int) -> np.random.Generator:
-    """A generator of its own for each purpose: no draw for one thing can change another."""
-    return np.random.default_rng([seed, *(zlib.crc32(str(name).encode()) for name in names)])
-
-
 def expand(config: WorldConfig, day: int = 0) -> Layout:
     """Lay out a world as it stands on a day (from 0)."""
     shelves, blocks, lamps, aisles = list(config.shelves), list(config.blocks), list(config.lamps), []
@@ -46,7 +40,25 @@ def expand(config: WorldConfig, day: int = 0) -> Layout:
         aisles += between
     if config.lamp_grid is not None:
         lamps += _lamp_grid(config.lamp_grid, (0.0, 0.0), config.size)
-    return Layout(tuple(shelves), tuple(blocks), config.hangings, tuple(lamps), tuple(aisles))
+    hangings, today, cuts = list(config.hangings), config.day(day), openings(config)
+    for room in config.rooms:
+        lamps += _room_lamps(config, room)
+        if room.walls:
+            blocks += walls(config, room, cuts) + roof(config, room) + doors(config, room, today, day)
+            hangings += windows(room)
+        fittings = furnish(config, room, cuts, today, day)
+        blocks += fittings.blocks
+        hangings += fittings.hangings
+    hangings = [_curtained(config, hanging, k, day) for k, hanging in enumerate(hangings)]
+    return Layout(tuple(shelves), tuple(blocks), tuple(hangings), tuple(lamps), tuple(aisles))
+
+
+def _curtained(config: WorldConfig, hanging: Hanging, number: int, day: int) -> Hanging:
+    """A window with its curtain closed, where the day has it so."""
+    if hanging.material != "window":
+        return hanging
+    closed = stream(config.seed, "curtain", number, "day", day).uniform() < config.day(day).curtains
+    return replace(hanging, material="curtain") if closed else hanging
 
 
 def _aisle_block(config: WorldConfig, block: AisleBlock) -> tuple[list[Shelf], list[Block], list[Aisle]]:
@@ -104,3 +116,11 @@ def _lamp_grid(grid: LampGrid, corner: Point, size: Point) -> list[Lamp]:
         for row in range(rows)
         for column in range(columns)
     ]
+
+
+def _room_lamps(config: WorldConfig, room: Room) -> list[Lamp]:
+    """Lamps of a room, switched by its name."""
+    if not room.lamps:
+        return []
+    grid = LampGrid((room.lamps, room.lamps))
+    return [replace(lamp, z=room.height, name=room.name) for lamp in _lamp_grid(grid, room.corner, room.size)]

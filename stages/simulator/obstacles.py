@@ -108,6 +108,16 @@ def nearest(obstacles: Obstacles, people: F64, x: float, y: float) -> tuple[floa
 
 
 @numba.njit(cache=True, error_model="numpy")
+def distances(obstacles: Obstacles, points: F64) -> F64:
+    """Distances (N,) of points (N, 2) to the nearest obstacle, at most `reach`; 0 inside one or beyond the floor."""
+    nobody = np.zeros((0, 3))
+    found = np.empty(len(points))
+    for k in range(len(points)):
+        found[k] = max(nearest(obstacles, nobody, points[k, 0], points[k, 1])[0], 0.0)
+    return found
+
+
+@numba.njit(cache=True, error_model="numpy")
 def beam(obstacles: Obstacles, people: F64, x: float, y: float, dx: float, dy: float, farthest: float) -> float:
     """Distance (m) along a unit direction to the first box or person, infinite beyond `farthest`."""
     best = np.inf

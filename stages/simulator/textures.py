@@ -4,6 +4,7 @@ Colours are blue-green-red. Each texture is drawn larger than it is kept and ave
 """
 
 import colorsys
+import math
 from collections.abc import Callable
 
 import cv2
@@ -32,7 +33,12 @@ def draw(material: str, rng: np.random.Generator) -> U8:
 
 def glow(material: str) -> float:
     """Share of a material's brightness that does not come from the light around it."""
-    return {"lamp": 1.0, "window": 0.8, "screen": 0.8}.get(material, 0.0)
+    return {"lamp": 1.0, "sky": 1.0, "window": 0.8, "screen": 0.8}.get(material, 0.0)
+
+
+def extent(material: str) -> tuple[float, float]:
+    """Width and height (m) that one texture of a material covers about; infinite: the whole face."""
+    return EXTENTS.get(material, (math.inf, math.inf))
 
 
 def mip_levels(textures: U8) -> list[U8]:
@@ -225,6 +231,189 @@ def _carton(rng: np.random.Generator) -> F32:
     return canvas
 
 
+def _plaster(rng: np.random.Generator) -> F32:
+    base = vivid(rng, (0.08, 0.4))
+    canvas = blank(scaled(base, rng.uniform(190.0, 235.0) / max(base))) + cloud(rng, 5, 4.0) + grain(rng, 3.0)
+    if rng.uniform() < 0.4:
+        box(canvas, 0, 0.68, 1, 0.965, scaled(vivid(rng, (0.2, 0.6)), 0.85))
+    box(canvas, 0, 0.965, 1, 1, (70, 75, 80))
+    return canvas
+
+
+def _brick(rng: np.random.Generator) -> F32:
+    canvas = blank((165, 172, 178))
+    tone = np.array([62.0, 82.0, 158.0]) * rng.uniform(0.7, 1.2) + rng.normal(0.0, 8.0, 3)
+    for row in range(12):
+        for column in range(-1, 4):
+            left = (column + 0.5 * (row % 2)) / 4
+            shade = tuple(tone * rng.uniform(0.8, 1.15))
+            box(canvas, max(left, 0.0), row / 12, min(left + 0.235, 1.0), (row + 0.85) / 12, shade)
+    return canvas + grain(rng, 6.0)
+
+
+def _facade(rng: np.random.Generator) -> F32:
+    """A storey of an outer wall: render or brick around a window."""
+    colour = vivid(rng, (0.08, 0.45))
+    canvas = (_brick(rng) if rng.uniform() < 0.4 else blank(scaled(colour, 0.8))) + cloud(rng, 5, 5.0)
+    left, top = rng.uniform(0.15, 0.3), rng.uniform(0.12, 0.25)
+    canvas = np.ascontiguousarray(canvas, dtype=np.float32)
+    box(canvas, left, top, 1 - left, 0.65, (225, 225, 225))
+    for column in range(2):
+        x = left + 0.03 + column * (0.5 - left)
+        box(canvas, x, top + 0.03, x + 0.46 - left, 0.62, (150, 120, 95))
+        box(canvas, x, top + 0.03, x + 0.3 * (0.46 - left), 0.62, (190, 165, 140))
+    box(canvas, 0, 0.92, 1, 1, (105, 108, 112))
+    return canvas + grain(rng, 4.0)
+
+
+def _carpet(rng: np.random.Generator) -> F32:
+    colour = scaled(vivid(rng, (0.2, 0.7)), 0.6)
+    return blank(colour) + cloud(rng, 20, 5.0) + grain(rng, 14.0)
+
+
+def _parquet(rng: np.random.Generator) -> F32:
+    canvas = blank((60, 95, 130))
+    tone = np.array([85.0, 128.0, 172.0]) * rng.uniform(0.7, 1.1)
+    for row in range(8):
+        start = rng.uniform(-0.5, 0.0)
+        while start < 1.0:
+            box(
+                canvas,
+                max(start, 0.0),
+                row / 8,
+                min(start + 0.49, 1.0),
+                (row + 0.95) / 8,
+                tuple(tone * rng.uniform(0.85, 1.15)),
+            )
+            start += 0.5
+    return canvas + cloud(rng, 30, 4.0) + grain(rng, 4.0)
+
+
+def _linoleum(rng: np.random.Generator) -> F32:
+    base = vivid(rng, (0.1, 0.4))
+    canvas = blank(scaled(base, rng.uniform(120.0, 185.0) / max(base)))
+    return canvas + cloud(rng, 12, 8.0) + cloud(rng, 48, 6.0) + grain(rng, 4.0)
+
+
+def _asphalt(rng: np.random.Generator) -> F32:
+    return blank((92, 92, 92)) + cloud(rng, 6, 6.0) + grain(rng, 16.0)
+
+
+def _paving(rng: np.random.Generator) -> F32:
+    canvas = blank((105, 112, 116))
+    tone = np.array([160.0, 166.0, 172.0]) * rng.uniform(0.85, 1.1)
+    for row in range(4):
+        for column in range(4):
+            slab = tuple(tone * rng.uniform(0.9, 1.08))
+            box(canvas, column / 4 + 0.008, row / 4 + 0.008, (column + 1) / 4, (row + 1) / 4, slab)
+    return canvas + cloud(rng, 16, 5.0) + grain(rng, 6.0)
+
+
+def _grass(rng: np.random.Generator) -> F32:
+    green = np.array([48.0, 128.0, 88.0], dtype=np.float32) * rng.uniform(0.85, 1.15)
+    canvas = blank(tuple(green)) * (1.0 + cloud(rng, 8, 0.1) + cloud(rng, 40, 0.12)) + grain(rng, 14.0)
+    for x, y in rng.uniform(0.0, DRAWN, (int(rng.integers(0, 14)), 2)):
+        cv2.circle(canvas, (int(x), int(y)), 3, (90, 225, 235), -1)
+    return canvas
+
+
+def _leaves(rng: np.random.Generator) -> F32:
+    tone = np.array([40.0, 105.0, 62.0]) * rng.uniform(0.75, 1.25) + np.array([0.0, 0.0, rng.uniform(0.0, 45.0)])
+    canvas = blank(tuple(0.5 * tone))
+    for x, y, size, shade in zip(*rng.uniform(0, 1, (4, 260)), strict=True):
+        colour = tuple(tone * (0.6 + 0.8 * shade))
+        cv2.circle(canvas, (int(x * DRAWN), int(y * DRAWN)), int(4 + 9 * size), colour, -1)
+    return canvas + grain(rng, 8.0)
+
+
+def _hedge(rng: np.random.Generator) -> F32:
+    return _leaves(rng) * 0.85 + cloud(rng, 30, 8.0)
+
+
+def _bark(rng: np.random.Generator) -> F32:
+    furrows = cv2.resize(
+        rng.normal(0.0, 1.0, (5, 28)).astype(np.float32), (DRAWN, DRAWN), interpolation=cv2.INTER_CUBIC
+    )
+    return blank((58, 78, 96)) * (1.0 + 0.25 * furrows[..., None].astype(np.float32)) + grain(rng, 8.0)
+
+
+def _sky(rng: np.random.Generator) -> F32:
+    return blank((238, 214, 190)) + cloud(rng, 3, 3.0)
+
+
+def _curtain(rng: np.random.Generator) -> F32:
+    colour = vivid(rng, (0.25, 0.7))
+    folds: F32 = 1.0 + np.float32(0.16) * np.sin(np.linspace(0.0, 22.0 * np.pi, DRAWN, dtype=np.float32))[None, :, None]
+    return blank(scaled(colour, 0.85)) * folds + grain(rng, 4.0)
+
+
+def _books(rng: np.random.Generator) -> F32:
+    """A bookcase: boards with backs of books and files."""
+    canvas = blank((48, 66, 84))
+    for shelf in range(5):
+        left, bottom = 0.03, (shelf + 0.94) / 5
+        uniform = vivid(rng) if rng.uniform() < 0.4 else None
+        while left < 0.95:
+            width, height = rng.uniform(0.02, 0.06), rng.uniform(0.11, 0.165)
+            if rng.uniform() < 0.9:
+                colour = scaled(uniform or vivid(rng, (0.2, 0.9)), rng.uniform(0.6, 1.0))
+                box(canvas, left, bottom - height, min(left + width, 0.97), bottom, colour)
+            left += width + 0.004
+        box(canvas, 0, bottom, 1, bottom + 0.02, (85, 118, 150))
+    return canvas + grain(rng, 4.0)
+
+
+def _cabinet(rng: np.random.Generator) -> F32:
+    base = vivid(rng, (0.05, 0.6))
+    colour = scaled(base, rng.uniform(150.0, 235.0) / max(base))
+    canvas = blank(scaled(colour, 0.6))
+    columns, rows = int(rng.integers(1, 3)), int(rng.integers(1, 5))
+    for row in range(rows):
+        for column in range(columns):
+            left, top = column / columns, row / rows * 0.94
+            box(canvas, left + 0.015, top + 0.015, left + 1 / columns - 0.015, top + 0.94 / rows - 0.005, colour)
+            middle = left + 0.5 / columns
+            box(canvas, middle - 0.06, top + 0.04, middle + 0.06, top + 0.06, (70, 70, 72))
+    box(canvas, 0, 0.95, 1, 1, (45, 45, 48))
+    return canvas + grain(rng, 3.0)
+
+
+def _steel(rng: np.random.Generator) -> F32:
+    brushed = cv2.resize(rng.normal(0.0, 5.0, (DRAWN, 3)).astype(np.float32), (DRAWN, DRAWN))
+    canvas = blank((188, 186, 182)) + brushed[..., None].astype(np.float32) + grain(rng, 3.0)
+    canvas = np.ascontiguousarray(canvas, dtype=np.float32)
+    box(canvas, 0.08, 0.1, 0.11, 0.5, (90, 90, 92))
+    box(canvas, 0, 0.6, 1, 0.615, (110, 110, 112))
+    return canvas
+
+
+def _fabric(rng: np.random.Generator) -> F32:
+    return blank(scaled(vivid(rng, (0.4, 0.9)), 0.75)) + cloud(rng, 10, 7.0) + grain(rng, 9.0)
+
+
+def _screen(rng: np.random.Generator) -> F32:
+    canvas = blank((30, 28, 28))
+    box(canvas, 0.05, 0.07, 0.95, 0.93, scaled(vivid(rng, (0.2, 0.8)), 0.7))
+    for row in range(int(rng.integers(3, 8))):
+        top = 0.14 + 0.1 * row
+        box(canvas, 0.12, top, rng.uniform(0.3, 0.88), top + 0.04, (235, 235, 235))
+    return canvas
+
+
+def _board(rng: np.random.Generator) -> F32:
+    """A white board with writing."""
+    canvas = blank((240, 240, 238)) + cloud(rng, 4, 3.0)
+    for _ in range(int(rng.integers(4, 12))):
+        at = (rng.uniform(0.08, 0.75, 2) * DRAWN).astype(int)
+        ink = ((160, 60, 30), (40, 40, 190), (60, 130, 40), (30, 30, 30))[int(rng.integers(4))]
+        steps = np.cumsum(rng.normal((5.0, 0.0), 5.0, (12, 2)), axis=0).astype(int)
+        cv2.polylines(canvas, [(at + steps).astype(np.int32)], False, ink, 3)
+    for edge in (0.0, 0.97):
+        box(canvas, edge, 0, edge + 0.03, 1, (150, 150, 152))
+        box(canvas, 0, edge, 1, edge + 0.03, (150, 150, 152))
+    return canvas
+
+
 def _goods(rng: np.random.Generator) -> F32:
     """One compartment of a shelf: what stands on a board, its price rail below, an upright at the left edge."""
     canvas = blank((52, 50, 48)) + cloud(rng, 4, 5.0)
@@ -337,5 +526,14 @@ FILLINGS: tuple[Callable[[F32, np.random.Generator], None], ...] = (
 MATERIALS: dict[str, Callable[[np.random.Generator], F32]] = {
     "wall": _wall, "concrete": _concrete, "stripes": _stripes, "floor": _floor, "ceiling": _ceiling, "lamp": _lamp,
     "wood": _wood, "mat": _mat, "counter": _counter, "door": _door, "window": _window, "poster": _poster,
-    "carton": _carton, "goods": _goods,
+    "carton": _carton, "goods": _goods, "plaster": _plaster, "brick": _brick, "facade": _facade, "carpet": _carpet,
+    "parquet": _parquet, "linoleum": _linoleum, "asphalt": _asphalt, "paving": _paving, "grass": _grass,
+    "hedge": _hedge, "leaves": _leaves, "bark": _bark, "sky": _sky, "curtain": _curtain, "books": _books,
+    "cabinet": _cabinet, "steel": _steel, "fabric": _fabric, "screen": _screen, "board": _board,
+}  # fmt: skip
+
+EXTENTS: dict[str, tuple[float, float]] = {
+    "wall": (2.0, math.inf), "plaster": (2.0, math.inf), "brick": (1.0, 1.0), "facade": (2.5, 3.0),
+    "concrete": (1.0, 1.0), "stripes": (1.0, 1.0), "ceiling": (1.0, 1.0), "hedge": (1.5, 1.5), "leaves": (2.0, 2.0),
+    "bark": (0.5, 1.0), "books": (1.0, math.inf), "wood": (1.2, 1.2),
 }  # fmt: skip

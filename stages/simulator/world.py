@@ -9,9 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from . import textures
-from .config import Block, Hanging, Shelf, WorldConfig
-from .layout import expand, stream
+from .config import Block, Hanging, Room, Shelf, WorldConfig
+from .layout import expand
+from .obstacles import Obstacles, distances, gather
 from .renderer import Scene
+from .streams import stream
 
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
@@ -70,6 +72,7 @@ class World:
         self._textures: list[npt.NDArray[np.uint8]] = []
         self._glow: list[float] = []
         self._named: dict[tuple[str, str], int] = {}
+        self._gathered: dict[float, Obstacles] = {}
         self._goods = [self._texture("goods", f"goods {k}") for k in range(config.goods)]
         self.boxes: list[Box] = [
             *self._walls(),
@@ -78,8 +81,8 @@ class World:
             *(self._hanging(hanging, k) for k, hanging in enumerate(self.layout.hangings)),
             *(self._lamp(k) for k in range(len(self.layout.lamps))),
         ]
-        self.floor = self._ground("floor", 6)
-        self.ceiling = self._ground("ceiling", 6)
+        self.floor = self._ground(config.floor, 6, config.rooms)
+        self.ceiling = self._ground(config.ceiling, 6)
 
     # What stands where
 
@@ -91,16 +94,28 @@ class World:
             self._glow.append(textures.glow(material))
         return self._named[material, name]
 
-    def _plain(self, texture: int, width: float, height: float, step: float = math.inf) -> Tiling:
-        """One texture over a face of `width` by `height` m, repeated about every `step` m."""
-        columns, rows = max(1, round(width / step)), max(1, round(height / step))
+    def _plain(
+        self, texture: int, width: float, height: float, extent: tuple[float, float] = (math.inf, math.inf)
+    ) -> Tiling:
+        """One texture over a face of `width` by `height` m, repeated about every `extent` m across and down."""
+        columns, rows = max(1, round(width / extent[0])), max(1, round(height / extent[1]))
         return Tiling(np.full((rows, columns), texture), width / columns, height / rows)
 
-    def _ground(self, material: str, kinds: int) -> Tiling:
+    def _ground(self, material: str, kinds: int, rooms: Sequence[Room] = ()) -> Tiling:
+        """Floor or ceiling in tiles of about a metre; rooms have floors of their own."""
         rows, columns = math.ceil(self.config.size[1]), math.ceil(self.config.size[0])
         choice = stream(self.config.seed, "ground", material).integers(kinds, size=(rows, columns))
         numbers = np.array([self._texture(material, f"{material} {k}") for k in range(kinds)])
-        return Tiling(numbers[choice], self.config.size[0] / columns, self.config.size[1] / rows)
+        tiles = numbers[choice]
+        width, depth = self.config.size[0] / columns, self.config.size[1] / rows
+        for room in rooms:
+            if room.floor is not None:
+                own = np.array([self._texture(room.floor, f"{room.name} floor {k}") for k in range(3)])
+                (left, low), (wide, deep) = room.corner, room.size
+                across = slice(round(left / width), round((left + wide) / width))
+                up = slice(round(low / depth), round((low + deep) / depth))
+                tiles[up, across] = own[choice[up, across] % len(own)]
+        return Tiling(tiles, width, depth)
 
     def _walls(self) -> list[Box]:
         width, depth = self.config.size
@@ -112,10 +127,9 @@ class World:
             ("west", (-WALL / 2, depth / 2), depth, math.pi / 2),
             ("south", (width / 2, -WALL / 2), width, 0.0),
         ):
-            texture = self._texture("wall", name)
+            texture = self._texture(self.config.wall, name)
             half = (length / 2 + WALL, WALL / 2)
-            columns = max(1, round(length / 2))
-            side = Tiling(np.full((1, columns), texture), 2 * half[0] / columns, high)
+            side = self._plain(texture, 2 * half[0], high, textures.extent(self.config.wall))
             end = self._plain(texture, WALL, high)
             cap = self._plain(texture, 2 * half[0], WALL)
             walls.append(Box("wall", centre, half, yaw, 0.0, high, (end, end, side, side, cap, cap)))
@@ -124,7 +138,7 @@ class World:
     def _shelf(self, shelf: Shelf, number: int) -> list[Box]:
         goods = self._goods_on(shelf, number)
         wood = self._texture("wood", "shelf")
-        cap = self._plain(wood, shelf.length, shelf.depth, 1.0)
+        cap = self._plain(wood, shelf.length, shelf.depth, (1.0, 1.0))
         height = shelf.height / shelf.levels
         sides = [
             Tiling(goods[face], extent / goods[face].shape[1], height)
@@ -182,19 +196,27 @@ class World:
         height: float,
         side: int,
         top: int,
-        step: float = math.inf,
+        extent: tuple[float, float] = (math.inf, math.inf),
     ) -> Box:
-        ends, fronts = self._plain(side, size[1], height, step), self._plain(side, size[0], height, step)
-        cap = self._plain(top, size[0], size[1], step)
+        ends, fronts = self._plain(side, size[1], height, extent), self._plain(side, size[0], height, extent)
+        cap = self._plain(top, size[0], size[1], extent)
         half = (size[0] / 2, size[1] / 2)
         return Box(kind, centre, half, yaw, low, low + height, (ends, ends, fronts, fronts, cap, cap))
 
     def _block(self, block: Block, number: int) -> Box:
         look = block.look or f"block {number}"
         side = self._texture(block.material, look)
-        top = self._texture(block.top, f"{look} top")
-        step = 1.0 if min(block.size) < 1.0 and block.height > 1.5 else math.inf
-        return self._solid("block", block.centre, block.size, block.yaw, block.bottom_z, block.height, side, top, step)
+        ends, fronts = (
+            self._plain(side, width, block.height, textures.extent(block.material)) for width in block.size[::-1]
+        )
+        top = self._plain(self._texture(block.top, f"{look} top"), *block.size, textures.extent(block.top))
+        bottom = top
+        if block.bottom is not None:
+            under = self._texture(block.bottom, f"{look} bottom")
+            bottom = self._plain(under, *block.size, textures.extent(block.bottom))
+        half = (block.size[0] / 2, block.size[1] / 2)
+        faces = (ends, ends, fronts, fronts, bottom, top)
+        return Box(block.kind, block.centre, half, block.yaw, block.bottom_z, block.bottom_z + block.height, faces)
 
     def _hanging(self, hanging: Hanging, number: int) -> Box:
         front = self._plain(self._texture(hanging.material, f"hanging {number}"), hanging.width, hanging.height)
@@ -213,7 +235,7 @@ class World:
     def _lamp(self, number: int) -> Box:
         lamp = self.layout.lamps[number]
         texture = self._texture("lamp", "lamp")
-        low = self.config.height - 0.08
+        low = (self.config.height if lamp.z is None else lamp.z) - 0.08
         return self._solid("lamp", lamp.centre, lamp.size, 0.0, low, 0.06, texture, texture)
 
     # As arrays for the renderer
@@ -317,16 +339,18 @@ class World:
 
     def clearance(self, points: npt.ArrayLike) -> F64:
         """Distance (m) of points (N, 2) of the map to the nearest obstacle or wall; 0 inside one."""
-        points = np.asarray(points, dtype=np.float64)
-        nearest = np.full(len(points), np.inf)
-        for box in self.obstacles:
-            cos, sin = math.cos(box.yaw), math.sin(box.yaw)
-            away = points - np.array(box.centre)
-            along = np.abs(cos * away[:, 0] + sin * away[:, 1]) - box.half[0]
-            across = np.abs(cos * away[:, 1] - sin * away[:, 0]) - box.half[1]
-            np.minimum(nearest, np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0)), out=nearest)
-        inside = ((points >= 0.0) & (points <= np.array(self.config.size))).all(axis=1)
-        return np.where(inside, nearest, 0.0)
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        reach = 2.0
+        found = distances(self._near(reach), points)
+        while reach < math.hypot(*self.config.size) and (far := found >= reach).any():
+            reach *= 4.0  # most points have something near; the few others look farther
+            found[far] = distances(self._near(reach), points[far])
+        return found
+
+    def _near(self, reach: float) -> Obstacles:
+        if reach not in self._gathered:
+            self._gathered[reach] = gather(self.obstacles, self.config.size, reach)
+        return self._gathered[reach]
 
     def is_free(self, points: npt.ArrayLike, radius: float) -> npt.NDArray[np.bool_]:
         """Whether a disc of `radius` m has room at points (N, 2)."""

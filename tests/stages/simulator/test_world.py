@@ -109,7 +109,7 @@ def test_every_material_is_drawn_the_same_for_the_same_seed(material: str) -> No
 
 
 def test_an_unknown_material_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(KeyError, match="no material 'marble'; there are: carton"):
+    with pytest.raises(KeyError, match="no material 'marble'; there are: asphalt"):
         textures.draw("marble", np.random.default_rng(0))
 
 

@@ -1,0 +1,343 @@
+"""Rooms as single bodies: walls cut by doors, windows, furniture along the walls and in the middle, trees outside."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from .config import Block, Day, Door, Furniture, Hanging, Material, Point, Room, Side, WorldConfig
+from .streams import stream
+
+THICK = 0.12
+"""Thickness (m) of an inner wall."""
+DOOR_HEIGHT = 2.1
+CLEAR = 0.7
+"""Metres on both sides of a door that furniture leaves free."""
+
+
+class Opening(NamedTuple):
+    """A gap in walls: whether they run along x, where they lie across that, its middle along it, and its width."""
+
+    along_x: bool
+    line: float
+    middle: float
+    width: float
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """Furniture along a wall: length along it, depth, height, looks, the height it hangs at, and what stands on it."""
+
+    length: float
+    depth: float
+    height: float
+    material: Material
+    top: Material = "wood"
+    bottom_z: float = 0.0
+    chair: bool = False
+    above: "_Piece | None" = None
+
+
+_SCREEN = _Piece(0.55, 0.06, 0.36, "screen", "steel", 0.78)
+_DESK = _Piece(1.5, 0.75, 0.74, "wood", chair=True, above=_SCREEN)
+_BOOKS = _Piece(1.0, 0.35, 2.0, "books")
+_CABINET = _Piece(0.9, 0.45, 1.2, "cabinet")
+_SOFA = _Piece(1.8, 0.8, 0.75, "fabric", "fabric")
+_PLANT = _Piece(0.45, 0.45, 1.3, "leaves", "leaves")
+_BENCH = _Piece(1.8, 0.75, 0.9, "steel", "steel", above=_Piece(0.5, 0.35, 0.4, "carton", "carton", 0.9))
+_COUNTER = _Piece(1.0, 0.6, 0.9, "cabinet", "steel", above=_Piece(1.0, 0.35, 0.65, "cabinet", "cabinet", 1.45))
+_FRIDGE = _Piece(0.7, 0.65, 1.8, "steel", "steel")
+_PRINTER = _Piece(0.9, 0.7, 1.1, "plaster", "screen")
+_BOXES = _Piece(0.8, 0.6, 0.9, "carton", "carton")
+_RECEPTION = _Piece(2.0, 0.7, 1.1, "counter")
+_BARE = _Piece(1.4, 0.0, 0.0, "poster")
+
+CATALOGUE: dict[Furniture, tuple[_Piece, ...]] = {
+    "none": (_BARE,),
+    "office": (_DESK, _DESK, _BOOKS, _CABINET, _BARE),
+    "meeting": (_CABINET, _BARE, _BARE, _PLANT),
+    "kitchen": (_COUNTER, _COUNTER, _FRIDGE, _COUNTER),
+    "lab": (_BENCH, _BENCH, _CABINET, _DESK),
+    "lounge": (_SOFA, _PLANT, _BARE, _SOFA),
+    "library": (_BOOKS,),
+    "store": (_BOXES, _CABINET, _BOXES),
+    "copy": (_PRINTER, _CABINET, _BARE),
+    "lobby": (_RECEPTION, _PLANT, _BARE, _SOFA),
+    "trees": (),
+    "park": (),
+}
+"""What stands along the walls of a room of each kind, drawn in this proportion."""
+
+TABLES: dict[Furniture, tuple[Point, Material]] = {
+    "meeting": ((2.4, 1.2), "wood"),
+    "kitchen": ((1.4, 0.8), "wood"),
+    "lab": ((2.2, 1.0), "steel"),
+    "library": ((1.6, 0.9), "wood"),
+}
+"""Size and look of the table in the middle, where there is room around it."""
+
+
+def openings(config: WorldConfig) -> list[Opening]:
+    """The ways through walls of all rooms."""
+    return [_opening(room, door) for room in config.rooms for door in room.doors]
+
+
+def _opening(room: Room, door: Door) -> Opening:
+    along_x, line, low, _ = _wall(room, door.side)
+    return Opening(along_x, line, low + door.at, door.width)
+
+
+def _wall(room: Room, side: Side) -> tuple[bool, float, float, float]:
+    """Whether a side runs along x, where it lies across that, and where it begins and ends."""
+    (x, y), (width, depth) = room.corner, room.size
+    if side in ("north", "south"):
+        return True, y + depth if side == "north" else y, x, x + width
+    return False, x + width if side == "east" else x, y, y + depth
+
+
+INWARD: dict[Side, int] = {"east": -1, "west": 1, "north": -1, "south": 1}
+
+
+def walls(config: WorldConfig, room: Room, cuts: list[Opening]) -> list[Block]:
+    """Walls of a room just inside its rectangle, and its facade just outside; above openings they go on."""
+    height = room.height or config.height
+    layers: list[tuple[float, Material, str, float]] = [(THICK / 2, room.wall, f"{room.name} wall", 0.0)]
+    if room.facade:
+        layers.append((-THICK / 2, room.facade, "facade", THICK))
+    blocks = []
+    for inset, material, look, overlap in layers:
+        for side in ("east", "north", "west", "south"):
+            along_x, line, low, high = _wall(room, side)
+            at = line + INWARD[side] * inset
+            here = sorted((c for c in cuts if _cuts(c, along_x, line, low, high)), key=lambda c: c.middle)
+            ends = [low - overlap, *(e for c in here for e in (c.middle - c.width / 2, c.middle + c.width / 2))]
+            for begin, end in zip(ends[::2], [*ends[1::2], high + overlap], strict=True):
+                if end - begin > 0.02:
+                    blocks.append(_piece_of_wall(along_x, at, begin, end, 0.0, height, material, look))
+            for cut in here:
+                begin, end = cut.middle - cut.width / 2, cut.middle + cut.width / 2
+                if height > DOOR_HEIGHT + 0.05:
+                    blocks.append(_piece_of_wall(along_x, at, begin, end, DOOR_HEIGHT, height, material, look))
+    return blocks
+
+
+def _cuts(cut: Opening, along_x: bool, line: float, low: float, high: float) -> bool:
+    return cut.along_x == along_x and abs(cut.line - line) < 3 * THICK and low < cut.middle < high
+
+
+def _piece_of_wall(
+    along_x: bool, at: float, begin: float, end: float, bottom_z: float, top_z: float, material: Material, look: str
+) -> Block:
+    middle = (begin + end) / 2
+    centre, size = ((middle, at), (end - begin, THICK)) if along_x else ((at, middle), (THICK, end - begin))
+    return Block(centre, size, top_z - bottom_z, material, "concrete", bottom_z, look=look, kind="wall")
+
+
+def roof(config: WorldConfig, room: Room) -> list[Block]:
+    """A ceiling of its own over a room that is lower than the hall."""
+    if room.height is None or not room.walls:
+        return []
+    (x, y), (width, depth) = room.corner, room.size
+    out = THICK if room.facade else 0.0
+    centre, size = (x + width / 2, y + depth / 2), (width + 2 * out, depth + 2 * out)
+    return [
+        Block(centre, size, 0.3, room.facade or "concrete", "concrete", room.height, 0.0, "ceiling", "roof", "roof")
+    ]
+
+
+def doors(config: WorldConfig, room: Room, day: Day, number: int) -> list[Block]:
+    """The leaves of a room's doors: across the opening where closed, swung into the room where open."""
+    leaves = []
+    for k, door in enumerate(room.doors):
+        if not door.leaf:
+            continue
+        along_x, line, low, _ = _wall(room, door.side)
+        at, inward = line + INWARD[door.side] * THICK / 2, INWARD[door.side]
+        middle = low + door.at
+        is_open = stream(config.seed, "door", room.name, k, "day", number).uniform() < day.doors
+        if is_open:
+            along, across, turned = middle - door.width / 2, at + inward * (door.width / 2 + THICK / 2), True
+        else:
+            along, across, turned = middle, at, False
+        centre = (along, across) if along_x else (across, along)
+        yaw = 0.0 if along_x != turned else math.pi / 2
+        look = f"{room.name} door"
+        leaves.append(Block(centre, (door.width, 0.05), DOOR_HEIGHT, "door", "wood", yaw=yaw, look=look, kind="door"))
+    return leaves
+
+
+def windows(room: Room) -> list[Hanging]:
+    """Rows of windows on the named sides, where no door is."""
+    panes = []
+    for side in room.windows:
+        along_x, line, low, high = _wall(room, side)
+        count = max(1, math.floor((high - low) / 1.8))
+        for k in range(count):
+            along = low + (high - low) * (k + 0.5) / count
+            if any(d.side == side and abs(low + d.at - along) < (d.width + 1.3) / 2 for d in room.doors):
+                continue
+            panes.append(_on_wall(room, side, along, 1.3, 0.9, 1.2, "window", along_x, line))
+    return panes
+
+
+def _on_wall(
+    room: Room,
+    side: Side,
+    along: float,
+    width: float,
+    low: float,
+    height: float,
+    material: Material,
+    along_x: bool,
+    line: float,
+) -> Hanging:
+    at = line + INWARD[side] * (THICK if room.walls else 0.0)
+    facing = {"east": math.pi, "north": -math.pi / 2, "west": 0.0, "south": math.pi / 2}[side]
+    return Hanging((along, at) if along_x else (at, along), facing, width, low, height, material)
+
+
+class Fittings(NamedTuple):
+    """What stands and hangs in a room."""
+
+    blocks: list[Block]
+    hangings: list[Hanging]
+
+
+def furnish(config: WorldConfig, room: Room, cuts: list[Opening], day: Day, number: int) -> Fittings:
+    """Furniture of a room, by its kind and the seed; on each day every piece is shifted along its wall a little."""
+    if room.furniture in ("trees", "park"):
+        return Fittings(_planted(config, room), [])
+    rng = stream(config.seed, "furniture", room.name)
+    moved = stream(config.seed, "furniture", room.name, "day", number)
+    blocks: list[Block] = []
+    hangings: list[Hanging] = []
+    pieces = CATALOGUE[room.furniture]
+    for side in ("east", "north", "west", "south"):
+        if not room.walls:
+            break
+        along_x, line, low, high = _wall(room, side)
+        corner = 1.0 if side in ("east", "west") else 0.2
+        free = [
+            (c.middle - c.width / 2 - CLEAR, c.middle + c.width / 2 + CLEAR)
+            for c in cuts
+            if _cuts(c, along_x, line, low, high)
+        ]
+        for piece, along in _lined_up(rng, pieces, room.amount, low + corner, high - corner, free):
+            shift = float(np.clip(moved.normal(0.0, 1.0), -2, 2)) * day.furniture
+            if piece.depth == 0.0:
+                if not any(w == side for w in room.windows):
+                    low_z, width = rng.uniform(0.9, 1.2), rng.uniform(0.6, 1.2)
+                    kind: Material = "board" if room.furniture in ("meeting", "lab") else "poster"
+                    tall = 1.0 if kind == "board" else rng.uniform(0.7, 1.2)
+                    hangings.append(_on_wall(room, side, along, width, low_z, tall, kind, along_x, line))
+                continue
+            if side in room.windows and piece.height > 1.4:
+                continue
+            along = min(max(along + shift, low + corner + piece.length / 2), high - corner - piece.length / 2)
+            blocks += _against(room, side, along_x, line, along, piece, float(moved.normal()) * day.furniture)
+    blocks += _table(config, room, float(moved.normal()) * day.furniture)
+    return Fittings(blocks, hangings)
+
+
+def _lined_up(
+    rng: np.random.Generator,
+    pieces: tuple[_Piece, ...],
+    amount: float,
+    begin: float,
+    end: float,
+    free: list[tuple[float, float]],
+) -> Iterator[tuple[_Piece, float]]:
+    """Pieces along a wall with their middles, clear of the stretches that doors need."""
+    at = begin
+    while at < end:
+        piece = pieces[int(rng.integers(len(pieces)))]
+        wanted, gap = rng.uniform() < amount, rng.uniform(0.02, 0.4)
+        last = at + piece.length
+        blocked = [stretch for stretch in free if at < stretch[1] and last > stretch[0]]
+        if blocked:
+            at = max(stretch[1] for stretch in blocked)
+            continue
+        if wanted and last <= end:
+            yield piece, at + piece.length / 2
+        at = last + gap
+
+
+def _against(
+    room: Room, side: Side, along_x: bool, line: float, along: float, piece: _Piece, turn: float
+) -> Iterator[Block]:
+    """A piece of furniture with its back to the wall, what stands on it, and the chair in front."""
+    inward = INWARD[side]
+
+    def body(part: _Piece, depth_at: float, yaw: float = 0.0, look: str = "") -> Block:
+        across = line + inward * (THICK + 0.01 + depth_at)
+        centre, size = (
+            ((along, across), (part.length, part.depth)) if along_x else ((across, along), (part.depth, part.length))
+        )
+        name = look or f"{room.name} {part.material}"
+        return Block(
+            centre, size, part.height, part.material, part.top, part.bottom_z, yaw, look=name, kind="furniture"
+        )
+
+    yield body(piece, piece.depth / 2)
+    if piece.above is not None:
+        yield body(piece.above, piece.above.depth / 2 + 0.02)
+    if piece.chair:
+        chair = _Piece(0.5, 0.5, 0.9, "fabric", "fabric")
+        yield body(chair, piece.depth + 0.3, 0.3 * turn + 0.2, f"{room.name} chair")
+
+
+def _table(config: WorldConfig, room: Room, shift: float) -> Iterator[Block]:
+    """The table in the middle with its chairs, where a robot gets around it."""
+    if room.furniture not in TABLES:
+        return
+    (length, depth), material = TABLES[room.furniture]
+    width, height = room.size
+    if width < height:
+        length, depth = depth, length
+    if width - length < 3.6 or height - depth < 3.6:
+        return
+    middle = room.corner[0] + width / 2 + max(-0.2, min(0.2, shift)), room.corner[1] + height / 2
+    yield Block(middle, (length, depth), 0.74, material, "wood", look=f"{room.name} table", kind="furniture")
+    long_side = max(length, depth)
+    for k in range(max(1, round(long_side / 0.9))):
+        for across in (-1, 1):
+            along = (k + 0.5) / max(1, round(long_side / 0.9)) * long_side - long_side / 2
+            off = across * (min(length, depth) / 2 + 0.2)
+            centre = (middle[0] + along, middle[1] + off) if length >= depth else (middle[0] + off, middle[1] + along)
+            yield Block(centre, (0.45, 0.45), 0.88, "fabric", "fabric", look=f"{room.name} chair", kind="furniture")
+
+
+def _planted(config: WorldConfig, room: Room) -> list[Block]:
+    """Trees (and in a park hedges and benches) scattered over a rectangle, apart from each other."""
+    rng = stream(config.seed, "planted", room.name)
+    (x, y), (width, depth) = room.corner, room.size
+    blocks: list[Block] = []
+    columns, rows = max(1, round(width / 4.0)), max(1, round(depth / 4.0))
+    for row in range(rows):
+        for column in range(columns):
+            at = (
+                x + width * (column + 0.5 + rng.uniform(-0.2, 0.2)) / columns,
+                y + depth * (row + 0.5 + rng.uniform(-0.2, 0.2)) / rows,
+            )
+            taken, what, yaw = rng.uniform() < room.amount, rng.uniform(), rng.uniform(0.0, math.pi)
+            trunk, crown = rng.uniform(0.25, 0.4), min(rng.uniform(1.6, 2.6), width, depth)
+            look = f"plant {rng.integers(12)}"
+            if not taken:
+                continue
+            if room.furniture == "park" and what < 0.4:
+                hedge = (min(rng.uniform(1.5, 3.0), width), 0.6)
+                blocks.append(
+                    Block(at, hedge, rng.uniform(0.8, 1.4), "hedge", "hedge", yaw=yaw, look=look, kind="plant")
+                )
+            elif room.furniture == "park" and what < 0.5:
+                blocks.append(
+                    Block(at, (min(1.6, width), 0.5), 0.5, "wood", "wood", yaw=yaw, look="bench", kind="furniture")
+                )
+            else:
+                low = rng.uniform(1.7, 2.3)
+                blocks.append(Block(at, (trunk, trunk), low + 0.2, "bark", "bark", yaw=yaw, look=look, kind="plant"))
+                tall = rng.uniform(1.5, 2.4)
+                blocks.append(Block(at, (crown, crown), tall, "leaves", "leaves", low, yaw, "leaves", look, "plant"))
+    return blocks
