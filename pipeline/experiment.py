@@ -6,7 +6,7 @@ combination of the sweep's labels is a condition, and each condition is run once
 
 import itertools
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -34,15 +34,14 @@ class Measure:
 class Claim:
     """Something the paper says (or that we expect), as a comparison that comes out true or false.
 
-    Of the conditions that `of` names, one case for each label of the factors in `each`. The figure is compared with:
-    `at_most` (a number, `published`, or the labels of another condition), `below`, `above` or `not_above` (the labels
-    of another condition), or every other condition (`lowest`). `times` multiplies the other side.
+    One case for each condition that has the labels of `of`. Its figure is compared with: `at_most` (a number,
+    `published`, or the labels of another condition), `below`, `above` or `not_above` (the labels of another condition),
+    or the best of the others (`lowest`). `times` multiplies the other side.
     """
 
     says: str
     measure: str
     of: Mapping[str, Any] = field(default_factory=dict)
-    each: tuple[str, ...] = ()
     at_most: float | str | Mapping[str, Any] | None = None
     below: Mapping[str, Any] | None = None
     above: Mapping[str, Any] | None = None
@@ -64,7 +63,7 @@ class Arrangement:
 
 @dataclass(frozen=True)
 class Remark:
-    """Something said on the page from runs of another variant beside the experiment: one run for each label of `over`."""
+    """Something said on the page from runs of another variant beside the experiment: one for each label of `over`."""
 
     says: str
     variant: str
@@ -78,9 +77,9 @@ class Remark:
 class Experiment:
     """What an experiment's file holds.
 
-    `set` and the words of `sweep` are what one would type; `sweep` is factor -> label -> words. `shared`: whether the
-    repetitions of a condition share what does not depend on the seed (not where time is measured). `published`:
-    measure -> labels in the order of the arrangement's rows and column -> the paper's figure.
+    `common` (for all runs), `set` (for all conditions) and the words of `sweep` (factor -> label -> words) are what one
+    would type. `shared`: whether the repetitions of a condition share what does not depend on the seed (not where time
+    is measured). `published`: measure -> labels in the order of the page's rows and column -> the paper's figure.
     """
 
     name: str
@@ -90,6 +89,7 @@ class Experiment:
     sweep: Mapping[str, Mapping[Any, str]]
     measures: Mapping[str, Measure]
     page: Arrangement
+    common: str = ""
     set: str = ""
     repetitions: int = 50
     published: Mapping[str, Any] = field(default_factory=dict)
@@ -176,7 +176,6 @@ def _contradictions(experiment: Experiment) -> "list[Problem]":
     shown += [("page." + k, f) for k, f in (("along", experiment.page.along), ("panels", experiment.page.panels)) if f]
     for number, claim in enumerate(experiment.claims):
         where = f"claims[{number}]"
-        shown += [(f"{where}.each", factor) for factor in claim.each]
         if claim.measure not in experiment.measures:
             problems.append(_unknown(f"{where}.measure", claim.measure, experiment.measures, "measures"))
         if _comparisons(claim) != 1:
@@ -210,8 +209,9 @@ def _entry(mapping: Mapping[Any, Any], label: str) -> Any:
 
 def figure_of(measure: Measure, result: Mapping[str, Any]) -> float | None:
     """A measure's figure in a repetition's result, in the measure's unit; None where it holds none."""
+    space = {**result["metrics"], "timing": result["timing"], "facts": result["facts"]}
     for path in measure.of:
-        parts = [_at(result, part.strip()) for part in path.split("+")]
+        parts = [_at(space, part.strip()) for part in path.split("+")]
         numbers = [part for part in parts if isinstance(part, int | float)]
         if len(numbers) == len(parts):
             return float(sum(numbers)) * measure.times
@@ -233,8 +233,3 @@ def comparison_of(claim: Claim) -> Side:
         if getattr(claim, side) is not None:
             return side
     return "lowest"
-
-
-def all_measures(experiment: Experiment) -> Sequence[tuple[str, Measure]]:
-    """Measures with their names, in the file's order."""
-    return list(experiment.measures.items())

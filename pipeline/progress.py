@@ -12,10 +12,14 @@ class Progress:
     """Shows frames done, frames per second and the time left; a context manager.
 
     `update` is called every tick and returns at once unless something is due: ten times a second in a terminal, every
-    two seconds elsewhere, and once when a graph's loop has ended. `stream` and `clock` are there for tests.
+    two seconds elsewhere, and once when a graph's loop has ended. `unit` is what is counted, where it is not frames.
+    `stream` and `clock` are there for tests.
     """
 
-    def __init__(self, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic, unit: str = "frames"
+    ) -> None:
+        self._unit = unit
         self._stream = sys.stderr if stream is None else stream
         self._clock = clock
         self._live = self._stream.isatty()
@@ -65,22 +69,25 @@ class Progress:
         rate = (self._done - self._first) / seconds if seconds > 0 else 0.0
         left = (self._total - self._done) / rate if self._total is not None and rate else None
         if self._live:
-            self._stream.write("\r\x1b[K" + live_line(self._name, self._done, self._total, rate, left))
+            self._stream.write("\r\x1b[K" + live_line(self._name, self._done, self._total, rate, left, self._unit))
         else:
-            said = {"graph": self._name, "frames": self._done, "of": self._total}
-            said |= {"frames_per_second": round(rate, 1), "seconds_left": None if left is None else round(left, 1)}
+            said = {"graph": self._name, self._unit: self._done, "of": self._total}
+            said |= {
+                f"{self._unit}_per_second": round(rate, 1),
+                "seconds_left": None if left is None else round(left, 1),
+            }
             self._stream.write(json.dumps(said) + "\n")
         self._stream.flush()
 
 
-def live_line(name: str, done: int, total: int | None, rate: float, left: float | None) -> str:
+def live_line(name: str, done: int, total: int | None, rate: float, left: float | None, unit: str = "frames") -> str:
     """The line in the terminal: `name  ━━━━────  120/300 frames  48.2 frames/s  0:04 left`."""
     words = [name]
     if total:
         full = min(24, 24 * done // total)
         words.append("━" * full + "─" * (24 - full))
-    words.append(f"{done}/{total} frames" if total is not None else f"{done} frames")
-    words.append(f"{rate:.1f} frames/s")
+    words.append(f"{done}/{total} {unit}" if total is not None else f"{done} {unit}")
+    words.append(f"{rate:.1f} {unit}/s")
     if left is not None and (total is None or done < total):
         words.append(f"{int(left) // 60}:{int(left) % 60:02d} left")
     return "  ".join(words)

@@ -1,73 +1,23 @@
 """One look for all pictures: colours that colour-blind readers tell apart, units on axes, the same bytes every time."""
 
-import io
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from omninav.pipeline.picture import Picture, picture
 from omninav.stages.values.maps import ReferenceGraph
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Canvas
+
+__all__ = ["Picture", "draw_map", "draw_pose", "extent_of", "fitting_height", "picture", "plan_axes"]
 
 Array = npt.NDArray[np.float64]
 
 # Okabe & Ito's palette (2008), dark enough on white
 ESTIMATE, TRUTH, ODOMETRY = "#0072B2", "#111111", "#D55E00"
 REFERENCE, EDGE, MARK, PARTICLE = "#8a8f98", "#c9ccd1", "#009E73", "#CC79A7"
-
-RC: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",  # comes with matplotlib: the same picture on every machine
-    "font.size": 9,
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#666666",
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "grid.linewidth": 0.6,
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "lines.linewidth": 1.5,
-    "lines.solid_joinstyle": "round",
-    "figure.facecolor": "white",
-}
-
-
-class Picture:
-    """A figure being drawn; `content` holds its bytes once the `picture` block has ended."""
-
-    def __init__(self, canvas: "Canvas") -> None:
-        self.canvas = canvas
-        self.content = b""
-
-
-@contextmanager
-def picture(width: float, height: float, dpi: int = 110, media_type: str = "image/png") -> Iterator[Picture]:
-    """A blank figure of width x height inches in the house style, without pyplot's global state.
-
-    Line drawings are PNG; what holds photographs is JPEG (`media_type` image/jpeg), or it would be far too large.
-    """
-    import matplotlib
-    from matplotlib.figure import Figure as Canvas
-
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()  # a user's own matplotlibrc must not change the bytes
-        matplotlib.rcParams.update(RC)
-        drawn = Picture(Canvas(figsize=(width, height), dpi=dpi, layout="constrained"))
-        yield drawn
-        buffer = io.BytesIO()
-        if media_type == "image/jpeg":
-            drawn.canvas.savefig(buffer, format="jpeg", pil_kwargs={"quality": 85})
-        else:
-            drawn.canvas.savefig(buffer, format="png", metadata={"Software": None}, pil_kwargs={"optimize": True})
-        drawn.content = buffer.getvalue()
 
 
 def plan_axes(axes: "Axes", extent: tuple[float, float, float, float] | None = None) -> None:

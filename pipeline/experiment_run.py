@@ -1,0 +1,324 @@
+"""Running an experiment: its logs, its maps, its conditions, and its page; what was finished before is found again."""
+
+import json
+import os
+import re
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from .crew import Job, work_through
+from .experiment import Condition, Experiment, read_experiment, words_of
+from .files import digest_text, write_whole
+from .graph import Graph
+from .problems import BadInput, Problem, ProblemsFound
+from .progress import Progress
+from .repetitions import condition_key, finished
+from .run import LIBRARIES, Plan, digests_of, git_commit, plan, version
+
+Compose = Callable[[Sequence[str]], dict[str, Any]]
+"""Words of the command line -> the plain, complete configuration they describe."""
+
+
+@dataclass
+class Cell:
+    """A condition of the experiment, or a run beside it, on its way: configuration, folder, results by seed, error."""
+
+    condition: Condition
+    variant: str
+    words: tuple[str, ...]
+    folder: Path
+    seeds: tuple[int, ...]
+    config: dict[str, Any] = field(default_factory=dict)
+    planned: Plan | None = None
+    key: str = ""
+    results: dict[int, dict[str, Any]] = field(default_factory=dict)
+    error: str = ""
+    shared: bool = True
+
+    @property
+    def name(self) -> str:
+        """The condition's labels, and the variant where it stands beside the experiment."""
+        return self.condition.name
+
+
+@dataclass
+class Log:
+    """A simulated drive that conditions read: where it lies, and what is stated of it."""
+
+    name: str
+    config: dict[str, Any]
+    folder: Path
+
+    @property
+    def file(self) -> Path:
+        """The log itself."""
+        return self.folder / "drive.mcap"
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What was stated when it was written."""
+        path = self.folder / "facts.json"
+        facts: dict[str, Any] = json.loads(path.read_text()) if path.exists() else {}
+        return facts
+
+
+class ExperimentRun:
+    """An experiment on its way through its phases: logs, maps, repetitions. `folder` is the same for every attempt."""
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        profile: str,
+        compose: Compose,
+        words: Sequence[str],
+        runs: Path,
+        argv: Sequence[str],
+    ) -> None:
+        self.experiment, self.profile, self.compose = experiment, profile, compose
+        self.folder = (runs / f"{experiment.name}_{profile}").resolve()
+        self.argv = list(argv)
+        self.cores = experiment.cores or len(os.sched_getaffinity(0))
+        self.started = datetime.now()
+        self.logs: dict[str, Log] = {}
+        self.cells = [
+            self._cell(condition, experiment.variant, (experiment.set, condition.words), words)
+            for condition in experiment.conditions()
+        ]
+        self.beside: list[list[Cell]] = []
+        for remark in experiment.remarks:
+            row = []
+            for label, own in experiment.sweep[remark.over].items():
+                condition = Condition({remark.over: str(label)}, str(own or ""))
+                row.append(self._cell(condition, remark.variant, (remark.set, condition.words), words, beside=True))
+            self.beside.append(row)
+
+    @property
+    def all_cells(self) -> list[Cell]:
+        """Conditions and the runs beside them."""
+        return [*self.cells, *(cell for row in self.beside for cell in row)]
+
+    def _cell(
+        self, condition: Condition, variant: str, parts: Sequence[str], words: Sequence[str], beside: bool = False
+    ) -> Cell:
+        own = [word for part in (self.experiment.common, *parts) for word in words_of(part)]
+        typed = (f"variant={variant}", *own, *words)
+        name = re.sub(r"[^A-Za-z0-9.]+", "_", condition.name + (f" {variant}" if beside else "")).strip("_")
+        seeds = (0,) if beside else tuple(range(self.experiment.repetitions))
+        cell = Cell(condition, variant, typed, self.folder / "conditions" / name, seeds, shared=self.experiment.shared)
+        return cell
+
+    def check(self) -> None:
+        """Compose and check every condition. Raises `ProblemsFound` before anything has run."""
+        problems: list[Problem] = []
+        composed: dict[tuple[str, ...], dict[str, Any]] = {}
+        for cell in self.all_cells:
+            try:
+                if cell.words not in composed:
+                    composed[cell.words] = self.compose(cell.words)
+                cell.config = json.loads(json.dumps(composed[cell.words], default=str))
+                cell.planned = plan(cell.config)
+            except ProblemsFound as found:
+                problems += [Problem(f"{cell.name}: {p.where}", p.what, p.hint) for p in found.problems]
+        if problems:
+            raise ProblemsFound(dict.fromkeys(problems))
+
+    def run(self) -> bool:
+        """All phases. Returns whether every job came to its end."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self._state("running")
+        self._write_logs()
+        self._key()
+        self._make_maps()
+        self._repeat()
+        self._state("complete" if not any(cell.error for cell in self.all_cells) else "failed")
+        self.write_page()
+        return not any(cell.error for cell in self.all_cells)
+
+    def write_page(self) -> Path:
+        """The page as things stand."""
+        from .experiment_page import write_page
+
+        return write_page(self)
+
+    # logs
+
+    def _write_logs(self) -> None:
+        for cell in self.all_cells:
+            assert cell.planned is not None
+            self._use_log(cell, cell.planned.graph, cell.config, cell.config.get("route"), cell.config.get("day"))
+            for artifact in cell.planned.artifacts:
+                spec = cell.config["artifacts"][artifact.name]
+                if artifact.graph is not None:
+                    self._use_log(cell, artifact.graph, spec["graph"], spec.get("route"), spec.get("day"))
+        for log in self.logs.values():
+            if not log.file.exists():
+                shutil.rmtree(log.folder, ignore_errors=True)
+        jobs = [
+            Job(
+                log.name,
+                "omninav.pipeline.repetitions:simulate",
+                {"config": log.config, "part": str(log.folder) + ".part", "folder": str(log.folder)},
+                self.folder / "logs" / f"{log.name.replace(' ', '_')}.log",
+            )
+            for log in self.logs.values()
+            if not log.file.exists()
+        ]
+        failed = self._through(jobs, "logs")
+        for log in self.logs.values():
+            if log.name in failed:
+                for cell in self.all_cells:
+                    if str(log.file) in json.dumps(cell.config):
+                        cell.error = f"its log ({log.name}) could not be simulated: {failed[log.name]}"
+
+    def _use_log(self, cell: Cell, graph: Graph, config: dict[str, Any], route: Any, day: Any) -> None:
+        """Let the graph's source read a simulated log instead of rendering for itself, where no log is named."""
+        source = graph.source
+        if source is None or "world" not in source.parameters or source.parameters.get("log") is not None:
+            return
+        world = cell.config["world"]
+        identity = json.dumps([world, route, day], sort_keys=True)
+        if identity not in self.logs:
+            digest = source.stage.inputs_digest() or digest_text(identity)
+            name = f"{world.get('name', 'world')} {route} day {day}"
+            made = self.compose(["variant=simulate"])
+            place = Path(str(cell.config.get("cache") or self.folder)).resolve() / "logs"
+            folder = place / f"{re.sub('[^A-Za-z0-9]+', '_', name)}_{digest[:12]}"
+            for node in made["nodes"].values():
+                if isinstance(node, dict) and "world" in node:
+                    node |= {"world": world, "route": route, "day": day, "log": f"{folder}.part/drive.mcap"}
+            self.logs[identity] = Log(name, made, folder)
+        config["nodes"][source.name]["log"] = str(self.logs[identity].file)
+
+    # maps
+
+    def _key(self) -> None:
+        """Plan every condition over its log, and find what was finished before."""
+        for cell in self.all_cells:
+            if cell.error:
+                continue
+            try:
+                cell.planned = plan(cell.config)
+                cell.key = condition_key(cell.planned)
+                cell.results = finished(cell.folder, cell.key, cell.seeds)
+            except (ProblemsFound, BadInput) as wrong:
+                cell.error = str(wrong)
+
+    def _make_maps(self) -> None:
+        """One job for each map that an unfinished condition needs, so that no condition waits for another's."""
+        jobs: dict[str, Job] = {}
+        needs: dict[str, list[Cell]] = {}
+        for cell in self._unfinished():
+            assert cell.planned is not None
+            for artifact in cell.planned.artifacts:
+                if artifact.graph is None or not cell.config.get("cache"):
+                    continue
+                key = digest_text(artifact.graph.digest(), artifact.origin, *digests_of(artifact.graph).values())[:8]
+                name = f"{artifact.name} {key}"
+                given = {"config": cell.config, "folder": str(self.folder / "maps" / name.replace(" ", "_"))}
+                log = self.folder / "maps" / f"{name.replace(' ', '_')}.log"
+                jobs.setdefault(name, Job(name, "omninav.pipeline.repetitions:prepare", given, log))
+                needs.setdefault(name, []).append(cell)
+        for name, error in self._through(list(jobs.values()), "maps").items():
+            for cell in needs[name]:
+                cell.error = f"its {name.split()[0]} could not be made: {error}"
+
+    # repetitions
+
+    def _unfinished(self) -> list[Cell]:
+        return [cell for cell in self.all_cells if not cell.error and len(cell.results) < len(cell.seeds)]
+
+    def _repeat(self) -> None:
+        cells = {str(number): cell for number, cell in enumerate(self._unfinished())}
+        jobs = [
+            Job(
+                number,
+                "omninav.pipeline.repetitions:repeat",
+                {
+                    "config": cell.config,
+                    "folder": str(cell.folder),
+                    "key": cell.key,
+                    "seeds": [seed for seed in cell.seeds if seed not in cell.results],
+                    "shared": cell.shared,
+                },
+                cell.folder / "run.log",
+            )
+            for number, cell in cells.items()
+        ]
+        total = sum(len(cell.seeds) for cell in self.all_cells)
+        with Progress(unit="repetitions") as progress:
+
+            def show() -> None:
+                progress.update(self.experiment.name, sum(len(cell.results) for cell in self.all_cells), total)
+
+            def heard(job: Job, word: Any) -> None:
+                if "seed" in word:
+                    cell = cells[job.name]
+                    cell.results |= finished(cell.folder, cell.key, [word["seed"]])
+                    show()
+
+            def ended(job: Job, error: str | None) -> None:
+                cell = cells[job.name]
+                cell.error = error or ""
+                if error:
+                    print(f"{cell.name}: {error}", flush=True)
+                self.write_page()
+
+            show()
+            work_through(jobs, self.cores, heard, ended)
+
+    def _through(self, jobs: Sequence[Job], what: str) -> dict[str, str]:
+        if not jobs:
+            return {}
+        done = [0]
+        with Progress(unit=what) as progress:
+
+            def heard(job: Job, word: Any) -> None:
+                progress.update(f"{self.experiment.name}: {what}", done[0], len(jobs))
+
+            def ended(job: Job, error: str | None) -> None:
+                done[0] += 1
+                if error:
+                    print(f"{job.name}: {error}", flush=True)
+                progress.update(f"{self.experiment.name}: {what}", done[0], len(jobs))
+
+            return work_through(jobs, self.cores, heard, ended)
+
+    def _state(self, status: str) -> None:
+        manifest = {
+            "omninav": version("omninav"),
+            "status": status,
+            "experiment": self.experiment.name,
+            "profile": self.profile,
+            "argv": self.argv,
+            "cwd": os.getcwd(),
+            "started": self.started.isoformat(timespec="seconds"),
+            "written": datetime.now().isoformat(timespec="seconds"),
+            "git_commit": git_commit(),
+            "cores": self.cores,
+            "libraries": {name: version(name) for name in LIBRARIES},
+        }
+        write_whole(self.folder / "experiment.json", json.dumps(manifest, indent=1) + "\n")
+
+
+def run_experiment(
+    config: Mapping[str, Any], compose: Compose, words: Sequence[str], argv: Sequence[str]
+) -> tuple[ExperimentRun, bool]:
+    """Run the experiment of a composed configuration. Returns it, and whether every job came to its end.
+
+    Raises `ProblemsFound` where the file or any condition is wrong, before anything has run.
+    """
+    profile = str(config.get("profile") or "paper")
+    experiment = read_experiment(config["experiment"], profile)
+    run = ExperimentRun(experiment, profile, compose, words, Path(str(config.get("runs", "runs"))), argv)
+    run.check()
+    write_whole(
+        run.folder / "experiment.yaml",
+        yaml.safe_dump(dict(config["experiment"]), sort_keys=False, allow_unicode=True, width=120),
+    )
+    return run, run.run()

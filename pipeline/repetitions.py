@@ -1,0 +1,179 @@
+"""One condition of an experiment, run once for every seed: what does not depend on the seed is computed once.
+
+Logs are simulated once and read by all conditions. The map and the features come from the cache. The first repetition
+records what follows from log and map alone (a frame's table of similarities), and the others read it.
+"""
+
+import json
+import math
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from .artifact import Cache
+from .crew import Tell
+from .engine import Engine
+from .files import digest_text, write_whole
+from .front import CachedFront, cached_front, front_boundary, front_nodes
+from .graph import Graph
+from .problems import BadInput
+from .results import Metrics
+from .run import Plan, Run, digests_of, keep_front, notes_of, obtain, plan, results_of, stage_times, usable
+from .spool import Spool
+from .value import Value
+
+BASE_SEED = 0
+"""Of maps and whatever else the repetitions share."""
+
+
+def measured(graph: Graph) -> Graph:
+    """The part of a graph that its metrics depend on: repetitions need no pictures."""
+    origins = [
+        f"{node.name}.{port.name}"
+        for node in graph.nodes.values()
+        for port in node.signature.outputs.values()
+        if port.type is Metrics
+    ]
+    return graph.leading_to(origins)
+
+
+def condition_key(planned: Plan) -> str:
+    """The hash of everything but the seed that decides a condition's results. Its logs must be there."""
+    graph = measured(planned.graph)
+    parts = [graph.digest(), *digests_of(graph).values()]
+    for artifact in planned.artifacts:
+        made = artifact.graph
+        parts += [artifact.name, artifact.origin]
+        parts += [made.digest(), *digests_of(made).values()] if made is not None else [str(artifact.file)]
+    return digest_text("condition", *parts)
+
+
+def finished(folder: Path, key: str, seeds: Sequence[int]) -> dict[int, dict[str, Any]]:
+    """The results that lie in a condition's folder and belong to this key, by seed."""
+    found = {}
+    for seed in seeds:
+        path = _result(folder, seed)
+        if path.exists():
+            result = json.loads(path.read_text())
+            if result.get("key") == key:
+                found[seed] = result
+    return found
+
+
+def _result(folder: Path, seed: int) -> Path:
+    return folder / f"seed_{seed}.json"
+
+
+def repeat(given: Mapping[str, Any], tell: Tell) -> None:
+    """Run a condition for some seeds; each one's result is a file, and `tell` hears its seed when it is there.
+
+    `given`: `config` (plain), `folder`, `key`, `seeds`, `shared`. Raises `BadInput` where the code has changed
+    since the key was made.
+    """
+    folder, seeds = Path(given["folder"]), list(given["seeds"])
+    planned = plan(given["config"])
+    if condition_key(planned) != given["key"]:
+        raise BadInput("code or logs have changed while the experiment ran; type the same command again")
+    cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
+    graph = measured(planned.graph)
+    run = Run(folder)
+    shutil.rmtree(run.memory, ignore_errors=True)
+    artifacts: dict[str, Value] = {}
+    facts: dict[str, Any] = {}
+    for artifact in planned.artifacts:
+        artifacts[artifact.name], made = obtain(run, artifact, BASE_SEED, cache, math.inf, _alive(tell))
+        facts[artifact.name] = made
+        (folder / f"{artifact.name}.omap").unlink(missing_ok=True)  # the cache keeps it
+    shared: CachedFront | None = None
+    for number, seed in enumerate(seeds):
+        place = run.memory / f"seed_{seed}"
+        record = bool(given["shared"]) and shared is None and number + 1 < len(seeds)
+        engine, recorded = _once(graph, artifacts, seed, place, cache, shared, record, tell)
+        shared = recorded or shared
+        result = {"key": given["key"], "seed": seed, "metrics": results_of(engine)[0], "timing": stage_times(engine)}
+        result |= notes_of(engine)
+        result["artifacts"] = facts
+        for spool in engine.spools.values():
+            spool.close()
+        if recorded is None:
+            shutil.rmtree(place, ignore_errors=True)
+        write_whole(_result(folder, seed), json.dumps(result, indent=1, sort_keys=True, default=str) + "\n")
+        tell({"seed": seed})
+    shutil.rmtree(run.memory, ignore_errors=True)
+
+
+def prepare(given: Mapping[str, Any], tell: Tell) -> None:
+    """Make the artifacts that a condition needs and leave them in the cache: `config` (plain), `folder` for scratch."""
+    planned = plan(given["config"])
+    run = Run(Path(given["folder"]))
+    for artifact in planned.artifacts:
+        obtain(run, artifact, BASE_SEED, Cache(Path(str(planned.config["cache"]))), math.inf, _alive(tell))
+    shutil.rmtree(run.folder, ignore_errors=True)
+
+
+def _once(
+    graph: Graph,
+    artifacts: Mapping[str, Value],
+    seed: int,
+    place: Path,
+    cache: Cache | None,
+    shared: CachedFront | None,
+    record: bool,
+    tell: Tell,
+) -> tuple[Engine, CachedFront | None]:
+    """One repetition; with `record` also the front that the others may share, where nothing in it was drawn."""
+    step = _heartbeat(tell)
+    if shared is not None:
+        engine = Engine(graph, artifacts, seed, place, place, every_s=math.inf, front=shared, progress=step)
+        engine.run()
+        return engine, None
+    nodes = front_nodes(graph, artifacts=True)
+    boundary = front_boundary(graph, nodes) if record and nodes else []
+    with cached_front(graph, cache, seed) as front:
+        known = usable(front)
+        engine = Engine(
+            graph, artifacts, seed, place, place, every_s=math.inf, front=known, progress=step, recorded=boundary
+        )
+        engine.run()
+        keep_front(engine, front, cache, seed)
+    if not boundary:
+        return engine, None
+    before = [node.name for node in graph.of_lifetime("before")]
+    notes = {name: engine.calls[name].ctx.notes() for name in sorted(nodes | set(before))}
+    if any(note["drew"] for note in notes.values()):
+        return engine, None
+    engine.spools.pop("shared").flush()
+    given = {origin: value for origin, value in engine.values.items() if origin.partition(".")[0] in before}
+    replay = Spool(place / "shared.spool")
+    return engine, CachedFront(nodes | frozenset(before), tuple(boundary), "", "", replay, notes, given)
+
+
+def _heartbeat(tell: Tell) -> Callable[[int, int | None], None]:
+    """Every hundredth frame a word, so that a job whose experiment was killed ends soon."""
+    return lambda done, total: tell({"frames": done, "of": total}) if done % 100 == 0 else None
+
+
+class _alive:  # noqa: N801 - stands where a Progress stands
+    def __init__(self, tell: Tell) -> None:
+        self._step = _heartbeat(tell)
+
+    def update(self, name: str, done: int, total: int | None = None) -> None:
+        """A graph's frames so far."""
+        self._step(done, total)
+
+
+def simulate(given: Mapping[str, Any], tell: Tell) -> None:
+    """Write a simulated drive as a log, with what its stages state of it: `config` (plain), `part` and `folder`.
+
+    It appears as a whole: written to `part`, then renamed.
+    """
+    part, folder = Path(given["part"]), Path(given["folder"])
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir(parents=True)
+    planned = plan(given["config"])
+    engine = Engine(planned.graph, {}, planned.seed)
+    engine.run()
+    write_whole(part / "facts.json", json.dumps(notes_of(engine)["facts"], indent=1, sort_keys=True) + "\n")
+    shutil.rmtree(folder, ignore_errors=True)
+    part.rename(folder)
