@@ -1,19 +1,16 @@
 """Unwarps whatever picture the recording has, by its camera's projection."""
 
 import math
-from typing import Annotated
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.problems import BadInput
 from omninav.stages.values.camera import Camera, Cylindrical, Donut, Equirectangular, Fisheye, HyperbolicMirror
-from omninav.stages.values.image import Image, Panorama
 
 from .donut import donut_table
 from .equirectangular import equirectangular_table
 from .fisheye import fisheye_table
 from .hyperbolic import hyperbolic_table
 from .strip import strip_table
-from .table import LastTable, Table
+from .table import Table, TableUnwarp
 
 
 def table_for(camera: Camera, columns: int, rows: int) -> Table:
@@ -41,25 +38,13 @@ def table_for(camera: Camera, columns: int, rows: int) -> Table:
             )
 
 
-class UnwarpByCamera(Stage):
+class UnwarpByCamera(TableUnwarp):
     """Panorama by whatever projection the recording's camera has, so that one variant runs on all recordings.
 
     Raises BadInput where the camera does not see the full circle, or is a donut whose ring has yet to be found
     (`unwarp=donut` finds it).
     """
 
-    columns: Annotated[int, Bounds(ge=8)] = 360
-    rows: Annotated[int, Bounds(ge=1)] = 80
-
-    class Out(Outputs):
-        """The picture as a panorama."""
-
-        panorama: Panorama
-
-    def setup(self, ctx: Context) -> None:
-        """No table yet: the camera comes with the first picture."""
-        self._tables = LastTable(lambda camera: table_for(camera, self.columns, self.rows))
-
-    def step(self, ctx: Context, image: Image, camera: Camera) -> Out:
-        """Remap one picture."""
-        return self.Out(panorama=self._tables.apply(image, camera))
+    def table(self, camera: Camera) -> Table:
+        """Where in its pictures each pixel of the panorama lies."""
+        return table_for(camera, self.columns, self.rows)

@@ -9,11 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.pipeline.problems import BadInput
 from omninav.stages.values.camera import Camera, Donut
-from omninav.stages.values.image import Image, Panorama, Pixels, column_azimuths
+from omninav.stages.values.image import Image, Panorama, Pixels
 
-from .table import LastTable, Table, fixed_point
+from .table import LastTable, Table, fixed_point, other_camera, polar
 
 Array = npt.NDArray[np.float64]
 Grey = npt.NDArray[np.float32]
@@ -92,10 +91,7 @@ def donut_table(camera: Donut, columns: int, rows: int) -> Table:
     assert camera.outer_radius_px is not None
     ring = camera.outer_radius_px - camera.inner_radius_px
     radius = camera.outer_radius_px - ring * (np.arange(rows) + 0.5) / rows
-    bearing = column_azimuths(columns) - camera.yaw
-    sign = 1.0 if camera.sense == "clockwise" else -1.0
-    u = camera.centre_x + radius[:, None] * np.cos(bearing)
-    v = camera.centre_y + sign * radius[:, None] * np.sin(bearing)
+    u, v = polar(camera.centre_x, camera.centre_y, radius, columns, camera.sense, camera.yaw)
     return fixed_point(u, v)
 
 
@@ -157,9 +153,7 @@ class DonutUnwarp(Stage):
     def step(self, ctx: Context, image: Image, camera: Camera, found: FoundRing) -> Out:
         """Unroll one picture."""
         if not isinstance(camera, Donut):
-            raise BadInput(
-                f"unwarp: this recording's camera is a {type(camera).__name__}, not a Donut; use unwarp=by_camera"
-            )
+            raise other_camera(camera, "a Donut")
         if camera is not self._open or self._complete is None:
             self._complete, self._open = with_ring(camera, image, found, ctx), camera
         if self._complete is None:

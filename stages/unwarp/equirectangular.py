@@ -5,13 +5,12 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Bounds
 from omninav.pipeline.problems import BadInput
 from omninav.stages.values.camera import Camera, Equirectangular
-from omninav.stages.values.image import Image, Panorama
 
 from .strip import strip_columns
-from .table import LastTable, Table, fixed_point
+from .table import Table, TableUnwarp, fixed_point, other_camera
 
 
 def equirectangular_table(
@@ -32,35 +31,18 @@ def equirectangular_table(
     return fixed_point(u_all, v_all, top, bottom, wraps=True)
 
 
-class EquirectangularUnwarp(Stage):
+class EquirectangularUnwarp(TableUnwarp):
     """Panorama from an equirectangular picture, cut to the elevations from `lowest_deg` to `highest_deg`.
 
     Raises BadInput where the recording's camera is another one, or shows none of these elevations.
     """
 
-    columns: Annotated[int, Bounds(ge=8)] = 360
-    rows: Annotated[int, Bounds(ge=1)] = 80
     highest_deg: Annotated[float, Bounds(ge=-90, le=90)] = 90.0
     lowest_deg: Annotated[float, Bounds(ge=-90, le=90)] = -90.0
 
-    class Out(Outputs):
-        """The picture in the common form."""
-
-        panorama: Panorama
-
-    def setup(self, ctx: Context) -> None:
-        """No table yet: the camera comes with the first picture."""
-        self._tables = LastTable(self._table)
-
-    def _table(self, camera: Camera) -> Table:
+    def table(self, camera: Camera) -> Table:
+        """Where in its pictures each pixel of the panorama lies."""
         if not isinstance(camera, Equirectangular):
-            raise BadInput(
-                f"unwarp: this recording's camera is a {type(camera).__name__}, not an Equirectangular one; "
-                "use unwarp=by_camera"
-            )
+            raise other_camera(camera, "an Equirectangular one")
         limits = math.radians(self.highest_deg), math.radians(self.lowest_deg)
         return equirectangular_table(camera, self.columns, self.rows, *limits)
-
-    def step(self, ctx: Context, image: Image, camera: Camera) -> Out:
-        """Resample one picture."""
-        return self.Out(panorama=self._tables.apply(image, camera))

@@ -1,16 +1,13 @@
 """Unwarps the picture of a hyperbolic mirror by the mirror's model."""
 
-from typing import Annotated
-
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.problems import BadInput
 from omninav.stages.geometry.catadioptric import back_project, project
 from omninav.stages.values.camera import Camera, HyperbolicMirror
-from omninav.stages.values.image import Image, Panorama, column_azimuths
+from omninav.stages.values.image import column_azimuths
 
-from .table import LastTable, Table, fixed_point
+from .table import Table, TableUnwarp, fixed_point, other_camera
 
 
 def elevation_range(camera: HyperbolicMirror) -> tuple[float, float]:
@@ -48,33 +45,15 @@ def hyperbolic_table(camera: HyperbolicMirror, columns: int, rows: int) -> Table
     return fixed_point(pixels[..., 0], pixels[..., 1], top, bottom)
 
 
-class HyperbolicUnwarp(Stage):
+class HyperbolicUnwarp(TableUnwarp):
     """Panorama from a hyperbolic mirror by its model: rows are equal steps of elevation.
 
     Svoboda & Pajdla's model as erratum 33 corrects it; the panorama spans the elevations inside the mask. The table
     is built once per camera. Raises BadInput for any other camera.
     """
 
-    columns: Annotated[int, Bounds(ge=8)] = 360
-    rows: Annotated[int, Bounds(ge=1)] = 80
-
-    class Out(Outputs):
-        """The picture, unwarped."""
-
-        panorama: Panorama
-
-    def setup(self, ctx: Context) -> None:
-        """No table yet: the camera comes with the first picture."""
-        self._tables = LastTable(self._table)
-
-    def _table(self, camera: Camera) -> Table:
+    def table(self, camera: Camera) -> Table:
+        """Where in its pictures each pixel of the panorama lies."""
         if not isinstance(camera, HyperbolicMirror):
-            raise BadInput(
-                f"unwarp: this recording's camera is a {type(camera).__name__}, not a HyperbolicMirror; "
-                "use unwarp=by_camera"
-            )
+            raise other_camera(camera, "a HyperbolicMirror")
         return hyperbolic_table(camera, self.columns, self.rows)
-
-    def step(self, ctx: Context, image: Image, camera: Camera) -> Out:
-        """Remap one picture."""
-        return self.Out(panorama=self._tables.apply(image, camera))

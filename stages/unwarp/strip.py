@@ -1,17 +1,14 @@
 """Brings a finished strip of the full circle into the common form."""
 
 import math
-from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.problems import BadInput
 from omninav.stages.values.camera import Camera, Cylindrical, Equirectangular
-from omninav.stages.values.image import Image, Panorama, column_azimuths
+from omninav.stages.values.image import column_azimuths
 
-from .table import LastTable, Table, fixed_point
+from .table import Table, TableUnwarp, fixed_point, other_camera
 
 Array = npt.NDArray[np.float64]
 
@@ -31,32 +28,14 @@ def strip_table(camera: Cylindrical, columns: int, rows: int) -> Table:
     return fixed_point(u_all, v_all, camera.elevation_top, camera.elevation_bottom, wraps=True)
 
 
-class StripUnwarp(Stage):
+class StripUnwarp(TableUnwarp):
     """Panorama from a finished strip: rolled or mirrored to the common form and resampled.
 
     Raises BadInput where the recording's camera is not a strip (`projection: cylindrical`).
     """
 
-    columns: Annotated[int, Bounds(ge=8)] = 360
-    rows: Annotated[int, Bounds(ge=1)] = 80
-
-    class Out(Outputs):
-        """The strip in the common form."""
-
-        panorama: Panorama
-
-    def setup(self, ctx: Context) -> None:
-        """No table yet: the camera comes with the first picture."""
-        self._tables = LastTable(self._table)
-
-    def _table(self, camera: Camera) -> Table:
+    def table(self, camera: Camera) -> Table:
+        """Where in its pictures each pixel of the panorama lies."""
         if not isinstance(camera, Cylindrical):
-            raise BadInput(
-                f"unwarp: this recording's camera is a {type(camera).__name__}, not a Cylindrical strip; "
-                "use unwarp=by_camera"
-            )
+            raise other_camera(camera, "a Cylindrical strip")
         return strip_table(camera, self.columns, self.rows)
-
-    def step(self, ctx: Context, image: Image, camera: Camera) -> Out:
-        """Resample one strip."""
-        return self.Out(panorama=self._tables.apply(image, camera))

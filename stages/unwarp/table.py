@@ -1,14 +1,17 @@
-"""Remap tables: where in a picture each pixel of a panorama lies, in OpenCV's fixed point."""
+"""Remap tables: where in a picture each pixel of a panorama lies, in OpenCV's fixed point; and stages that use one."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import NamedTuple, cast
+from typing import Annotated, NamedTuple, cast
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.values.camera import Camera
-from omninav.stages.values.image import Image, Panorama, Pixels
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.problems import BadInput
+from omninav.stages.values.camera import Camera, Sense
+from omninav.stages.values.image import Image, Panorama, Pixels, column_azimuths
 
 Array = npt.NDArray[np.float64]
 Whole = npt.NDArray[np.int16]
@@ -44,6 +47,15 @@ def fixed_point(
     return Table(cast(Whole, whole), cast(Part, part), top, bottom, wraps)
 
 
+def polar(
+    centre_x: float, centre_y: float, radius: Array, columns: int, sense: Sense, yaw: float
+) -> tuple[Array, Array]:
+    """Column and row in the picture of each pixel of a panorama whose rows are circles of `radius` (rows,) pixels."""
+    bearing = column_azimuths(columns) - yaw
+    sign = 1.0 if sense == "clockwise" else -1.0
+    return centre_x + radius[:, None] * np.cos(bearing), centre_y + sign * radius[:, None] * np.sin(bearing)
+
+
 class LastTable:
     """Keeps the table of the camera seen last, so that it is built once per camera and not once per picture."""
 
@@ -58,3 +70,32 @@ class LastTable:
             self._table = self._build(camera)
             self._camera = camera
         return self._table.apply(image.pixels)
+
+
+class TableUnwarp(Stage, ABC):
+    """A panorama by a table that follows from the camera: what the stages for one projection each have in common."""
+
+    columns: Annotated[int, Bounds(ge=8)] = 360
+    rows: Annotated[int, Bounds(ge=1)] = 80
+
+    class Out(Outputs):
+        """The picture as a panorama."""
+
+        panorama: Panorama
+
+    @abstractmethod
+    def table(self, camera: Camera) -> Table:
+        """The table of a camera. Raises BadInput where the camera is of another projection."""
+
+    def setup(self, ctx: Context) -> None:
+        """No table yet: the camera comes with the first picture."""
+        self._tables = LastTable(self.table)
+
+    def step(self, ctx: Context, image: Image, camera: Camera) -> Out:
+        """Remap one picture."""
+        return self.Out(panorama=self._tables.apply(image, camera))
+
+
+def other_camera(camera: Camera, wanted: str) -> BadInput:
+    """The refusal of a camera by a stage for another projection."""
+    return BadInput(f"unwarp: this recording's camera is a {type(camera).__name__}, not {wanted}; use unwarp=by_camera")
