@@ -1,38 +1,11 @@
 import re
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass, field
 
 import pytest
 
 from omninav.pipeline.draw import mermaid, svg
-from omninav.pipeline.stage import Parameter, Port, Signature
-
-
-@dataclass
-class Node:
-    name: str
-    target: str
-    lifetime: str
-    signature: Signature
-    parameters: dict = field(default_factory=dict)
-
-
-@dataclass
-class Wire:
-    to_node: str
-    to_port: str
-    from_node: str
-    from_port: str
-    delay: int = 0
-    hold: bool = False
-    collect: bool = False
-    initial: str | None = None
-
-
-@dataclass
-class Graph:
-    nodes: dict
-    wires: list
+from omninav.pipeline.graph import Graph, Node, Wire
+from omninav.pipeline.stage import Parameter, Port, Signature, Stage
 
 
 def graph(nodes: dict[str, tuple[str, str]], wires: list[str], **more: Wire) -> Graph:
@@ -42,7 +15,7 @@ def graph(nodes: dict[str, tuple[str, str]], wires: list[str], **more: Wire) -> 
         ports = {port: Port(port, int) for port in outputs.split()}
         parameters = {"gain": Parameter("gain", float, 1.5)}
         read = Signature({}, ports, parameters, None, f"Makes <{name}> & more.", name == "source")
-        made[name] = Node(name, f"robot.stages.{name.title()}", lifetime, read, {"gain": 2.5})
+        made[name] = Node(name, f"robot.stages.{name.title()}", Stage(), read, {"gain": 2.5}, lifetime)
     plain = [Wire(*to.split("."), *start.split(".")) for to, start in (wire.split(" < ") for wire in wires)]
     return Graph(made, [*plain, *more.values()])
 
@@ -104,7 +77,7 @@ def test_boxes_never_overlap_and_lie_inside_the_picture(views):
     made = loop()
     for number in range(views):
         read = Signature({}, {"figure": Port("figure", int)}, {}, None, "", False)
-        made.nodes[f"view_{number}"] = Node(f"view_{number}", "x.View", "after", read)
+        made.nodes[f"view_{number}"] = Node(f"view_{number}", "x.View", Stage(), read, {}, "after")
         made.wires.append(Wire(f"view_{number}", "ticks", "source", "tick", collect=True))
     text = svg(made)
     placed = list(boxes(text).values())
