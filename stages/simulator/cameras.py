@@ -12,12 +12,19 @@ from omninav.stages.values.camera import Camera, Cylindrical, Equirectangular, H
 F64 = npt.NDArray[np.float64]
 
 
+RAYS_TO_A_WEDGE = 200
+"""About how many rays share one look around: fewer looks for more rays cost less, but each finds more bodies."""
+
+
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """The pixels of a camera that see something.
+    """The pixels of a camera that see something, in wedges of like azimuth.
 
-    `shape`: rows and columns of the picture. `pixels` (N,): their numbers, row by row. `directions` (N, 3): unit rays
-    in the robot's frame. `footprint` (N,): angle (rad) across a pixel. `gain` (N,): share that vignetting leaves.
+    `shape`: rows and columns of the picture. `pixels` (N,): their numbers, row by row from 0, wedge after wedge.
+    `directions` (N, 3): unit rays in the robot's frame. `footprint` (N,): angle (rad) across a pixel. `gain` (N,):
+    share that vignetting leaves. `wedge_start` (W + 1,): first ray of each wedge; `wedges` (W, 3): its lowest and
+    highest azimuth (rad, counter-clockwise from forward) and steepest slope. `ray_of` (rows * columns,): ray of each
+    pixel, or -1.
     """
 
     shape: tuple[int, int]
@@ -25,6 +32,9 @@ class Rays:
     directions: npt.NDArray[np.float32]
     footprint: npt.NDArray[np.float32]
     gain: npt.NDArray[np.float32]
+    wedge_start: npt.NDArray[np.int32]
+    wedges: F64
+    ray_of: npt.NDArray[np.int32]
 
 
 def camera_rays(camera: Camera, vignetting: float = 0.0) -> Rays:
@@ -65,13 +75,44 @@ def camera_rays(camera: Camera, vignetting: float = 0.0) -> Rays:
     rim = np.hypot(u + 0.5 - camera.width / 2, v + 0.5 - camera.height_px / 2) / corner
     if isinstance(camera, Cylindrical | Equirectangular):
         rim = np.zeros_like(rim)
+    pixels = np.flatnonzero(seen).astype(np.int32)
+    order, wedge_start, wedges = _wedges(directions[seen])
+    ray_of = np.full(seen.size, -1, dtype=np.int32)
+    ray_of[pixels[order]] = np.arange(len(pixels), dtype=np.int32)
+    footprint = np.nan_to_num(footprint[seen], nan=float(np.nanmax(footprint)))
     return Rays(
         shape=(camera.height_px, camera.width),
-        pixels=np.flatnonzero(seen).astype(np.int32),
-        directions=np.ascontiguousarray(directions[seen], dtype=np.float32),
-        footprint=np.nan_to_num(footprint[seen], nan=float(np.nanmax(footprint))).astype(np.float32),
-        gain=(1.0 - vignetting * rim[seen] ** 2).astype(np.float32),
+        pixels=pixels[order],
+        directions=np.ascontiguousarray(directions[seen][order], dtype=np.float32),
+        footprint=footprint[order].astype(np.float32),
+        gain=(1.0 - vignetting * rim[seen][order] ** 2).astype(np.float32),
+        wedge_start=wedge_start,
+        wedges=wedges,
+        ray_of=ray_of,
     )
+
+
+def _wedges(directions: F64) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int32], F64]:
+    """Rays (N, 3) by azimuth: the order that brings wedges together and lower rays first, and `Rays`' two arrays."""
+    azimuth = np.arctan2(directions[:, 1], directions[:, 0])
+    level = np.hypot(directions[:, 0], directions[:, 1])
+    slope = directions[:, 2] / np.maximum(level, 1e-9)
+    taken = len(np.unique(np.floor(azimuth * 180.0 / math.pi))) / 360.0
+    count = max(8, round(len(azimuth) / RAYS_TO_A_WEDGE / taken))
+    around = 2.0 * math.pi / count
+    # The first ray lies in the middle of its wedge, so that each column of a strip falls into one.
+    number = np.round((azimuth - azimuth[0]) / around)
+    off = azimuth - azimuth[0] - number * around
+    number = np.mod(number.astype(np.int64), count)
+    order = np.lexsort((slope, number))
+    used, start = np.unique(number[order], return_index=True)
+    middle = azimuth[0] + used * around
+    sorted_off = off[order]
+    lowest, highest = np.minimum.reduceat(sorted_off, start), np.maximum.reduceat(sorted_off, start)
+    wedges = np.stack(
+        [middle + lowest - 1e-6, middle + highest + 1e-6, np.maximum.reduceat(slope[order], start)], axis=1
+    )
+    return order, np.append(start, len(order)).astype(np.int32), wedges
 
 
 def mirror_directions(camera: HyperbolicMirror, pixels: npt.ArrayLike) -> F64:

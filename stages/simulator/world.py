@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -11,8 +10,10 @@ import numpy.typing as npt
 from . import textures
 from .config import Block, Hanging, Room, Shelf, WorldConfig
 from .layout import expand
+from .lighting import lamps_and_windows
 from .obstacles import Obstacles, distances, gather
 from .renderer import Scene
+from .scene import Box, Tiling, build_scene
 from .streams import stream
 
 F64 = npt.NDArray[np.float64]
@@ -26,32 +27,7 @@ HEADROOM = 1.4
 """What hangs higher (m) can be driven under."""
 
 
-@dataclass(frozen=True)
-class Tiling:
-    """How a face is covered: `tiles` (rows, columns) of textures, each `width` by `height` metres."""
-
-    tiles: I64
-    width: float
-    height: float
-
-
-@dataclass(frozen=True)
-class Box:
-    """A body: what it is, centre, half length and half depth, yaw, lower and upper z, and its faces' coverings.
-
-    `faces`: -x, +x, -y, +y, bottom, top in the box's own frame.
-    """
-
-    kind: str
-    centre: tuple[float, float]
-    half: tuple[float, float]
-    yaw: float
-    low: float
-    high: float
-    faces: tuple[Tiling, Tiling, Tiling, Tiling, Tiling, Tiling]
-
-
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=1024)
 def _drawn(seed: int, material: str, name: str) -> npt.NDArray[np.uint8]:
     """A texture, drawn once for all days of a world."""
     texture = textures.draw(material, stream(seed, "texture", material, name))
@@ -243,92 +219,17 @@ class World:
     @cached_property
     def scene(self) -> Scene:
         """This world for the ray caster."""
-        tilings = [self.floor, self.ceiling, *(face for box in self.boxes for face in box.faces)]
-        lengths = [tiling.tiles.size for tiling in tilings]
-        starts = np.concatenate([[0], np.cumsum(lengths)[:-1]])
-        table = [(start, t.tiles.shape[1], t.tiles.shape[0]) for start, t in zip(starts, tilings, strict=True)]
-        levels = textures.mip_levels(np.stack(self._textures))
-        cell_start, cell_boxes, cell_top, grid, shape = self._cells(0.5)
-        step = 0.1
-        return Scene(
-            boxes=np.array(
-                [
-                    (
-                        *b.centre,
-                        math.cos(b.yaw),
-                        math.sin(b.yaw),
-                        *b.half,
-                        b.low,
-                        b.high,
-                        b.half[0] ** 2 + b.half[1] ** 2,
-                    )
-                    for b in self.boxes
-                ]
-            ),
-            faces=(2 + np.arange(6 * len(self.boxes), dtype=np.int32)).reshape(-1, 6),
-            surface_table=np.array(table, dtype=np.int32),
-            surface_size=np.array([(t.width, t.height) for t in tilings]),
-            tiles=np.concatenate([t.tiles.ravel() for t in tilings]).astype(np.int32),
-            texels=np.concatenate([level.ravel() for level in levels]),
-            level_start=np.concatenate([[0], np.cumsum([level.size for level in levels])[:-1]]).astype(np.int64),
-            side=textures.SIDE,
-            glow=np.array(self._glow, dtype=np.float32),
-            cell_start=cell_start,
-            cell_boxes=cell_boxes,
-            cell_top=cell_top,
-            grid=grid,
-            rows=shape[0],
-            columns=shape[1],
-            light=self._light(step, grid, shape),
-            light_step=step,
-            height=self.config.height,
+        return build_scene(
+            self.boxes,
+            self.floor,
+            self.ceiling,
+            self.config.size,
+            self.config.height,
+            self._textures,
+            self._glow,
+            lamps_and_windows(self.layout.lamps, self.layout.hangings, self.config, self.day),
+            self.config.ambient,
         )
-
-    def _cells(self, size: float) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32], F64, F64, tuple[int, int]]:
-        """Which boxes touch which cell of a grid over the floor, by their bounding rectangles."""
-        corner = -WALL - 0.05
-        columns = math.ceil((self.config.size[0] - 2 * corner) / size)
-        rows = math.ceil((self.config.size[1] - 2 * corner) / size)
-        members: list[list[int]] = [[] for _ in range(rows * columns)]
-        top = np.zeros(rows * columns)
-        for number, box in enumerate(self.boxes):
-            corners = outline(box)
-            low = np.floor((corners.min(axis=0) - corner) / size - 1e-9).astype(int)
-            high = np.floor((corners.max(axis=0) - corner) / size + 1e-9).astype(int)
-            for row in range(max(low[1], 0), min(high[1], rows - 1) + 1):
-                for column in range(max(low[0], 0), min(high[0], columns - 1) + 1):
-                    members[row * columns + column].append(number)
-                    top[row * columns + column] = max(top[row * columns + column], box.high)
-        start = np.concatenate([[0], np.cumsum([len(m) for m in members])]).astype(np.int32)
-        flat = np.array([number for m in members for number in m], dtype=np.int32)
-        return start, flat, top, np.array([corner, corner, size]), (rows, columns)
-
-    def _light(self, step: float, grid: F64, shape: tuple[int, int]) -> npt.NDArray[np.float32]:
-        """Irradiance on faces that look up, +x, -x, +y, -y: every lamp's, with the square of the distance, unshaded.
-
-        The floor is darker close to what stands on it. The mean over the floor is brought to 1.
-        """
-        columns, rows = math.ceil(shape[1] * grid[2] / step) + 1, math.ceil(shape[0] * grid[2] / step) + 1
-        x, y = grid[0] + step * np.arange(columns), grid[1] + step * np.arange(rows)
-        points = np.stack(np.meshgrid(x, y), axis=-1)
-        normals = np.array([(0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], dtype=float)
-        heights = np.array([0.0, 1.0, 1.0, 1.0, 1.0])
-        light = np.zeros((rows, columns, 5, 3))
-        for lamp in self.layout.lamps:
-            for side in range(5):
-                across = np.array(lamp.centre) - points
-                rise = self.config.height - heights[side]
-                square = (across**2).sum(axis=-1) + rise**2
-                facing = across @ normals[side, :2] + rise * normals[side, 2]
-                fall = np.maximum(facing, 0.0) / square**1.5 * (rise / np.sqrt(square))
-                light[:, :, side, :] += fall[..., None] * np.array(lamp.light)
-        mean = light[:, :, 0, :].mean() or 1.0
-        light *= (1.0 - self.config.ambient) / mean
-        light[:, :, 1:, :] *= 1.6  # a wall also gets what floor and ceiling throw back
-        light += self.config.ambient
-        clear = self.clearance(points.reshape(-1, 2)).reshape(rows, columns)
-        light[:, :, 0, :] *= (1.0 - 0.4 * np.exp(-np.maximum(clear, 0.0) / 0.15))[..., None]
-        return light.astype(np.float32)
 
     # Room to drive
 

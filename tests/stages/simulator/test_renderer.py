@@ -49,8 +49,8 @@ def marker() -> tuple[Scene, npt.NDArray[np.float64]]:
     block = scene.tiles[scene.surface_table[scene.faces[number], 0]]
     start, side = 0, scene.side
     while side >= 1:
-        level = texels[start : start + len(glow) * side * side * 3].reshape(len(glow), -1)
-        level[block] = 255
+        level = texels[start : start + len(glow) * side * side].reshape(len(glow), -1)
+        level[block] = 0xFFFFFF
         start, side = start + level.size, side // 2
     glow[block] = 1.0
     cos, sin = math.cos(0.4), math.sin(0.4)
@@ -205,7 +205,7 @@ def test_noise_follows_from_its_key_alone_and_has_the_stated_spread(demo: Scene)
         assert abs(error.mean()) < 0.05
         assert abs(error.std() - math.sqrt(3.0**2 + 1 / 6)) < 0.05  # two roundings of variance 1/12
     first, second = (noisy[0] - clean)[middle], (noisy[2] - clean)[middle]
-    assert abs(np.corrcoef(first, second)[0, 1]) < 0.01
+    assert abs(np.corrcoef(first, second)[0, 1]) < 0.02  # the clean picture's rounding is in both: 1/12 of 9
 
 
 def test_the_ring_is_lit_and_the_robot_in_its_middle_is_black(demo: Scene) -> None:

@@ -1,0 +1,149 @@
+"""A world's bodies, textures and lights as the arrays that the ray caster works on."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from . import textures
+from .lighting import Light, contact_map, light_map
+from .renderer import Scene
+
+F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
+I64 = npt.NDArray[np.int64]
+U8 = npt.NDArray[np.uint8]
+
+CELL = 0.5
+"""Size (m) of the cells by which boxes are found."""
+MARGIN = 0.25
+"""How far (m) the cells reach beyond the floor, for outer walls."""
+LIGHT_STEP = 0.2
+CONTACT_STEP = 0.1
+
+
+@dataclass(frozen=True)
+class Tiling:
+    """How a face is covered: `tiles` (rows, columns) of textures, each `width` by `height` metres."""
+
+    tiles: I64
+    width: float
+    height: float
+
+
+Coverings = tuple[Tiling, Tiling, Tiling, Tiling, Tiling, Tiling]
+"""Of the faces -x, +x, -y, +y, bottom, top of a box, in its own frame."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """A body: what it is, centre, half length and half depth, yaw, lower and upper z, and its faces' coverings."""
+
+    kind: str
+    centre: tuple[float, float]
+    half: tuple[float, float]
+    yaw: float
+    low: float
+    high: float
+    faces: Coverings
+
+
+def build_scene(
+    boxes: Sequence[Box],
+    floor: Tiling,
+    ceiling: Tiling,
+    size: tuple[float, float],
+    height: float,
+    pictures: Sequence[U8],
+    glow: Sequence[float],
+    lights: Sequence[Light],
+    ambient: float,
+    looks: Sequence[Sequence[Coverings]] = (),
+) -> Scene:
+    """The scene of boxes on a floor of `size` m under a ceiling at `height` m.
+
+    `pictures` and `glow` are the textures that tilings number, and how much of each shines by itself. `looks`: the
+    coverings of the parts of people, look by look.
+    """
+    tilings = [floor, ceiling, *(face for box in boxes for face in box.faces)]
+    people = [face for look in looks for part in look for face in part]
+    parts = len(looks[0]) if looks else 0
+    numbers = len(tilings) + np.arange(len(people), dtype=np.int32)
+    tilings += people
+    starts = np.cumsum([0, *(tiling.tiles.size for tiling in tilings)])[:-1]
+    table = [(start, t.tiles.shape[1], t.tiles.shape[0]) for start, t in zip(starts, tilings, strict=True)]
+    levels = textures.mip_levels(np.stack(pictures))
+    bodies = box_array(boxes)
+    grid = np.array([-MARGIN, -MARGIN, CELL])
+    columns, rows = (math.ceil((extent + 2 * MARGIN) / CELL) for extent in size)
+    cell_start, cell_boxes = cells(bodies, grid, rows, columns)
+    return Scene(
+        boxes=bodies,
+        faces=(2 + np.arange(6 * len(boxes), dtype=np.int32)).reshape(-1, 6),
+        surface_table=np.array(table, dtype=np.int32),
+        surface_size=1.0 / np.array([(t.width, t.height) for t in tilings]),
+        tiles=np.concatenate([t.tiles.ravel() for t in tilings]).astype(np.int32),
+        texels=np.concatenate([packed(level).ravel() for level in levels]),
+        level_start=np.cumsum([0, *(level.size // 3 for level in levels)])[:-1].astype(np.int64),
+        side=textures.SIDE,
+        glow=np.array(glow, dtype=np.float32),
+        cell_start=cell_start,
+        cell_boxes=cell_boxes,
+        grid=grid,
+        rows=rows,
+        columns=columns,
+        light=light_map(lights, ambient, bodies, height, grid[:2], size, LIGHT_STEP),
+        light_step=LIGHT_STEP,
+        contact=contact_map(bodies, grid[:2], size, CONTACT_STEP),
+        contact_step=CONTACT_STEP,
+        height=height,
+        looks=numbers.reshape(len(looks), parts, 6),
+    )
+
+
+def box_array(boxes: Sequence[Box]) -> F64:
+    """Boxes (B, 9) as `renderer.Bodies` describes them."""
+    rows = [
+        (*b.centre, math.cos(b.yaw), math.sin(b.yaw), *b.half, b.low, b.high, b.half[0] ** 2 + b.half[1] ** 2)
+        for b in boxes
+    ]
+    return np.array(rows, dtype=np.float64).reshape(-1, 9)
+
+
+def packed(texels: U8) -> npt.NDArray[np.uint32]:
+    """Blue-green-red texels (..., 3) as numbers (...,): blue in the lowest byte."""
+    wide = texels.astype(np.uint32)
+    return (wide @ np.array([1, 1 << 8, 1 << 16], dtype=np.uint32)).astype(np.uint32, copy=False)
+
+
+def cells(boxes: F64, grid: F64, rows: int, columns: int) -> tuple[I32, I32]:
+    """Which boxes touch which cell, by their bounding rectangles: where each begins (cells + 1,), and boxes."""
+    cos, sin = np.abs(boxes[:, 2]), np.abs(boxes[:, 3])
+    reach = np.stack([cos * boxes[:, 4] + sin * boxes[:, 5], sin * boxes[:, 4] + cos * boxes[:, 5]], axis=1)
+    low = np.floor((boxes[:, :2] - reach - grid[:2]) / grid[2] - 1e-9).astype(np.int64)
+    high = np.floor((boxes[:, :2] + reach - grid[:2]) / grid[2] + 1e-9).astype(np.int64)
+    last = np.array([columns - 1, rows - 1])
+    return _cells(np.clip(low, 0, last), np.clip(high, 0, last), rows, columns)
+
+
+@numba.njit(cache=True)
+def _cells(low: I64, high: I64, rows: int, columns: int) -> tuple[I32, I32]:
+    start = np.zeros(rows * columns + 1, dtype=np.int32)
+    for box in range(len(low)):
+        for row in range(low[box, 1], high[box, 1] + 1):
+            for column in range(low[box, 0], high[box, 0] + 1):
+                start[row * columns + column + 1] += 1
+    for cell in range(rows * columns):
+        start[cell + 1] += start[cell]
+    members = np.empty(start[-1], dtype=np.int32)
+    filled = start[:-1].copy()
+    for box in range(len(low)):
+        for row in range(low[box, 1], high[box, 1] + 1):
+            for column in range(low[box, 0], high[box, 0] + 1):
+                cell = row * columns + column
+                members[filled[cell]] = box
+                filled[cell] += 1
+    return start, members
