@@ -252,7 +252,8 @@ def _origins(wire: DrawnWire) -> list[str]:
 
 def _reads_truth(graph: DrawnGraph, origin: str) -> bool:
     node, _, port = origin.partition(".")
-    return port == "truth" and node in graph.nodes and graph.nodes[node].signature.is_source
+    given = graph.nodes[node].signature.outputs.get(port) if node in graph.nodes else None
+    return given is not None and given.truth
 
 
 def _later(wire: DrawnWire) -> str:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import networkx as nx
 
 from .catalog import UnknownStage, code_version, entries, resolve
+from .closed_loop import truth_in_the_loop
 from .files import digest_text
 from .ports import compatible, convert_fields, type_name
 from .problems import Problem, ProblemsFound, nearest, suggest
@@ -155,6 +156,8 @@ class _Builder:
         if not self.problems:
             lifetimes = self._lifetimes()
             graph = self._ordered(lifetimes)
+            for where, what, hint in truth_in_the_loop(graph):
+                self._problem(where, what, hint)
         return graph
 
     def _problem(self, where: str, what: str, hint: str = "") -> None:

@@ -41,6 +41,14 @@ class Bounds:
         return " and ".join(f"{sign} {limit:g}" for sign, limit in limits if limit is not None)
 
 
+class Truth:
+    """Marks an output that no robot in the field would have: `pose: Annotated[Pose, Truth]`.
+
+    Metrics and views may read it, and so may a graph over a recorded log; in a closed loop nothing that leads to a
+    command may. A source's output named `truth` is marked by its name, and so is every output whose value type says so.
+    """
+
+
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 class Outputs:
     """Base of a stage's `Out` class: one field per output port. A field with a default may be absent (None)."""
@@ -184,6 +192,8 @@ class Port:
     """True for an input declared `Sequence[X]`: `type` is then X."""
     keeps_gaps: bool = False
     """True for `Sequence[X | None]`: one entry per tick, None where the value was absent."""
+    truth: bool = False
+    """True for an output marked `Truth`."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -283,9 +293,17 @@ def _read_outputs(cls: type[Stage], returned: Any, where: str) -> dict[str, Port
     hints = _hints(returned, cls)
     ports = {}
     for field in dataclasses.fields(returned):  # type: ignore[arg-type]  # Outputs makes it a dataclass
-        annotation, optional = split_optional(hints[field.name])
-        ports[field.name] = Port(field.name, annotation, optional or field.default is not dataclasses.MISSING)
+        annotation, *marks = get_args(hints[field.name]) if _is_annotated(hints[field.name]) else (hints[field.name],)
+        annotation, optional = split_optional(annotation)
+        truth = Truth in marks or bool(getattr(annotation, "is_truth", False))
+        truth = truth or (field.name == "truth" and issubclass(cls, Source))
+        optional = optional or field.default is not dataclasses.MISSING
+        ports[field.name] = Port(field.name, annotation, optional, truth=truth)
     return ports
+
+
+def _is_annotated(annotation: Any) -> bool:
+    return get_origin(annotation) is Annotated
 
 
 def read_parameters(cls: type[Any]) -> dict[str, Parameter]:

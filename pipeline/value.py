@@ -15,11 +15,12 @@ class Value:
     Fields are arrays, numbers, strings, other values, and tuples, lists and string-keyed dicts of these: what
     `codec.py` can write. `in_place` marks a large value that one stage updates in place (a map); it is then not
     frozen, and the engine sees to it that nobody reads it too late. `bulky` marks what is too large to be kept over
-    a whole log (images): it is never cached.
+    a whole log (images): it is never cached. `is_truth` marks what no robot in the field has: a plan of the world.
     """
 
     in_place: ClassVar[bool] = False
     bulky: ClassVar[bool] = False
+    is_truth: ClassVar[bool] = False
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)

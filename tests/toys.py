@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Source, Stage, State, Tick, Value
+from omninav.pipeline import Bounds, Context, Outputs, Source, Stage, State, Tick, Truth, Value
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.results import Metrics
 
@@ -241,3 +241,41 @@ class NotAStage:
 
     def __init__(self) -> None:
         type(self).called = True
+
+
+class Steered(Source):
+    """A number that goes where it is told; where it is, is truth."""
+
+    class Place(State):
+        at: float = 0.0
+        ticks: int = 0
+
+    class Out(Outputs):
+        tick: Tick
+        felt: Number
+        truth: Number
+        hidden: Annotated[Number | None, Truth] = None
+
+    def step(self, ctx: Context, place: Place, command: Number | None = None) -> Out | None:
+        if place.ticks == 10:
+            return None
+        place.at += command.value if command else 0.0
+        place.ticks += 1
+        tick = Tick(index=place.ticks - 1, stamp=place.ticks * 10**9, frame=place.ticks - 1)
+        return self.Out(tick=tick, felt=Number(place.at), truth=Number(place.at), hidden=Number(place.at))
+
+
+class Surveyed(Number):
+    """A number that nobody inside the world has."""
+
+    is_truth = True
+
+
+class Surveyor(Stage):
+    """Gives a plan of the world."""
+
+    class Out(Outputs):
+        plan: Surveyed
+
+    def step(self, ctx: Context) -> Out:
+        return self.Out(plan=Surveyed(1.0))

@@ -157,8 +157,7 @@ def drive(
         if arrived or event is None:
             break
         rolled_to[done - 1] = poses[done - 1].copy()
-        state[:3] = lifted(poses[done - 1], event)
-        state[SPEED] = state[TURNING] = 0.0
+        put_down(state, event)
         poses[done - 1] = state[:3]
         if event.to is not None:
             along = _nearest_along(points, ends, state[:2])
@@ -169,9 +168,10 @@ def drive(
     return Drive(np.arange(done) / rate, poses, before, int(state[COLLISIONS]))
 
 
-def lifted(pose: npt.ArrayLike, event: Event) -> F64:
-    """Where a robot stands that was lifted from a pose (3,)."""
-    return compose(pose if event.to is None else event.to, (0.0, 0.0, event.turn))
+def put_down(state: F64, event: Event) -> None:
+    """Somebody lifts a robot and puts it down: its `state` (8,) is at rest then, and nothing is counted as driven."""
+    state[:3] = compose(state[:3] if event.to is None else event.to, (0.0, 0.0, event.turn))
+    state[SPEED] = state[TURNING] = state[TOUCHING] = 0.0
 
 
 def _legs(waypoints: npt.ArrayLike) -> tuple[F64, F64]:

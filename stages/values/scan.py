@@ -23,5 +23,5 @@ class Scan(Value):
 
     def azimuths(self) -> Array:
         """Where the readings look: (N,) radians."""
-        azimuths: Array = self.first + self.step * np.arange(len(self.ranges))
+        azimuths: Array = self.first + self.step * np.arange(len(self.ranges), dtype=np.float64)
         return azimuths

@@ -8,6 +8,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.log import LogWriter, standard_types
 from omninav.stages.values.belief import Particles, PoseEstimate
+from omninav.stages.values.command import Command
 from omninav.stages.values.drives import Array, Drive, drives, known
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion, Pose
@@ -29,6 +30,7 @@ class ResultLog(Stage):
     | `/odom` | Odometry | odometry alone, from the log's first frame, in the frame `odom` |
     | `/ground_truth/pose` | PoseStamped | where the log has it |
     | `/map` | MarkerArray | the map's references and edges, once per log |
+    | `/command` | TwistStamped | what a driver asked for, in a closed loop |
     | `/tf` | TFMessage | `map` to `odom`, once per log: odometry laid where `odometry alone` starts |
 
     Stamps are the images' header stamps.
@@ -43,19 +45,27 @@ class ResultLog(Stage):
         self,
         ctx: Context,
         ticks: Sequence[Tick],
-        estimates: Sequence[PoseEstimate | None],
         truth: Sequence[Pose | None],
         motion: Sequence[Motion | None],
+        estimates: Sequence[PoseEstimate | None] | None = None,
         beliefs: Sequence[Particles | None] | None = None,
         map: ReferenceGraph | None = None,
+        commands: Sequence[Command | None] | None = None,
     ) -> Out:
         """The whole run at once."""
         if ctx.folder is None:
             return self.Out()
+        if estimates is None:
+            estimates = [None] * len(ticks)
         remaining: Iterator[Particles | None] = iter(beliefs if beliefs is not None else [])
         with LogWriter(ctx.folder / "result.mcap") as log:
             for drive in drives(ticks, estimates, truth, motion):
                 self._write_drive(log, drive, remaining, map)
+            for tick, command in zip(ticks, commands or (), strict=bool(commands)):
+                if command is not None:
+                    twist = {"linear": {"x": command.speed}, "angular": {"z": command.turning}}
+                    fields = {"header": header(tick.stamp, "base_link"), "twist": twist}
+                    log.write("/command", "geometry_msgs/msg/TwistStamped", tick.stamp, fields)
         return self.Out()
 
     def _write_drive(
@@ -89,7 +99,8 @@ class ResultLog(Stage):
             {"header": header(int(stamp)), "pose": ros_pose(pose)}
             for stamp, pose in zip(drive.stamps[has_estimate], drive.estimate[has_estimate], strict=True)
         ]
-        log.write("/estimate/path", "nav_msgs/msg/Path", last, {"header": header(last), "poses": poses})
+        if poses:
+            log.write("/estimate/path", "nav_msgs/msg/Path", last, {"header": header(last), "poses": poses})
 
 
 def header(stamp: int, frame: str = FRAME) -> Fields:

@@ -12,7 +12,7 @@ def graph(nodes: dict[str, tuple[str, str]], wires: list[str], **more: Wire) -> 
     """`nodes`: name -> (lifetime, outputs); `wires`: "to.port < from.port"."""
     made = {}
     for name, (lifetime, outputs) in nodes.items():
-        ports = {port: Port(port, int) for port in outputs.split()}
+        ports = {port: Port(port, int, truth=port == "truth") for port in outputs.split()}
         parameters = {"gain": Parameter("gain", float, 1.5)}
         read = Signature({}, ports, parameters, None, f"Makes <{name}> & more.", name == "source")
         made[name] = Node(name, f"robot.stages.{name.title()}", Stage(), read, {"gain": 2.5}, lifetime)

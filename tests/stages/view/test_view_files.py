@@ -41,7 +41,8 @@ def test_frames_without_an_estimate_are_counted(tmp_path):
 
 def write_result(folder, run, **parameters):
     stage = ResultLog(**parameters)
-    stage.step(Context("log", folder=folder), *run.drive, run.beliefs, run.map)
+    ticks, estimates, truth, motion = run.drive
+    stage.step(Context("log", folder=folder), ticks, truth, motion, estimates, run.beliefs, run.map)
     return folder / "result.mcap"
 
 

@@ -1,0 +1,35 @@
+"""A closed loop is steered by what a robot would have: nothing that leads to a command knows the truth."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .graph import Graph, Wire
+
+
+def steering(graph: "Graph") -> frozenset[str]:
+    """The nodes that a source's next step depends on, by any kind of wire; empty where the source takes no input."""
+    source = graph.source
+    if source is None:
+        return frozenset()
+    return frozenset(graph.leading_to(o for wire in graph.inputs_of(source.name) for o in _origins(wire)).nodes)
+
+
+def truth_in_the_loop(graph: "Graph") -> Iterator[tuple[str, str, str]]:
+    """Where, what and what to type for every wire that brings truth (see `Truth`) to a stage that steers the robot.
+
+    Metrics and views, which no command depends on, may read it. A map is taken as it was made: from a tour, before.
+    """
+    for name in sorted(steering(graph)):
+        for wire in graph.inputs_of(name):
+            for origin in _origins(wire):
+                given = graph.port(origin)
+                if given is not None and (given.truth or getattr(given.type, "is_truth", False)):
+                    what = (
+                        f"{origin} is ground truth, and '{name}' steers the robot: no robot in the field would have it"
+                    )
+                    yield wire.where, what, f"take the wire out: {wire.where}=null"
+
+
+def _origins(wire: "Wire") -> list[str]:
+    return [wire.origin, *([wire.initial] if wire.initial else [])]

@@ -1,0 +1,1 @@
+"""From where to go to what the wheels shall do."""

@@ -1,0 +1,74 @@
+"""Driving about without bumping into anything."""
+
+import math
+from dataclasses import field
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.stages.values.command import Command
+from omninav.stages.values.scan import Scan
+
+F64 = npt.NDArray[np.float64]
+
+
+def _no_ranges() -> F64:
+    return np.zeros(0)
+
+
+class Memory(State):
+    """Which way it turns away (1 left, -1 right, 0 undecided), and the ranges of the tick before."""
+
+    side: int = 0
+    ranges: F64 = field(default_factory=_no_ranges)
+
+
+def free_ahead(ranges: F64, azimuths: F64, radius: float, margin: float) -> float:
+    """How far (m) a disc of `radius` m can go straight on, `margin` m clear on both sides; (N,) ranges and azimuths."""
+    ahead, beside = ranges * np.cos(azimuths), np.abs(ranges * np.sin(azimuths))
+    in_the_way = (np.cos(azimuths) > 0.0) & (beside < radius + margin)
+    return float(ahead[in_the_way].min(initial=float(ranges.max()))) - radius
+
+
+def roomier_side(ranges: F64, azimuths: F64) -> float:
+    """Where there is more room in front: the mean way (m) to the left of (N,) ranges, negative to the right."""
+    front = np.cos(azimuths) > -0.1
+    return float((ranges * np.sin(azimuths))[front].mean())
+
+
+class WallAvoider(Stage):
+    """Wanders: straight on where there is room, towards the roomier side where not, on the spot where there is none.
+
+    It reads nothing but the ring of ranges. Speed is such that it can stop within what is free ahead. A
+    reading counts as free where it had no echo twice. A robot that turns away keeps its side until there is room again.
+    """
+
+    speed: Annotated[float, Bounds(gt=0)] = 0.4
+    turning: Annotated[float, Bounds(gt=0)] = 0.8
+    radius: Annotated[float, Bounds(gt=0)] = 0.25
+    margin: Annotated[float, Bounds(ge=0)] = 0.15
+    """Room (m) that it keeps on all sides."""
+    stop_at: Annotated[float, Bounds(gt=0)] = 0.25
+    """Free way (m) at which it turns on the spot."""
+    slow_at: Annotated[float, Bounds(gt=0)] = 1.2
+    """Free way (m) at which it begins to turn away."""
+
+    class Out(Outputs):
+        command: Command
+
+    def step(self, ctx: Context, scan: Scan, memory: Memory) -> Out:
+        """The command that this ring of ranges asks for."""
+        heard = np.minimum(scan.ranges, scan.farthest)
+        ranges = np.minimum(heard, memory.ranges) if len(memory.ranges) == len(heard) else heard
+        memory.ranges = heard
+        free = free_ahead(ranges, scan.azimuths(), self.radius, self.margin)
+        roomier = roomier_side(ranges, scan.azimuths())
+        if free > self.slow_at:
+            memory.side = 0
+            return self.Out(command=Command(self.speed, 0.5 * self.turning * math.tanh(roomier)))
+        if memory.side == 0:
+            memory.side = 1 if roomier >= 0.0 else -1
+        share = max(0.0, (free - self.stop_at) / (self.slow_at - self.stop_at))
+        return self.Out(command=Command(self.speed * share, memory.side * self.turning * (1.0 - 0.5 * share)))

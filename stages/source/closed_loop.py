@@ -1,0 +1,164 @@
+"""A simulated robot that goes where it is told: the source of a closed loop."""
+
+from dataclasses import field
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
+from omninav.stages.geometry.se2 import between, compose
+from omninav.stages.simulator import tours
+from omninav.stages.simulator.cameras import camera_rays
+from omninav.stages.simulator.config import Event, WorldConfig
+from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.obstacles import gather
+from omninav.stages.simulator.odometry import draw_bias, measured
+from omninav.stages.simulator.ranges import measure
+from omninav.stages.simulator.renderer import render
+from omninav.stages.simulator.robot import COLLISIONS, WAY, at_rest, limits, put_down, reach, steer
+from omninav.stages.simulator.streams import stream
+from omninav.stages.simulator.world import World
+from omninav.stages.values.camera import Camera
+from omninav.stages.values.command import Command
+from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.image import Image
+from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.scan import Scan
+
+from .recording import UnreadableRecording
+from .simulated import EPOCH, mirror, ring_scan, simulation_digest
+
+F64 = npt.NDArray[np.float64]
+
+
+def _nowhere() -> F64:
+    return np.zeros(0)
+
+
+class Simulation(State):
+    """The robot as it is: its state (see `robot`; empty before the first tick), odometry pose, ticks made."""
+
+    robot: F64 = field(default_factory=_nowhere)
+    odometry: F64 = field(default_factory=lambda: np.zeros(3))
+    ticks: int = 0
+
+
+class ClosedLoop(Source):
+    """A robot in a simulated world that drives as the last command says; every tick it looks, measures and feels.
+
+    It starts at rest where the world's `route` starts, or at `start` (x, y in metres, heading in radians), and goes on
+    for `seconds`, `rate` ticks each. The command of the tick before holds until this tick. `motion` is what its wheels
+    say, absent at the first tick. Noise is drawn from the run's seed, goods and textures from the world's. Without a
+    command it brakes. A picture that is lost or late on its way (`world.delivery`) is absent, and counted.
+    """
+
+    world: WorldConfig = DEMO
+    day: Annotated[int, Bounds(ge=0)] = 1
+    route: str = "drive"
+    start: tuple[float, float, float] | None = None
+    seconds: Annotated[float, Bounds(gt=0)] = 60.0
+    rate: Annotated[float, Bounds(ge=1)] = 5.0
+    events: tuple[Event, ...] = ()
+
+    class Out(Outputs):
+        tick: Tick
+        image: Image | None = None
+        camera: Camera
+        odometry: Pose
+        motion: Motion | None = None
+        scan: Scan
+        truth: Pose
+        tally: DriveTally
+
+    def setup(self, ctx: Context) -> None:
+        """Build the world; the bodies in it are looked up by place."""
+        world = World(self.world, self.day)
+        self._scene = world.scene
+        self._room = gather(world.obstacles, self.world.size, reach(self.world.robot))
+        self._limits = limits(self.world.robot)
+        self._camera = mirror(self.world.camera)
+        self._rays = camera_rays(self._camera, self.world.sensor.vignetting)
+        self._bias = draw_bias(self.world.odometry, stream(self.world.seed, "odometry bias", self.day))
+        self._first = self._first_pose(world)
+
+    def inputs_digest(self) -> str | None:
+        """sha256 over the world and the code that simulates it."""
+        return simulation_digest(self.world)
+
+    def length(self) -> int | None:
+        """Ticks in all."""
+        return int(self.seconds * self.rate)
+
+    def step(self, ctx: Context, simulation: Simulation, command: Command | None = None) -> Out | None:
+        """Drive on under the last command, then perceive; None when the time is over."""
+        if simulation.ticks >= int(self.seconds * self.rate):
+            return None
+        motion = None
+        if simulation.ticks == 0:
+            simulation.robot = at_rest(self._first)
+        else:
+            motion = self._drive(ctx, simulation, command or Command(0.0, 0.0))
+        out = self._perceive(ctx, simulation, motion)
+        simulation.ticks += 1
+        return out
+
+    def _drive(self, ctx: Context, simulation: Simulation, command: Command) -> Motion:
+        """One tick under a command, and what the wheels say of it."""
+        robot, now = simulation.robot, simulation.ticks / self.rate
+        before = robot[:3].copy()
+        steer(robot, command.speed, command.turning, self._limits, 1.0 / self.rate, self._room, self._people(now))
+        rolled = measured(between(before, robot[:3])[None], self.world.odometry, self._bias, ctx.rng)[0]
+        simulation.odometry = compose(simulation.odometry, rolled)
+        for event in self.events:
+            if now - 1.0 / self.rate < event.at <= now:
+                put_down(robot, event)
+        return Motion(*(float(value) for value in rolled))
+
+    def _perceive(self, ctx: Context, simulation: Simulation, motion: Motion | None) -> Out:
+        pose, now = simulation.robot[:3], simulation.ticks / self.rate
+        metres = measure(self._room, self._people(now)[None], pose[None], self.world.ranges, ctx.rng)[0]
+        stamp = EPOCH + self.day * 86400 * 10**9 + 8 * 3600 * 10**9 + round(now * 1e9)
+        return self.Out(
+            tick=Tick(index=simulation.ticks, stamp=stamp, frame=simulation.ticks, first_of_log=simulation.ticks == 0),
+            image=self._look(ctx, pose, now),
+            camera=self._camera,
+            odometry=_pose(simulation.odometry),
+            motion=motion,
+            scan=ring_scan(self.world, metres),
+            truth=_pose(pose),
+            tally=DriveTally(int(simulation.robot[COLLISIONS]), float(simulation.robot[WAY])),
+        )
+
+    def _look(self, ctx: Context, pose: F64, now: float) -> Image | None:
+        sensor, delivery = self.world.sensor, self.world.delivery
+        fate, key = ctx.rng.uniform(size=2), int(ctx.rng.integers(2**62))
+        if fate[0] < delivery.dropped or fate[1] < delivery.late:
+            ctx.count("lost_picture" if fate[0] < delivery.dropped else "late_picture")
+            return None
+        swing = float(np.sin(2 * np.pi * now / sensor.exposure_period))
+        exposure = sensor.exposure * (1.0 + sensor.exposure_drift * swing)
+        eye = self.world.camera.height
+        return Image(render(self._scene, self._rays, pose, eye, exposure=exposure, noise=sensor.noise, key=key))
+
+    def _people(self, now: float) -> F64:
+        """Who is about: (M, 3) x, y, radius."""
+        return np.zeros((0, 3))
+
+    def _first_pose(self, world: World) -> F64:
+        if self.start is not None:
+            pose = np.array(self.start)
+        elif self.route in self.world.routes:
+            way = tours.plan(world, self.world.routes[self.route])
+            ahead = next((point for point in way if np.hypot(*(point - way[0])) > 0.1), way[-1]) - way[0]
+            pose = np.array([*way[0], np.arctan2(ahead[1], ahead[0])])
+        else:
+            raise UnreadableRecording(
+                f"world '{self.world.name}' has no route '{self.route}' to start from; it has: "
+                f"{', '.join(sorted(self.world.routes)) or 'none'}; or type nodes.source.start=[x,y,heading]"
+            )
+        return pose
+
+
+def _pose(row: F64) -> Pose:
+    return Pose(*(float(value) for value in row))
