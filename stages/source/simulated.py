@@ -13,13 +13,14 @@ import numpy.typing as npt
 from omninav.pipeline.files import digest_file, digest_text
 from omninav.stages import simulator
 from omninav.stages.geometry import catadioptric, odometry_noise, se2
+from omninav.stages.simulator import tours
 from omninav.stages.simulator.cameras import Rays, camera_rays
 from omninav.stages.simulator.config import Event, MirrorCamera, WorldConfig
 from omninav.stages.simulator.obstacles import Obstacles, gather
 from omninav.stages.simulator.odometry import draw_bias, odometry
 from omninav.stages.simulator.ranges import azimuths, measure
 from omninav.stages.simulator.renderer import render
-from omninav.stages.simulator.robot import drive, reach, wandered
+from omninav.stages.simulator.robot import drive, reach
 from omninav.stages.simulator.streams import stream
 from omninav.stages.simulator.world import World
 from omninav.stages.values.camera import HyperbolicMirror
@@ -64,7 +65,11 @@ class SimulatedRecording:
 
     def _drive(self) -> None:
         world = self.world
-        line = wandered(world.routes[self.route].waypoints, world.robot.wander, self._stream("line"))
+        try:
+            way = tours.plan(self._world, world.routes[self.route])
+        except tours.NoWay as why:
+            raise UnreadableRecording(f"route '{self.route}': {why}") from None
+        line = tours.wandered(self._world, way, world.robot.wander, self._stream("line"))
         driven = drive(line, world.robot, world.timing.odometry, room=self._room, events=self.events)
         self._seconds, self.driven, self.collisions = driven.times, driven.poses, driven.collisions
         bias = draw_bias(world.odometry, stream(world.seed, "odometry bias", self.day))

@@ -1,0 +1,353 @@
+"""Tours: a route of a world as a line of points that a robot can follow, around whatever stands in between."""
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from .config import Point, Route
+from .layout import Aisle
+from .streams import stream
+from .world import World
+
+F64 = npt.NDArray[np.float64]
+
+SPARE = 0.1
+"""Metres that a tour keeps from obstacles beyond the robot's radius."""
+COMFORT = 0.6
+"""Metres beyond the radius from which on a tour no longer minds an obstacle."""
+SPACING = 0.4
+"""Metres between the points of a tour."""
+SWAY = 2.5
+"""Metres over which a hand on the joystick drifts to one side."""
+
+
+class NoWay(Exception):
+    """A route that cannot be driven on this day: one clear line why."""
+
+
+def plan(world: World, route: Route) -> F64:
+    """The points (W, 2) of a route around what stands in the world on its day, rounded as a joystick is moved.
+
+    All points keep the robot's radius and 0.1 m from obstacles where there is as much room. Raises `NoWay` where a
+    point cannot be reached, or nothing is left to visit.
+    """
+    radius = world.config.robot.radius
+    if route.kind == "waypoints":
+        points = np.asarray(route.waypoints, dtype=np.float64)
+        if len(points) and _straight(world, points, radius):
+            return _cut(points, route.length)
+    ways = _Ways(world)
+    goals = _goals(world, ways, route)
+    line = [np.asarray(next(goals, (math.nan, math.nan)))]
+    if np.isnan(line[0]).any():
+        raise NoWay(f"world '{world.config.name}': the route has no points")
+    legs, done = [], 0.0
+    for goal in goals:
+        leg = ways.between(line[-1], np.asarray(goal))
+        legs.append(leg)
+        line.append(leg[-1])
+        done += _length(leg)
+        if route.length is not None and done >= route.length:
+            break
+    if not legs:
+        raise NoWay(f"world '{world.config.name}': the route has only one point that can be reached")
+    return _cut(ways.smooth(np.concatenate([legs[0], *(leg[1:] for leg in legs[1:])])), route.length)
+
+
+def wandered(world: World, line: F64, spread: float, rng: np.random.Generator) -> F64:
+    """A line (W, 2) as it is driven on one day: beside itself by `spread` m (standard deviation, cut off at two).
+
+    The drift is smooth along the way, and smaller where it would leave less than 0.1 m of room. Start and end stay.
+    """
+    points = _resampled(line, SPACING)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    knots = np.arange(0.0, along[-1] + 2 * SWAY, SWAY)
+    draws = np.clip(rng.normal(0.0, spread, (len(knots), 2)), -2 * spread, 2 * spread)
+    drift = np.stack([np.interp(along, knots, draws[:, axis]) for axis in range(2)], axis=1)
+    drift *= np.clip(np.minimum(along, along[-1] - along) / SWAY, 0.0, 1.0)[:, None]
+    needed = np.minimum(world.clearance(points), world.config.robot.radius + SPARE)
+    share = np.ones(len(points))
+    for _ in range(4):
+        tight = world.clearance(points + share[:, None] * drift) < needed - 1e-9
+        spread_out = np.convolve(tight, np.ones(5), mode="same") > 0
+        share[spread_out] *= 0.5
+    share[
+        np.convolve(world.clearance(points + share[:, None] * drift) < needed - 1e-9, np.ones(5), mode="same") > 0
+    ] = 0
+    wandering: F64 = points + share[:, None] * drift
+    return wandering
+
+
+# Where a route leads
+
+
+def _goals(world: World, ways: "_Ways", route: Route) -> Iterator[Point]:
+    """The points that a route visits, one after the other."""
+    if route.kind == "waypoints":
+        yield from route.waypoints
+        return
+    if route.kind == "laps":
+        for _ in range(route.laps):
+            yield from route.waypoints
+        yield from route.waypoints[:1]
+        return
+    rng = stream(world.config.seed, "tour", route.kind, route.seed)
+    start = route.waypoints[0] if route.waypoints else ways.somewhere(rng)
+    yield start
+    if route.kind == "rooms":
+        yield from _through_rooms(world, ways, route, start)
+    elif route.kind == "aisles":
+        yield from _through_aisles(world, route, start)
+    else:
+        yield from _at_random(world, ways, route, start, rng)
+    yield from route.waypoints[1:]
+
+
+def _through_aisles(world: World, route: Route, start: Point) -> Iterator[Point]:
+    """Down every aisle, always the nearest one next; on the next time around from the other end."""
+    aisles = [a for a in world.layout.aisles if not route.through or a.block in route.through]
+    if not aisles:
+        raise NoWay(f"world '{world.config.name}' has no aisles in {', '.join(route.through) or 'it'}")
+    at = start
+    entered: dict[int, int] = {}
+    for _ in range(route.laps):
+        left = dict(enumerate(aisles))
+        while left:
+            options = [
+                (math.dist(at, aisle.ends[end]) + (2.0 if entered.get(number) == end else 0.0), number, end)
+                for number, aisle in left.items()
+                for end in ((0,) if aisle.closed else (0, 1))
+            ]
+            _, number, end = min(options)
+            entered[number] = end
+            points = list(_down(left.pop(number), end))
+            yield from points
+            at = points[-1]
+
+
+def _down(aisle: Aisle, end: int) -> Iterator[Point]:
+    """Into an aisle at an end and out at the other; out of a closed one where one came in."""
+    (ax, ay), (bx, by) = aisle.ends[end], aisle.ends[1 - end]
+    yield ax, ay
+    if aisle.closed:
+        length = math.hypot(bx - ax, by - ay)
+        share = max(0.5, 1.0 - 1.8 / length)
+        yield ax + share * (bx - ax), ay + share * (by - ay)
+        yield ax, ay
+    else:
+        yield bx, by
+
+
+def _through_rooms(world: World, ways: "_Ways", route: Route, start: Point) -> Iterator[Point]:
+    """Into every room, the nearest by the way there first."""
+    rooms = [room for room in world.config.rooms if not route.through or room.name in route.through]
+    unknown = set(route.through) - {room.name for room in rooms}
+    if unknown:
+        raise NoWay(f"world '{world.config.name}' has no room {', '.join(sorted(unknown))}")
+    spots = [spot for room in rooms if (spot := ways.freest(room.corner, room.size)) is not None]
+    at: Point = start
+    while spots:
+        far = ways.distances(np.asarray(at))
+        reach = [ways.look_up(far, spot) for spot in spots]
+        nearest = int(np.argmin(reach))
+        if not math.isfinite(reach[nearest]):
+            return  # behind closed doors
+        at = spots.pop(nearest)
+        yield at
+
+
+def _at_random(world: World, ways: "_Ways", route: Route, start: Point, rng: np.random.Generator) -> Iterator[Point]:
+    """From one place to another, for as long as it is asked for: down aisles near by where there are any."""
+    length = route.length or 100.0
+    at, gone = start, 0.0
+    seen: list[int] = []
+    open_aisles = [k for k, aisle in enumerate(world.layout.aisles) if not aisle.closed]
+    while gone < 3 * length:
+        if open_aisles:
+            aisles = world.layout.aisles
+            near = sorted(
+                (math.dist(at, aisles[k].ends[end]), k, end)
+                for k in open_aisles
+                if k not in seen[-40:]
+                for end in (0, 1)
+            )[:16]
+            _, number, end = near[int(rng.integers(len(near)))]
+            seen.append(number)
+            points = list(_down(aisles[number], end))
+        else:
+            points = [ways.somewhere(rng)]
+        for point in points:
+            gone += math.dist(at, point)
+            at = point
+            yield point
+
+
+# Ways over the floor
+
+
+class _Ways:
+    """Free cells of a world's floor as a graph: shortest ways that mind obstacles, and what can be reached."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._step = max(0.1, max(world.config.size) / 500.0)
+        columns, rows = (math.ceil(extent / self._step) for extent in world.config.size)
+        x, y = self._step * (np.arange(columns) + 0.5), self._step * (np.arange(rows) + 0.5)
+        points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        self._clear: F64 = world.clearance(points).reshape(rows, columns)
+        radius = world.config.robot.radius
+        self._free = self._clear > radius + SPARE
+        count, parts = cv2.connectedComponents(self._free.astype(np.uint8), connectivity=8)
+        sizes = np.bincount(parts.ravel(), minlength=count)
+        sizes[0] = 0
+        self._main = parts == sizes.argmax()
+        self._dear = 1.0 + 3.0 * np.clip(1.0 - (self._clear - radius) / COMFORT, 0.0, 1.0)
+        self._graph = self._edges()
+
+    def _edges(self) -> csr_array:
+        """Steps to the eight neighbours, longer close to obstacles."""
+        rows, columns = self._free.shape
+        number = np.arange(rows * columns).reshape(rows, columns)
+        starts, ends, costs = [], [], []
+        for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            a = (slice(0, rows - dy), slice(max(-dx, 0), columns - max(dx, 0)))
+            b = (slice(dy, rows), slice(max(dx, 0), columns + min(dx, 0)))
+            both = self._free[a] & self._free[b]
+            starts.append(number[a][both])
+            ends.append(number[b][both])
+            costs.append((0.5 * self._step * math.hypot(dx, dy) * (self._dear[a] + self._dear[b]))[both])
+        start, end, cost = np.concatenate(starts), np.concatenate(ends), np.concatenate(costs)
+        return csr_array((cost, (start, end)), shape=(number.size, number.size))  # type: ignore[no-untyped-call]
+
+    def _cell(self, point: npt.ArrayLike) -> int:
+        """Number of the free cell nearest to a point."""
+        x, y = (float(v) for v in np.asarray(point))
+        columns = self._free.shape[1]
+        row, column = int(y / self._step), int(x / self._step)
+        for reach in (0, 2, 5, 12, 30):
+            low = max(row - reach, 0), max(column - reach, 0)
+            free = np.argwhere(self._main[low[0] : row + reach + 1, low[1] : column + reach + 1])
+            if len(free):
+                free += low
+                nearest = free[np.argmin(((free - (row, column)) ** 2).sum(axis=1))]
+                return int(nearest[0] * columns + nearest[1])
+        raise NoWay(f"world '{self._world.config.name}': no room for the robot near ({x:g}, {y:g}) on this day")
+
+    def _middle(self, cells: npt.NDArray[np.int_]) -> F64:
+        rows, columns = np.divmod(cells, self._free.shape[1])
+        middle: F64 = self._step * (np.stack([columns, rows], axis=-1) + 0.5)
+        return middle
+
+    def between(self, start: F64, end: F64) -> F64:
+        """Points (N, 2) of a way between two points, straight where nothing is near."""
+        if _straight(self._world, np.stack([start, end]), self._world.config.robot.radius + 2 * SPARE):
+            return _resampled(np.stack([start, end]), SPACING)
+        a, b = self._cell(start), self._cell(end)
+        if a == b:
+            return np.stack([start, self._middle(np.array([b]))[0]])
+        limit = 4.0 * float(np.hypot(*(end - start))) + 10.0
+        cost, before = dijkstra(self._graph, directed=False, indices=a, return_predecessors=True, limit=limit)
+        if not np.isfinite(cost[b]):
+            cost, before = dijkstra(self._graph, directed=False, indices=a, return_predecessors=True)
+        if not np.isfinite(cost[b]):
+            (x, y), name = end, self._world.config.name
+            raise NoWay(f"world '{name}': ({x:g}, {y:g}) cannot be reached on day {self._world.day}")
+        cells = [b]
+        while cells[-1] != a:
+            cells.append(int(before[cells[-1]]))
+        way = self._middle(np.array(cells[::-1]))
+        if self._world.is_free(start[None], self._world.config.robot.radius + SPARE)[0]:
+            way[0] = start
+        if self._world.is_free(end[None], self._world.config.robot.radius + SPARE)[0]:
+            way[-1] = end
+        return _resampled(way, SPACING)
+
+    def smooth(self, line: F64) -> F64:
+        """A line without its corners: each point drawn to the middle of its neighbours while there is room."""
+        points = _resampled(line, SPACING)
+        needed = np.minimum(self._clearance(points), self._world.config.robot.radius + 2 * SPARE)
+        for turn in range(60):
+            inner = slice(1 + turn % 2, len(points) - 1, 2)
+            count = len(points[inner])
+            before, after = points[turn % 2 :: 2][:count], points[2 + turn % 2 :: 2][:count]
+            drawn = points[inner] + 0.4 * (0.5 * (before + after) - points[inner])
+            back = np.einsum("ij,ij->i", points[inner] - before, after - points[inner]) < 0.0
+            allowed = (self._clearance(drawn) >= needed[inner]) & ~back
+            points[inner] = np.where(allowed[:, None], drawn, points[inner])
+        return points
+
+    def _clearance(self, points: F64) -> F64:
+        at = (points / self._step - 0.5).astype(np.float32)
+        clear = self._clear.astype(np.float32)
+        looked_up: F64 = np.concatenate(
+            [  # a remapped picture has fewer than 32768 rows
+                cv2.remap(clear, part[:, 0], part[:, 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).ravel()
+                for part in np.array_split(at, len(at) // 16384 + 1)
+            ]
+        ).astype(np.float64)
+        return looked_up
+
+    def distances(self, start: F64) -> F64:
+        """Costs of the ways from a point to all cells; infinite where there is none."""
+        cost: F64 = dijkstra(self._graph, directed=False, indices=self._cell(start))
+        return cost
+
+    def look_up(self, costs: F64, point: Point) -> float:
+        """The cost at a point."""
+        return float(costs[self._cell(point)])
+
+    def freest(self, corner: Point, size: Point) -> Point | None:
+        """The roomiest reachable place in a rectangle, not far from its middle; None where there is none."""
+        low = [math.floor(v / self._step) for v in (corner[1], corner[0])]
+        high = [math.ceil((v + extent) / self._step) for v, extent in ((corner[1], size[1]), (corner[0], size[0]))]
+        window = (slice(low[0], high[0]), slice(low[1], high[1]))
+        room = np.where(self._main[window], np.minimum(self._clear[window], 1.5), -1.0)
+        rows, columns = np.mgrid[0 : room.shape[0], 0 : room.shape[1]]
+        off = np.hypot(rows - room.shape[0] / 2, columns - room.shape[1] / 2) * self._step
+        best = np.unravel_index(np.argmax(np.where(room > 0, room - 0.05 * off, -9.0)), room.shape)
+        if room[best] <= 0:
+            return None
+        return float((low[1] + best[1] + 0.5) * self._step), float((low[0] + best[0] + 0.5) * self._step)
+
+    def somewhere(self, rng: np.random.Generator) -> Point:
+        """A place with some room around it."""
+        roomy = np.argwhere(self._main & (self._clear > min(COMFORT, float(self._clear[self._main].max()) * 0.8)))
+        row, column = roomy[int(rng.integers(len(roomy)))]
+        return float((column + 0.5) * self._step), float((row + 0.5) * self._step)
+
+
+# Lines
+
+
+def _straight(world: World, points: F64, room: float) -> bool:
+    """Whether straight lines from point to point keep as much room."""
+    return bool(world.is_free(_resampled(points, 0.1), room).all())
+
+
+def _length(points: F64) -> float:
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())
+
+
+def _resampled(points: Sequence[Point] | F64, spacing: float) -> F64:
+    """A line with points no more than `spacing` apart; its corners stay."""
+    corners = np.asarray(points, dtype=np.float64)
+    pieces = [corners[:1]]
+    for a, b in pairwise(corners):
+        count = math.ceil(math.dist(a, b) / spacing - 1e-9)
+        if count:
+            pieces.append(a + (b - a) * (np.arange(1, count + 1) / count)[:, None])
+    return np.concatenate(pieces)
+
+
+def _cut(points: F64, length: float | None) -> F64:
+    """The first `length` m of a line."""
+    if length is None:
+        return points
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    return points[: max(2, int(np.searchsorted(along, length)) + 1)]
