@@ -64,8 +64,8 @@ def steer(
 ) -> None:
     """Drive on for some time under one command (m/s, rad/s): `state` (8,) changes, within the `limits` (6,) of a robot.
 
-    A robot that would get closer to an obstacle or a person than its radius does not: it slides along, or is held,
-    while its wheels stand still against it, and each new contact is counted. It can always turn, and always back away.
+    A robot that would get closer to an obstacle or a person than its radius does not: it slides along, or is held
+    and each new contact is counted. It can always turn, and always back away.
     """
     _steer(state, speed, turning, robot, round(seconds / STEP), room, people)
 
@@ -109,7 +109,8 @@ def _kept_off(state: F64, dx: float, dy: float, robot: F64, room: Obstacles, peo
     then = nearest(room, people, state[X] + dx, state[Y] + dy)[0]
     if robot[5] == 0.0 or (then < robot[0] and then < now - 1e-12):
         dx = dy = 0.0
-    state[SPEED] *= math.hypot(dx, dy) / before
+    if math.hypot(dx, dy) < 0.1 * before:  # it stands; along a wall it scrapes on as fast as its wheels turn
+        state[SPEED] = 0.0
     return dx, dy
 
 

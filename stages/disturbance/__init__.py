@@ -1,0 +1,1 @@
+"""What is done to panoramas on purpose, to see what a method stands."""

@@ -1,0 +1,94 @@
+"""Parts of the panorama covered by colour noise, as if someone stood before the camera."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.values.image import Panorama
+
+Mask = npt.NDArray[np.bool_]
+Ints = npt.NDArray[np.int64]
+
+
+def random_parts(rng: np.random.Generator, whole: int, parts: int) -> Ints:
+    """`whole` split into `parts` whole numbers >= 0, each split as likely as any other: (parts,)."""
+    cuts = np.sort(rng.integers(0, whole + 1, size=parts - 1))
+    return np.diff(np.concatenate([[0], cuts, [whole]]))
+
+
+def sectors(rng: np.random.Generator, rows: int, columns: int, share: float, width: float) -> Mask:
+    """Full-height sectors around the circle that cover `share` of it exactly: (rows, columns) bool.
+
+    As many as fit with a mean width of `width` (a share of the circle); their widths, gaps and place are random.
+    """
+    covered = round(share * columns)
+    number = max(1, round(share / width))
+    wide, gaps = random_parts(rng, covered, number), random_parts(rng, columns - covered, number)
+    starts = np.cumsum(gaps + np.concatenate([[0], wide[:-1]])) + int(rng.integers(columns))
+    mask = np.zeros(columns, dtype=np.bool_)
+    for start, length in zip(starts, wide, strict=True):
+        mask[np.arange(start, start + length) % columns] = True
+    return np.broadcast_to(mask, (rows, columns))
+
+
+def rectangles(rng: np.random.Generator, rows: int, columns: int, share: float, width: float) -> Mask:
+    """Rectangles at random places, until they cover `share` of the picture: (rows, columns) bool.
+
+    Their mean width is `width` of the circle, their mean height half of the picture; the last one is cut to fit, to a
+    column of it. They may overlap and reach over the seam.
+    """
+    mask = np.zeros((rows, columns), dtype=np.bool_)
+    wanted = round(share * rows * columns)
+    missing = wanted
+    while missing > 0:
+        wide = max(1, round(2 * width * columns * rng.random()))
+        high = max(1, round(rows * rng.random()))
+        top, left = int(rng.integers(rows - high + 1)), int(rng.integers(columns))
+        across = np.arange(left, left + min(wide, columns)) % columns
+        new = np.cumsum((~mask[top : top + high, across]).sum(axis=0))
+        across = across[: int(np.searchsorted(new, missing)) + 1]
+        mask[top : top + high, across] = True
+        missing = wanted - int(mask.sum())
+    return mask
+
+
+class ColourNoise(Stage):
+    """Covers a share of the panorama by artificial segments of Gaussian colour noise.
+
+    Gross & Koenig 2004, section 3, occlusion experiments: views are "randomly occluded by artificial image segments
+    showing Gaussian-distributed color noise", from 0 to 80 % of the image. Their shape is not said. `sectors` reach
+    over the full height, as people before the camera do and as the paper uses the word segment; `rectangles` cover
+    parts of the height too. `width_deg`: their mean width. Every pixel's blue, green and red are drawn from a normal
+    distribution of `mean` and `sigma` (0..255).
+
+    Which parts are covered, and the noise, follow from `pattern` and the frame's number, so that all repetitions of
+    an experiment see the same pictures; with `pattern` null they follow from the run's seed.
+    """
+
+    share: Annotated[float, Bounds(ge=0, le=1)] = 0.4
+    shape: Literal["sectors", "rectangles"] = "sectors"
+    width_deg: Annotated[float, Bounds(gt=0, le=360)] = 40.0
+    mean: float = 128.0
+    sigma: Annotated[float, Bounds(ge=0)] = 64.0
+    pattern: Annotated[int, Bounds(ge=0)] | None = 0
+
+    class Out(Outputs):
+        """The panorama, covered in part."""
+
+        panorama: Panorama
+
+    def step(self, ctx: Context, panorama: Panorama) -> Out:
+        """Cover one panorama."""
+        if self.share == 0.0:
+            return self.Out(panorama=panorama)
+        tick = ctx.tick
+        rng = ctx.rng if self.pattern is None else np.random.default_rng([self.pattern, tick.log, tick.frame])
+        rows, columns = panorama.pixels.shape[:2]
+        shape = sectors if self.shape == "sectors" else rectangles
+        mask = shape(rng, rows, columns, self.share, self.width_deg / 360.0)
+        pixels = panorama.pixels.copy()
+        noise = rng.normal(self.mean, self.sigma, (int(mask.sum()), 3))
+        pixels[mask] = np.clip(np.rint(noise), 0, 255).astype(np.uint8)
+        return self.Out(panorama=Panorama(pixels, panorama.elevation_top, panorama.elevation_bottom))
