@@ -1,0 +1,59 @@
+"""Occlusion by colour noise."""
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.disturbance.colour_noise import ColourNoise, rectangles, sectors
+from omninav.stages.values.image import Panorama
+
+GREY = Panorama(np.full((60, 360, 3), 7, dtype=np.uint8), 0.5, -0.5)
+
+
+def covered(stage: ColourNoise, frame: int = 0, seed: int = 0) -> np.ndarray:
+    ctx = Context("disturbance", np.random.default_rng(seed))
+    ctx.tick = Tick(index=frame, stamp=0, log=0, frame=frame)
+    return stage.step(ctx, GREY).panorama.pixels
+
+
+@pytest.mark.parametrize("shape", [sectors, rectangles])
+@pytest.mark.parametrize("share", [0.1, 0.35, 0.8])
+def test_the_share_that_is_asked_for_is_covered(shape, share):
+    for seed in range(20):
+        mask = shape(np.random.default_rng(seed), 60, 360, share, 40 / 360)
+        assert mask.mean() == pytest.approx(share, abs=1 / 360)
+
+
+def test_sectors_reach_over_the_full_height():
+    mask = sectors(np.random.default_rng(1), 60, 360, 0.4, 40 / 360)
+    assert (mask == mask[0]).all()
+
+
+def test_every_column_is_as_likely_to_be_covered():
+    masks = [sectors(np.random.default_rng(seed), 1, 36, 0.4, 40 / 360)[0] for seed in range(3000)]
+    assert np.mean(masks, axis=0) == pytest.approx(0.4, abs=4 * np.sqrt(0.24 / 3000))
+
+
+def test_the_pattern_follows_the_frame_and_not_the_seed():
+    stage = ColourNoise(share=0.4)
+    assert (covered(stage, 3, seed=1) == covered(stage, 3, seed=2)).all()
+    assert (covered(stage, 3) != covered(stage, 4)).any()
+    assert (covered(ColourNoise(share=0.4, pattern=1), 3) != covered(stage, 3)).any()
+
+
+def test_without_a_pattern_it_follows_the_seed():
+    stage = ColourNoise(share=0.4, pattern=None)
+    assert (covered(stage, 3, seed=1) != covered(stage, 3, seed=2)).any()
+    assert (covered(stage, 3, seed=1) == covered(stage, 3, seed=1)).all()
+
+
+def test_noise_has_the_mean_and_spread_asked_for_and_the_rest_is_untouched():
+    pixels = covered(ColourNoise(share=0.5, mean=120.0, sigma=20.0))
+    noisy = (pixels != 7).any(axis=2)
+    assert noisy.mean() == pytest.approx(0.5, abs=0.01)
+    assert pixels[noisy].mean(axis=0) == pytest.approx([120.0] * 3, abs=1.0)
+    assert pixels[noisy].std(axis=0) == pytest.approx([20.0] * 3, abs=1.0)
+
+
+def test_no_share_changes_nothing():
+    assert (covered(ColourNoise(share=0.0)) == GREY.pixels).all()
