@@ -8,6 +8,7 @@ from its own numbers alone, so that threads cannot change a picture.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numba
@@ -15,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .cameras import Rays
+from .people import Person, figures
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -39,9 +41,6 @@ class Bodies(NamedTuple):
 
     boxes: F64
     faces: I32
-
-
-NOBODY = Bodies(np.zeros((0, 9)), np.zeros((0, FACES), dtype=np.int32))
 
 
 class Scene(NamedTuple):
@@ -88,14 +87,15 @@ def render(
     exposure: float = 1.0,
     noise: float = 0.0,
     key: int = 0,
-    moving: Bodies = NOBODY,
+    people: Sequence[Person] = (),
 ) -> U8:
     """The picture (rows, columns, 3), uint8 blue-green-red, from a robot's pose (x, y, heading).
 
     Several poses (N, 3) over the time the shutter is open give their mean: motion blur. `eye_height` (m): of the
     camera above the floor. `noise`: standard deviation (grey levels), drawn per pixel and colour from `key` alone.
-    `moving`: bodies that are not part of the scene. Pixels without a ray are black, with noise.
+    Pixels without a ray are black, with noise.
     """
+    moving = Bodies(*figures(people, scene.looks))
     poses = np.atleast_2d(np.asarray(pose, dtype=np.float64))
     lit = np.zeros((len(rays.pixels), 3), dtype=np.float32)
     for x, y, heading in poses.tolist():

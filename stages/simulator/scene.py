@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numba
 import numpy as np
 import numpy.typing as npt
 
 from . import textures
+from .bodies import Box, Coverings, Tiling, box_array
 from .lighting import Light, contact_map, light_map
 from .renderer import Scene
 
@@ -23,32 +23,6 @@ MARGIN = 0.25
 """How far (m) the cells reach beyond the floor, for outer walls."""
 LIGHT_STEP = 0.2
 CONTACT_STEP = 0.1
-
-
-@dataclass(frozen=True)
-class Tiling:
-    """How a face is covered: `tiles` (rows, columns) of textures, each `width` by `height` metres."""
-
-    tiles: I64
-    width: float
-    height: float
-
-
-Coverings = tuple[Tiling, Tiling, Tiling, Tiling, Tiling, Tiling]
-"""Of the faces -x, +x, -y, +y, bottom, top of a box, in its own frame."""
-
-
-@dataclass(frozen=True)
-class Box:
-    """A body: what it is, centre, half length and half depth, yaw, lower and upper z, and its faces' coverings."""
-
-    kind: str
-    centre: tuple[float, float]
-    half: tuple[float, float]
-    yaw: float
-    low: float
-    high: float
-    faces: Coverings
 
 
 def build_scene(
@@ -102,15 +76,6 @@ def build_scene(
         height=height,
         looks=numbers.reshape(len(looks), parts, 6),
     )
-
-
-def box_array(boxes: Sequence[Box]) -> F64:
-    """Boxes (B, 9) as `renderer.Bodies` describes them."""
-    rows = [
-        (*b.centre, math.cos(b.yaw), math.sin(b.yaw), *b.half, b.low, b.high, b.half[0] ** 2 + b.half[1] ** 2)
-        for b in boxes
-    ]
-    return np.array(rows, dtype=np.float64).reshape(-1, 9)
 
 
 def packed(texels: U8) -> npt.NDArray[np.uint32]:

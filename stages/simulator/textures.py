@@ -519,6 +519,58 @@ def _cases(canvas: F32, rng: np.random.Generator) -> None:
         left = right + 0.015
 
 
+def _coat(rng: np.random.Generator) -> F32:
+    """Clothes above the waist: plain, striped, checked or with a print, open or closed in the middle."""
+    colour, other = scaled(vivid(rng, (0.1, 0.9)), rng.uniform(0.3, 1.0)), vivid(rng, (0.2, 0.9))
+    canvas = blank(colour) + cloud(rng, 5, 9.0)
+    style = rng.integers(5)
+    if style == 0:
+        for k in range(0, 10, 2):
+            box(canvas, 0, k / 10, 1, (k + 0.8) / 10, other)
+    elif style == 1:
+        for k in range(0, 8, 2):
+            box(canvas, k / 8, 0, (k + 0.5) / 8, 1, scaled(colour, 0.6))
+            box(canvas, 0, k / 8, 1, (k + 0.5) / 8, other)
+    elif style == 2:
+        box(canvas, 0.25, 0.25, 0.75, 0.6, other)
+    elif style == 3:
+        box(canvas, 0.36, 0, 0.64, 1, other)
+    box(canvas, 0, 0.94, 1, 1, scaled(colour, 0.5))
+    box(canvas, 0.49, 0.1, 0.51, 0.94, scaled(colour, 0.55))
+    return canvas + grain(rng, 4.0)
+
+
+def _trousers(rng: np.random.Generator) -> F32:
+    colour = scaled(vivid(rng, (0.05, 0.6)), rng.uniform(0.2, 0.7))
+    canvas = blank(colour) + cloud(rng, 4, 8.0)
+    box(canvas, 0.46, 0, 0.54, 1, scaled(colour, 0.8))
+    box(canvas, 0, 0.92, 1, 1, scaled(vivid(rng, (0.0, 0.4)), 0.3))
+    return canvas + grain(rng, 5.0)
+
+
+SKINS: tuple[Colour, ...] = ((172, 200, 236), (150, 182, 226), (105, 145, 200), (72, 105, 155), (48, 66, 98))
+
+
+def _face(rng: np.random.Generator) -> F32:
+    skin = SKINS[int(rng.integers(len(SKINS)))]
+    hair = scaled((60, 90, 130), rng.uniform(0.2, 1.6))
+    canvas = blank(skin) + cloud(rng, 4, 4.0)
+    box(canvas, 0, 0, 1, rng.uniform(0.12, 0.28), hair)
+    for left in (0.18, 0.62):
+        box(canvas, left, 0.42, left + 0.2, 0.5, (40, 40, 45))
+    box(canvas, 0.45, 0.48, 0.55, 0.68, scaled(skin, 0.85))
+    box(canvas, 0.32, 0.76, 0.68, 0.81, (70, 70, 165))
+    return canvas + grain(rng, 3.0)
+
+
+def _hair(rng: np.random.Generator) -> F32:
+    canvas = blank(scaled((60, 90, 130), rng.uniform(0.2, 1.7))) + cloud(rng, 6, 10.0)
+    if rng.uniform() < 0.3:  # a cap
+        box(canvas, 0, 0, 1, 0.4, vivid(rng))
+    box(canvas, 0, 0.85, 1, 1, SKINS[int(rng.integers(len(SKINS)))])
+    return canvas + grain(rng, 8.0)
+
+
 FILLINGS: tuple[Callable[[F32, np.random.Generator], None], ...] = (
     _packets, _cans, _bottles, _tools, _rolls, _plants, _cases
 )  # fmt: skip
@@ -530,6 +582,7 @@ MATERIALS: dict[str, Callable[[np.random.Generator], F32]] = {
     "parquet": _parquet, "linoleum": _linoleum, "asphalt": _asphalt, "paving": _paving, "grass": _grass,
     "hedge": _hedge, "leaves": _leaves, "bark": _bark, "sky": _sky, "curtain": _curtain, "books": _books,
     "cabinet": _cabinet, "steel": _steel, "fabric": _fabric, "screen": _screen, "board": _board,
+    "coat": _coat, "trousers": _trousers, "face": _face, "hair": _hair,
 }  # fmt: skip
 
 EXTENTS: dict[str, tuple[float, float]] = {

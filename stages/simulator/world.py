@@ -7,13 +7,14 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from . import textures
+from . import people, textures
+from .bodies import Box, Tiling
 from .config import Block, Hanging, Room, Shelf, WorldConfig
 from .layout import expand
 from .lighting import lamps_and_windows
 from .obstacles import Obstacles, distances, gather
 from .renderer import Scene
-from .scene import Box, Tiling, build_scene
+from .scene import build_scene
 from .streams import stream
 
 F64 = npt.NDArray[np.float64]
@@ -229,7 +230,19 @@ class World:
             self._glow,
             lamps_and_windows(self.layout.lamps, self.layout.hangings, self.config, self.day),
             self.config.ambient,
+            [people.coverings(self._texture, look) for look in range(people.LOOKS)],
         )
+
+    # Who walks there
+
+    @cached_property
+    def _crowd(self) -> people.Crowd:
+        count = self.config.day(self.day).people
+        return people.Crowd(self.config.seed, self.day, count, self.config.size, self.clearance)
+
+    def people_at(self, seconds: float, track: people.Track | None = None) -> tuple[people.Person, ...]:
+        """The people of this day at a time; some keep the robot company where its `track` up to then is known."""
+        return self._crowd.at(seconds, track)
 
     # Room to drive
 

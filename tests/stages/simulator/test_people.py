@@ -1,0 +1,104 @@
+"""People: where they walk, how near they come, and that they are seen where they stand."""
+
+import dataclasses
+import math
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from omninav.stages.simulator.cameras import camera_rays
+from omninav.stages.simulator.config import Day
+from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.people import PARTS, Person, Track, figures
+from omninav.stages.simulator.renderer import render
+from omninav.stages.simulator.world import World
+from omninav.stages.values.camera import Equirectangular
+
+BUSY = dataclasses.replace(DEMO, days=(Day(people=12),))
+PANORAMA = Equirectangular(720, 180, column_of_forward=360.0, elevation_top=0.7, elevation_bottom=-0.9)
+
+
+@pytest.fixture(scope="module")
+def busy() -> World:
+    return World(BUSY)
+
+
+@pytest.fixture(scope="module")
+def track() -> Track:
+    """A robot that drives along an aisle of the demo, 6 m at 0.1 m/s."""
+    times = np.arange(0.0, 60.0, 0.05)
+    return Track(times, np.stack([2.0 + 0.1 * times, np.full_like(times, 4.5), np.zeros_like(times)], axis=1))
+
+
+def positions(people: tuple[Person, ...]) -> npt.NDArray[np.float64]:
+    return np.array([person.position for person in people]).reshape(-1, 2)
+
+
+def test_walkers_never_walk_through_anything(busy: World) -> None:
+    for seconds in np.arange(0.0, 300.0, 1.3):
+        assert (busy.clearance(positions(busy.people_at(seconds))) > 0.25).all()
+
+
+def test_walkers_go_no_faster_than_people_do_and_get_about(busy: World) -> None:
+    paths = np.array([positions(busy.people_at(0.5 * step)) for step in range(600)])
+    assert np.hypot(*np.diff(paths, axis=0).T).max() < 0.5 * 1.25
+    assert (np.ptp(paths, axis=0).max(axis=1) > 3.0).mean() > 0.7
+
+
+def test_the_same_time_shows_the_same_people_in_whatever_order_it_is_asked_for(busy: World, track: Track) -> None:
+    times = (40.0, 3.0, 55.5, 40.0)
+    other = World(BUSY)
+    forth = [busy.people_at(seconds, track) for seconds in times]
+    assert forth == [other.people_at(seconds, track) for seconds in times]
+    assert forth[0] == forth[3]
+    assert forth[0] != World(BUSY, day=1).people_at(40.0, track)
+
+
+def test_some_keep_the_robot_company_and_nobody_is_run_over(busy: World, track: Track) -> None:
+    beside = 0
+    for seconds in np.arange(10.0, 60.0, 0.5):
+        robot = track.poses[np.searchsorted(track.times, seconds), :2]
+        distance = np.hypot(*(positions(busy.people_at(seconds, track)) - robot).T)
+        assert distance.min() > 0.55
+        beside += int((distance < 1.5).any())
+    assert beside > 40  # of 100 moments
+
+
+def test_nobody_knows_where_the_robot_will_go(busy: World, track: Track) -> None:
+    known = track.times <= 30.0
+    assert busy.people_at(30.0, track) == busy.people_at(30.0, Track(track.times[known], track.poses[known]))
+
+
+def test_a_person_is_seen_where_it_stands(busy: World) -> None:
+    """The pixels that a person changes are those its body covers: bearing, width, head and feet, to a pixel."""
+    pose, eye = (5.8, 4.5, 0.4), 0.9
+    person = Person((7.6, 4.9), heading=1.0, height=1.7)
+    rays = camera_rays(PANORAMA)
+    before, after = (render(busy.scene, rays, pose, eye, people=people) for people in ((), (person,)))
+    rows, columns = np.nonzero(np.abs(before.astype(int) - after).max(axis=-1) > 4)
+    seen: list[tuple[float, float]] = []
+    boxes, _ = figures((person,), busy.scene.looks)
+    assert len(boxes) == len(PARTS)
+    for box in boxes:
+        for along in (-1, 1):
+            for across in (-1, 1):
+                x = box[0] + along * box[2] * box[4] - across * box[3] * box[5] - pose[0]
+                y = box[1] + along * box[3] * box[4] + across * box[2] * box[5] - pose[1]
+                azimuth = math.atan2(y, x) - pose[2]
+                for z in box[6:8]:
+                    elevation = math.atan2(z - eye, math.hypot(x, y))
+                    seen.append((360.0 - azimuth / (2 * math.pi) * 720, (0.7 - elevation) / 1.6 * 180))
+    expected = np.array(seen)
+    assert abs(columns.min() - expected[:, 0].min()) < 1.5
+    assert abs(columns.max() + 1 - expected[:, 0].max()) < 1.5
+    assert abs(rows.min() - expected[:, 1].min()) < 1.5
+    assert abs(rows.max() + 1 - expected[:, 1].max()) < 1.5
+
+
+def test_a_shelf_hides_who_is_behind_it(busy: World) -> None:
+    rays = camera_rays(PANORAMA)
+    pose = (5.8, 4.5, 0.4)
+    without = render(busy.scene, rays, pose, 0.9)
+    small = Person((3.7, 1.5), 0.0, height=1.2)
+    np.testing.assert_array_equal(without, render(busy.scene, rays, pose, 0.9, people=(small,)))
