@@ -28,7 +28,7 @@ class Memory(State):
 def free_ahead(ranges: F64, azimuths: F64, radius: float, margin: float) -> float:
     """How far (m) a disc of `radius` m can go straight on, `margin` m clear on both sides; (N,) ranges and azimuths."""
     ahead, beside = ranges * np.cos(azimuths), np.abs(ranges * np.sin(azimuths))
-    in_the_way = (np.cos(azimuths) > 0.0) & (beside < radius + margin)
+    in_the_way = (np.cos(azimuths) > 0.1) & (beside < radius + margin)
     return float(ahead[in_the_way].min(initial=float(ranges.max()))) - radius
 
 

@@ -1,0 +1,199 @@
+"""A simulated robot that is told where to go."""
+
+import dataclasses
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.pipeline.codec import decode, encode, encode_state, restore_state
+from omninav.stages.driving.wall_avoider import Memory, WallAvoider, free_ahead, roomier_side
+from omninav.stages.simulator.config import Delivery, Event, MirrorCamera, OdometryNoise, Ranges, WorldConfig
+from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.world import World
+from omninav.stages.source.closed_loop import ClosedLoop, Simulation
+from omninav.stages.source.recording import UnreadableRecording
+from omninav.stages.values.command import Command
+from omninav.stages.values.scan import Scan
+
+SMALL = MirrorCamera(
+    width=160, height_px=120, focal=124.25, centre=(79.5, 59.5), inner_radius_px=8.5, outer_radius_px=59.5
+)
+WORLD = replace(DEMO, camera=SMALL)
+EXACT = replace(WORLD, odometry=OdometryNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+
+class Loop:
+    """A source with the memory that an engine would keep for it."""
+
+    def __init__(self, seed: int = 0, **parameters: object) -> None:
+        self.source = ClosedLoop(**{"world": WORLD, **parameters})  # type: ignore[arg-type]
+        self.ctx = Context("source", np.random.default_rng(seed))
+        self.state = Simulation()
+        self.source.setup(self.ctx)
+
+    def step(self, command: Command | None = None) -> ClosedLoop.Out | None:
+        return self.source.step(self.ctx, self.state, command)
+
+
+def flat(out: ClosedLoop.Out) -> bytes:
+    return encode({field.name: getattr(out, field.name) for field in dataclasses.fields(out)})  # type: ignore[arg-type]
+
+
+def test_it_starts_where_the_route_starts_and_ends_when_the_time_is_over():
+    loop = Loop(seconds=1.0)
+    ticks = []
+    while (out := loop.step()) is not None:
+        ticks.append(out)
+    assert len(ticks) == loop.source.length() == 5
+    assert (ticks[0].truth.x, ticks[0].truth.y) == WORLD.routes["drive"].waypoints[0]
+    assert ticks[0].motion is None
+    assert [out.tick.first_of_log for out in ticks] == [True, False, False, False, False]
+    assert np.diff([out.tick.stamp for out in ticks]).tolist() == [200_000_000] * 4
+    assert vars(ticks[-1].truth) == vars(ticks[0].truth)  # nobody told it to move
+
+
+def test_it_obeys_and_its_wheels_say_how_far_it_came():
+    loop = Loop(world=EXACT, start=(1.5, 1.3, 0.0))
+    first = loop.step()
+    outs = [loop.step(Command(0.4, 0.0)) for _ in range(25)]
+    assert first is not None
+    assert outs[-1] is not None
+    driven = 0.4 * 5.0 - 0.4**2 / (2 * WORLD.robot.acceleration)
+    assert outs[-1].truth.x == pytest.approx(1.5 + driven, abs=0.01)
+    assert outs[-1].tally.distance == pytest.approx(driven, abs=0.01)
+    assert outs[-1].odometry.x == pytest.approx(driven, abs=0.01)
+    assert sum(out.motion.x for out in outs if out and out.motion) == pytest.approx(driven, abs=0.01)
+
+
+def test_without_a_command_it_brakes():
+    loop = Loop()
+    loop.step()
+    for _ in range(5):
+        loop.step(Command(0.4, 0.0))
+    for _ in range(10):
+        last = loop.step(None)
+    assert last is not None
+    assert last.motion is not None
+    assert math.hypot(last.motion.x, last.motion.y) < 1e-6
+
+
+def test_a_robot_driven_into_a_shelf_is_counted_and_stays_outside():
+    loop = Loop(start=(3.7, 1.5, math.pi / 2))
+    for _ in range(40):
+        out = loop.step(Command(0.4, 0.0))
+    assert out is not None
+    assert out.tally.collisions >= 1
+    world = World(WORLD, 1)
+    assert world.clearance([[out.truth.x, out.truth.y]])[0] == pytest.approx(WORLD.robot.radius, abs=0.01)
+
+
+def test_its_ranges_are_those_of_the_world_around_it():
+    loop = Loop(world=replace(WORLD, ranges=Ranges(noise=0.0, lost=0.0, beam=1e-6)), start=(1.2, 4.5, math.pi))
+    out = loop.step()
+    assert out is not None
+    assert out.scan.ranges[8] == pytest.approx(1.2, abs=0.05)  # the wall ahead, or the poster on it
+    assert out.scan.azimuths()[8] == pytest.approx(0.0)
+
+
+def test_somebody_who_lifts_it_is_not_seen_by_its_wheels():
+    loop = Loop(world=EXACT, start=(1.5, 1.3, 0.0), events=(Event(at=1.0, to=(9.5, 7.3, 0.0)),))
+    outs = [loop.step(Command(0.2, 0.0)) for _ in range(9)]
+    before, after = outs[4], outs[5]
+    assert before is not None
+    assert after is not None
+    assert after.truth.x == 9.5
+    assert after.motion is not None
+    assert abs(after.motion.x) < 0.05
+
+
+def test_lost_pictures_are_absent_and_counted():
+    loop = Loop(world=replace(WORLD, delivery=Delivery(dropped=0.4, late=0.3)))
+    images = [out.image for out in (loop.step() for _ in range(40)) if out]
+    lost = sum(image is None for image in images)
+    assert loop.ctx.counts["lost_picture"] + loop.ctx.counts["late_picture"] == lost
+    assert 0.35 < lost / 40 < 0.8
+
+
+def test_a_loop_that_is_put_to_sleep_goes_on_to_the_same_bytes():
+    commands = [Command(0.4, math.sin(k)) for k in range(20)]
+    whole = Loop(seed=3)
+    unbroken = [flat(out) for out in (whole.step(command) for command in commands) if out]
+    first = Loop(seed=3)
+    for command in commands[:9]:
+        first.step(command)
+    saved = decode(encode({"state": encode_state(first.state), "generator": first.ctx.generator_state()}))
+    second = Loop(seed=99)
+    restore_state(second.state, saved["state"])
+    second.ctx.restore(saved["generator"], second.ctx.notes())
+    assert [flat(out) for out in (second.step(command) for command in commands[9:]) if out] == unbroken[9:]
+
+
+def test_another_seed_is_another_noise_in_the_same_world():
+    one, same, other = (Loop(seed=seed).step() for seed in (0, 0, 1))
+    assert one is not None
+    assert same is not None
+    assert other is not None
+    assert flat(one) == flat(same) != flat(other)
+    assert vars(one.truth) == vars(other.truth)
+
+
+def test_a_route_that_is_not_there_is_refused():
+    with pytest.raises(UnreadableRecording, match="no route 'nowhere' to start from; it has: drive, tour"):
+        Loop(route="nowhere")
+
+
+# the driver
+
+
+def ring(**near: float) -> Scan:
+    """16 readings at 4 m but for some, by number: `ring(_8=0.3)` has something ahead."""
+    ranges = np.full(16, np.inf)
+    for name, metres in near.items():
+        ranges[int(name[1:])] = metres
+    return Scan(ranges, -math.pi, math.pi / 8, nearest=0.0, farthest=4.0)
+
+
+def test_free_way_is_the_nearest_echo_within_the_robots_width():
+    scan = ring(_8=2.0, _9=0.6, _12=0.3, _0=0.3)
+    ranges = np.minimum(scan.ranges, 4.0)
+    assert free_ahead(ranges, scan.azimuths(), 0.25, 0.15) == pytest.approx(0.6 * math.cos(math.pi / 8) - 0.25)
+    assert free_ahead(ranges, scan.azimuths(), 0.20, 0.0) == pytest.approx(2.0 - 0.20)
+    assert roomier_side(ranges, scan.azimuths()) < 0
+
+
+def test_the_driver_goes_on_where_there_is_room_and_turns_on_the_spot_where_there_is_none():
+    driver = WallAvoider()
+    ctx = Context("driver")
+    free = driver.step(ctx, ring(), Memory()).command
+    assert (free.speed, free.turning) == pytest.approx((driver.speed, 0.0))
+    blocked = driver.step(ctx, ring(_8=0.4, _9=0.5), Memory()).command
+    assert blocked.speed == 0.0
+    assert blocked.turning < 0.0
+
+
+def test_a_single_missing_echo_does_not_free_the_way():
+    driver, memory, ctx = WallAvoider(), Memory(), Context("driver")
+    driver.step(ctx, ring(_8=0.4), memory)
+    assert driver.step(ctx, ring(), memory).command.speed == 0.0
+    assert driver.step(ctx, ring(), memory).command.speed == driver.speed
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_the_driver_wanders_without_touching_anything(seed: int, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(ClosedLoop, "_look", lambda *_: None)  # it does not look at pictures
+    loop, driver, memory = Loop(seed=seed, seconds=300.0), WallAvoider(), Memory()
+    command, track = None, []
+    while (out := loop.step(command)) is not None:
+        command = driver.step(loop.ctx, out.scan, memory).command
+        track.append((out.truth.x, out.truth.y))
+        last = out
+    assert last.tally.collisions == 0
+    assert last.tally.distance > 60.0
+    assert np.ptp(np.array(track)[:, 0]) > 6.0
+
+
+def test_a_world_without_any_route_can_be_started_anywhere():
+    assert Loop(world=WorldConfig(camera=SMALL), start=(2.0, 2.0, 0.0)).step() is not None

@@ -1,0 +1,135 @@
+"""What befalls a simulated drive: liftings, pictures lost or late, ranges; in its log as in itself."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.pipeline.log import LogReader
+from omninav.stages.geometry.se2 import between, wrap
+from omninav.stages.simulator.config import Delivery, Event, MirrorCamera, OdometryNoise, Route
+from omninav.stages.simulator.demo import DEMO
+from omninav.stages.source.log import LogSource, Position
+from omninav.stages.source.opening import open_recording
+from omninav.stages.source.recording import UnreadableRecording
+from omninav.stages.source.simulated import SimulatedRecording
+from omninav.stages.source.simulated_log import record
+from omninav.stages.source.topics import Topics
+
+SMALL = MirrorCamera(
+    width=160, height_px=120, focal=124.25, centre=(79.5, 59.5), inner_radius_px=8.5, outer_radius_px=59.5
+)
+WORLD = replace(
+    DEMO,
+    camera=SMALL,
+    routes={"there": Route(waypoints=((2.0, 1.5), (6.0, 1.5)))},
+    delivery=Delivery(dropped=0.15, late=0.2, late_by=0.7),
+)
+KIDNAPPED = (Event(at=3.03, turn=1.0), Event(at=5.0, to=(5.0, 1.4, 0.2)))
+EXACT = replace(WORLD, odometry=OdometryNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), delivery=Delivery())
+
+
+@pytest.fixture(scope="module")
+def drive() -> SimulatedRecording:
+    return SimulatedRecording(WORLD, "there", 1, KIDNAPPED)
+
+
+@pytest.fixture(scope="module")
+def log(drive: SimulatedRecording, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("events") / "drive.mcap"
+    record(drive, path)
+    return path
+
+
+def test_a_lifted_robot_is_elsewhere_in_the_truth_and_nowhere_else():
+    """Between its pictures truth moves by what odometry says, but for the two leaps."""
+    drive = SimulatedRecording(EXACT, "there", 1, KIDNAPPED)
+    off = between(drive.truth[:-1], drive.truth[1:]) - between(drive.odometry[:-1], drive.odometry[1:])
+    off[:, 2] = wrap(off[:, 2])
+    leaps = np.flatnonzero(np.abs(off).max(axis=1) > 1e-6)
+    moments = drive.stamps[leaps] - drive.times[0]
+    assert [round(moment / 1e9, 2) for moment in moments] == [3.02, 4.52]
+    assert off[leaps[0], 2] == pytest.approx(1.0)
+
+
+def test_no_picture_is_taken_on_the_way_from_one_place_to_the_other():
+    pictures = replace(EXACT, timing=replace(EXACT.timing, pictures=100.0))
+    drive = SimulatedRecording(pictures, "there", 1, (Event(at=5.0, to=(5.0, 1.4, 0.2)),))
+    steps = np.hypot(*np.diff(drive.truth[:, :2], axis=0).T)
+    assert (steps > 0.01).sum() == 1
+
+
+def test_a_log_holds_truth_up_to_the_leap_and_from_it_on(drive: SimulatedRecording, log: Path):
+    assert len(drive.true_times) == len(drive.times) + 2
+    found = open_recording(str(log))
+    np.testing.assert_array_equal(found.stamps, drive.stamps)
+    np.testing.assert_allclose(found.truth, drive.truth, atol=1e-9)  # type: ignore[arg-type]
+    np.testing.assert_allclose(found.odometry, drive.odometry, atol=1e-9)  # type: ignore[arg-type]
+    events = [json.loads(message.content.data) for message in LogReader(log).messages(["/ground_truth/event"])]
+    assert [event["at"] for event in events] == [3.03, 5.0]
+    assert events[1]["to"] == [5.0, 1.4, 0.2]
+
+
+def test_lost_pictures_are_missing_and_overtaken_ones_are_counted(drive: SimulatedRecording, log: Path):
+    taken = len(drive._shots)
+    assert 0 < len(drive.sent) < taken
+    assert len(drive.stamps) == len(drive.sent) - drive.dropped["backward_stamp"]
+    assert drive.dropped["backward_stamp"] > 0
+    assert open_recording(str(log)).dropped == drive.dropped
+    assert (np.diff(drive.stamps) > 0).all()
+
+
+def test_losing_pictures_does_not_change_those_that_arrive(drive: SimulatedRecording):
+    whole = SimulatedRecording(replace(WORLD, delivery=Delivery()), "there", 1, KIDNAPPED)
+    frame = int(np.flatnonzero(whole.stamps == drive.stamps[5])[0])
+    assert frame > 5
+    np.testing.assert_array_equal(whole.image(frame), drive.image(5))
+    np.testing.assert_array_equal(whole.rolled, drive.rolled)
+
+
+def test_ranges_come_back_from_the_log_as_they_were_before_each_picture(drive: SimulatedRecording, log: Path):
+    found = open_recording(str(log))
+    for frame in (0, 4, len(drive.stamps) - 1):
+        wanted, read = drive.scan(frame), found.scan(frame)
+        assert wanted is not None
+        assert read is not None
+        np.testing.assert_array_equal(read.ranges, wanted.ranges)
+        np.testing.assert_allclose(read.azimuths(), wanted.azimuths(), atol=1e-6)
+        assert (read.nearest, read.farthest) == (wanted.nearest, wanted.farthest)
+
+
+def test_the_log_source_gives_ranges_with_each_tick_and_does_without(log: Path):
+    def first(**parameters: object) -> LogSource.Out:
+        source, ctx = LogSource(log=str(log), **parameters), Context("source")  # type: ignore[arg-type]
+        source.setup(ctx)
+        out = source.step(ctx, Position())
+        assert out is not None
+        return out
+
+    assert first().scan is not None
+    assert first(topics=Topics(scan=None)).scan is None
+    with pytest.raises(UnreadableRecording, match=r"no topic /sonar; type topics\.scan=null"):
+        first(topics=Topics(scan="/sonar"))
+    with pytest.raises(UnreadableRecording, match="/odom carries nav_msgs/msg/Odometry, not sensor_msgs"):
+        first(topics=Topics(scan="/odom"))
+
+
+def test_the_same_events_give_the_same_bytes_and_others_another_drive(
+    drive: SimulatedRecording, log: Path, tmp_path: Path
+):
+    record(SimulatedRecording(WORLD, "there", 1, KIDNAPPED[::-1]), tmp_path / "again.mcap")
+    assert (tmp_path / "again.mcap").read_bytes() == log.read_bytes()
+    assert SimulatedRecording(WORLD, "there", 1).digest() != drive.digest()
+
+
+def test_added_noise_makes_a_days_odometry_worse():
+    def drift(added: tuple[float, float, float]) -> float:
+        world = replace(EXACT, odometry=replace(EXACT.odometry, added=added))
+        drive = SimulatedRecording(world, "there", 1)
+        return float(np.abs(wrap(drive.odometry[:, 2] - (drive.truth[:, 2] - drive.truth[0, 2]))).max())
+
+    assert drift((0.0, 0.0, 0.0)) < 0.01
+    assert drift((20.0, 20.0, 20.0)) > 0.1
