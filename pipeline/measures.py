@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-STATISTICS = ("mean", "median", "p90", "p95", "max", "rmse")
+STATISTICS = ("mean", "std", "median", "p90", "p95", "max", "rmse")
 FIRST = ("position_error_m", "heading_error_deg", "loss_rate", "converged_after_frames", "frames")
 """Quantities that every run may have, in the order in which they are shown; others follow by name."""
 

@@ -17,7 +17,8 @@ from omninav.stages.values.pose import Motion, Pose
 class TrajectoryErrors(Stage):
     """Errors of the estimate against ground truth, with those of odometry alone and of the belief's mean beside them.
 
-    Per log: `frames`; `position_error_m` and `heading_error_deg` (mean, median, p90, max); `loss_rate`, the share of
+    Per log: `frames`; `driven_m`, the length of the true path; `position_error_m` and `heading_error_deg` (mean, standard
+    deviation `std`, median, p90, max); `loss_rate`, the share of
     frames further than `lost_m` from the truth; `converged_after_frames`, how many frames went by before the error
     stayed below 1 m and 20 degrees for ten frames (None if it never did); the errors and loss rate again under
     `after_convergence`. `odometry_alone` starts at the first true pose. The top level is the last log, and `logs` has
@@ -55,6 +56,8 @@ def drive_metrics(drive: Drive, lost_m: float) -> dict[str, Any]:
     if not drive.has_truth:
         return result
     scored = known(drive.truth) & known(drive.estimate)
+    true = drive.truth[known(drive.truth)]
+    result["driven_m"] = float(np.hypot(*np.diff(true[:, :2], axis=0).T).sum())
     result["frames_without_truth"] = int((~known(drive.truth)).sum())
     result["frames_without_estimate"] = int((known(drive.truth) & ~known(drive.estimate)).sum())
     if not scored.any():
@@ -88,9 +91,10 @@ def pose_errors(poses: Array, truth: Array, lost_m: float) -> dict[str, Any]:
 
 
 def spread(errors: npt.NDArray[np.float64]) -> dict[str, float]:
-    """Mean, median, 90th percentile and maximum (percentiles interpolate linearly)."""
+    """Mean, standard deviation, median, 90th percentile and maximum (percentiles interpolate linearly)."""
     return {
         "mean": float(errors.mean()),
+        "std": float(errors.std()),
         "median": float(np.median(errors)),
         "p90": float(np.percentile(errors, 90)),
         "max": float(errors.max()),

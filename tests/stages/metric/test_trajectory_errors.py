@@ -22,8 +22,12 @@ def measured(estimates, truth, motion=None, logs=None, **parameters):
 def test_errors_of_five_frames_worked_by_hand():
     found = measured([at(x) for x in (0.0, 1.0, 2.0, 3.0, 4.0)], [Pose(0, 0, np.radians(10))] * 5)
     # distances 0, 1, 2, 3, 4: p90 lies 0.6 of the way from 3 to 4
-    assert found["position_error_m"] == pytest.approx({"mean": 2.0, "median": 2.0, "p90": 3.6, "max": 4.0})
-    assert found["heading_error_deg"] == pytest.approx({"mean": 10.0, "median": 10.0, "p90": 10.0, "max": 10.0})
+    assert found["position_error_m"] == pytest.approx(
+        {"mean": 2.0, "std": 2.0**0.5, "median": 2.0, "p90": 3.6, "max": 4.0}
+    )
+    assert found["heading_error_deg"] == pytest.approx(
+        {"mean": 10.0, "std": 0.0, "median": 10.0, "p90": 10.0, "max": 10.0}
+    )
     assert found["loss_rate"] == 0.4  # 3 m and 4 m are above 2.5 m
     assert found["mean_pose"]["position_error_m"]["mean"] == 3.0
 
@@ -67,8 +71,9 @@ def test_odometry_alone_is_measured_like_the_estimate():
     motion = [None, *[Motion(1.5, 0.0, 0.0)] * 3]
     found = measured([at(float(x)) for x in range(4)], truth, motion)
     assert found["position_error_m"]["max"] == 0.0
+    assert found["driven_m"] == 3.0
     assert found["odometry_alone"]["position_error_m"] == pytest.approx(
-        {"mean": 0.75, "median": 0.75, "p90": 1.35, "max": 1.5}
+        {"mean": 0.75, "std": 1.25**0.5 / 2, "median": 0.75, "p90": 1.35, "max": 1.5}
     )
 
 
