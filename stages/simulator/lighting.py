@@ -9,7 +9,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from .config import Hanging, Lamp, WorldConfig
+from .config import Day, Hanging, Lamp, WorldConfig
 from .streams import stream
 
 F32 = npt.NDArray[np.float32]
@@ -23,6 +23,8 @@ CLOSE = 0.15
 """Distance (m) over which a body darkens the floor beside it."""
 DAYLIGHT = (1.1, 1.0, 0.92)
 """Colour of the sky: blue, green, red."""
+SKY_STEP = 4.0
+"""Distance (m) of the lamps that an open sky is made of."""
 THROUGH_CURTAINS = 0.06
 """Share of the light that passes a closed curtain."""
 FACES = np.array([(0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], dtype=np.float64)
@@ -75,7 +77,21 @@ def lamps_and_windows(
                     scale=hanging.width * hanging.height,
                 )
             )
-    return lights
+    return [*lights, *_sky(config, day)]
+
+
+def _sky(config: WorldConfig, day: Day) -> list[Light]:
+    """The light of an open sky, as from many large lamps where no roof is."""
+    if config.ceiling != "sky":
+        return []
+    columns, rows = (math.ceil(extent / SKY_STEP) for extent in config.size)
+    roofs = [(*room.corner, *room.size) for room in config.rooms if room.walls]
+    points = [((c + 0.5) * SKY_STEP, (r + 0.5) * SKY_STEP) for r in range(rows) for c in range(columns)]
+    return [
+        Light(position=(x, y, config.height), colour=DAYLIGHT, on=day.light, scale=0.25 * SKY_STEP**2)
+        for x, y in points
+        if not any(left <= x <= left + wide and low <= y <= low + deep for left, low, wide, deep in roofs)
+    ]
 
 
 def lamps_on(lamps: Sequence[Lamp], config: WorldConfig, number: int) -> list[bool]:
