@@ -1,6 +1,7 @@
 """A ring of ultrasound-like range readings."""
 
 import math
+from collections.abc import Sequence
 
 import numba
 import numpy as np
@@ -8,6 +9,7 @@ import numpy.typing as npt
 
 from .config import Ranges
 from .obstacles import Obstacles, beam
+from .people import Person
 
 F64 = npt.NDArray[np.float64]
 
@@ -18,6 +20,11 @@ RAYS = 5
 def azimuths(ring: Ranges) -> tuple[float, float]:
     """Azimuth of the first reading and the step to the next (rad): the first looks backwards."""
     return -math.pi, 2 * math.pi / ring.readings
+
+
+def round_bodies(people: Sequence[Person]) -> F64:
+    """People as a ring and a robot's bumper know them: (M, 3) x, y, radius."""
+    return np.array([(*person.position, person.radius) for person in people]).reshape(-1, 3)
 
 
 def measure(room: Obstacles, people: F64, poses: npt.ArrayLike, ring: Ranges, rng: np.random.Generator) -> F64:

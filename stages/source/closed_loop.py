@@ -14,7 +14,8 @@ from omninav.stages.simulator.config import Event, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.obstacles import gather
 from omninav.stages.simulator.odometry import draw_bias, measured
-from omninav.stages.simulator.ranges import measure
+from omninav.stages.simulator.people import Person, Track
+from omninav.stages.simulator.ranges import measure, round_bodies
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.robot import COLLISIONS, WAY, at_rest, limits, put_down, reach, steer
 from omninav.stages.simulator.streams import stream
@@ -32,14 +33,22 @@ from .simulated import EPOCH, mirror, ring_scan, simulation_digest
 F64 = npt.NDArray[np.float64]
 
 
+REMEMBERED = 2500
+"""Ticks of its way that people who keep the robot company know of."""
+
+
 def _nowhere() -> F64:
     return np.zeros(0)
 
 
 class Simulation(State):
-    """The robot as it is: its state (see `robot`; empty before the first tick), odometry pose, ticks made."""
+    """The robot as it is: its state (see `robot`; empty before the first tick), odometry pose, ticks made.
+
+    `track` (N, 4): time (s) and pose at the last ticks; people who keep it company follow it.
+    """
 
     robot: F64 = field(default_factory=_nowhere)
+    track: F64 = field(default_factory=lambda: np.zeros((0, 4)))
     odometry: F64 = field(default_factory=lambda: np.zeros(3))
     ticks: int = 0
 
@@ -74,7 +83,7 @@ class ClosedLoop(Source):
     def setup(self, ctx: Context) -> None:
         """Build the world; the bodies in it are looked up by place."""
         world = World(self.world, self.day)
-        self._scene = world.scene
+        self._world, self._scene = world, world.scene
         self._room = gather(world.obstacles, self.world.size, reach(self.world.robot))
         self._limits = limits(self.world.robot)
         self._camera = mirror(self.world.camera)
@@ -107,7 +116,8 @@ class ClosedLoop(Source):
         """One tick under a command, and what the wheels say of it."""
         robot, now = simulation.robot, simulation.ticks / self.rate
         before = robot[:3].copy()
-        steer(robot, command.speed, command.turning, self._limits, 1.0 / self.rate, self._room, self._people(now))
+        people = round_bodies(self._people(simulation))
+        steer(robot, command.speed, command.turning, self._limits, 1.0 / self.rate, self._room, people)
         rolled = measured(between(before, robot[:3])[None], self.world.odometry, self._bias, ctx.rng)[0]
         simulation.odometry = compose(simulation.odometry, rolled)
         for event in self.events:
@@ -117,11 +127,13 @@ class ClosedLoop(Source):
 
     def _perceive(self, ctx: Context, simulation: Simulation, motion: Motion | None) -> Out:
         pose, now = simulation.robot[:3], simulation.ticks / self.rate
-        metres = measure(self._room, self._people(now)[None], pose[None], self.world.ranges, ctx.rng)[0]
+        simulation.track = np.vstack([simulation.track, [now, *pose]])[-REMEMBERED:]
+        people = self._people(simulation)
+        metres = measure(self._room, round_bodies(people)[None], pose[None], self.world.ranges, ctx.rng)[0]
         stamp = EPOCH + self.day * 86400 * 10**9 + 8 * 3600 * 10**9 + round(now * 1e9)
         return self.Out(
             tick=Tick(index=simulation.ticks, stamp=stamp, frame=simulation.ticks, first_of_log=simulation.ticks == 0),
-            image=self._look(ctx, pose, now),
+            image=self._look(ctx, pose, now, people),
             camera=self._camera,
             odometry=_pose(simulation.odometry),
             motion=motion,
@@ -130,7 +142,7 @@ class ClosedLoop(Source):
             tally=DriveTally(int(simulation.robot[COLLISIONS]), float(simulation.robot[WAY])),
         )
 
-    def _look(self, ctx: Context, pose: F64, now: float) -> Image | None:
+    def _look(self, ctx: Context, pose: F64, now: float, people: tuple[Person, ...]) -> Image | None:
         sensor, delivery = self.world.sensor, self.world.delivery
         fate, key = ctx.rng.uniform(size=2), int(ctx.rng.integers(2**62))
         if fate[0] < delivery.dropped or fate[1] < delivery.late:
@@ -139,11 +151,14 @@ class ClosedLoop(Source):
         swing = float(np.sin(2 * np.pi * now / sensor.exposure_period))
         exposure = sensor.exposure * (1.0 + sensor.exposure_drift * swing)
         eye = self.world.camera.height
-        return Image(render(self._scene, self._rays, pose, eye, exposure=exposure, noise=sensor.noise, key=key))
+        seen = render(self._scene, self._rays, pose, eye, exposure=exposure, noise=sensor.noise, key=key, people=people)
+        return Image(seen)
 
-    def _people(self, now: float) -> F64:
-        """Who is about: (M, 3) x, y, radius."""
-        return np.zeros((0, 3))
+    def _people(self, simulation: Simulation) -> tuple[Person, ...]:
+        """Who is about at the last tick that was made."""
+        track = simulation.track
+        now = float(track[-1, 0]) if len(track) else 0.0
+        return self._world.people_at(now, Track(track[:, 0], track[:, 1:]))
 
     def _first_pose(self, world: World) -> F64:
         if self.start is not None:

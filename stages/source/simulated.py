@@ -18,7 +18,8 @@ from omninav.stages.simulator.cameras import Rays, camera_rays
 from omninav.stages.simulator.config import Event, MirrorCamera, WorldConfig
 from omninav.stages.simulator.obstacles import Obstacles, gather
 from omninav.stages.simulator.odometry import draw_bias, odometry
-from omninav.stages.simulator.ranges import azimuths, measure
+from omninav.stages.simulator.people import Person, Track
+from omninav.stages.simulator.ranges import azimuths, measure, round_bodies
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.robot import drive, reach
 from omninav.stages.simulator.streams import stream
@@ -62,6 +63,7 @@ class SimulatedRecording:
         self._start = EPOCH + day * 86400 * 10**9 + (9 + sorted(world.routes).index(route)) * 3600 * 10**9
         self._drive()
         self._take_pictures()
+        self._turn_rings()
 
     def _drive(self) -> None:
         world = self.world
@@ -106,6 +108,13 @@ class SimulatedRecording:
         self.truth = self._true(self._shots[self._taken])
         self.odometry = se2.interpolate(self._seconds, self.rolled, self._shots[self._taken])
 
+    def _turn_rings(self) -> None:
+        rate = self.world.ranges.rate
+        self._rings = np.arange(int(np.floor(self._seconds[-1] * rate + 1e-9)) + 1) / rate
+        self.ring_times = self._stamps(self._rings)
+        """Stamps (ns) of all turns of the range ring."""
+        self._ring_key = int(self._stream("ranges").integers(2**62))
+
     def _stamps(self, seconds: F64) -> I64:
         stamps: I64 = self._start + np.round(seconds * 1e9).astype(np.int64)
         return stamps
@@ -149,25 +158,28 @@ class SimulatedRecording:
             exposure=sensor.exposure * (1.0 + sensor.exposure_drift * float(swing)),
             noise=sensor.noise,
             key=self._key + shot,
+            people=self._people(float(at)),
         )
 
     @cached_property
     def _rays(self) -> Rays:
         return camera_rays(self.camera, self.world.sensor.vignetting)
 
-    @cached_property
-    def scans(self) -> tuple[I64, F64]:
-        """All turns of the range ring: stamps (S,) in ns, and metres (S, readings), infinite without an echo."""
-        ring = self.world.ranges
-        seconds = np.arange(int(np.floor(self._seconds[-1] * ring.rate + 1e-9)) + 1) / ring.rate
-        people = np.zeros((len(seconds), 0, 3))
-        metres = measure(self._room, people, self._true(seconds), ring, self._stream("ranges"))
-        return self._stamps(seconds), metres.astype(np.float32).astype(np.float64)  # as a message holds them
-
     def scan(self, frame: int) -> Scan | None:
         """The last turn of the range ring before a frame."""
-        times, metres = self.scans
-        return ring_scan(self.world, metres[np.searchsorted(times, self.stamps[frame], side="right") - 1])
+        return self.ring(int(np.searchsorted(self.ring_times, self.stamps[frame], side="right")) - 1)
+
+    def ring(self, turn: int) -> Scan:
+        """A turn of the range ring, by its number."""
+        at, ring = self._rings[turn], self.world.ranges
+        people = round_bodies(self._people(float(at)))
+        rng = np.random.default_rng([self._ring_key, turn])
+        metres = measure(self._room, people[None], self._true(at[None]), ring, rng)[0]
+        return ring_scan(self.world, metres.astype(np.float32).astype(np.float64))  # as a message holds them
+
+    def _people(self, seconds: float) -> tuple[Person, ...]:
+        """Who is about, some of them because of the robot."""
+        return self._world.people_at(seconds, Track(self._seconds, self.driven))
 
     def digest(self) -> str:
         """sha256 over the world, the route, the day, the events and the code that renders it."""

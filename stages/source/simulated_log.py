@@ -12,7 +12,7 @@ import numpy.typing as npt
 from omninav.pipeline.log import LogWriter
 
 from .camera_yaml import write_camera
-from .simulated import SimulatedRecording, ring_scan
+from .simulated import SimulatedRecording
 
 F64 = npt.NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def _arrivals(recording: SimulatedRecording) -> list[tuple[int, str, int]]:
     """All messages by the time of their arrival (ns): what it is, and its number."""
     found = [(int(stamp) + WHEEL_TRANSIT, "odometry", number) for number, stamp in enumerate(recording.times)]
     found += [(int(stamp) + WHEEL_TRANSIT, "truth", number) for number, stamp in enumerate(recording.true_times)]
-    found += [(int(stamp) + RING_TRANSIT, "scan", number) for number, stamp in enumerate(recording.scans[0])]
+    found += [(int(stamp) + RING_TRANSIT, "scan", number) for number, stamp in enumerate(recording.ring_times)]
     found += [(int(stamp), "event", number) for number, stamp in enumerate(recording.put)]
     return found + [(arrival, "picture", number) for number, (arrival, _, _) in enumerate(recording.sent)]
 
@@ -64,8 +64,7 @@ def _write_odometry(log: LogWriter, recording: SimulatedRecording, number: int, 
 
 
 def _write_scan(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int) -> None:
-    stamps, metres = recording.scans
-    scan = ring_scan(recording.world, metres[number])
+    scan = recording.ring(number)
     message = {
         "header": {"frame_id": "base_link"},
         "angle_min": scan.first,
@@ -76,7 +75,7 @@ def _write_scan(log: LogWriter, recording: SimulatedRecording, number: int, arri
         "range_max": scan.farthest,
         "ranges": scan.ranges.astype(np.float32),
     }
-    log.write("/scan", "sensor_msgs/msg/LaserScan", int(stamps[number]), message, arrival)
+    log.write("/scan", "sensor_msgs/msg/LaserScan", int(recording.ring_times[number]), message, arrival)
 
 
 def _write_picture(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int, quality: int) -> None:
