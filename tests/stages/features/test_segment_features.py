@@ -37,6 +37,15 @@ def test_every_segment_sums_to_one_where_no_pixel_has_a_hue() -> None:
     assert np.allclose(joint.sum(axis=1), 1.0)
 
 
+@pytest.mark.parametrize("joint", [False, True])
+def test_grey_segments_compare_by_their_brightness(joint: bool) -> None:
+    greys = np.repeat(np.array([20, 30, 200, 250], np.uint8), 9)  # two of the lowest value bin, two of the highest
+    pixels = np.repeat(np.tile(greys, (10, 1))[..., None], 3, axis=2)
+    histograms = hsv_histograms(pixels, 4, joint=joint, least_saturation=64, least_value=32)
+    shared = np.minimum(histograms[:, None], histograms[None]).sum(axis=2)
+    assert np.allclose(shared, np.kron(np.eye(2), np.ones((2, 2))))
+
+
 @pytest.mark.parametrize("hue", [0.01, 0.2, 0.5, 0.7, 0.97])
 def test_a_colour_falls_into_the_bin_of_its_hue(hue: float) -> None:
     red, green, blue = (round(255 * c) for c in colorsys.hsv_to_rgb(hue, 1.0, 0.9))
@@ -57,7 +66,8 @@ def test_histograms_agree_with_counting_by_numpy(joint: bool) -> None:
         h, s, v = hsv[:, 6 * j : 6 * j + 6].reshape(-1, 3).T
         coloured = (s >= 50) & (v >= 40)
         if joint:
-            bins = np.bincount(h[coloured] * 16 // 180 * 4 + v[coloured] * 4 // 256, minlength=64) / coloured.sum()
+            bins = np.bincount(h[coloured] * 16 // 180 * 4 + v[coloured] * 4 // 256, minlength=64) / len(h)
+            bins = bins + np.tile(np.bincount(v[~coloured] * 4 // 256, minlength=4) / (16 * len(h)), 16)
         else:
             hue = np.bincount(h[coloured] * 16 // 180, minlength=16) / (2 * len(h))
             value = np.bincount(v * 4 // 256, minlength=4) / len(h)
