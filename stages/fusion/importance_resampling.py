@@ -29,10 +29,15 @@ class ImportanceResampling(Stage):
     """Importance weights, then systematic resampling where few particles carry the weight.
 
     Gross & Koenig 2004, section 2 (5000 samples for global localisation, 500 for tracking). Weights are multiplied by
-    the likelihood; below an effective size of `resample_below` times the number, particles are resampled. Against
-    kidnapping, `kidnapped` is the probability per picture that the robot was put anywhere: the `proposals`, poses the
-    view itself suggests, then share the weight kidnapped x `likelihood.anywhere`, which is what a uniform belief
-    would get; so they win where the belief explains the view badly, and only there.
+    the likelihood; below an effective size of `resample_below` times the number, particles are resampled.
+
+    Against kidnapping: with probability `kidnapped` per picture of fresh evidence the robot was put anywhere. What a
+    uniform belief would then get, kidnapped x fresh x `likelihood.anywhere`, goes to the `proposals`, poses that the
+    view itself suggests. They join the particles set `aside` (a share of `number`), which are resampled among
+    themselves, by how well they fit the view, so that a hypothesis lives however little it weighs, and evidence for it
+    adds up from picture to picture. As soon as they weigh more than their share, they are resampled with all others.
+    It is one mixture, with weights that are right throughout; only where the particles go is decided apart.
+
     `adapt`: `kld` sets the number between `tracking` and `number` by the cells of `cell_m`, `cell_deg` the belief fills
     (Fox 2001; `kld_error`, 99 % confidence); `none` keeps `number`.
     """
@@ -42,6 +47,7 @@ class ImportanceResampling(Stage):
     adapt: Literal["kld", "none"] = "none"
     resample_below: Annotated[float, Bounds(ge=0, le=1)] = 0.5
     kidnapped: Annotated[float, Bounds(ge=0, lt=1)] = 1e-7
+    aside: Annotated[float, Bounds(ge=0, lt=1)] = 0.1
     kld_error: Annotated[float, Bounds(gt=0)] = 0.05
     cell_m: Annotated[float, Bounds(gt=0)] = 0.25
     cell_deg: Annotated[float, Bounds(gt=0)] = 10.0
@@ -53,26 +59,47 @@ class ImportanceResampling(Stage):
 
     def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:
         """Fuse prediction and observation."""
-        poses, weights = particles.poses, particles.weights * likelihood.values * (1.0 - self.kidnapped)
-        if proposals is not None and likelihood.anywhere is not None and self.kidnapped > 0.0:
-            # Drawn from the view itself, they carry the evidence for "anywhere" in equal parts.
-            number = len(proposals.poses)
-            anywhere = self.kidnapped * likelihood.anywhere * float(particles.weights.sum())
-            poses = np.concatenate([poses, proposals.poses])
-            weights = np.concatenate([weights, np.full(number, anywhere / number)])
-        total = float(weights.sum())
+        poses, known = particles.poses, particles.weights * likelihood.values
+        total, new = float(known.sum()), 0.0
         if not (math.isfinite(total) and total > 0.0):
             ctx.count("belief_without_support", detail="fusion: no particle explains the picture; weights kept")
-            poses, weights, total = particles.poses, particles.weights, float(particles.weights.sum())
-        weights = weights / total
-        wanted = self._wanted(particles.poses)
-        known = weights[: len(particles.poses)]
-        moved_away = 1.0 - float(known.sum())
-        rich = effective_size(known) >= self.resample_below * wanted
-        if wanted == len(known) and rich and moved_away * wanted < 1.0:
-            return self.Out(belief=Particles(particles.poses, known / known.sum()))
+            known, total, proposals = particles.weights, float(particles.weights.sum()), None
+        moved = self.kidnapped * likelihood.fresh
+        if proposals is not None and likelihood.anywhere is not None:
+            new = moved * likelihood.anywhere * float(particles.weights.sum())
+            known, total = known * (1.0 - moved), total * (1.0 - moved) + new
+        wanted, tracked = self._wanted(poses[: len(poses) - particles.aside]), len(poses) - particles.aside
+        weights = known / total
+        aside = int(self.aside * wanted) if new > 0.0 else 0
+        if float(weights[tracked:].sum()) * wanted > aside:  # it weighs enough to live among the others
+            tracked = len(poses)
+        main = self._resampled(ctx, poses[:tracked], weights[:tracked], wanted - aside)
+        if proposals is None or not aside:
+            return self.Out(belief=Particles(main[0], main[1] / main[1].sum()))
+        others = self._set_aside(
+            ctx,
+            np.concatenate([poses[tracked:], proposals.poses]),
+            np.concatenate([weights[tracked:], proposals.weights * (new / total)]),
+            np.concatenate([likelihood.values[tracked:], np.full(len(proposals.poses), likelihood.fresh)]),
+            aside,
+        )
+        both = np.concatenate([main[1], others[1]])
+        return self.Out(belief=Particles(np.concatenate([main[0], others[0]]), both / both.sum(), aside))
+
+    def _set_aside(
+        self, ctx: Context, poses: Array, weights: Array, fitness: Array, number: int
+    ) -> tuple[Array, Array]:
+        # Drawn by how well they fit, not by what they weigh (the draw is in the weights): by weight, an old hypothesis
+        # would push out each new one before anything could speak for it.
+        drawn = systematic(fitness, number, float(ctx.rng.random()))
+        return poses[drawn], weights[drawn] / fitness[drawn] * (fitness.sum() / number)
+
+    def _resampled(self, ctx: Context, poses: Array, weights: Array, wanted: int) -> tuple[Array, Array]:
+        # The weights keep their sum, which is less than 1 where others are set aside.
+        if wanted == len(weights) and effective_size(weights) >= self.resample_below * wanted:
+            return poses, weights
         drawn = systematic(weights, wanted, float(ctx.rng.random()))
-        return self.Out(belief=Particles(poses[drawn], np.full(wanted, 1.0 / wanted)))
+        return poses[drawn], np.full(wanted, weights.sum() / wanted)
 
     def _wanted(self, poses: Array) -> int:
         if self.adapt == "none":

@@ -1,7 +1,7 @@
 """Which references of a map are worth comparing, and whether they can be compared at all."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,36 +12,56 @@ from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
 
+Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+"""Multiples of it, less their whole part, fill an interval evenly from the first on."""
 
-STRANGERS = 64
-"""References compared wherever the belief is, spread evenly over the map: what "alike" is worth is judged by them."""
+
+class Candidates(NamedTuple):
+    """References to compare: their indices, ascending, and how many of the map's each stands for.
+
+    Both None: all of them, each for itself.
+    """
+
+    chosen: Ints | None = None
+    stands_for: Array | None = None
 
 
-def near_belief(poses: npt.NDArray[np.float64], near: Particles | None, radius: float, whole: int = 0) -> Ints | None:
-    """Indices of the references to compare, ascending; None for all of them.
+def near_belief(
+    poses: Array, near: Particles | None, radius: float, whole: int, strangers: int, turn: int
+) -> Candidates:
+    """The references within `radius` metres of any particle, and `strangers` of the others.
 
-    Those within `radius` metres of any particle, and `STRANGERS` spread over the map. All are compared where there is
-    no belief, where `radius` is 0, where none is near, and where there are at most `whole` references.
+    Strangers are taken at equal steps along the map, others at each `turn`, so that all of them have their turn; each
+    stands for as many as the step is long, and sums with `stands_for` are unbiased for the whole map. All references
+    are compared where there is no belief, where `radius` is 0, where none is near, and where there are at most `whole`.
     """
     if near is None or radius <= 0.0 or len(poses) <= whole:
-        return None
+        return Candidates()
     places = np.floor(near.poses[:, :2] / (radius / 2)).astype(np.int64)
     low = places.min(axis=0)
     height = int(places[:, 1].max() - low[1]) + 1
     numbers = np.unique((places[:, 0] - low[0]) * height + places[:, 1] - low[1])  # far faster than unique rows
     cells = np.column_stack([numbers // height, numbers % height]) + low
     if len(cells) > len(poses):
-        return None
+        return Candidates()
     # A particle lies within radius / 2 * sqrt(1/2) of its cell's centre: the reach grows by that much.
     reach = radius * (1.0 + math.sqrt(0.5) / 2)
     tree: Any = KDTree((cells + 0.5) * (radius / 2))  # type: ignore[no-untyped-call]
     near_any = np.isfinite(tree.query(poses[:, :2], distance_upper_bound=reach)[0])
-    if not near_any.any():
-        return None
-    near_any[np.linspace(0, len(poses) - 1, min(STRANGERS, len(poses))).astype(np.int64)] = True
-    return None if near_any.all() else np.flatnonzero(near_any)
+    others = np.flatnonzero(~near_any)
+    if len(others) == len(poses) or len(others) <= strangers:
+        return Candidates()
+    stands_for = near_any.astype(np.float64)
+    if strangers:
+        step = len(others) / strangers
+        first = (turn * GOLDEN % 1.0) * step
+        taken = np.minimum((first + step * np.arange(strangers)).astype(np.int64), len(others) - 1)
+        stands_for[others[taken]] = step
+    chosen = np.flatnonzero(stands_for)
+    return Candidates(chosen, stands_for[chosen])
 
 
 def check_alike(features: SegmentFeatures, map: ReferenceGraph) -> bool:

@@ -72,7 +72,8 @@ class RotationTranslationRotation(Stage):
             return self.Out(belief=belief)
         way = turn_go_turn(motion.x, motion.y, motion.turn)
         noise = ctx.rng.standard_normal((3, len(belief.poses)))
-        return self.Out(belief=Particles(moved(belief.poses, way, self.sigmas(way), noise), belief.weights))
+        poses = moved(belief.poses, way, self.sigmas(way), noise)
+        return self.Out(belief=Particles(poses, belief.weights, belief.aside))
 
     def sigmas(self, way: tuple[float, float, float]) -> tuple[float, float, float]:
         """Standard deviations of first turn (rad), way (m), second turn (rad)."""

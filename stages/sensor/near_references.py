@@ -25,7 +25,7 @@ FADED = 3.0
 """Beyond so many fading distances a reference says less than 1.2 % of what it says at its own place."""
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _expected(
     poses: Array,
     references: Array,
@@ -39,35 +39,46 @@ def _expected(
     fade: float,
     ordinary: float,
 ) -> Array:
-    headings = similarity.shape[1]
-    per_radian = headings / (2 * np.pi)
+    # `similarity` has its first heading once more at the end, so that a turn needs no modulo.
+    headings = similarity.shape[1] - 1
+    per_radian, per_cell = headings / (2 * np.pi), 1.0 / cell
+    least, decay = 1e-4 * fade * fade, -0.5 / (fade * fade)
+    neighbours = nearest.shape[1]
+    row = np.empty(neighbours, np.int64)
+    apart = np.empty(neighbours)
+    turned = np.empty(neighbours)
     out = np.empty(len(poses))
     for n in range(len(poses)):
         x, y, heading = poses[n, 0], poses[n, 1], poses[n, 2]
         out[n] = ordinary
-        i, j = int(np.floor((x - origin[0]) / cell)), int(np.floor((y - origin[1]) / cell))
+        i, j = int(np.floor((x - origin[0]) * per_cell)), int(np.floor((y - origin[1]) * per_cell))
         if not (0 <= i < columns and 0 <= j < lines):
             continue
-        closest = np.inf
-        for r in nearest[i * lines + j]:
-            if r >= 0 and rows[r] >= 0:
-                closest = min(closest, (x - references[r, 0]) ** 2 + (y - references[r, 1]) ** 2)
-        if closest == np.inf:
+        here = nearest[i * lines + j]
+        number, closest = 0, np.inf
+        for k in range(neighbours):
+            r = here[k]
+            if r < 0:
+                break
+            if rows[r] < 0:
+                continue
+            far_x, far_y = x - references[r, 0], y - references[r, 1]
+            far = far_x * far_x + far_y * far_y
+            row[number], apart[number], turned[number] = rows[r], far, (heading - references[r, 2]) * per_radian
+            number += 1
+            closest = min(closest, far)
+        if number == 0:
             continue
         total, mass = 0.0, 0.0
-        for r in nearest[i * lines + j]:
-            if r < 0 or rows[r] < 0:
-                continue
-            far = (x - references[r, 0]) ** 2 + (y - references[r, 1]) ** 2
-            weight = 1.0 / (far + 0.25 * closest + 1e-4 * fade * fade)
-            turn = (heading - references[r, 2]) * per_radian
-            whole = np.floor(turn)
-            part = turn - whole
-            h = int(whole) % headings
-            value = similarity[rows[r], h] * (1.0 - part) + similarity[rows[r], (h + 1) % headings] * part
-            total += weight * value
+        nearly = 0.25 * closest + least
+        for k in range(number):
+            weight = 1.0 / (apart[k] + nearly)
+            turn = turned[k] - headings * np.floor(turned[k] / headings)
+            h = min(int(turn), headings - 1)
+            before = similarity[row[k], h]
+            total += weight * (before + (similarity[row[k], h + 1] - before) * (turn - h))
             mass += weight
-        known = math.exp(-0.5 * closest / (fade * fade))
+        known = math.exp(decay * closest)
         out[n] = max(ordinary, known * total / mass + (1.0 - known) * ordinary)
     return out
 
@@ -83,18 +94,33 @@ def expected_similarity(
     where it was not compared.
     """
     poses = np.ascontiguousarray(poses)
-    return _expected(poses, references, rows, similarity, *cells, fade, ordinary)
+    around = np.concatenate([similarity, similarity[:, :1]], axis=1)
+    return _expected(poses, references, rows, around, *cells, fade, ordinary)
 
 
-def ordinary_match(best: Floats, places: Array, strangers_from: float, quantile: float) -> float:
+def weighted_quantile(values: Floats, weights: Array, quantile: float) -> float:
+    """The quantile of values that stand for `weights` of their kind: linear between the middles of their shares."""
+    order = np.argsort(values, kind="stable")
+    upto = np.cumsum(weights[order])
+    return float(np.interp(quantile * upto[-1], upto - 0.5 * weights[order], values[order]))
+
+
+def ordinary_match(
+    best: Floats, places: Array, strangers_from: float, quantile: float, stands_for: Array | None = None
+) -> float:
     """What a reference of some other place reaches at its best heading.
 
     `best` (R,): each reference's similarity at its best heading; `places` (R, >= 2) where they are (m). Of those
     farther than `strangers_from` metres from the best of all, the `quantile`; where there are none, the median of all.
+    `stands_for` (R,): how many references of the map each stands for; None: one each.
     """
-    winner = places[int(np.argmax(best)), :2]
-    strangers = best[np.hypot(*(places[:, :2] - winner).T) > strangers_from]
-    return float(np.quantile(strangers, quantile)) if len(strangers) else float(np.median(best))
+    if stands_for is None:
+        stands_for = np.ones(len(best))
+    gap = places[:, :2] - places[int(np.argmax(best)), :2]
+    strange = gap[:, 0] ** 2 + gap[:, 1] ** 2 > strangers_from**2
+    if not strange.any():
+        return float(np.median(best))
+    return weighted_quantile(best[strange], stands_for[strange], quantile)
 
 
 class NearReferences(Stage):
@@ -114,9 +140,14 @@ class NearReferences(Stage):
     `reach`, else `reach_m`): one configuration serves a room, a field and a lawn. `fade`: over which what a reference
     says is lost; `strangers`: from how far away a reference is of another place; `spread`: of proposals.
 
-    `proposals`: poses drawn from the similarity field (`propose: similarity`, by the same weights) or anywhere around
-    the references (`uniform`). They carry no weight of their own: `likelihood.anywhere` says how well the view fits
-    anywhere. Defaults: docs/experiments/omniview_mcl_defaults.md.
+    Where only some references were compared, those that stand for many (`Similarities.stands_for`) count as many, so
+    that power, ordinary match and `likelihood.anywhere` are estimates for the whole map.
+
+    `proposals`: poses that a robot put down anywhere would likely be at, weighted by how likely: drawn by weight from
+    the similarity field and spread around it (`propose: similarity`), or anywhere around the references, each with
+    its own likelihood (`uniform`). `likelihood.anywhere` says how well the view fits anywhere. For who has just been put
+    down the picture is the first of its place, so both take its whole evidence. Defaults:
+    docs/experiments/omniview_mcl_defaults.md.
     """
 
     power: Annotated[float, Bounds(gt=0)] | None = None
@@ -163,18 +194,32 @@ class NearReferences(Stage):
         candidates = np.arange(len(map)) if similarities.candidates is None else similarities.candidates
         rows = np.full(len(map), -1, np.int64)
         rows[candidates] = np.arange(len(candidates))
-        best = values.max(axis=1)
-        floor = ordinary_match(best, map.poses[candidates], self.strangers * unit, self.ordinary)
-        expected = expected_similarity(particles.poses, map.poses, self._cells, rows, values, self.fade * unit, floor)
-        power, top = self._power(best) * self._fresh(motion, unit), max(float(best.max()), 1e-12)
-        field = Field(values, floor, top, power)
-        likelihood = Likelihood((expected / top) ** power, field.mean)
-        return self.Out(likelihood=likelihood, proposals=self._proposals(ctx, field, candidates, map, unit))
+        best, each = values.max(axis=1), similarities.stands_for
+        floor = ordinary_match(best, map.poses[candidates], self.strangers * unit, self.ordinary, each)
+        power, fresh, top = self._power(best, each), self._fresh(motion, unit), max(float(best.max()), 1e-12)
+        field = Field(values, floor, top, power, each)
+        anywhere, proposals = field.mean, None
+        if self.propose == "similarity" and self.proposals:
+            proposals = self._from_field(ctx, field, map.poses[candidates], unit)
+        elif self.propose == "uniform" and self.proposals:
+            poses = self._uniform(ctx, field, map.poses[candidates], unit)
+            fit = (self._expected(poses, map, rows, values, unit, floor) / top) ** power
+            anywhere, proposals = float(fit.mean()), Particles(poses, fit / fit.sum())
+        expected = self._expected(particles.poses, map, rows, values, unit, floor)
+        likelihood = Likelihood((expected / top) ** (power * fresh), anywhere, fresh)
+        return self.Out(likelihood=likelihood, proposals=proposals)
 
-    def _power(self, best: Floats) -> float:
+    def _expected(
+        self, poses: Array, map: ReferenceGraph, rows: Ints, values: Floats, unit: float, floor: float
+    ) -> Array:
+        return expected_similarity(poses, map.poses, self._cells, rows, values, self.fade * unit, floor)
+
+    def _power(self, best: Floats, stands_for: Array | None = None) -> float:
         if self.power is not None:
             return self.power
-        spread = float(np.log(np.maximum(best, 1e-12)).std())
+        logarithms = np.log(np.maximum(best, 1e-12)).astype(np.float64)
+        centre = np.average(logarithms, weights=stands_for)
+        spread = math.sqrt(float(np.average(np.square(logarithms - centre), weights=stands_for)))
         return self.contrast / max(spread, 1e-6)
 
     def _fresh(self, motion: Motion | None, unit: float) -> float:
@@ -183,45 +228,57 @@ class NearReferences(Stage):
             return 1.0
         return min(1.0, max(self.standing, math.hypot(motion.x, motion.y) / (self.independent * unit)))
 
-    def _proposals(
-        self, ctx: Context, field: "Field", candidates: Ints, map: ReferenceGraph, unit: float
-    ) -> Particles | None:
-        if self.propose == "none" or not self.proposals:
-            return None
-        if self.propose == "similarity":
-            references, turns = np.divmod(field.draw(ctx.rng, self.proposals), field.headings)
-            poses = map.poses[candidates[references]].copy()
-            poses[:, 2] += 2 * np.pi * (turns + ctx.rng.random(self.proposals) - 0.5) / field.headings
-        else:
-            poses = map.poses[ctx.rng.integers(len(map), size=self.proposals)].copy()
-            poses[:, 2] = ctx.rng.uniform(-np.pi, np.pi, self.proposals)
-        poses[:, :2] += self.spread * unit * ctx.rng.standard_normal((self.proposals, 2))
+    def _from_field(self, ctx: Context, field: "Field", references: Array, unit: float) -> Particles:
+        chosen, turns = np.divmod(field.draw(ctx.rng, self.proposals), field.headings)
+        poses = references[chosen].copy()
+        poses[:, 2] += 2 * np.pi * (turns + ctx.rng.random(self.proposals) - 0.5) / field.headings
+        return Particles(self._spread(ctx, poses, unit), np.full(self.proposals, 1.0 / self.proposals))
+
+    def _uniform(self, ctx: Context, field: "Field", references: Array, unit: float) -> Array:
+        poses = references[field.anywhere(ctx.rng, self.proposals)].copy()
+        poses[:, 2] = ctx.rng.uniform(-np.pi, np.pi, self.proposals)
+        return self._spread(ctx, poses, unit)
+
+    def _spread(self, ctx: Context, poses: Array, unit: float) -> Array:
+        poses[:, :2] += self.spread * unit * ctx.rng.standard_normal((len(poses), 2))
         poses[:, 2] = wrap(poses[:, 2])
-        return Particles(poses, np.full(self.proposals, 1.0 / self.proposals))
+        return poses
 
 
 class Field:
     """Weights (max(S, floor) / top)^power over references and headings, most of which lie on the floor.
 
-    Only what rises above the floor is raised to the power: in a large map that is a few in a hundred.
+    Only what rises above the floor is raised to the power: in a large map that is a few in a hundred. `stands_for`
+    (references,): how many references of the map each stands for, and counts as; None: one each.
     """
 
-    def __init__(self, values: Floats, floor: float, top: float, power: float) -> None:
+    def __init__(self, values: Floats, floor: float, top: float, power: float, stands_for: Array | None = None) -> None:
         flat = values.ravel()
         self.headings = values.shape[1]
-        self._size = flat.size
+        each = np.ones(len(values)) if stands_for is None else stands_for
         self._above = np.flatnonzero(flat > floor)
-        self._cumulative = np.cumsum((flat[self._above].astype(np.float64) / top) ** power)
-        self._raised = float(self._cumulative[-1]) if len(self._above) else 0.0
-        self._flat = (self._size - len(self._above)) * (floor / top) ** power
-        self.mean = (self._raised + self._flat) / self._size
-        """Mean weight: how well the view fits anywhere."""
+        counted = each[self._above // self.headings]
+        self._raised = np.cumsum(counted * (flat[self._above].astype(np.float64) / top) ** power)
+        self._references = np.cumsum(each)
+        size = self.headings * float(self._references[-1])
+        self._peaks = float(self._raised[-1]) if len(self._above) else 0.0
+        self._flat = max(size - float(counted.sum()), 0.0) * (floor / top) ** power
+        self.mean = (self._peaks + self._flat) / size
+        """Mean weight over the map: how well the view fits anywhere."""
 
     def draw(self, rng: np.random.Generator, number: int) -> Ints:
         """Cells drawn by weight: (number,) flat indices. What falls to the floor is any cell."""
-        chance = rng.random(number) * (self._raised + self._flat)
-        anywhere = rng.integers(self._size, size=number)
+        chance = rng.random(number) * (self._peaks + self._flat)
+        anywhere = self.anywhere(rng, number) * self.headings + rng.integers(self.headings, size=number)
         if not len(self._above):
             return anywhere
-        at = np.searchsorted(self._cumulative, chance, side="right")
-        return np.where(chance < self._raised, self._above[np.minimum(at, len(self._above) - 1)], anywhere)
+        return np.where(chance < self._peaks, self._above[_drawn(self._raised, chance)], anywhere)
+
+    def anywhere(self, rng: np.random.Generator, number: int) -> Ints:
+        """References drawn from the whole map, alike for all of them: (number,) rows of the compared ones."""
+        return _drawn(self._references, rng.random(number) * self._references[-1])
+
+
+def _drawn(cumulative: Array, chance: Array) -> Ints:
+    at: Ints = np.minimum(np.searchsorted(cumulative, chance, side="right"), len(cumulative) - 1)
+    return at

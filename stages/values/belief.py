@@ -35,10 +35,15 @@ class Belief(Value):
 
 
 class Particles(Belief):
-    """Weighted samples of the pose. `poses`: (N, 3) x, y (m), heading (rad), map frame. `weights`: (N,), sum 1."""
+    """Weighted samples of the pose. `poses`: (N, 3) x, y (m), heading (rad), map frame. `weights`: (N,), sum 1.
+
+    The last `aside` of them are hypotheses that the robot was put elsewhere: kept, however little they weigh, until the
+    evidence for them has added up.
+    """
 
     poses: Array
     weights: Array
+    aside: int = 0
 
     def estimate(self) -> PoseEstimate:
         mode, covariance, share = heaviest_mode(self.poses, self.weights)
@@ -59,8 +64,10 @@ class Likelihood(Value):
     """How well each particle explains the present view. `values`: (N,), not negative, any scale.
 
     `anywhere`: on the same scale, the mean over all poses the map knows: what a robot put down anywhere would get.
-    None where it is not known.
+    None where it is not known. `fresh`: the share of the picture's evidence that is new, in [0, 1]; less than 1 where
+    the robot has hardly moved since the picture before.
     """
 
     values: Array
     anywhere: float | None = None
+    fresh: float = 1.0

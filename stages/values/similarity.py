@@ -11,8 +11,10 @@ class Similarities(Value):
 
     Column h stands for a robot whose heading is the reference view's own heading turned counter-clockwise by
     2 pi h / headings. `candidates` (references,) holds the indices of the map's references that were compared, in
-    ascending order; None means all of them.
+    ascending order; None means all of them. `stands_for` (references,): how many references of the map each of them
+    stands for, where only some were compared; None: one each. Sums with it are estimates for the whole map.
     """
 
     values: npt.NDArray[np.float32]
     candidates: npt.NDArray[np.int64] | None = None
+    stands_for: npt.NDArray[np.float64] | None = None

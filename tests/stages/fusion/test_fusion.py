@@ -54,14 +54,15 @@ def share_of_proposals(anywhere: float, believed: float) -> float:
     values = np.where(np.arange(10_000) % 10 == 0, believed, 0.0)
     stage = ImportanceResampling(number=10_000, kidnapped=0.01)
     out = fuse(stage, belief(10_000), values, anywhere=anywhere, proposals=proposals)
-    return float((out.poses[:, 0] == 77.0).mean())
+    assert out.weights.sum() == pytest.approx(1.0)
+    return float(out.weights[out.poses[:, 0] == 77.0].sum())
 
 
 def test_a_kidnapped_robot_is_where_the_evidence_says() -> None:
     # Bayes by hand: 0.01 x anywhere against 0.99 x the mean likelihood of the belief (a tenth of `believed`).
     for anywhere, believed in ((1.0, 1.0), (1.0, 0.01), (0.001, 1.0)):
         expected = 0.01 * anywhere / (0.01 * anywhere + 0.99 * 0.1 * believed)
-        assert share_of_proposals(anywhere, believed) == pytest.approx(expected, abs=0.011)
+        assert share_of_proposals(anywhere, believed) == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_belief_that_explains_nothing_anywhere_gives_way_to_the_evidence() -> None:
@@ -70,7 +71,33 @@ def test_a_belief_that_explains_nothing_anywhere_gives_way_to_the_evidence() -> 
     stage = ImportanceResampling(number=5000, kidnapped=1e-7)
     for believed, share in ((1e-3, 0.0), (1e-9, 0.1 / 1.1), (1e-12, 100 / 101)):
         out = fuse(stage, belief(5000), np.full(5000, believed), anywhere=1e-3, proposals=proposals)
-        assert (out.poses[:, 0] == 77.0).mean() == pytest.approx(share, abs=0.02)
+        assert out.weights[out.poses[:, 0] == 77.0].sum() == pytest.approx(share, abs=1e-4)
+
+
+def test_evidence_for_a_kidnapping_adds_up_from_picture_to_picture() -> None:
+    # Each picture speaks 10:1 against the belief, for the proposals of the first; later ones propose nothing of worth.
+    # Bayes by hand, with a prior of 1e-6 for "put there at the first picture": odds 1e-6 x 10^n after n more pictures.
+    stage, ctx = ImportanceResampling(number=5000, kidnapped=1e-6), Context("fusion", np.random.default_rng(0))
+    there = Particles(np.full((50, 3), 77.0), np.full(50, 0.02))
+    elsewhere = Particles(np.full((50, 3), -77.0), np.full(50, 0.02))
+    now = stage.step(ctx, belief(5000), Likelihood(np.ones(5000), 1.0), there).belief
+    assert now.aside == 500
+    for picture in range(1, 11):
+        values = np.where(now.poses[:, 0] == 77.0, 1.0, 0.1)
+        now = stage.step(ctx, now, Likelihood(values, 1e-9), elsewhere).belief
+        share, odds = now.weights[now.poses[:, 0] == 77.0].sum(), 1e-6 * 10.0**picture
+        assert share == pytest.approx(odds / (1 + odds), rel=0.5, abs=0.02), picture
+    assert (now.poses[:, 0] == 77.0).mean() > 0.4  # the particles have followed the weights
+
+
+def test_a_robot_that_stands_is_kidnapped_less_often_per_picture() -> None:
+    proposals, particles = Particles(np.full((50, 3), 77.0), np.full(50, 0.02)), belief(5000)
+    ctx, stage = Context("fusion"), ImportanceResampling(kidnapped=1e-3)
+    shares = []
+    for fresh in (1.0, 0.1):
+        out = stage.step(ctx, particles, Likelihood(np.ones(5000), 1.0, fresh), proposals).belief
+        shares.append(out.weights[out.poses[:, 0] == 77.0].sum())
+    assert shares[0] == pytest.approx(10 * shares[1], rel=0.01)
 
 
 def test_the_number_follows_the_cells_the_belief_fills() -> None:

@@ -4,13 +4,14 @@ import pytest
 from omninav.pipeline import Context
 from omninav.pipeline.problems import BadInput
 from omninav.stages.fusion.best_match import BestMatch
-from omninav.stages.match.candidates import STRANGERS, near_belief
+from omninav.stages.match.candidates import near_belief
 from omninav.stages.match.histogram_intersection import HistogramIntersection
 from omninav.stages.match.l2 import L2Match
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentColours, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
 SEGMENTS = 12
@@ -53,29 +54,63 @@ def test_the_same_view_gives_the_same_bytes(match: SelectiveMatch) -> None:
     assert one.dtype == np.float32
 
 
+def gaps_to(map: ReferenceGraph, belief: Particles) -> np.ndarray:
+    return np.hypot(*(map.poses[:, None, :2] - belief.poses[:, :2]).transpose(2, 0, 1)).min(axis=1)
+
+
 @pytest.mark.parametrize("radius", [0.4, 1.0, 3.0])
-def test_near_a_belief_every_reference_within_the_radius_is_compared_and_few_others(radius: float) -> None:
-    map, belief = a_map(200, 0.1), particles_at(8.0)
-    chosen = near_belief(map.poses, belief, radius)
+def test_near_a_belief_every_reference_within_the_radius_is_compared_for_itself(radius: float) -> None:
+    map, belief = a_map(400, 0.1), particles_at(8.0)
+    chosen, stands_for = near_belief(map.poses, belief, radius, 0, 20, 3)
     assert chosen is not None
-    gap = np.hypot(*(map.poses[:, None, :2] - belief.poses[:, :2]).transpose(2, 0, 1)).min(axis=1)
-    assert set(np.flatnonzero(gap <= radius)) <= set(chosen)
-    strangers = np.linspace(0, 199, STRANGERS).astype(int)
-    assert gap[np.setdiff1d(chosen, strangers)].max() <= 1.8 * radius
-    assert set(strangers) <= set(chosen)
+    assert stands_for is not None
+    gap = gaps_to(map, belief)
+    near = np.flatnonzero(gap <= radius)
+    assert set(near) <= set(chosen)
+    assert (stands_for[np.isin(chosen, near)] == 1).all()
+    assert (gap[chosen] > 1.8 * radius).sum() <= 20
     assert (np.diff(chosen) > 0).all()
 
 
+def test_strangers_stand_for_the_whole_map_and_all_have_their_turn() -> None:
+    map, belief = a_map(400, 0.1), particles_at(8.0)
+    seen: set[int] = set()
+    for turn in range(60):
+        chosen, stands_for = near_belief(map.poses, belief, 1.0, 0, 20, turn)
+        assert chosen is not None
+        assert stands_for is not None
+        assert stands_for.sum() == pytest.approx(400)
+        seen |= set(chosen)
+    assert len(seen) == 400
+    # A sum over the map, estimated turn by turn, is right on average.
+    value = np.random.default_rng(0).random(400)
+    turns = [near_belief(map.poses, belief, 1.0, 0, 20, turn) for turn in range(200)]
+    assert np.mean([(value[c] * w).sum() for c, w in turns]) == pytest.approx(value.sum(), rel=0.005)  # type: ignore[index]
+
+
 def test_what_is_compared_near_the_belief_is_what_it_is_everywhere() -> None:
-    map = a_map(200, 0.1)
+    map = a_map(400, 0.1)
     seen, ctx = SegmentHistograms(map.features[80]), Context("match")
-    stage = SelectiveMatch(headings=SEGMENTS, radius_m=1.0, whole_up_to=0)
+    stage = SelectiveMatch(headings=SEGMENTS, radius=2.0, reach_m=0.5, strangers=20, whole_up_to=0)
     near, all_ = stage.step(ctx, seen, map, particles_at(8.0)).similarities, stage.step(ctx, seen, map).similarities
     assert near.candidates is not None
-    assert len(near.candidates) < 50 + STRANGERS
+    assert len(near.candidates) < 50 + 20
     assert np.array_equal(near.values, all_.values[near.candidates])
     far = stage.step(ctx, seen, map, particles_at(500.0)).similarities  # no reference near: look everywhere
     assert far.candidates is None
+
+
+@pytest.mark.parametrize("match", [SelectiveMatch, HistogramIntersection, L2Match])
+def test_how_far_is_near_follows_the_reach_of_the_views(match: type[SelectiveMatch]) -> None:
+    map, belief = a_map(800, 0.1), particles_at(30.0)
+    stage, seen = match(headings=SEGMENTS, strangers=10, whole_up_to=0), SegmentHistograms(map.features[80])
+    compared = []
+    for reach in (0.1, 0.5, 2.0):
+        candidates = stage.step(Context("match"), seen, map, belief, Reach(reach)).similarities.candidates
+        assert candidates is not None
+        assert set(np.flatnonzero(gaps_to(map, belief) <= 4.5 * reach)) <= set(candidates)
+        compared.append(len(candidates))
+    assert compared[0] < 40 < compared[1] < 130 < compared[2]
 
 
 def test_small_maps_are_always_compared_whole() -> None:

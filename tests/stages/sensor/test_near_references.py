@@ -5,7 +5,13 @@ import pytest
 
 from omninav.pipeline import Context
 from omninav.stages.geometry.nearby import nearest_cells
-from omninav.stages.sensor.near_references import NearReferences, expected_similarity, ordinary_match
+from omninav.stages.sensor.near_references import (
+    Field,
+    NearReferences,
+    expected_similarity,
+    ordinary_match,
+    weighted_quantile,
+)
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
@@ -96,6 +102,37 @@ def test_the_ordinary_match_is_a_quantile_over_the_references_of_other_places() 
     assert ordinary_match(best, places, 1.0, 0.5) == pytest.approx(0.4)
     assert ordinary_match(best, places, 1.0, 1.0) == pytest.approx(0.5)
     assert ordinary_match(best, places, 9.0, 1.0) == pytest.approx(0.5)  # no strangers: the median of all
+    # The one at 4 m stands for ninety: the median is its own.
+    assert ordinary_match(best, places, 1.0, 0.5, np.array([1.0, 1, 1, 90, 1])) == pytest.approx(0.5, abs=0.003)
+
+
+def test_a_quantile_of_what_stands_for_many_is_that_of_the_many() -> None:
+    values, weights = RNG.random(300).astype(np.float32), RNG.integers(1, 20, 300)
+    many = np.repeat(values, weights)
+    for quantile in (0.1, 0.5, 0.8):
+        assert weighted_quantile(values, weights.astype(float), quantile) == pytest.approx(
+            float(np.quantile(many, quantile)), abs=0.01
+        )
+
+
+def test_some_references_stand_for_the_whole_map() -> None:
+    # What every tenth reference says of the map, each standing for ten, is what all of them say.
+    field = RNG.normal(0.5, 0.05, (5000, 36)).astype(np.float32).clip(0, 1)
+    whole = Field(field, 0.5, 0.7, 8.0)
+    some = Field(field[::10], 0.5, 0.7, 8.0, np.full(500, 10.0))
+    assert some.mean == pytest.approx(whole.mean, rel=0.01)
+    assert whole.mean == pytest.approx(float(((np.maximum(field, 0.5) / 0.7) ** 8.0).mean()), rel=1e-6)
+
+
+def test_cells_are_drawn_by_weight_and_by_how_many_they_stand_for() -> None:
+    field = np.full((3, 4), 0.1, np.float32)
+    field[0, 1] = field[2, 3] = 1.0
+    drawn = Field(field, 0.5, 1.0, 2.0, np.array([1.0, 5.0, 3.0])).draw(np.random.default_rng(0), 40_000)
+    # By hand: peaks 1 and 3; on the floor, 0.25 for each of 36 - 4 cells: 8.
+    shares = np.bincount(drawn, minlength=12) / 40_000
+    assert shares[1] == pytest.approx((1 + 8 / 36) / 12, abs=0.006)
+    assert shares[11] == pytest.approx((3 + 8 * 3 / 36) / 12, abs=0.01)
+    assert shares[4:8].sum() == pytest.approx(8 * 20 / 36 / 12, abs=0.01)
 
 
 def test_the_power_follows_from_how_much_similarity_varies_between_places() -> None:
@@ -137,6 +174,32 @@ def test_proposals_are_drawn_from_the_field_and_around_the_references(propose: s
     assert gap.min(axis=1).max() < 0.4
     at_the_match = (gap[:, 3] < 0.2).mean()
     assert at_the_match > 0.9 if propose == "similarity" else at_the_match < 0.2
+
+
+def test_uniform_proposals_carry_their_own_likelihood() -> None:
+    out = step(
+        NearReferences(propose="uniform", proposals=20_000, spread=0.05, reach_m=0.1), REFERENCES, one_good_match()
+    )
+    assert out.proposals is not None
+    assert out.likelihood.anywhere is not None
+    gap = np.hypot(*(out.proposals.poses[:, :2] - REFERENCES[3, :2]).T)
+    turn = np.angle(np.exp(1j * (out.proposals.poses[:, 2] - REFERENCES[3, 2] - np.pi / 2)))
+    fits = (gap < 0.15) & (np.abs(turn) < 0.2)
+    assert 0 < fits.mean() < 0.01
+    assert out.proposals.weights[fits].sum() > 100 * fits.mean()
+    # Few draws may miss the place: then they must not carry what it would have carried.
+    missed = step(NearReferences(propose="uniform", proposals=2, reach_m=0.1), REFERENCES, one_good_match())
+    assert missed.likelihood.anywhere is not None
+    assert missed.likelihood.anywhere < 0.1 * out.likelihood.anywhere
+
+
+def test_a_robot_that_stands_may_still_have_been_put_there() -> None:
+    # For who was put there just now the picture is the first one: all of its evidence is new.
+    stage = NearReferences(independent=0.4, standing=0.1)
+    moving = step(stage, REFERENCES, one_good_match(), Motion(0.5, 0.0, 0.0)).likelihood
+    standing = step(stage, REFERENCES, one_good_match(), Motion(0.0, 0.0, 0.0)).likelihood
+    assert (moving.fresh, standing.fresh) == (1.0, 0.1)
+    assert standing.anywhere == moving.anywhere
 
 
 def test_an_empty_comparison_says_nothing() -> None:
