@@ -1,5 +1,6 @@
 """What the engine costs per stage and tick, beside plain calls and beside a DAG library that runs the same graph."""
 
+import os
 import time
 
 from omninav.pipeline import Context, Outputs, Source, Stage, State, Tick, Value
@@ -46,7 +47,7 @@ class AddOne(Stage):
 
 
 def rows() -> list[Row]:
-    """A chain of ten stages over 2000 ticks: the engine, plain calls of the same stages, and Hamilton."""
+    """A chain of ten stages over 2000 ticks: the engine, plain calls of the same stages, Hamilton and Haystack."""
     here = __name__
     nodes = {"source": {"_target_": f"{here}.Ticks"}} | {f"s{i}": {"_target_": f"{here}.AddOne"} for i in range(STAGES)}
     wires = {f"s{i}": {"number": "source.number" if i == 0 else f"s{i - 1}.number"} for i in range(STAGES)}
@@ -77,19 +78,10 @@ def rows() -> list[Row]:
             limit=20.0,
         )
     ]
-    hamilton = _hamilton()
-    if hamilton is not None:
-        found.append(
-            Row(
-                "engine, whole, per stage and tick",
-                taken["engine"] * per,
-                "us",
-                "sf-hamilton, same graph",
-                hamilton,
-                limit=1.0,
-                of_peer=True,
-            )
-        )
+    for name, measured in (("sf-hamilton", _hamilton()), ("haystack-ai", _haystack())):
+        if measured is not None:
+            what, peer = "engine, whole, per stage and tick", f"{name}, same graph"
+            found.append(Row(what, taken["engine"] * per, "us", peer, measured, limit=1.0, of_peer=True))
     return found
 
 
@@ -119,4 +111,31 @@ def _hamilton() -> float | None:
     start = time.perf_counter()
     for tick in range(ticks):
         chain.execute([f"s{STAGES - 1}"], inputs={"number": float(tick)})
+    return (time.perf_counter() - start) * 1e6 / (ticks * STAGES)
+
+
+def _haystack() -> float | None:
+    """Microseconds per stage and tick in a Haystack pipeline, None where it is not installed."""
+    os.environ.setdefault("HAYSTACK_TELEMETRY_ENABLED", "False")
+    try:
+        from haystack import Pipeline, component
+    except ImportError:
+        return None
+
+    @component
+    class OneMore:
+        @component.output_types(number=float)
+        def run(self, number: float) -> dict[str, float]:
+            return {"number": number + 1.0}
+
+    chain = Pipeline()
+    for i in range(STAGES):
+        chain.add_component(f"s{i}", OneMore())
+        if i:
+            chain.connect(f"s{i - 1}.number", f"s{i}.number")
+    chain.run({"s0": {"number": 0.0}})
+    ticks = 60
+    start = time.perf_counter()
+    for tick in range(ticks):
+        chain.run({"s0": {"number": float(tick)}})
     return (time.perf_counter() - start) * 1e6 / (ticks * STAGES)
