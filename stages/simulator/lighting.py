@@ -74,7 +74,7 @@ def lamps_and_windows(
                     facing=(cos, sin, 0.0),
                     colour=DAYLIGHT,
                     on=(share * day.light[0], share * day.light[1], share * day.light[2]),
-                    scale=hanging.width * hanging.height,
+                    scale=0.5 * hanging.width * hanging.height,
                 )
             )
     return [*lights, *_sky(config, day)]

@@ -105,7 +105,7 @@ def walls(config: WorldConfig, room: Room, cuts: list[Opening]) -> list[Block]:
     height = room.height or config.height
     layers: list[tuple[float, Material, str, float]] = [(THICK / 2, room.wall, f"{room.name} wall", 0.0)]
     if room.facade:
-        layers.append((-THICK / 2, room.facade, "facade", THICK))
+        layers.append((-THICK / 2, room.facade, f"{room.name} facade", THICK))
     blocks = []
     for inset, material, look, overlap in layers:
         for side in ("east", "north", "west", "south"):

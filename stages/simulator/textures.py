@@ -232,10 +232,10 @@ def _carton(rng: np.random.Generator) -> F32:
 
 
 def _plaster(rng: np.random.Generator) -> F32:
-    base = vivid(rng, (0.08, 0.4))
-    canvas = blank(scaled(base, rng.uniform(190.0, 235.0) / max(base))) + cloud(rng, 5, 4.0) + grain(rng, 3.0)
-    if rng.uniform() < 0.4:
-        box(canvas, 0, 0.68, 1, 0.965, scaled(vivid(rng, (0.2, 0.6)), 0.85))
+    base = vivid(rng, (0.04, 0.28))
+    canvas = blank(scaled(base, rng.uniform(190.0, 230.0) / max(base))) + cloud(rng, 5, 4.0) + grain(rng, 3.0)
+    if rng.uniform() < 0.3:
+        box(canvas, 0, 0.68, 1, 0.965, scaled(vivid(rng, (0.15, 0.45)), 0.85))
     box(canvas, 0, 0.965, 1, 1, (70, 75, 80))
     return canvas
 
@@ -267,7 +267,7 @@ def _facade(rng: np.random.Generator) -> F32:
 
 
 def _carpet(rng: np.random.Generator) -> F32:
-    colour = scaled(vivid(rng, (0.2, 0.7)), 0.6)
+    colour = scaled(vivid(rng, (0.15, 0.5)), 0.6)
     return blank(colour) + cloud(rng, 20, 5.0) + grain(rng, 14.0)
 
 
@@ -310,7 +310,7 @@ def _paving(rng: np.random.Generator) -> F32:
 
 
 def _grass(rng: np.random.Generator) -> F32:
-    green = np.array([48.0, 128.0, 88.0], dtype=np.float32) * rng.uniform(0.85, 1.15)
+    green = np.array([58.0, 112.0, 88.0], dtype=np.float32) * rng.uniform(0.85, 1.15)
     canvas = blank(tuple(green)) * (1.0 + cloud(rng, 8, 0.1) + cloud(rng, 40, 0.12)) + grain(rng, 14.0)
     for x, y in rng.uniform(0.0, DRAWN, (int(rng.integers(0, 14)), 2)):
         cv2.circle(canvas, (int(x), int(y)), 3, (90, 225, 235), -1)

@@ -24,6 +24,8 @@ WALL = 0.2
 """Thickness (m) of the outer walls."""
 LOW = 0.03
 """What is no higher (m) can be driven over."""
+PATCHED = ("floor", "ceiling", "grass", "asphalt", "paving", "parquet", "sky")
+"""Grounds whose pieces differ a little; others are of one piece."""
 HEADROOM = 1.4
 """What hangs higher (m) can be driven under."""
 
@@ -46,8 +48,6 @@ class World:
         self.config = config
         self.day = day
         self.layout = expand(config, day)
-        self._textures: list[npt.NDArray[np.uint8]] = []
-        self._glow: list[float] = []
         self._named: dict[tuple[str, str], int] = {}
         self._gathered: dict[float, Obstacles] = {}
         self._goods = [self._texture("goods", f"goods {k}") for k in range(config.goods)]
@@ -64,12 +64,8 @@ class World:
     # What stands where
 
     def _texture(self, material: str, name: str) -> int:
-        """Number of the texture of a material for a thing of that name, drawn when first asked for."""
-        if (material, name) not in self._named:
-            self._named[material, name] = len(self._textures)
-            self._textures.append(_drawn(self.config.seed, material, name))
-            self._glow.append(textures.glow(material))
-        return self._named[material, name]
+        """Number of the texture of a material for a thing of that name; it is drawn for the scene."""
+        return self._named.setdefault((material, name), len(self._named))
 
     def _plain(
         self, texture: int, width: float, height: float, extent: tuple[float, float] = (math.inf, math.inf)
@@ -83,11 +79,13 @@ class World:
         rows, columns = math.ceil(self.config.size[1]), math.ceil(self.config.size[0])
         choice = stream(self.config.seed, "ground", material).integers(kinds, size=(rows, columns))
         numbers = np.array([self._texture(material, f"{material} {k}") for k in range(kinds)])
+        choice = choice if material in PATCHED else 0 * choice
         tiles = numbers[choice]
         width, depth = self.config.size[0] / columns, self.config.size[1] / rows
         for room in rooms:
             if room.floor is not None:
-                own = np.array([self._texture(room.floor, f"{room.name} floor {k}") for k in range(3)])
+                kinds = 3 if room.floor in PATCHED else 1
+                own = np.array([self._texture(room.floor, f"{room.name} floor {k}") for k in range(kinds)])
                 (left, low), (wide, deep) = room.corner, room.size
                 across = slice(round(left / width), round((left + wide) / width))
                 up = slice(round(low / depth), round((low + deep) / depth))
@@ -226,8 +224,8 @@ class World:
             self.ceiling,
             self.config.size,
             self.config.height,
-            self._textures,
-            self._glow,
+            [_drawn(self.config.seed, material, name) for material, name in self._named],
+            [textures.glow(material) for material, _ in self._named],
             lamps_and_windows(self.layout.lamps, self.layout.hangings, self.config, self.day),
             self.config.ambient,
             [people.coverings(self._texture, look) for look in range(people.LOOKS)],
