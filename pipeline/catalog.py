@@ -8,6 +8,7 @@ A third party's stage is named `role.name`, as `match.gradient`:
   `path/to/gradient.py:GradientMatch`.
 """
 
+import functools
 import importlib
 import importlib.metadata
 import importlib.util
@@ -109,12 +110,16 @@ def _load_file(path: Path) -> ModuleType:
     return sys.modules[name]
 
 
+@functools.cache
+def _installed(path: tuple[str, ...]) -> tuple[Entry, ...]:
+    """What installed distributions offer; looking through them takes as long as everything else, so once will do."""
+    points = importlib.metadata.entry_points(group=ENTRY_POINTS)
+    return tuple(Entry(point.name, point.value, "installed") for point in sorted(points, key=lambda point: point.name))
+
+
 def plugins() -> list[Entry]:
     """Stages that others offer, from installed entry points and from the environment; none is imported for this."""
-    found = [
-        Entry(point.name, point.value, "installed")
-        for point in sorted(importlib.metadata.entry_points(group=ENTRY_POINTS), key=lambda point: point.name)
-    ]
+    found = list(_installed(tuple(sys.path)))
     for item in filter(None, (text.strip() for text in os.environ.get(ENVIRONMENT, "").split(","))):
         name, equals, target = item.partition("=")
         if not equals or "." not in name or ":" not in target:
