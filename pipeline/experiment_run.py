@@ -107,10 +107,18 @@ class ExperimentRun:
         self, condition: Condition, variant: str, parts: Sequence[str], words: Sequence[str], beside: bool = False
     ) -> Cell:
         own = [word for part in (self.experiment.common, *parts) for word in words_of(part)]
-        typed = (f"variant={variant}", *own, *words)
+        named = any(word.startswith("variant=") for word in own)  # a condition may be of another variant
+        typed = (*([] if named else [f"variant={variant}"]), *own, *words)
         name = re.sub(r"[^A-Za-z0-9.]+", "_", condition.name + (f" {variant}" if beside else "")).strip("_")
         seeds = (0,) if beside else tuple(range(self.experiment.repetitions))
-        cell = Cell(condition, variant, typed, self.folder / "conditions" / name, seeds, shared=self.experiment.shared)
+        cell = Cell(
+            condition,
+            variant,
+            typed,
+            self.folder / "conditions" / name,
+            seeds,
+            shared=self.experiment.shared and not beside,
+        )
         return cell
 
     def check(self) -> None:
@@ -277,6 +285,7 @@ class ExperimentRun:
             return {}
         done = [0]
         with Progress(unit=what) as progress:
+            progress.update(f"{self.experiment.name}: {what}", 0, len(jobs))
 
             def heard(job: Job, word: Any) -> None:
                 progress.update(f"{self.experiment.name}: {what}", done[0], len(jobs))

@@ -68,6 +68,8 @@ def _result(folder: Path, seed: int) -> Path:
 def repeat(given: Mapping[str, Any], tell: Tell) -> None:
     """Run a condition for some seeds; each one's result is a file, and `tell` hears its seed when it is there.
 
+    Without `shared` nothing but the map comes from the cache or from the repetition before: all is timed as on a robot.
+
     `given`: `config` (plain), `folder`, `key`, `seeds`, `shared`. Raises `BadInput` where the code has changed
     since the key was made.
     """
@@ -89,7 +91,9 @@ def repeat(given: Mapping[str, Any], tell: Tell) -> None:
     for number, seed in enumerate(seeds):
         place = run.memory / f"seed_{seed}"
         record = bool(given["shared"]) and shared is None and number + 1 < len(seeds)
-        engine, recorded = _once(graph, artifacts, seed, place, cache, shared, record, tell)
+        engine, recorded = _once(
+            graph, artifacts, seed, place, cache if given["shared"] else None, shared, record, tell
+        )
         shared = recorded or shared
         result = {"key": given["key"], "seed": seed, "metrics": results_of(engine)[0], "timing": stage_times(engine)}
         result |= notes_of(engine)
