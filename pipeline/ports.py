@@ -145,6 +145,9 @@ def _convert_union(value: Any, wanted: Any, where: str) -> Any:
         return None
     if optional:
         return _convert(value, rest, where)
+    meant = _by_kind(value, get_args(wanted), where)
+    if meant is not None:
+        return _convert(value, meant, where)
     several = []
     for option in get_args(wanted):
         try:
@@ -153,6 +156,24 @@ def _convert_union(value: Any, wanted: Any, where: str) -> Any:
             several.append(unfit.problems)
     shaped = [p for p in several if any(problem.where != where for problem in p)]
     raise _Unfit(shaped[0]) if shaped else _unfit(value, wanted, where)
+
+
+def _by_kind(value: Any, options: Sequence[Any], where: str) -> Any:
+    """The option of a union that a mapping means by its `kind`, where options are dataclasses told apart by that."""
+    if not isinstance(value, Mapping) or "kind" not in value:
+        return None
+    groups = [option for option in options if dataclasses.is_dataclass(option) and isinstance(option, type)]
+    kinds = {
+        kind: option
+        for option in groups
+        if "kind" in (known := read_parameters(option))
+        for kind in get_args(known["kind"].type)
+    }
+    if kinds and value["kind"] not in kinds:
+        raise _unfit(
+            value["kind"], Literal[tuple(kinds)], f"{where}.kind", suggest(str(value["kind"]), kinds, "choices")
+        )
+    return kinds.get(value["kind"])
 
 
 def _convert_items(value: Any, wanted: Any, where: str) -> Any:
