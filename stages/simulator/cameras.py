@@ -9,6 +9,8 @@ import numpy.typing as npt
 from omninav.stages.geometry.catadioptric import back_project
 from omninav.stages.values.camera import Camera, Cylindrical, Equirectangular, HyperbolicMirror, Perspective
 
+from .config import CameraConfig, CylinderCamera, EquirectangularCamera, MirrorCamera, Sensor
+
 F64 = npt.NDArray[np.float64]
 
 
@@ -24,7 +26,8 @@ class Rays:
     `directions` (N, 3): unit rays in the robot's frame. `footprint` (N,): angle (rad) across a pixel. `gain` (N,):
     share that vignetting leaves. `wedge_start` (W + 1,): first ray of each wedge; `wedges` (W, 3): its lowest and
     highest azimuth (rad, counter-clockwise from forward) and steepest slope. `ray_of` (rows * columns,): ray of each
-    pixel, or -1.
+    pixel, or -1. `own` (M, 3): colours of the M pixels that see the robot itself; their gains and numbers in `ray_of`
+    follow those of the rays.
     """
 
     shape: tuple[int, int]
@@ -35,11 +38,68 @@ class Rays:
     wedge_start: npt.NDArray[np.int32]
     wedges: F64
     ray_of: npt.NDArray[np.int32]
+    own: npt.NDArray[np.float32]
 
 
-def camera_rays(camera: Camera, vignetting: float = 0.0) -> Rays:
+def camera_of(config: CameraConfig) -> Camera:
+    """A world's camera as the value that travels on wires."""
+    if isinstance(config, MirrorCamera):
+        return HyperbolicMirror(
+            width=config.width,
+            height_px=config.height_px,
+            focal_x=config.focal,
+            focal_y=config.focal,
+            centre_x=config.centre[0],
+            centre_y=config.centre[1],
+            a=config.a,
+            b=config.b,
+            inner_radius_px=config.inner_radius_px,
+            outer_radius_px=config.outer_radius_px,
+            height=config.height,
+            yaw=config.yaw,
+        )
+    if isinstance(config, CylinderCamera | EquirectangularCamera):
+        strip = Cylindrical if isinstance(config, CylinderCamera) else Equirectangular
+        return strip(
+            width=config.width,
+            height_px=config.height_px,
+            column_of_forward=config.width / 2,
+            elevation_top=config.elevation_top,
+            elevation_bottom=config.elevation_bottom,
+            height=config.height,
+        )
+    return Perspective(
+        width=config.width,
+        height_px=config.height_px,
+        focal_x=config.focal,
+        focal_y=config.focal,
+        centre_x=config.centre[0],
+        centre_y=config.centre[1],
+        height=config.height,
+        yaw=config.yaw,
+    )
+
+
+def shutter_times(sensor: Sensor, at: float) -> F64:
+    """Moments (s) of the sub-exposures of a picture taken at a time: they lie evenly around it."""
+    if sensor.shutter == 0.0:
+        return np.array([at])
+    parts: F64 = at + sensor.shutter * ((np.arange(sensor.sub_exposures) + 0.5) / sensor.sub_exposures - 0.5)
+    return parts
+
+
+DECK = 0.45
+"""Height (m) of the robot's deck: in the ordinary mirror it just fills the middle that is masked."""
+HOUSING = 0.02
+"""Radius (m) of the camera below the mirror."""
+HANGS = 0.073
+"""Distance (m) of the camera's lens below the mirror's focus."""
+
+
+def camera_rays(camera: Camera, vignetting: float = 0.0, robot_radius: float = 0.0) -> Rays:
     """The rays of a camera; `vignetting` is the share of light that is lost in the corners of the picture.
 
+    A robot of `robot_radius` (m) is seen in the picture where the camera's height is known; there is none if that is 0.
     Raises `TypeError` for a projection whose rays are not known (a donut without a mirror model).
     """
     v, u = np.mgrid[0 : camera.height_px, 0 : camera.width].astype(np.float64)
@@ -47,7 +107,8 @@ def camera_rays(camera: Camera, vignetting: float = 0.0) -> Rays:
     if isinstance(camera, HyperbolicMirror):
         directions = turn(mirror_directions(camera, np.stack([u, v], axis=-1)), camera.yaw)
         radius = np.hypot(u - camera.centre_x, v - camera.centre_y)
-        seen = (radius >= camera.inner_radius_px) & (radius <= camera.outer_radius_px)
+        seen = radius <= camera.outer_radius_px
+        ring = seen & (radius >= camera.inner_radius_px)
     elif isinstance(camera, Cylindrical):
         if camera.elevation_top is None or camera.elevation_bottom is None:
             raise TypeError("a cylindrical camera without elevation_top and elevation_bottom has no rays; give both")
@@ -67,7 +128,11 @@ def camera_rays(camera: Camera, vignetting: float = 0.0) -> Rays:
             f"no rays are known for {type(camera).__name__}; use HyperbolicMirror, Cylindrical, "
             "Equirectangular or Perspective"
         )
-    seen &= np.isfinite(directions).all(axis=-1)
+    own = _own_body(directions, robot_radius, camera)
+    is_own = seen & np.isfinite(own).all(axis=-1)
+    if isinstance(camera, HyperbolicMirror):
+        seen = ring
+    seen &= np.isfinite(directions).all(axis=-1) & ~is_own
     across, down_angle = _pixel_angles(directions)
     with np.errstate(invalid="ignore"):
         footprint = np.sqrt(across * down_angle)
@@ -79,17 +144,45 @@ def camera_rays(camera: Camera, vignetting: float = 0.0) -> Rays:
     order, wedge_start, wedges = _wedges(directions[seen])
     ray_of = np.full(seen.size, -1, dtype=np.int32)
     ray_of[pixels[order]] = np.arange(len(pixels), dtype=np.int32)
+    ray_of[is_own.ravel()] = len(pixels) + np.arange(is_own.sum(), dtype=np.int32)
+    gain = 1.0 - vignetting * rim**2
     footprint = np.nan_to_num(footprint[seen], nan=float(np.nanmax(footprint)))
     return Rays(
         shape=(camera.height_px, camera.width),
         pixels=pixels[order],
         directions=np.ascontiguousarray(directions[seen][order], dtype=np.float32),
         footprint=footprint[order].astype(np.float32),
-        gain=(1.0 - vignetting * rim[seen][order] ** 2).astype(np.float32),
+        gain=np.concatenate([gain[seen][order], gain[is_own]]).astype(np.float32),
         wedge_start=wedge_start,
         wedges=wedges,
         ray_of=ray_of,
+        own=own[is_own].astype(np.float32),
     )
+
+
+def _own_body(directions: F64, radius: float, camera: Camera) -> F64:
+    """Colours (..., 3), blue-green-red, of the robot along rays (..., 3) from its camera; NaN where they pass it.
+
+    It is a round deck with a mark in front, and under a mirror the camera that looks up at it.
+    """
+    colours = np.full(directions.shape, np.nan)
+    height = getattr(camera, "height", None)
+    if radius <= 0.0 or height is None or height <= DECK:
+        return colours
+    with np.errstate(invalid="ignore", divide="ignore"):
+        level = np.hypot(directions[..., 0], directions[..., 1]) / np.maximum(-directions[..., 2], 1e-9)
+        azimuth = np.arctan2(directions[..., 1], directions[..., 0])
+        off = level * (height - DECK)
+        deck = off < radius
+        colours[deck] = (95.0, 82.0, 70.0)
+        colours[deck & (off > 0.88 * radius)] = (38.0, 36.0, 34.0)
+        colours[deck & (np.abs(azimuth) < 0.2)] = (40.0, 60.0, 205.0)
+        if isinstance(camera, HyperbolicMirror):
+            off = level * HANGS
+            for edge, colour in ((HOUSING, (46.0, 44.0, 42.0)), (0.6 * HOUSING, (120.0, 118.0, 115.0)),
+                                 (0.5 * HOUSING, (40.0, 22.0, 18.0))):  # fmt: skip
+                colours[off < edge] = colour
+    return colours
 
 
 def _wedges(directions: F64) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int32], F64]:

@@ -282,6 +282,7 @@ class OdometryNoise:
 class MirrorCamera:
     """The omnidirectional camera: a hyperbolic mirror over a perspective camera. Numbers as in camera.yaml."""
 
+    kind: Literal["mirror"] = "mirror"
     width: int = 640
     height_px: int = 480
     focal: Positive = 497.0
@@ -295,6 +296,47 @@ class MirrorCamera:
 
 
 @dataclass(frozen=True)
+class CylinderCamera:
+    """A ready strip: azimuths at equal steps, forward in the middle; tangents of elevations (rad) at equal steps."""
+
+    kind: Literal["cylinder"] = "cylinder"
+    width: int = 720
+    height_px: int = 180
+    elevation_top: float = 0.6
+    elevation_bottom: float = -0.8
+    height: Positive = 0.9
+
+
+@dataclass(frozen=True)
+class EquirectangularCamera:
+    """A ready panorama: azimuths at equal steps, forward in the middle, and elevations (rad) at equal steps."""
+
+    kind: Literal["equirectangular"] = "equirectangular"
+    width: int = 720
+    height_px: int = 180
+    elevation_top: float = 0.7
+    elevation_bottom: float = -0.85
+    height: Positive = 0.9
+
+
+@dataclass(frozen=True)
+class PerspectiveCamera:
+    """An ordinary camera that looks ahead, turned by `yaw`: focal length and centre in pixels."""
+
+    kind: Literal["perspective"] = "perspective"
+    width: int = 320
+    height_px: int = 240
+    focal: Positive = 277.0
+    centre: Point = (159.5, 119.5)
+    height: Positive = 0.9
+    yaw: float = 0.0
+
+
+CameraConfig = MirrorCamera | CylinderCamera | EquirectangularCamera | PerspectiveCamera
+"""Told apart by `kind`."""
+
+
+@dataclass(frozen=True)
 class Sensor:
     """What the chip does: noise (grey levels), darker rim (share lost in the corner), slow exposure drift (share)."""
 
@@ -304,6 +346,10 @@ class Sensor:
     exposure_drift: Share = 0.04
     exposure_period: Positive = 23.0
     """Seconds."""
+    shutter: Spread = 0.0
+    """Seconds that a picture takes: what moves meanwhile is blurred."""
+    sub_exposures: Annotated[int, Bounds(ge=1)] = 6
+    """Moments within it that are rendered and averaged."""
 
 
 @dataclass(frozen=True)
@@ -386,7 +432,7 @@ class WorldConfig:
     routes: dict[str, Route] = field(default_factory=dict)
     robot: Robot = Robot()
     odometry: OdometryNoise = OdometryNoise()
-    camera: MirrorCamera = MirrorCamera()
+    camera: CameraConfig = MirrorCamera()
     sensor: Sensor = Sensor()
     timing: Timing = Timing()
     ranges: Ranges = Ranges()

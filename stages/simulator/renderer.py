@@ -97,7 +97,9 @@ def render(
     """
     moving = Bodies(*figures(people, scene.looks))
     poses = np.atleast_2d(np.asarray(pose, dtype=np.float64))
-    lit = np.zeros((len(rays.pixels), 3), dtype=np.float32)
+    lit = np.zeros((len(rays.gain), 3), dtype=np.float32)
+    if len(rays.own):
+        lit[len(rays.pixels) :] = rays.own * _light_on_deck(scene, float(poses[0, 0]), float(poses[0, 1]))
     for x, y, heading in poses.tolist():
         _trace(scene, moving, rays.directions, rays.footprint, rays.wedge_start, rays.wedges, x, y, heading,
                float(eye_height), 1.0 / len(poses), lit)  # fmt: skip
@@ -105,6 +107,14 @@ def render(
     _expose(lit, rays.ray_of, rays.gain, float(exposure), float(noise), np.uint64(key), QUANTILES,
             picture.reshape(-1, 3))  # fmt: skip
     return picture
+
+
+def _light_on_deck(scene: Scene, x: float, y: float) -> F32:
+    """Light (3,) that falls on the robot at a point of the map."""
+    column, row = (round((at - corner) / scene.light_step) for at, corner in zip((x, y), scene.grid, strict=False))
+    _, rows, columns, _ = scene.light.shape
+    here: F32 = scene.light[0, min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)]
+    return here
 
 
 @numba.njit(cache=True, error_model="numpy", parallel=True)

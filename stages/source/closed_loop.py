@@ -9,7 +9,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
 from omninav.stages.geometry.se2 import between, compose
 from omninav.stages.simulator import tours
-from omninav.stages.simulator.cameras import camera_rays
+from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.config import Event, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.obstacles import gather
@@ -28,7 +28,7 @@ from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
 
 from .recording import UnreadableRecording
-from .simulated import EPOCH, mirror, ring_scan, simulation_digest
+from .simulated import EPOCH, ring_scan, simulation_digest
 
 F64 = npt.NDArray[np.float64]
 
@@ -86,8 +86,8 @@ class ClosedLoop(Source):
         self._world, self._scene = world, world.scene
         self._room = gather(world.obstacles, self.world.size, reach(self.world.robot))
         self._limits = limits(self.world.robot)
-        self._camera = mirror(self.world.camera)
-        self._rays = camera_rays(self._camera, self.world.sensor.vignetting)
+        self._camera = camera_of(self.world.camera)
+        self._rays = camera_rays(self._camera, self.world.sensor.vignetting, self.world.robot.radius)
         self._bias = draw_bias(self.world.odometry, stream(self.world.seed, "odometry bias", self.day))
         self._first = self._first_pose(world)
 

@@ -14,8 +14,8 @@ from omninav.pipeline.files import digest_file, digest_text
 from omninav.stages import simulator
 from omninav.stages.geometry import catadioptric, odometry_noise, se2
 from omninav.stages.simulator import tours
-from omninav.stages.simulator.cameras import Rays, camera_rays
-from omninav.stages.simulator.config import Event, MirrorCamera, WorldConfig
+from omninav.stages.simulator.cameras import Rays, camera_of, camera_rays, shutter_times
+from omninav.stages.simulator.config import Event, WorldConfig
 from omninav.stages.simulator.obstacles import Obstacles, gather
 from omninav.stages.simulator.odometry import draw_bias, odometry
 from omninav.stages.simulator.people import Person, Track
@@ -24,7 +24,6 @@ from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.robot import drive, reach
 from omninav.stages.simulator.streams import stream
 from omninav.stages.simulator.world import World
-from omninav.stages.values.camera import HyperbolicMirror
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
@@ -57,7 +56,7 @@ class SimulatedRecording:
             )
         self.world, self.route, self.day = world, route, day
         self.events = tuple(sorted(events, key=lambda event: event.at))
-        self.camera = mirror(world.camera)
+        self.camera = camera_of(world.camera)
         self.dropped: Counter[str] = Counter()
         self.details: dict[str, str] = {}
         self._start = EPOCH + day * 86400 * 10**9 + (9 + sorted(world.routes).index(route)) * 3600 * 10**9
@@ -83,6 +82,7 @@ class SimulatedRecording:
         # Up to that moment it was where its wheels had brought it: nobody flies from one place to the other
         self._true_seconds = np.insert(driven.times, put, driven.times[put])
         self.true_poses = np.insert(driven.poses, put, driven.rolled_to[put], axis=0)
+        self._true_columns = (*self.true_poses[:, :2].T.copy(), np.unwrap(self.true_poses[:, 2]))
         self.true_times: I64 = np.insert(self.times, put, self.times[put] - 1)
 
     def _take_pictures(self) -> None:
@@ -120,7 +120,9 @@ class SimulatedRecording:
         return stamps
 
     def _true(self, seconds: F64) -> F64:
-        return se2.interpolate(self._true_seconds, self.true_poses, seconds)
+        """Where the robot was, (N, 3), at times (N,); `se2.interpolate` would go through the whole drive each time."""
+        columns = [np.interp(seconds, self._true_seconds, column) for column in self._true_columns]
+        return np.stack([columns[0], columns[1], se2.wrap(columns[2])], axis=-1)
 
     @property
     def name(self) -> str:
@@ -153,7 +155,7 @@ class SimulatedRecording:
         return render(
             self._world.scene,
             self._rays,
-            self._true(at[None])[0],
+            self._true(shutter_times(sensor, at)),
             self.world.camera.height,
             exposure=sensor.exposure * (1.0 + sensor.exposure_drift * float(swing)),
             noise=sensor.noise,
@@ -163,7 +165,7 @@ class SimulatedRecording:
 
     @cached_property
     def _rays(self) -> Rays:
-        return camera_rays(self.camera, self.world.sensor.vignetting)
+        return camera_rays(self.camera, self.world.sensor.vignetting, self.world.robot.radius)
 
     def scan(self, frame: int) -> Scan | None:
         """The last turn of the range ring before a frame."""
@@ -187,6 +189,14 @@ class SimulatedRecording:
         return digest_text(simulation_digest(self.world), self.route, str(self.day), events)
 
 
+def in_order(days: int | Sequence[int]) -> list[int]:
+    """Days that a route is driven on, each once, in the order of the calendar. Raises `UnreadableRecording`."""
+    listed = sorted({days} if isinstance(days, int) else set(days))
+    if not listed or listed[0] < 0:
+        raise UnreadableRecording("days are numbered from 0; type day=1 or day=[0,1,2]")
+    return listed
+
+
 def simulation_digest(world: WorldConfig) -> str:
     """sha256 over a world and the code that simulates it."""
     folder = Path(simulator.__file__).parent
@@ -200,21 +210,3 @@ def ring_scan(world: WorldConfig, metres: F64) -> Scan:
     """A turn of a world's range ring as the value that travels on wires."""
     first, step = azimuths(world.ranges)
     return Scan(metres, first, step, nearest=0.0, farthest=world.ranges.farthest)
-
-
-def mirror(camera: MirrorCamera) -> HyperbolicMirror:
-    """A world's camera as the value that travels on wires."""
-    return HyperbolicMirror(
-        width=camera.width,
-        height_px=camera.height_px,
-        focal_x=camera.focal,
-        focal_y=camera.focal,
-        centre_x=camera.centre[0],
-        centre_y=camera.centre[1],
-        a=camera.a,
-        b=camera.b,
-        inner_radius_px=camera.inner_radius_px,
-        outer_radius_px=camera.outer_radius_px,
-        height=camera.height,
-        yaw=camera.yaw,
-    )

@@ -1,6 +1,7 @@
 """Simulated drives as MCAP logs."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.log import LogWriter
+from omninav.stages.values.camera import Camera, HyperbolicMirror, Perspective
 
 from .camera_yaml import write_camera
 from .simulated import SimulatedRecording
@@ -20,29 +22,35 @@ WHEEL_TRANSIT, RING_TRANSIT = 2_000_000, 5_000_000
 """Nanoseconds from the stamp of odometry and of a range reading to its arrival."""
 
 
-def record(recording: SimulatedRecording, path: Path, quality: int = 90) -> None:
-    """Write a simulated drive as an MCAP log; the same recording gives the same bytes.
+def record(recordings: SimulatedRecording | Sequence[SimulatedRecording], path: Path, quality: int = 90) -> None:
+    """Write a simulated drive, or several one after the other, as an MCAP log; the same drives give the same bytes.
 
     Topics as every recording has them: JPEG pictures, camera information, odometry, truth, ranges (`/scan`); what was
     done to the robot stands on `/ground_truth/event` as JSON; camera.yaml is attached. Odometry, truth and ranges come
     at their own rates. Log times run behind header stamps as a camera's, a wheel's and a ring's do.
     """
+    drives = [recordings] if isinstance(recordings, SimulatedRecording) else recordings
     with LogWriter(path) as log:
-        log.attach("camera.yaml", write_camera(recording.camera).encode(), "application/yaml")
-        for arrival, topic, number in sorted(_arrivals(recording)):
-            if topic == "odometry":
-                _write_odometry(log, recording, number, arrival)
-            elif topic == "truth":
-                stamp = int(recording.true_times[number])
-                truth = {"header": {"frame_id": "map"}, "pose": _pose(recording.true_poses[number])}
-                log.write("/ground_truth/pose", "geometry_msgs/msg/PoseStamped", stamp, truth, arrival)
-            elif topic == "scan":
-                _write_scan(log, recording, number, arrival)
-            elif topic == "event":
-                said = json.dumps(asdict(recording.events[number]))
-                log.write("/ground_truth/event", "std_msgs/msg/String", arrival, {"data": said})
-            else:
-                _write_picture(log, recording, number, arrival, quality)
+        log.attach("camera.yaml", write_camera(drives[0].camera).encode(), "application/yaml")
+        for drive in drives:
+            _write(log, drive, quality)
+
+
+def _write(log: LogWriter, recording: SimulatedRecording, quality: int) -> None:
+    for arrival, topic, number in sorted(_arrivals(recording)):
+        if topic == "odometry":
+            _write_odometry(log, recording, number, arrival)
+        elif topic == "truth":
+            stamp = int(recording.true_times[number])
+            truth = {"header": {"frame_id": "map"}, "pose": _pose(recording.true_poses[number])}
+            log.write("/ground_truth/pose", "geometry_msgs/msg/PoseStamped", stamp, truth, arrival)
+        elif topic == "scan":
+            _write_scan(log, recording, number, arrival)
+        elif topic == "event":
+            said = json.dumps(asdict(recording.events[number]))
+            log.write("/ground_truth/event", "std_msgs/msg/String", arrival, {"data": said})
+        else:
+            _write_picture(log, recording, number, arrival, quality)
 
 
 def _arrivals(recording: SimulatedRecording) -> list[tuple[int, str, int]]:
@@ -80,20 +88,22 @@ def _write_scan(log: LogWriter, recording: SimulatedRecording, number: int, arri
 
 def _write_picture(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int, quality: int) -> None:
     _, stamp, shot = recording.sent[number]
-    camera = recording.camera
-    matrix = [camera.focal_x, camera.skew, camera.centre_x, 0.0, camera.focal_y, camera.centre_y, 0.0, 0.0, 1.0]
-    info = {
-        "header": {"frame_id": "omni_camera"},
-        "width": camera.width,
-        "height": camera.height_px,
-        "distortion_model": "hyperbolic_mirror",
-        "d": [camera.a, camera.b],
-        "k": matrix,
-    }
+    info = _camera_info(recording.camera)
     _, packed = cv2.imencode(".jpg", recording.picture(shot), [cv2.IMWRITE_JPEG_QUALITY, quality])
     picture = {"header": {"frame_id": "omni_camera"}, "format": "jpeg", "data": packed.ravel()}
     log.write("/camera/camera_info", "sensor_msgs/msg/CameraInfo", stamp, info, arrival)
     log.write("/camera/image/compressed", "sensor_msgs/msg/CompressedImage", stamp, picture, arrival)
+
+
+def _camera_info(camera: Camera) -> dict[str, Any]:
+    """What a CameraInfo can say of a camera; camera.yaml says the rest."""
+    info = {"header": {"frame_id": "omni_camera"}, "width": camera.width, "height": camera.height_px}
+    if isinstance(camera, HyperbolicMirror | Perspective):
+        k = [camera.focal_x, camera.skew, camera.centre_x, 0.0, camera.focal_y, camera.centre_y, 0.0, 0.0, 1.0]
+        info["k"] = k
+    if isinstance(camera, HyperbolicMirror):
+        info |= {"distortion_model": "hyperbolic_mirror", "d": [camera.a, camera.b]}
+    return info
 
 
 def _pose(pose: F64) -> dict[str, Any]:

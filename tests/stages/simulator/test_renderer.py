@@ -10,13 +10,22 @@ import numpy.typing as npt
 import pytest
 
 from omninav.stages.geometry.catadioptric import project
-from omninav.stages.simulator.cameras import camera_rays, turn
-from omninav.stages.simulator.config import Block, Lamp, WorldConfig
+from omninav.stages.simulator.cameras import camera_of, camera_rays, shutter_times, turn
+from omninav.stages.simulator.config import (
+    Block,
+    CameraConfig,
+    CylinderCamera,
+    EquirectangularCamera,
+    Lamp,
+    MirrorCamera,
+    PerspectiveCamera,
+    Sensor,
+    WorldConfig,
+)
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import Scene, render
 from omninav.stages.simulator.world import World
-from omninav.stages.source.simulated import mirror
-from omninav.stages.values.camera import Cylindrical, Donut, Equirectangular, Perspective
+from omninav.stages.values.camera import Camera, Cylindrical, Donut, Equirectangular, HyperbolicMirror, Perspective
 
 EYE = 0.9
 PANORAMA = Equirectangular(
@@ -72,30 +81,60 @@ FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (
 """Corners around each face, numbered 4 x + 2 y + z."""
 
 
+CAMERAS = [MirrorCamera(), CylinderCamera(), EquirectangularCamera(), PerspectiveCamera(yaw=0.2)]
+
+
+def projected(camera: Camera, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Pixels (N, 2), integer at their centres, of points in the robot's frame from the eye."""
+    if isinstance(camera, HyperbolicMirror):
+        rays = turn(points, -camera.yaw)
+        return project(
+            rays, camera.focal_x, camera.focal_y, camera.centre_x, camera.centre_y, camera.skew, camera.a, camera.b
+        )
+    if isinstance(camera, Perspective):
+        ahead = turn(points, -camera.yaw)
+        return np.stack(
+            [
+                camera.centre_x - camera.focal_x * ahead[:, 1] / ahead[:, 0],
+                camera.centre_y - camera.focal_y * ahead[:, 2] / ahead[:, 0],
+            ],
+            axis=1,
+        )
+    assert isinstance(camera, Cylindrical | Equirectangular)
+    assert camera.elevation_top is not None
+    assert camera.elevation_bottom is not None
+    slope = points[:, 2] / np.hypot(points[:, 0], points[:, 1])
+    high, top, bottom = np.arctan(slope), camera.elevation_top, camera.elevation_bottom
+    if isinstance(camera, Cylindrical):
+        high, top, bottom = slope, math.tan(top), math.tan(bottom)
+    column = camera.column_of_forward - np.arctan2(points[:, 1], points[:, 0]) / (2 * math.pi) * camera.width
+    return np.stack([column - 0.5, (top - high) / (top - bottom) * camera.height_px - 0.5], axis=1)
+
+
 @pytest.mark.parametrize("pose", [(4.6, 4.2, 0.3), (7.2, 6.4, -2.0), (6.3, 3.2, 1.9)])
-def test_a_box_in_the_mirror_lies_within_half_a_pixel_of_where_its_edges_project(
-    marker: tuple[Scene, npt.NDArray[np.float64]], pose: tuple[float, float, float]
+@pytest.mark.parametrize("config", CAMERAS, ids=lambda config: str(config.kind))
+def test_each_camera_of_a_world_sees_a_box_within_half_a_pixel_of_where_its_edges_project(
+    marker: tuple[Scene, npt.NDArray[np.float64]], config: CameraConfig, pose: tuple[float, float, float]
 ) -> None:
     """Its faces, with edges finely cut and projected, are filled at 8 times the size: there the outline is known."""
     scene, corners = marker
-    camera = mirror(DEMO.camera)
+    if isinstance(config, PerspectiveCamera):
+        config = dataclasses.replace(config, yaw=math.atan2(5.0 - pose[1], 6.0 - pose[0]) - pose[2] + 0.1)
+    camera = camera_of(config)
     picture = render(scene, camera_rays(camera), pose, EYE)[..., 0]
-    fine = np.zeros((480 * 8, 640 * 8), dtype=np.uint8)
+    fine = np.zeros((camera.height_px * 8, camera.width * 8), dtype=np.uint8)
     for face in FACES:
         edges = [
             corners[a] + (corners[b] - corners[a]) * part
             for a, b in zip(face, (*face[1:], face[0]), strict=True)
             for part in np.linspace(0.0, 1.0, 100)
         ]
-        rays = turn(seen_from(np.array(edges), pose), -camera.yaw)
-        pixels = project(
-            rays, camera.focal_x, camera.focal_y, camera.centre_x, camera.centre_y, camera.skew, camera.a, camera.b
-        )
+        pixels = projected(camera, seen_from(np.array(edges), pose))
         cv2.fillPoly(fine, [np.round(pixels * 8).astype(np.int32)], 255)
-    assert (picture > 127).sum() > 100
+    lit = picture > 127
+    assert lit.sum() > 100
     inside = cv2.distanceTransform(fine, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[::8, ::8] / 8
     outside = cv2.distanceTransform(255 - fine, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[::8, ::8] / 8
-    lit = picture > 127
     assert lit[inside > 0.5].all()
     assert not lit[outside > 0.5].any()
 
@@ -177,7 +216,8 @@ def test_a_bearing_in_the_mirror_is_the_angle_in_the_picture_plus_yaw(
 ) -> None:
     """Architecture, section 5: atan2(v - cy, u - cx) + yaw, counter-clockwise from the robot's forward."""
     scene, _ = marker
-    camera = mirror(DEMO.camera)
+    camera = camera_of(DEMO.camera)
+    assert isinstance(camera, HyperbolicMirror)
     heading = 0.7
     picture = render(scene, camera_rays(camera), (3.6, 4.2, heading), EYE)[..., 0]
     v, u = np.nonzero(picture > 127)
@@ -194,7 +234,7 @@ def test_a_low_shelf_is_looked_over(demo: Scene) -> None:
 
 
 def test_noise_follows_from_its_key_alone_and_has_the_stated_spread(demo: Scene) -> None:
-    rays = camera_rays(mirror(DEMO.camera), 0.1)
+    rays = camera_rays(camera_of(DEMO.camera), 0.1)
     pose = (5.8, 4.5, 0.4)
     clean = render(demo, rays, pose, EYE).astype(float)
     noisy = [render(demo, rays, pose, EYE, noise=3.0, key=key) for key in (7, 7, 8)]
@@ -209,7 +249,8 @@ def test_noise_follows_from_its_key_alone_and_has_the_stated_spread(demo: Scene)
 
 
 def test_the_ring_is_lit_and_the_robot_in_its_middle_is_black(demo: Scene) -> None:
-    camera = mirror(DEMO.camera)
+    camera = camera_of(DEMO.camera)
+    assert isinstance(camera, HyperbolicMirror)
     picture = render(demo, camera_rays(camera), (5.8, 4.5, 0.4), EYE)
     v, u = np.mgrid[0:480, 0:640]
     radius = np.hypot(u - camera.centre_x, v - camera.centre_y)
@@ -218,7 +259,7 @@ def test_the_ring_is_lit_and_the_robot_in_its_middle_is_black(demo: Scene) -> No
 
 
 def test_the_number_of_threads_does_not_change_a_picture(demo: Scene) -> None:
-    rays = camera_rays(mirror(DEMO.camera), 0.1)
+    rays = camera_rays(camera_of(DEMO.camera), 0.1)
     threads = numba.get_num_threads()
     try:
         pictures = []
@@ -228,6 +269,63 @@ def test_the_number_of_threads_does_not_change_a_picture(demo: Scene) -> None:
     finally:
         numba.set_num_threads(threads)
     np.testing.assert_array_equal(*pictures)
+
+
+def test_a_turn_by_whole_columns_is_a_shift_to_within_a_tenth_of_a_column(demo: Scene) -> None:
+    """Measured by phase correlation, rows together, to a fraction of a column, for turns either way."""
+    rays = camera_rays(camera_of(CylinderCamera()))
+    before = render(demo, rays, (5.8, 4.5, 0.4), EYE).astype(float).mean(axis=2)
+    for columns in (1, 37, 360, -200):
+        turned = render(demo, rays, (5.8, 4.5, 0.4 + columns * 2 * math.pi / 720), EYE).astype(float).mean(axis=2)
+        spectrum = (np.fft.rfft(turned, axis=1) * np.conj(np.fft.rfft(before, axis=1))).sum(axis=0)
+        spectrum[0] = 0.0
+        fine = np.fft.irfft(spectrum, n=720 * 50)  # padded: fifty steps to a column
+        shift = int(fine.argmax()) / 50
+        assert abs(math.remainder(shift - columns, 720)) <= 0.1
+
+
+def test_the_robot_sees_its_deck_and_its_camera_in_the_middle_of_the_mirror(demo: Scene) -> None:
+    camera = camera_of(DEMO.camera)
+    assert isinstance(camera, HyperbolicMirror)
+    alone = render(demo, camera_rays(camera), (5.8, 4.5, 0.4), EYE)
+    whole = render(demo, camera_rays(camera, robot_radius=0.25), (5.8, 4.5, 0.4), EYE)
+    v, u = np.mgrid[0:480, 0:640]
+    radius = np.hypot(u - camera.centre_x, v - camera.centre_y)
+    np.testing.assert_array_equal(whole[radius >= 34], alone[radius >= 34])
+    assert (whole[radius < 33].max(axis=-1) > 8).all()
+    # The red mark on the deck lies ahead: bearing 0 is at the picture angle -yaw.
+    red = (whole[..., 2].astype(int) - whole[..., 0] > 40) & (radius < 34)
+    bearing = math.atan2(v[red].mean() - camera.centre_y, u[red].mean() - camera.centre_x) + camera.yaw
+    assert abs(bearing) < 0.05
+
+
+def test_motion_blur_is_the_mean_over_the_poses_of_the_shutter_time(demo: Scene) -> None:
+    rays = camera_rays(PANORAMA)
+    poses = np.array([(5.8, 4.5, 0.4 + 0.01 * k) for k in range(4)])
+    singly = np.array([render(demo, rays, pose, EYE).astype(float) for pose in poses])
+    bright = (singly == 255).any(axis=0)  # the chip is full after all of them, not after each
+    assert np.abs(render(demo, rays, poses, EYE) - singly.mean(axis=0))[~bright].max() <= 1.0
+    np.testing.assert_allclose(shutter_times(Sensor(shutter=0.2, sub_exposures=4), 1.0), [0.925, 0.975, 1.025, 1.075])
+    np.testing.assert_array_equal(shutter_times(Sensor(), 1.0), [1.0])
+
+
+def test_what_the_grid_hides_is_what_looking_at_every_box_hides(demo: Scene) -> None:
+    """With one cell that holds all boxes nothing is left out for being hidden, and the same picture comes out."""
+    one = demo._replace(
+        cell_start=np.array([0, len(demo.boxes)], dtype=np.int32),
+        cell_boxes=np.arange(len(demo.boxes), dtype=np.int32),
+        grid=np.array([-50.0, -50.0, 200.0]),
+        rows=1,
+        columns=1,
+    )
+    light = {"light": np.ones_like(demo.light), "contact": np.ones_like(demo.contact)}  # they hang on the grid's corner
+    for pose in ((5.8, 4.5, 0.4), (1.5, 7.4, -2.0), (10.0, 1.0, 1.6)):
+        for eye in (0.3, 0.9, 2.5):
+            for camera in (PANORAMA, camera_of(DEMO.camera)):
+                rays = camera_rays(camera)
+                np.testing.assert_array_equal(
+                    render(demo._replace(**light), rays, pose, eye), render(one._replace(**light), rays, pose, eye)
+                )
 
 
 def test_a_donut_without_a_mirror_model_has_no_rays() -> None:
