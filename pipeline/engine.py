@@ -150,6 +150,8 @@ class Engine:
         self.calls: dict[str, Call] = {}
         for node in graph.nodes.values():
             ctx = Context(node.name, np.random.default_rng([seed, zlib.crc32(node.name.encode())]), folder)
+            origins = [*wanted, *(o for wire in graph.wires for o in (wire.origin, wire.initial) if o)]
+            ctx.read = frozenset(port for name, _, port in (o.partition(".") for o in origins) if name == node.name)
             wires = [wire for wire in graph.inputs_of(node.name) if not wire.collect]
             self.calls[node.name] = Call(node, wires, ctx, static)
         self.static = static

@@ -86,7 +86,12 @@ class Context:
         self.details: dict[str, str] = {}
         self.facts: dict[str, Any] = {}
         self.drew = False
+        self.read: frozenset[str] | None = None
         self._rng = rng
+
+    def is_read(self, port: str) -> bool:
+        """Whether anybody reads an output. What nobody reads may be left out, if nothing random is drawn for it."""
+        return self.read is None or port in self.read
 
     @property
     def rng(self) -> "np.random.Generator":

@@ -376,7 +376,7 @@ class Ranges:
     """Standard deviation (m) of an echo."""
     lost: Share = 0.02
     """Share of readings without an echo though something is there."""
-    rate: Positive = 10.0
+    rate: Positive = 5.0
     """Readings (Hz) of the whole ring in a log."""
 
 

@@ -41,7 +41,8 @@ class LogSource(Source):
     """Recorded drives, one after another: a tick for every picture that can be used.
 
     `log` names one recording or several (see `open_recording`); without one, `route` of the simulated `world` is driven
-    on `day`, with `events` on its way. `first`, `stop` and `stride` select frames of each.
+    on `day` (or one after the other on several), with `events` on its way. `first`, `stop` and `stride` select frames
+    of each. After a pause of more than `new_log_after` seconds another log begins: several days may lie in one file.
     Poses are metres and radians; stamps are header stamps. `motion` is the SE(2) increment of the odometry between
     the pictures' own times, absent at the first picture of each log; where pictures are left out it spans the gap.
 
@@ -52,7 +53,7 @@ class LogSource(Source):
     log: str | tuple[str, ...] | None = None
     world: WorldConfig = DEMO
     route: str | None = None
-    day: int = 1
+    day: int | tuple[int, ...] = 1
     events: tuple[Event, ...] = ()
     topics: Topics = Topics()
     camera: str | None = None
@@ -60,6 +61,7 @@ class LogSource(Source):
     first: Annotated[int, Bounds(ge=0)] = 0
     stop: Annotated[int, Bounds(ge=1)] | None = None
     stride: Annotated[int, Bounds(ge=1)] = 1
+    new_log_after: Annotated[float, Bounds(gt=0)] = 3600.0
     synthetic_distance_noise: Annotated[float, Bounds(ge=0.10)] = 0.10
     synthetic_turn_noise_deg_per_m: Annotated[float, Bounds(ge=3.0)] = 3.0
     synthetic_turn_noise_deg_per_rad: Annotated[float, Bounds(ge=0.0)] = 3.0
@@ -76,17 +78,17 @@ class LogSource(Source):
     def setup(self, ctx: Context) -> None:
         """Open all logs; what is lost by then is counted."""
         self._open()
-        for recording, lost in zip(self._recordings, self._lost, strict=True):
+        for recording, lost in zip(self._opened, self._lost, strict=True):
             for kind, number in sorted(lost.items()):
                 ctx.count(kind, number, recording.details.get(kind, ""))
-        kinds = [_odometry_kind(recording) for recording in self._recordings]
+        kinds = [_odometry_kind(recording) for recording in self._opened]
         ctx.fact("odometry", ", ".join(dict.fromkeys(kinds)))
 
     def inputs_digest(self) -> str | None:
         """sha256 over the content of all logs, in their order."""
         self._open()
         whole = hashlib.sha256()
-        for recording in self._recordings:
+        for recording in self._opened:
             whole.update(recording.digest().encode())
         return whole.hexdigest()
 
@@ -143,7 +145,7 @@ class LogSource(Source):
             odometry=_pose(odometry),
             motion=None if increment is None else Motion(*(float(value) for value in increment)),
             truth=_pose(truth),
-            scan=recording.scan(frame),
+            scan=recording.scan(frame) if ctx.is_read("scan") else None,
         )
 
     def _disturbed(self, ctx: Context, increment: Array) -> Array:
@@ -156,29 +158,33 @@ class LogSource(Source):
         )
 
     def _open(self) -> None:
-        if getattr(self, "_recordings", None) is not None:
+        if getattr(self, "_opened", None) is not None:
             return
         names = (self.log,) if isinstance(self.log, str) or self.log is None else self.log
         recordings: list[Recording]
         if self.log is None and self.route is not None:
-            from .simulated import SimulatedRecording  # brings the compiler, which a log does not need
+            from .simulated import SimulatedRecording, in_order  # brings the compiler, which a log does not need
 
-            recordings = [SimulatedRecording(self.world, self.route, self.day, self.events)]
+            days = in_order(self.day)
+            recordings = [SimulatedRecording(self.world, self.route, day, self.events) for day in days]
         elif not names or None in names:
             raise UnreadableRecording("no recording is named; type log=PATH")
         else:
             recordings = [open_recording(str(name), self.topics, self.camera, self.layouts) for name in names]
-        self._frames = [
-            np.arange(len(recording.stamps))[self.first : self.stop : self.stride] for recording in recordings
-        ]
-        for recording, frames in zip(recordings, self._frames, strict=True):
+        self._recordings, self._frames = [], []
+        for recording in recordings:
+            frames = np.arange(len(recording.stamps))[self.first : self.stop : self.stride]
             if not len(frames):
                 raise UnreadableRecording(
                     f"{recording.name}: first={self.first}, stop={self.stop} leaves none of its frames; "
                     "type nodes.source.first=0 nodes.source.stop=null"
                 )
+            pauses = np.flatnonzero(np.diff(recording.stamps[frames]) > self.new_log_after * 1e9) + 1
+            for part in np.split(frames, pauses):
+                self._recordings.append(recording)
+                self._frames.append(part)
+        self._opened = recordings
         self._lost = [recording.dropped.copy() for recording in recordings]
-        self._recordings = recordings
 
 
 def disturb(increment: Array, noise: Array, distance: float, turn_per_metre: float, turn_per_radian: float) -> Array:

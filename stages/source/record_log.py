@@ -1,9 +1,8 @@
 """Writing a drive through a simulated world as a log, with its floor plan and grid beside it."""
 
 from pathlib import Path
-from typing import Annotated
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.problems import BadInput
 from omninav.stages.simulator.config import Event, WorldConfig
 from omninav.stages.simulator.demo import DEMO
@@ -12,21 +11,21 @@ from omninav.stages.simulator.plan import draw_plan
 from omninav.stages.simulator.world import World
 
 from .camera_yaml import write_camera
-from .simulated import SimulatedRecording
+from .simulated import SimulatedRecording, in_order
 from .simulated_log import record
 
 
 class RecordLog(Stage):
-    """Writes one simulated drive: the log, and beside it camera.yaml, a floor plan and an occupancy grid.
+    """Writes a simulated drive, or one on each of several days: a log, camera.yaml, a floor plan, an occupancy grid.
 
-    `log`: the .mcap file to write; the others are named after it. The same world, route, day
-    and events give the same bytes.
-    Raises `BadInput` where `log` is no .mcap name and `UnreadableRecording` for an unknown route.
+    `log`: the .mcap file to write; the others are named after it. Plan and grid are the first day's. The same world,
+    route, days and events give the same bytes. Raises `BadInput` where `log` is no .mcap name and
+    `UnreadableRecording` for an unknown route.
     """
 
     world: WorldConfig = DEMO
     route: str = "drive"
-    day: Annotated[int, Bounds(ge=0)] = 1
+    day: int | tuple[int, ...] = 1
     log: str | None = None
     events: tuple[Event, ...] = ()
 
@@ -38,11 +37,14 @@ class RecordLog(Stage):
         path = Path(self.log or "")
         if path.suffix != ".mcap":
             raise BadInput("simulate: name the log to write: log=out.mcap")
-        recording = SimulatedRecording(self.world, self.route, self.day, self.events)
-        record(recording, path)
-        path.with_suffix(".camera.yaml").write_text(write_camera(recording.camera))
-        world = World(self.world, self.day)
-        draw_plan(world, path.with_suffix(".plan.png"), {self.route: recording.truth})
+        days = in_order(self.day)
+        drives = [SimulatedRecording(self.world, self.route, day, self.events) for day in days]
+        record(drives, path)
+        path.with_suffix(".camera.yaml").write_text(write_camera(drives[0].camera))
+        world = World(self.world, days[0])
+        driven = {f"{self.route}, day {drive.day}": drive.truth for drive in drives}
+        draw_plan(world, path.with_suffix(".plan.png"), driven)
         grid = write_grid(world, path.parent / f"{path.stem}.grid")
-        print(f"{path}: {len(recording.stamps)} pictures; floor plan, camera.yaml and {grid} beside it")
+        pictures = sum(len(drive.stamps) for drive in drives)
+        print(f"{path}: {pictures} pictures; floor plan, camera.yaml and {grid} beside it")
         return self.Out()

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from omninav.pipeline import Context
 from omninav.pipeline.artifact import Cache
 from omninav.pipeline.engine import Engine, StageFailed
 from omninav.pipeline.front import cached_front, front_nodes, keep
@@ -85,6 +86,19 @@ def test_a_value_updated_in_place_is_seen_delayed_before_the_writer_and_whole_at
         "all": {"numbers": {"from": "look.number", "collect": True}},
     }
     assert numbers(graph_of({k: v for k, v in nodes.items() if k != "final"}, wires), tmp_path) == list(range(10))
+
+
+def test_a_stage_knows_which_of_its_outputs_are_read_by_wires_first_values_and_whoever_wants_them():
+    wires = {
+        "source": {"command": {"from": "drive.number", "delay": 1, "initial": "stop.number"}},
+        "drive": {"number": "source.felt"},
+    }
+    graph = graph_of({"source": "Steered", "drive": "Scale", "stop": "Constant"}, wires)
+    engine = Engine(graph, {}, 0, wanted=["source.truth"])
+    source, stop = engine.calls["source"].ctx, engine.calls["stop"].ctx
+    assert [source.is_read(port) for port in ("felt", "truth", "hidden", "tick")] == [True, True, False, False]
+    assert stop.is_read("number")
+    assert Context("alone").is_read("anything")
 
 
 def test_randomness_comes_from_seed_and_node_name_alone(tmp_path: Path):

@@ -133,3 +133,34 @@ def test_added_noise_makes_a_days_odometry_worse():
 
     assert drift((0.0, 0.0, 0.0)) < 0.01
     assert drift((20.0, 20.0, 20.0)) > 0.1
+
+
+def test_several_days_in_one_log_are_read_as_one_drive_after_another(tmp_path: Path):
+    days = [SimulatedRecording(replace(WORLD, delivery=Delivery()), "there", day) for day in (0, 2)]
+    record(days, tmp_path / "days.mcap")
+
+    def ticks(source: LogSource) -> list[LogSource.Out]:
+        ctx, position, outs = Context("source"), Position(), []
+        source.setup(ctx)
+        while (out := source.step(ctx, position)) is not None:
+            outs.append(out)
+        assert len(outs) == source.length()
+        return outs
+
+    read = ticks(LogSource(log=str(tmp_path / "days.mcap")))
+    driven = ticks(LogSource(world=replace(WORLD, delivery=Delivery()), route="there", day=(2, 0)))
+    assert [out.tick.log for out in read] == [0] * len(days[0].stamps) + [1] * len(days[1].stamps)
+    assert [out.motion is None for out in read] == [out.tick.first_of_log for out in read]
+    assert sum(out.tick.first_of_log for out in read) == 2
+    for one, other in zip(read, driven, strict=True):
+        assert (one.tick.stamp, one.tick.log, one.tick.first_of_log) == (
+            other.tick.stamp,
+            other.tick.log,
+            other.tick.first_of_log,
+        )
+        assert one.motion is None or vars(one.motion) == pytest.approx(vars(other.motion), abs=1e-9)
+
+
+def test_days_that_cannot_be_are_refused():
+    with pytest.raises(UnreadableRecording, match=r"days are numbered from 0; type day=1 or day=\[0,1,2\]"):
+        LogSource(world=WORLD, route="there", day=(0, -1)).setup(Context("source"))
