@@ -22,9 +22,10 @@ def rows() -> list[Row]:
                 log.write(
                     "/odom", "nav_msgs/msg/Odometry", number * 50_000_000, {"header": {"frame_id": "odom"}, **pose}
                 )
-        noise = np.random.default_rng(0).integers(0, 255, 60_000, dtype=np.uint8)
+        rng = np.random.default_rng(0)
         with LogWriter(pictures) as log:
             for number in range(300):
+                noise = rng.integers(0, 255, 60_000, dtype=np.uint8)  # as little to compress as in a JPEG
                 image = {"header": {"frame_id": "camera"}, "format": "jpeg", "data": noise}
                 log.write("/image", "sensor_msgs/msg/CompressedImage", number * 100_000_000, image)
         return [_row("odometry", odometry), _row("pictures", pictures)]

@@ -7,6 +7,7 @@ Reading trusts nothing: every chunk's checksum is verified, a damaged chunk cost
 gives every whole message before the cut. What was lost is counted by kind.
 """
 
+import os
 import struct
 import zlib
 from collections import Counter, OrderedDict
@@ -24,7 +25,7 @@ import zstandard
 from lz4 import frame as lz4
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Footer, Schema
+from mcap.records import Attachment, Channel, ChunkIndex, Footer, Schema
 from mcap.writer import CompressionType, Writer
 
 from .files import whole_file
@@ -39,7 +40,10 @@ _MESSAGE = struct.Struct("<HIQQ")
 _STAMP_LITTLE, _STAMP_BIG = struct.Struct("<iI").unpack_from, struct.Struct(">iI").unpack_from
 _FOOTER_SIZE = _RECORD.size + 20 + len(MAGIC)
 _DEFINITION_ENCODINGS = ("ros2msg", "ros2idl")
-_CHUNKS_IN_MEMORY = 4
+_CHUNK_HEAD = struct.Struct("<QQQII")
+_LENGTH = struct.Struct("<Q")
+_BYTES_IN_MEMORY = 32_000_000
+"""Of unpacked chunks, beside the last one used: logs up to that size are unpacked once."""
 
 
 class LogError(BadInput):
@@ -89,7 +93,7 @@ class LogReader:
     """One MCAP file: its topics, attachments and messages, as far as they are sound.
 
     Opening reads the summary at the end of the file, where there is one, and nothing else. `scan` goes through the
-    file once and keeps no message; `fetch` reads the bytes of one message again (a few unpacked chunks stay in memory).
+    file once and keeps no message; `fetch` reads the bytes of one message again (some unpacked chunks stay in memory).
     `dropped` counts what was lost, by kind, and `details` tells the first case of each:
 
     * `cut_file`: the file ends before its end record;
@@ -108,6 +112,7 @@ class LogReader:
         self._channels: dict[int, Channel] = {}
         self._chunks: list[_Chunk] = []
         self._unpacked: OrderedDict[int, bytes] = OrderedDict()
+        self._in_memory = 0
         self._stores: dict[str, Typestore] = {}
         self._known_channels: dict[int, tuple[str, bool]] = {}
         self._types: dict[str, str] = {}
@@ -146,6 +151,7 @@ class LogReader:
         """Every sound message of some topics (None: all), in the order of the file."""
         self._chunks.clear()
         self._unpacked.clear()
+        self._in_memory = 0
         if self._scanned:  # a second pass counts nothing twice
             kept = self.dropped.copy()
             yield from self._scan(topics)
@@ -154,7 +160,7 @@ class LogReader:
             yield from self._scan(topics)
             self._scanned = True
 
-    def fetch(self, location: Location) -> bytes:
+    def fetch(self, location: Location) -> bytes | memoryview:
         """The bytes of a message found by `scan`."""
         if location.chunk < 0:
             with self.path.open("rb") as file:
@@ -164,14 +170,15 @@ class LogReader:
         if data is None:
             chunk = self._chunks[location.chunk]
             with self.path.open("rb") as file:
-                file.seek(chunk.start)
-                data = _unpack(file.read(chunk.length), chunk.whole)
+                packed = os.pread(file.fileno(), chunk.length, chunk.start)
+            data = _unpack(packed, chunk.whole, check=False)  # `scan` has checked it
             self._unpacked[location.chunk] = data
-            while len(self._unpacked) > _CHUNKS_IN_MEMORY:
-                self._unpacked.popitem(last=False)
+            self._in_memory += len(data)
+            while self._in_memory > _BYTES_IN_MEMORY and len(self._unpacked) > 1:
+                self._in_memory -= len(self._unpacked.popitem(last=False)[1])
         else:
             self._unpacked.move_to_end(location.chunk)
-        return data[location.start : location.start + location.length]
+        return memoryview(data)[location.start : location.start + location.length]
 
     def decode(self, topic: str, data: bytes | memoryview) -> Any:
         """A message object (fields as attributes, as ROS names them). Raises `BadMessage`."""
@@ -243,11 +250,10 @@ class LogReader:
             for opcode, start, length, whole in self._walk(file):
                 if opcode == Opcode.CHUNK:
                     seen.add(start - _RECORD.size)
-                    file.seek(start)
-                    content = file.read(length)
+                    packed = os.pread(file.fileno(), length, start)  # past the file's buffer, which would copy it
                     self._chunks.append(_Chunk(start, length, whole))
                     try:
-                        data = _unpack(content, whole)
+                        data = _unpack(packed, whole)
                     except Exception as error:
                         if whole:
                             self.drop(
@@ -255,7 +261,11 @@ class LogReader:
                                 f"{self.path}: chunk at byte {start - _RECORD.size}: {error}",
                             )
                         continue
-                    yield from self._in_chunk(data, len(self._chunks) - 1, topics, whole)
+                    number = len(self._chunks) - 1
+                    if self._in_memory + len(data) <= _BYTES_IN_MEMORY:
+                        self._unpacked[number] = data
+                        self._in_memory += len(data)
+                    yield from self._in_chunk(data, number, topics, whole)
                 elif not whole:
                     continue
                 elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
@@ -563,25 +573,31 @@ def _parse(kind: Any, content: bytes) -> Any:
     return kind.read(ReadDataStream(BytesIO(content)))
 
 
-def _unpack(content: bytes, whole: bool) -> bytes:
+def _unpack(content: bytes, whole: bool, check: bool = True) -> bytes:
     """The records in a chunk. A chunk that was cut off gives what its compression has let through so far.
 
-    Raises whatever a damaged chunk makes the decompressors raise, and ValueError for a wrong checksum.
+    Raises whatever a damaged chunk makes the decompressors raise, and ValueError for a wrong checksum (with `check`).
     """
     if not whole:
         return _unpack_cut(content)
-    chunk = _parse(Chunk, content)
-    if chunk.compression == "zstd":
-        data = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=chunk.uncompressed_size)
-    elif chunk.compression == "lz4":
-        data = lz4.decompress(chunk.data)  # type: ignore[attr-defined]
-    elif chunk.compression == "":
-        data = chunk.data
+    _, _, size, checksum, named = _CHUNK_HEAD.unpack_from(content)
+    at = _CHUNK_HEAD.size + named
+    compression = content[_CHUNK_HEAD.size : at].decode()
+    packed = memoryview(content)[at + _LENGTH.size :]
+    if len(packed) < _LENGTH.unpack_from(content, at)[0]:
+        raise ValueError("it is shorter than it says")
+    packed = packed[: _LENGTH.unpack_from(content, at)[0]]
+    if compression == "zstd":
+        data = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
+    elif compression == "lz4":
+        data = lz4.decompress(packed)  # type: ignore[attr-defined]
+    elif compression == "":
+        data = bytes(packed)
     else:
-        raise ValueError(f"its compression '{chunk.compression}' is not known")
-    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise ValueError(f"its compression '{compression}' is not known")
+    if check and checksum and zlib.crc32(data) != checksum:
         raise ValueError("checksum is wrong")
-    return bytes(data)
+    return data
 
 
 def _unpack_cut(content: bytes) -> bytes:

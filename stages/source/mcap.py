@@ -57,7 +57,7 @@ class SplitLog:
             for record in part.scan(topics):
                 yield record._replace(location=(number, record.location))
 
-    def fetch(self, location: tuple[int, Location]) -> bytes:
+    def fetch(self, location: tuple[int, Location]) -> bytes | memoryview:
         """The bytes of a message again."""
         part, inside = location
         return self._parts[part].fetch(inside)
