@@ -145,8 +145,8 @@ class NearReferences(Stage):
 
     `proposals`: poses that a robot put down anywhere would likely be at, weighted by how likely: drawn by weight from
     the similarity field and spread around it (`propose: similarity`), or anywhere around the references, each with
-    its own likelihood (`uniform`). `likelihood.anywhere` says how well the view fits anywhere. For who has just been put
-    down the picture is the first of its place, so both take its whole evidence. Defaults:
+    its own likelihood (`uniform`). `likelihood.anywhere` says how well the view fits anywhere. For who has just been
+    put down the picture is the first of its place, so both take its whole evidence. Defaults:
     docs/experiments/omniview_mcl_defaults.md.
     """
 
@@ -269,14 +269,16 @@ class Field:
     def draw(self, rng: np.random.Generator, number: int) -> Ints:
         """Cells drawn by weight: (number,) flat indices. What falls to the floor is any cell."""
         chance = rng.random(number) * (self._peaks + self._flat)
-        anywhere = self.anywhere(rng, number) * self.headings + rng.integers(self.headings, size=number)
+        anywhere: Ints = self.anywhere(rng, number) * self.headings + rng.integers(self.headings, size=number)
         if not len(self._above):
             return anywhere
-        return np.where(chance < self._peaks, self._above[_drawn(self._raised, chance)], anywhere)
+        peaks = self._above[_drawn(self._raised, chance)]
+        drawn: Ints = np.where(chance < self._peaks, peaks, anywhere)
+        return drawn
 
     def anywhere(self, rng: np.random.Generator, number: int) -> Ints:
         """References drawn from the whole map, alike for all of them: (number,) rows of the compared ones."""
-        return _drawn(self._references, rng.random(number) * self._references[-1])
+        return _drawn(self._references, rng.random(number) * float(self._references[-1]))
 
 
 def _drawn(cumulative: Array, chance: Array) -> Ints:

@@ -1,0 +1,57 @@
+"""Particles weighed by the view expected at their pose."""
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.stages.geometry.nearby import nearest_cells
+from omninav.stages.geometry.segments import selective_similarity, turned_view
+from omninav.stages.sensor.expected_observation import ExpectedObservation, likeness_of_expected
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.features import SegmentHistograms
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.similarity import Similarities
+
+RNG = np.random.default_rng(0)
+REFERENCES = np.column_stack([RNG.uniform(0, 4, (40, 2)), RNG.uniform(-3, 3, 40)])
+FEATURES = RNG.random((40, 12, 20)).astype(np.float32) ** 4
+FEATURES /= FEATURES.sum(axis=2, keepdims=True)
+
+
+def test_the_expected_view_is_the_mean_of_the_nearest_turned_to_the_heading() -> None:
+    poses, view = np.column_stack([RNG.uniform(0, 4, (30, 2)), RNG.uniform(-9, 9, 30)]), FEATURES[5]
+    cells = nearest_cells(REFERENCES, 3, 0.1, 6.0)
+    found = likeness_of_expected(poses, REFERENCES, FEATURES, view, True, cells, 2.0, 0.1)
+    for pose, likeness in zip(poses, found, strict=True):
+        centre = cells.origin + (np.floor((pose[:2] - cells.origin) / cells.cell) + 0.5) * cells.cell
+        nearest = np.argsort(np.hypot(*(REFERENCES[:, :2] - centre).T))[:3]
+        squares = np.square(REFERENCES[nearest, :2] - pose[:2]).sum(axis=1)
+        weights = 1 / (squares + squares.min() / 4 + 1e-4 * 2.0**2)
+        turned = [turned_view(FEATURES[n], float(pose[2] - REFERENCES[n, 2])) for n in nearest]
+        expected = np.average(turned, axis=0, weights=weights).astype(np.float32)
+        score, known = selective_similarity(expected[None], view)[0], np.exp(-0.5 * squares.min() / 2.0**2)
+        assert likeness == pytest.approx(max(0.1, known * score + (1 - known) * 0.1), abs=2e-5)
+
+
+def test_colours_are_compared_by_their_distance() -> None:
+    colours = (RNG.random((40, 9, 3)) * 255).astype(np.float32)
+    cells = nearest_cells(REFERENCES, 1, 0.05, 3.0)
+    found = likeness_of_expected(REFERENCES, REFERENCES, colours, colours[4], False, cells, 1.0, 0.0)
+    assert int(np.argmax(found)) == 4
+    assert found[4] == pytest.approx(1.0, abs=0.01)
+
+
+def test_the_particle_where_the_view_was_taken_wins() -> None:
+    map = ReferenceGraph(REFERENCES, FEATURES, "histograms", np.zeros((0, 2), np.int64), "truth")
+    stage, ctx = ExpectedObservation(reach_m=0.1), Context("sensor", np.random.default_rng(0))
+    stage.setup(ctx)
+    seen = np.roll(FEATURES[3], 3, axis=0)  # a robot there, turned left by a quarter
+    poses = np.array(
+        [REFERENCES[3] + (0, 0, np.pi / 2), REFERENCES[3] - (0, 0, np.pi / 2), REFERENCES[7], [50.0, 50, 0]]
+    )
+    field = RNG.uniform(0.3, 0.5, (40, 12)).astype(np.float32)
+    field[3, 3] = 1.0
+    out = stage.step(ctx, Similarities(field), SegmentHistograms(seen), Particles(poses, np.full(4, 0.25)), map)
+    likelihood = out.likelihood.values
+    assert np.argmax(likelihood) == 0
+    assert likelihood[0] > 100 * likelihood[1:].max()
