@@ -23,8 +23,7 @@ def truth_in_the_loop(graph: "Graph") -> Iterator[tuple[str, str, str]]:
     for name in sorted(steering(graph)):
         for wire in graph.inputs_of(name):
             for origin in _origins(wire):
-                given = graph.port(origin)
-                if given is not None and (given.truth or getattr(given.type, "is_truth", False)):
+                if _is_truth(graph, origin):
                     what = (
                         f"{origin} is ground truth, and '{name}' steers the robot: no robot in the field would have it"
                     )
@@ -33,3 +32,13 @@ def truth_in_the_loop(graph: "Graph") -> Iterator[tuple[str, str, str]]:
 
 def _origins(wire: "Wire") -> list[str]:
     return [wire.origin, *([wire.initial] if wire.initial else [])]
+
+
+def truth_readers(graph: "Graph") -> list[str]:
+    """The nodes that read anything marked as truth, by any kind of wire."""
+    return sorted({wire.to_node for wire in graph.wires if any(_is_truth(graph, o) for o in _origins(wire))})
+
+
+def _is_truth(graph: "Graph", origin: str) -> bool:
+    given = graph.port(origin)
+    return given is not None and (given.truth or bool(getattr(given.type, "is_truth", False)))

@@ -3,7 +3,7 @@
 import pytest
 
 import toys
-from omninav.pipeline.closed_loop import steering
+from omninav.pipeline.closed_loop import steering, truth_readers
 from omninav.pipeline.draw import mermaid
 from omninav.pipeline.graph import build
 from omninav.pipeline.problems import ProblemsFound
@@ -31,7 +31,7 @@ def refused(nodes: dict, wires: dict) -> list:
 def test_metrics_behind_a_closed_loop_may_read_truth():
     graph = build(config(NODES, WIRES))
     assert steering(graph) == {"source", "driving", "stop"}
-    assert graph.readers_of("source.truth") == ["all", "scored"]
+    assert truth_readers(graph) == ["all", "scored"]
 
 
 def test_a_driver_that_reads_truth_is_refused_with_what_to_type():
