@@ -17,6 +17,8 @@ F64 = npt.NDArray[np.float64]
 
 REACH = 12.0
 """Distance (m) beyond which a light adds nothing: what little would come from there is part of the ambient light."""
+SOFT = 0.25
+"""Square (m) of the extent of a light: close by it is no point."""
 SPREAD = 2.5
 """How far (m, one sigma) light that is thrown back spreads."""
 CLOSE = 0.15
@@ -202,8 +204,7 @@ def _shine(
                 for side in range(5):
                     rise = lights[light, 2] - heights[side]
                     square = away_x * away_x + away_y * away_y + rise * rise
-                    if square < 0.04:
-                        square = 0.04
+                    square += SOFT
                     arriving = away_x * faces[side, 0] + away_y * faces[side, 1] + rise * faces[side, 2]
                     leaving = -(away_x * lights[light, 3] + away_y * lights[light, 4] + rise * lights[light, 5])
                     if arriving <= 0.0 or leaving <= 0.0:

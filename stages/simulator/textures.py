@@ -141,6 +141,11 @@ def _lamp(rng: np.random.Generator) -> F32:
     return canvas
 
 
+def _unlit(rng: np.random.Generator) -> F32:
+    """A lamp that is off."""
+    return 0.55 * _lamp(rng)
+
+
 def _wood(rng: np.random.Generator) -> F32:
     rings = cv2.resize(rng.normal(0.0, 1.0, (2, 40)).astype(np.float32), (DRAWN, DRAWN), interpolation=cv2.INTER_CUBIC)
     canvas = blank((95, 140, 185)) * (1.0 + 0.08 * rings[..., None].astype(np.float32)) + grain(rng, 4.0)
@@ -582,7 +587,7 @@ MATERIALS: dict[str, Callable[[np.random.Generator], F32]] = {
     "parquet": _parquet, "linoleum": _linoleum, "asphalt": _asphalt, "paving": _paving, "grass": _grass,
     "hedge": _hedge, "leaves": _leaves, "bark": _bark, "sky": _sky, "curtain": _curtain, "books": _books,
     "cabinet": _cabinet, "steel": _steel, "fabric": _fabric, "screen": _screen, "board": _board,
-    "coat": _coat, "trousers": _trousers, "face": _face, "hair": _hair,
+    "unlit": _unlit, "coat": _coat, "trousers": _trousers, "face": _face, "hair": _hair,
 }  # fmt: skip
 
 EXTENTS: dict[str, tuple[float, float]] = {

@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from . import people, textures
 from .bodies import Box, Tiling
-from .config import Block, Hanging, Room, Shelf, WorldConfig
+from .config import Block, Hanging, Lamp, Room, Shelf, WorldConfig
 from .layout import expand
-from .lighting import lamps_and_windows
+from .lighting import lamps_and_windows, lamps_on
 from .obstacles import Obstacles, distances, gather
 from .renderer import Scene
 from .scene import build_scene
@@ -48,7 +48,9 @@ class World:
         self.config = config
         self.day = day
         self.layout = expand(config, day)
+        lamps = self.layout.lamps
         self._named: dict[tuple[str, str], int] = {}
+        self._tints: dict[int, tuple[float, float, float]] = {}
         self._gathered: dict[float, Obstacles] = {}
         self._goods = [self._texture("goods", f"goods {k}") for k in range(config.goods)]
         self.boxes: list[Box] = [
@@ -56,7 +58,7 @@ class World:
             *(box for k, shelf in enumerate(self.layout.shelves) for box in self._shelf(shelf, k)),
             *(self._block(block, k) for k, block in enumerate(self.layout.blocks)),
             *(self._hanging(hanging, k) for k, hanging in enumerate(self.layout.hangings)),
-            *(self._lamp(k) for k in range(len(self.layout.lamps))),
+            *(self._lamp(lamp, on) for lamp, on in zip(lamps, lamps_on(lamps, config, day), strict=True)),
         ]
         self.floor = self._ground(config.floor, 6, config.rooms)
         self.ceiling = self._ground(config.ceiling, 6)
@@ -207,9 +209,9 @@ class World:
             faces=(rim, rim, front, front, rim, rim),
         )
 
-    def _lamp(self, number: int) -> Box:
-        lamp = self.layout.lamps[number]
-        texture = self._texture("lamp", "lamp")
+    def _lamp(self, lamp: Lamp, is_on: bool) -> Box:
+        texture = self._texture("lamp", f"lamp {lamp.light}") if is_on else self._texture("unlit", "lamp")
+        self._tints[texture] = lamp.light
         low = (self.config.height if lamp.z is None else lamp.z) - 0.08
         return self._solid("lamp", lamp.centre, lamp.size, 0.0, low, 0.06, texture, texture)
 
@@ -218,17 +220,25 @@ class World:
     @cached_property
     def scene(self) -> Scene:
         """This world for the ray caster."""
+        looks = [people.coverings(self._texture, look) for look in range(people.LOOKS)]
+        day = np.array(self.config.day(self.day).light)
+        pictures, glow = [], [textures.glow(material) for material, _ in self._named]
+        for number, (material, name) in enumerate(self._named):
+            picture = _drawn(self.config.seed, material, name)
+            if glow[number]:  # what shines has the light's colour
+                picture = np.clip(picture * (day * self._tints.get(number, (1.0, 1.0, 1.0))), 0, 255).astype(np.uint8)
+            pictures.append(picture)
         return build_scene(
             self.boxes,
             self.floor,
             self.ceiling,
             self.config.size,
             self.config.height,
-            [_drawn(self.config.seed, material, name) for material, name in self._named],
-            [textures.glow(material) for material, _ in self._named],
+            pictures,
+            glow,
             lamps_and_windows(self.layout.lamps, self.layout.hangings, self.config, self.day),
             self.config.ambient,
-            [people.coverings(self._texture, look) for look in range(people.LOOKS)],
+            looks,
         )
 
     # Who walks there
