@@ -1,0 +1,72 @@
+"""What a simulated picture costs: two cameras in four home stores, on the day with the most people, beside one wall."""
+
+import resource
+import time
+
+import numpy as np
+
+from omninav.pipeline.ports import convert
+from omninav.stages.simulator.cameras import camera_of, camera_rays
+from omninav.stages.simulator.config import CylinderCamera, MirrorCamera, WorldConfig
+from omninav.stages.simulator.people import Track
+from omninav.stages.simulator.renderer import render
+from omninav.stages.simulator.world import World
+
+from .table import Row
+
+WORLDS = ("home_store_demo", "home_store_small", "home_store_mid", "home_store")
+CAMERAS = (("640x480 mirror", MirrorCamera(), 30.0), ("720x180 panorama", CylinderCamera(), 50.0))
+POSES = 10
+"""Places all over the free floor, each seen a few times."""
+
+
+def rows() -> list[Row]:
+    """Frames per second, with people, lights, vignetting and noise; how long a world takes to build, and memory."""
+    found = []
+    for name in WORLDS:
+        start = time.perf_counter()
+        world = _world(name)
+        scene = world.scene
+        built = time.perf_counter() - start
+        extent = f"{world.config.size[0]:g} x {world.config.size[1]:g} m, {len(world.boxes)} boxes"
+        for camera, config, least in CAMERAS:
+            rays = camera_rays(camera_of(config), vignetting=0.12, robot_radius=0.25)
+            taken = []
+            for pose, people in _moments(world):
+                render(scene, rays, pose, 0.9, noise=2.0, people=people)
+                for key in range(5):
+                    start = time.perf_counter()
+                    render(scene, rays, pose, 0.9, noise=2.0, key=key, people=people)
+                    taken.append(time.perf_counter() - start)
+            rate = 1.0 / float(np.median(taken))
+            found.append(Row(f"{camera}, {name} ({extent})", rate, "1/s", limit=least, higher_is_better=True))
+        found.append(Row(f"a day of {name} ready to be seen", built, "s", limit=20.0))
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    found.append(Row("memory of a process that has built and seen all of them", peak, "MB", limit=1000.0))
+    return found
+
+
+def _world(name: str) -> World:
+    """A world of `conf/world` on its busiest day."""
+    from hydra import compose, initialize_config_module
+    from omegaconf import OmegaConf
+
+    with initialize_config_module("omninav.conf", version_base="1.3"):
+        described = OmegaConf.to_container(compose("config", overrides=[f"world={name}"]).world, resolve=True)
+    config, problems = convert(described, WorldConfig, "world")
+    assert not problems, problems
+    busiest = max(range(len(config.days)), key=lambda day: config.days[day].people)
+    return World(config, busiest)
+
+
+def _moments(world: World) -> list[tuple[np.ndarray, tuple]]:  # type: ignore[type-arg]
+    """Poses on the free floor and who is about, some beside the robot."""
+    rng = np.random.default_rng(5)
+    points = rng.uniform((0.0, 0.0), world.config.size, (2000, 2))
+    points = points[world.clearance(points) > 0.4][:POSES]
+    times = np.arange(0.0, 40.0, 0.05)
+    moments = []
+    for point, heading in zip(points, rng.uniform(-np.pi, np.pi, POSES), strict=False):
+        pose = np.array([*point, heading])
+        moments.append((pose, world.people_at(39.0, Track(times, np.tile(pose, (len(times), 1))))))
+    return moments
