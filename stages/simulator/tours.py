@@ -23,6 +23,8 @@ COMFORT = 0.6
 """Metres beyond the radius from which on a tour no longer minds an obstacle."""
 SPACING = 0.4
 """Metres between the points of a tour."""
+NEAR = 1.2
+"""Metres within which a point that has no room for the robot is replaced by one that has."""
 SWAY = 2.5
 """Metres over which a hand on the joystick drifts to one side."""
 
@@ -34,8 +36,8 @@ class NoWay(Exception):
 def plan(world: World, route: Route) -> F64:
     """The points (W, 2) of a route around what stands in the world on its day, rounded as a joystick is moved.
 
-    All points keep the robot's radius and 0.1 m from obstacles where there is as much room. Raises `NoWay` where a
-    point cannot be reached, or nothing is left to visit.
+    All points keep the robot's radius and 0.1 m from obstacles where there is as much room. On a day with closed doors
+    what lies behind them is left out. Raises `NoWay` where a point cannot be reached otherwise, or nothing is left.
     """
     radius = world.config.robot.radius
     if route.kind == "waypoints":
@@ -43,7 +45,7 @@ def plan(world: World, route: Route) -> F64:
         if len(points) and _straight(world, points, radius):
             return _cut(points, route.length)
     ways = _Ways(world)
-    goals = _goals(world, ways, route)
+    goals = ways.open_to(_goals(world, ways, route))
     line = [np.asarray(next(goals, (math.nan, math.nan)))]
     if np.isnan(line[0]).any():
         raise NoWay(f"world '{world.config.name}': the route has no points")
@@ -230,7 +232,7 @@ class _Ways:
         x, y = (float(v) for v in np.asarray(point))
         columns = self._free.shape[1]
         row, column = int(y / self._step), int(x / self._step)
-        for reach in (0, 2, 5, 12, 30):
+        for reach in (0, 2, 5, max(5, math.ceil(NEAR / self._step))):
             low = max(row - reach, 0), max(column - reach, 0)
             free = np.argwhere(self._main[low[0] : row + reach + 1, low[1] : column + reach + 1])
             if len(free):
@@ -243,6 +245,17 @@ class _Ways:
         rows, columns = np.divmod(cells, self._free.shape[1])
         middle: F64 = self._step * (np.stack([columns, rows], axis=-1) + 0.5)
         return middle
+
+    def open_to(self, goals: Iterator[Point]) -> Iterator[Point]:
+        """Goals without those behind doors that are closed today."""
+        for goal in goals:
+            try:
+                self._cell(goal)
+            except NoWay:
+                if self._world.config.day(self._world.day).doors == 1.0:
+                    raise
+                continue
+            yield goal
 
     def between(self, start: F64, end: F64) -> F64:
         """Points (N, 2) of a way between two points, straight where nothing is near."""
