@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from omninav.stages.geometry.se2 import compose
 
-from .config import Event, Point, Robot
+from .config import Event, Robot
 from .obstacles import Obstacles, gather, nearest
 
 F64 = npt.NDArray[np.float64]
@@ -248,10 +248,3 @@ def _pursue(
             _step(state, speed, turning, robot, room, NOBODY)
         poses[row] = state[:3]
     return len(poses), along, False
-
-
-def wandered(waypoints: Sequence[Point], spread: float, rng: np.random.Generator) -> F64:
-    """Waypoints (W, 2), each missed by a Gaussian of `spread` metres, cut off at two."""
-    miss = np.clip(rng.normal(0.0, spread, (len(waypoints), 2)), -2 * spread, 2 * spread)
-    wandering: F64 = np.asarray(waypoints, dtype=np.float64) + miss
-    return wandering
