@@ -94,9 +94,11 @@ def _likeness(
         total, best = np.float32(0), np.float32(0)
         for k in range(segments):
             total += alike[k]
-            best = max(best, total * factors[k])
+            score = total * factors[k]
+            best = score if score > best else best
         known = math.exp(-0.5 * closest / (fade * fade))
-        out[n] = max(ordinary, known * best + (1.0 - known) * ordinary)
+        faded = known * best + (1.0 - known) * ordinary
+        out[n] = faded if faded > ordinary else ordinary
     return out
 
 

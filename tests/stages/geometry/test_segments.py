@@ -88,6 +88,20 @@ def test_the_score_stays_within_zero_and_one(alike: list[float]) -> None:
     assert -1e-6 <= selective_similarity(expected, observed)[0] <= 1 + 1e-5
 
 
+@pytest.mark.parametrize("exponent", [0.0, 1 / 3, 0.5])
+@pytest.mark.parametrize("segments", [1, 7, 36])
+def test_similarities_stay_within_zero_and_one_and_a_view_is_wholly_like_itself(segments: int, exponent: float) -> None:
+    # Erratum 20: bounded because each segment's histogram sums to 1.
+    references = histograms(30, segments, 20)
+    references[10:20, :, 1:] = 0  # one bin holds all
+    references[10:20, :, 0] = 1
+    for view in (references[0], references[15]):
+        found = similarities(references, view, 36, True, True, exponent)
+        assert found.min() >= 0.0
+        assert found.max() <= 1.0
+        assert found[[0, 15][int(view[0, 0] == 1)], 0] == pytest.approx(1.0, abs=1e-5)
+
+
 @given(st.integers(1, 70), st.integers(0, 2**32 - 1))
 def test_the_network_sorts(length: int, seed: int) -> None:
     items = list(np.random.default_rng(seed).random(length))

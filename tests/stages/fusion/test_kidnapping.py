@@ -1,0 +1,120 @@
+"""The whole filter on a map of some thousand references: tracking near the belief, and a robot put elsewhere."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.fusion.importance_resampling import ImportanceResampling
+from omninav.stages.fusion.start import Start
+from omninav.stages.geometry.segments import turned_view
+from omninav.stages.match.selective import SelectiveMatch
+from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
+from omninav.stages.sensor.near_references import NearReferences
+from omninav.stages.values.belief import Likelihood
+from omninav.stages.values.features import SegmentHistograms
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Motion
+from omninav.stages.values.reach import Reach
+
+SEGMENTS, BINS = 12, 16
+REACH = Reach(0.6)
+STEP = Motion(0.3, 0.0, 0.0)
+
+
+class Land:
+    """A flat land whose look, segment by segment of the compass, changes smoothly over about a metre."""
+
+    def __init__(self) -> None:
+        rng = np.random.default_rng(0)
+        self.waves = rng.normal(0, 1.0, (6, 2, SEGMENTS * BINS))
+        self.phases = rng.uniform(0, 2 * np.pi, (6, SEGMENTS * BINS))
+
+    def seen_from(self, pose: np.ndarray, noise: np.ndarray | None = None) -> np.ndarray:
+        """Histograms (segments, bins) around a robot at a pose."""
+        fields = sum(np.cos(pose[:2] @ wave + phase) for wave, phase in zip(self.waves, self.phases, strict=True))
+        values = np.exp(fields.reshape(SEGMENTS, BINS) + (0 if noise is None else noise))
+        return turned_view((values / values.sum(axis=1, keepdims=True)).astype(np.float32), float(pose[2]))
+
+    def map(self) -> ReferenceGraph:
+        """Parallel ways of 30 m, a reference every 0.4 m: over 3000."""
+        rng = np.random.default_rng(1)
+        along, across = np.meshgrid(np.arange(0, 30, 0.4), np.arange(0, 30, 0.7), indexing="ij")
+        poses = np.column_stack([along.ravel(), across.ravel(), rng.uniform(-np.pi, np.pi, along.size)])
+        features = np.stack([self.seen_from(pose) for pose in poses])
+        return ReferenceGraph(poses, features, "histograms", np.zeros((0, 2), np.int64), "truth")
+
+
+LAND = Land()
+MAP = LAND.map()
+DRIVE = [np.array([4.0 + 0.3 * k, 5.25, 0.0]) for k in range(30)]
+ELSEWHERE = [np.array([24.15, 25.0 - 0.3 * k, -np.pi / 2]) for k in range(40)]
+
+
+class Filtered(NamedTuple):
+    """One drive through the filter: errors (m), and what the sensor said at each picture."""
+
+    errors: np.ndarray
+    said: list[Likelihood]
+    compared: list[int]
+
+
+def drive(path: list[np.ndarray], match: SelectiveMatch, seed: int = 0) -> Filtered:
+    stages = {
+        "start": Start(),
+        "motion": RotationTranslationRotation(),
+        "match": match,
+        "sensor": NearReferences(),
+        "fusion": ImportanceResampling(),
+    }
+    contexts = {name: Context(name, np.random.default_rng([seed, n])) for n, name in enumerate(stages)}
+    for name, stage in stages.items():
+        stage.setup(contexts[name])
+    start, motion, _, sensor, fusion = stages.values()
+    noise, errors, said, compared = np.random.default_rng(9), [], [], []
+    for k, pose in enumerate(path):
+        for ctx in contexts.values():
+            ctx.tick = Tick(index=k, stamp=k, first_of_log=k == 0)
+        moved = STEP if k else None
+        if k == 0:
+            belief = start.step(contexts["start"], MAP, None, REACH).belief  # type: ignore[attr-defined]
+        belief = motion.step(contexts["motion"], belief, moved).belief  # type: ignore[attr-defined]
+        view = SegmentHistograms(LAND.seen_from(pose, noise.normal(0, 0.5, (SEGMENTS, BINS))))
+        alike = match.step(contexts["match"], view, MAP, belief, REACH).similarities
+        out = sensor.step(contexts["sensor"], alike, belief, MAP, moved, REACH)  # type: ignore[attr-defined]
+        belief = fusion.step(contexts["fusion"], belief, out.likelihood, out.proposals).belief  # type: ignore[attr-defined]
+        estimate = belief.estimate().pose
+        errors.append(np.hypot(estimate.x - pose[0], estimate.y - pose[1]))
+        said.append(out.likelihood)
+        compared.append(len(alike.values))
+    return Filtered(np.array(errors), said, compared)
+
+
+def near() -> SelectiveMatch:
+    return SelectiveMatch()
+
+
+def whole() -> SelectiveMatch:
+    return SelectiveMatch(radius=0.0)
+
+
+def test_tracking_near_the_belief_is_as_good_as_comparing_the_whole_map() -> None:
+    some, all_ = drive(DRIVE, near()), drive(DRIVE, whole())
+    assert len(MAP) > 3000
+    assert all_.compared[-1] == len(MAP)
+    assert max(some.compared[10:]) < 0.2 * len(MAP)
+    assert np.median(all_.errors[5:]) < 0.25  # references stand 0.4 m and 0.7 m apart
+    assert np.median(some.errors[5:]) < np.median(all_.errors[5:]) + 0.05
+    # "Anywhere" is that of the whole map, on average over some pictures, to a factor of two.
+    ratio = [np.log(a.anywhere / b.anywhere) for a, b in zip(some.said[5:], all_.said[5:], strict=True)]  # type: ignore[operator]
+    assert abs(np.mean(ratio)) < np.log(2)
+
+
+@pytest.mark.parametrize("match", [near, whole])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_robot_that_is_put_elsewhere_is_found_within_some_tens_of_pictures(match, seed: int) -> None:  # type: ignore[no-untyped-def]
+    errors = drive(DRIVE[:15] + ELSEWHERE, match(), seed).errors
+    assert errors[10:15].max() < 0.5
+    assert errors[15] > 10
+    assert errors[15 + 30 :].max() < 0.5
