@@ -73,15 +73,11 @@ def wandered(world: World, line: F64, spread: float, rng: np.random.Generator) -
     draws = np.clip(rng.normal(0.0, spread, (len(knots), 2)), -2 * spread, 2 * spread)
     drift = np.stack([np.interp(along, knots, draws[:, axis]) for axis in range(2)], axis=1)
     drift *= np.clip(np.minimum(along, along[-1] - along) / SWAY, 0.0, 1.0)[:, None]
-    needed = np.minimum(world.clearance(points), world.config.robot.radius + SPARE)
+    needed = np.minimum(world.clearance(points), world.config.robot.radius + SPARE) - 1e-9
     share = np.ones(len(points))
-    for _ in range(4):
-        tight = world.clearance(points + share[:, None] * drift) < needed - 1e-9
-        spread_out = np.convolve(tight, np.ones(5), mode="same") > 0
-        share[spread_out] *= 0.5
-    share[
-        np.convolve(world.clearance(points + share[:, None] * drift) < needed - 1e-9, np.ones(5), mode="same") > 0
-    ] = 0
+    for factor in (0.5, 0.5, 0.5, 0.5, 0.0):
+        tight = world.clearance(points + share[:, None] * drift) < needed
+        share[np.convolve(tight, np.ones(5))[2:-2] > 0] *= factor  # with the neighbours, so that the line stays smooth
     wandering: F64 = points + share[:, None] * drift
     return wandering
 
@@ -363,4 +359,8 @@ def _cut(points: F64, length: float | None) -> F64:
     if length is None:
         return points
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    return points[: max(2, int(np.searchsorted(along, length)) + 1)]
+    kept = int(np.searchsorted(along, length))
+    if kept == len(points):
+        return points
+    end = [np.interp(length, along, points[:, axis]) for axis in range(2)]
+    return np.concatenate([points[:kept], [end]])

@@ -52,7 +52,8 @@ class World:
         self._named: dict[tuple[str, str], int] = {}
         self._tints: dict[int, tuple[float, float, float]] = {}
         self._gathered: dict[float, Obstacles] = {}
-        self._goods = [self._texture("goods", f"goods {k}") for k in range(config.goods)]
+        kinds = config.goods if self.layout.shelves else 0
+        self._goods = [self._texture("goods", f"goods {k}") for k in range(kinds)]
         self.boxes: list[Box] = [
             *self._walls(),
             *(box for k, shelf in enumerate(self.layout.shelves) for box in self._shelf(shelf, k)),

@@ -1,0 +1,265 @@
+"""The worlds that come with the project: what stands there, the ways through, what days change, what a seed fixes."""
+
+import dataclasses
+import math
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from omegaconf import OmegaConf
+
+from omninav.pipeline.ports import convert
+from omninav.stages.simulator import tours
+from omninav.stages.simulator.config import AisleBlock, Block, Day, Door, LampGrid, Room, Route, WorldConfig
+from omninav.stages.simulator.layout import expand
+from omninav.stages.simulator.occupancy import occupancy
+from omninav.stages.simulator.plan import draw_plan
+from omninav.stages.simulator.world import World
+from omninav.stages.source.simulated import SimulatedRecording
+from omninav.stages.source.simulated_log import record
+
+CONF = Path(__file__).parents[3] / "conf" / "world"
+NAMES = sorted(path.stem for path in CONF.glob("*.yaml") if path.stem != "empty")
+SIZES = {
+    "home_store_small": (25, 10), "home_store_mid": (50, 80), "home_store": (100, 60), "office": (37, 14),
+    "hall": (20, 20), "institute": (10, 15),
+}  # fmt: skip
+
+
+@lru_cache
+def load(name: str) -> WorldConfig:
+    described = OmegaConf.to_container(OmegaConf.merge(*(OmegaConf.load(CONF / f"{n}.yaml") for n in ("empty", name))))
+    described.pop("defaults")  # type: ignore[union-attr,call-arg]
+    world, problems = convert(described, WorldConfig, "world")
+    assert not problems
+    return world  # type: ignore[no-any-return]
+
+
+@lru_cache
+def built(name: str, day: int = 0) -> World:
+    return World(load(name), day)
+
+
+def length(line: np.ndarray) -> float:
+    return float(np.hypot(*np.diff(line[:, :2], axis=0).T).sum())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_world_is_named_as_its_file_and_has_a_tour_and_a_drive(name: str) -> None:
+    world = load(name)
+    assert world.name == name
+    assert {"tour", "drive"} <= set(world.routes)
+    assert world.size == SIZES.get(name, world.size)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_grid_and_plan_show_the_same_bodies(name: str, tmp_path: Path) -> None:
+    """A body taller than half a metre is dark in the grid at its centre; free cells hold no body's centre."""
+    world = built(name)
+    cells, origin = occupancy(world, 0.1)
+    for box in world.obstacles:
+        row, column = (int((box.centre[axis] - origin[axis]) / 0.1) for axis in (1, 0))
+        inside = 0 <= row < cells.shape[0] and 0 <= column < cells.shape[1]
+        assert not inside or cells[row, column], box
+    draw_plan(world, tmp_path / "plan.png")
+    assert (tmp_path / "plan.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_tours_keep_clear_of_everything_on_the_first_and_on_the_last_day(name: str) -> None:
+    config = load(name)
+    for day in (0, len(config.days) - 1):
+        world = built(name, day)
+        for route in config.routes.values():
+            line = tours.plan(world, route)
+            driven = tours.wandered(world, line, config.robot.wander, np.random.default_rng(day))
+            dense = np.concatenate([a + (b - a) * np.linspace(0, 1, 5)[:, None] for a, b in pairwise(driven)])
+            assert world.clearance(dense).min() > config.robot.radius
+            assert length(line) > 10
+
+
+@pytest.mark.parametrize(
+    ("name", "route", "least", "most"),
+    [
+        ("home_store", "training", 1400, 1650),
+        *(("home_store", f"tt{k}", 150, 200) for k in (1, 2, 3, 4)),
+        ("campus", "tour", 440, 460),
+    ],
+)
+def test_routes_have_the_lengths_of_the_papers(name: str, route: str, least: float, most: float) -> None:
+    assert least <= length(tours.plan(built(name), load(name).routes[route])) <= most
+
+
+def test_the_campus_tour_has_545_images() -> None:
+    assert len(SimulatedRecording(load("campus"), "tour", 0).stamps) == pytest.approx(545, abs=1)
+
+
+def test_a_lap_of_the_office_loop_has_about_100_images() -> None:
+    assert len(SimulatedRecording(load("office_loop"), "lap", 0).stamps) == pytest.approx(100, abs=8)
+
+
+def test_the_home_store_has_more_than_40_aisles_and_training_goes_through_each() -> None:
+    """An aisle is gone through where the line comes within half a metre of points all along its open part."""
+    world = built("home_store")
+    aisles = world.layout.aisles
+    assert len(aisles) > 40
+    line = tours.plan(world, world.config.routes["training"])
+    for aisle in aisles:
+        a, b = np.array(aisle.ends)
+        for share in np.linspace(0.15, 0.75, 5):
+            assert np.hypot(*(line - (a + share * (b - a))).T).min() < 0.5
+
+
+def test_the_second_test_tour_meets_the_most_people() -> None:
+    days = load("home_store").days
+    assert max(days, key=lambda day: day.people) is days[2]
+    assert days[0].rearranged == 0.0
+
+
+def test_departments_differ_in_their_goods_and_neighbouring_aisles_share_them() -> None:
+    world = built("home_store")
+    goods = {
+        name: [
+            set(world._goods_on(s, k)[3].ravel()) for k, s in enumerate(world.layout.shelves) if s.department == name
+        ]
+        for name in ("tools", "garden")
+    }
+    per_department = {name: set.union(*shelves) for name, shelves in goods.items()}
+    assert all(len(kinds) <= world.config.assortment for kinds in per_department.values())
+    assert per_department["tools"] != per_department["garden"]
+    tools = goods["tools"]
+    assert np.mean([len(a & b) / len(a | b) for a, b in pairwise(tools)]) > 0.7
+
+
+@pytest.mark.parametrize("name", ["office", "campus", "institute", "office_loop"])
+def test_rooms_differ_in_the_colours_of_walls_or_floor(name: str) -> None:
+    world = built(name)
+    walls = {b.look: b for b in world.layout.blocks if b.kind == "wall" and b.look.endswith(" wall")}
+    assert len(walls) == sum(room.walls for room in world.config.rooms)
+
+
+# Days
+
+
+ROOM = Room("den", (1.0, 1.0), (6.0, 5.0), (Door("east", 2.0),), windows=("north", "west"), furniture="office")
+HOUSE = WorldConfig(
+    size=(14.0, 9.0),
+    rooms=(ROOM,),
+    aisle_blocks=(AisleBlock((8.5, 1.0), (4.5, 6.0), aisle=1.2, depth=0.6),),
+    lamp_grid=LampGrid(),
+    days=(Day(),),
+    routes={"walk": Route(((8.0, 1.0), (8.0, 8.0)))},
+)
+
+
+def parts(day: Day) -> dict[str, object]:
+    """What can be told apart of a house on its second day."""
+    world = World(dataclasses.replace(HOUSE, days=(Day(), day)), 1)
+
+    def kind(*names: str) -> list[tuple[object, ...]]:
+        return [(b.kind, b.centre, b.half, b.yaw, b.low, b.high) for b in world.boxes if b.kind in names]
+
+    hung = [hanging.material for hanging in world.layout.hangings]
+    return {
+        "goods": [tuple(map(tuple, face.tiles)) for b in world.boxes if b.kind == "shelf" for face in b.faces[:4]],
+        "shelves": kind("shelf", "stock", "wall", "roof", "lamp"),
+        "furniture": kind("furniture"),
+        "doors": kind("door"),
+        "curtains": hung,
+    }
+
+
+@pytest.mark.parametrize(
+    ("day", "changed"),
+    [
+        (Day(), set()),
+        (Day(people=5), set()),
+        (Day(light=(0.5, 0.7, 1.0), lamps_off=0.5), set()),
+        (Day(rearranged=0.3), {"goods"}),
+        (Day(furniture=0.1), {"furniture"}),
+        (Day(doors=0.0), {"doors"}),
+        (Day(curtains=1.0), {"curtains"}),
+    ],
+)
+def test_a_day_changes_what_it_says_and_nothing_else(day: Day, changed: set[str]) -> None:
+    plain, other = parts(Day()), parts(day)
+    assert {name for name in plain if plain[name] != other[name]} == changed
+
+
+def test_days_after_the_last_are_like_the_last_but_hit_other_things() -> None:
+    config = dataclasses.replace(HOUSE, days=(Day(), Day(rearranged=0.5)))
+    assert config.day(7) == config.days[1]
+    one, other = (
+        np.concatenate([b.faces[2].tiles.ravel() for b in World(config, d).boxes if b.kind == "shelf"]) for d in (1, 7)
+    )
+    assert (one != other).any()
+
+
+def test_a_closed_door_keeps_tours_out_and_an_open_one_lets_them_in() -> None:
+    inside = Route(((8.0, 1.0), (3.5, 3.5), (8.0, 8.0)))
+    config = dataclasses.replace(HOUSE, days=(Day(), Day(doors=0.0)))
+    entered, kept_out = (tours.plan(World(config, day), inside) for day in (0, 1))
+    assert (entered[:, 0] < 6.0).any()
+    assert not (kept_out[:, 0] < 6.9).any()
+
+
+def test_a_place_without_room_is_refused_with_its_coordinates() -> None:
+    walled = dataclasses.replace(HOUSE, blocks=(Block((3.5, 8.0), (5.0, 1.9), 1.0),))
+    with pytest.raises(tours.NoWay, match=r"no room for the robot near \(3.5, 8\)"):
+        tours.plan(World(walled, 0), Route(((8.0, 1.0), (3.5, 8.0))))
+
+
+# Lay-outs
+
+
+def test_an_aisle_block_fills_its_rectangle_with_rows_no_closer_than_an_aisle() -> None:
+    block = AisleBlock((10.0, 5.0), (20.0, 12.0), "paint", aisle=2.0, depth=1.0, cross_aisles=1)
+    layout = expand(WorldConfig(size=(40.0, 30.0), aisle_blocks=(block,)))
+    x = sorted({round(shelf.centre[0], 6) for shelf in layout.shelves})
+    assert x[0] == pytest.approx(10.5)
+    assert x[-1] == pytest.approx(29.5)
+    gaps = np.diff(x) - 1.0
+    assert gaps.min() >= 2.0
+    np.testing.assert_allclose(gaps, gaps[0], atol=1e-5)
+    assert len(layout.aisles) == 2 * (len(x) - 1)
+    lows = sorted({round(s.centre[1] - s.length / 2, 6) for s in layout.shelves})
+    highs = sorted({round(s.centre[1] + s.length / 2, 6) for s in layout.shelves})
+    assert (lows[0], highs[-1]) == (5.0, 17.0)
+    assert lows[1] - highs[0] == pytest.approx(gaps[0], abs=1e-5)
+
+
+def test_a_door_cuts_both_walls_that_lie_back_to_back() -> None:
+    rooms = (Room("a", (0, 0), (5, 5), (Door("east", 2.5, leaf=False),)), Room("b", (5, 0), (5, 5)))
+    world = World(WorldConfig(size=(10.0, 5.0), rooms=rooms))
+    line = np.stack([np.linspace(3.0, 7.0, 41), np.full(41, 2.5)], axis=1)
+    np.testing.assert_allclose(world.clearance(line).min(), 0.5, atol=1e-6)
+    assert world.clearance([(5.0, 1.0)])[0] == 0.0
+
+
+def test_clearance_is_exact_far_from_everything() -> None:
+    """Against every box of a sparse hall, one by one."""
+    rng = np.random.default_rng(4)
+    blocks = tuple(Block(tuple(rng.uniform(5, 55, 2)), (1.0, 0.4), 1.0, yaw=rng.uniform(0, 3)) for _ in range(5))
+    world = World(WorldConfig(size=(60.0, 60.0), blocks=blocks))
+    points = rng.uniform(0, 60, (400, 2))
+    expected = np.minimum(points, 60 - points).min(axis=1)
+    for block in blocks:
+        away = points - block.centre
+        cos, sin = math.cos(block.yaw), math.sin(block.yaw)
+        over = np.abs(away @ [[cos, -sin], [sin, cos]]) - np.array(block.size) / 2
+        expected = np.minimum(expected, np.hypot(*np.maximum(over, 0).T))
+    np.testing.assert_allclose(world.clearance(points), expected, atol=1e-9)
+
+
+# Bytes
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_piece_of_a_log_is_the_same_bytes_twice(name: str, tmp_path: Path) -> None:
+    config = load(name)
+    short = dataclasses.replace(config, routes={"piece": dataclasses.replace(config.routes["drive"], length=0.3)})
+    for log in ("one.mcap", "two.mcap"):
+        record(SimulatedRecording(short, "piece", 1), tmp_path / log)
+    assert (tmp_path / "one.mcap").read_bytes() == (tmp_path / "two.mcap").read_bytes()
