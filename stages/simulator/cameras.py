@@ -190,21 +190,27 @@ def _wedges(directions: F64) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int3
     azimuth = np.arctan2(directions[:, 1], directions[:, 0])
     level = np.hypot(directions[:, 0], directions[:, 1])
     slope = directions[:, 2] / np.maximum(level, 1e-9)
+    columns, number = np.unique(np.round(azimuth * 1e5), return_inverse=True)
+    if len(columns) * 16 <= len(azimuth):  # a strip: all rays of a column look one way
+        return _gathered(number, columns[number] * 1e-5, azimuth, slope)
     taken = len(np.unique(np.floor(azimuth * 180.0 / math.pi))) / 360.0
     count = max(8, round(len(azimuth) / RAYS_TO_A_WEDGE / taken))
     around = 2.0 * math.pi / count
-    # The first ray lies in the middle of its wedge, so that each column of a strip falls into one.
     number = np.round((azimuth - azimuth[0]) / around)
-    off = azimuth - azimuth[0] - number * around
-    number = np.mod(number.astype(np.int64), count)
+    return _gathered(np.mod(number.astype(np.int64), count), azimuth[0] + number * around, azimuth, slope)
+
+
+def _gathered(
+    number: npt.NDArray[np.int64], middle: F64, azimuth: F64, slope: F64
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int32], F64]:
+    """Rays (N,) in the order of their wedges' numbers, and the wedges; `middle` is the azimuth of each ray's wedge."""
     order = np.lexsort((slope, number))
-    used, start = np.unique(number[order], return_index=True)
-    middle = azimuth[0] + used * around
-    sorted_off = off[order]
-    lowest, highest = np.minimum.reduceat(sorted_off, start), np.maximum.reduceat(sorted_off, start)
-    wedges = np.stack(
-        [middle + lowest - 1e-6, middle + highest + 1e-6, np.maximum.reduceat(slope[order], start)], axis=1
-    )
+    _, start = np.unique(number[order], return_index=True)
+    off = (azimuth - middle)[order]
+    around = middle[order][start]
+    lowest, highest = np.minimum.reduceat(off, start), np.maximum.reduceat(off, start)
+    steepest = np.maximum.reduceat(slope[order], start)
+    wedges = np.stack([around + lowest - 1e-6, around + highest + 1e-6, steepest], axis=1)
     return order, np.append(start, len(order)).astype(np.int32), wedges
 
 

@@ -134,14 +134,32 @@ def _trace(
 ) -> None:
     """Add colours (N, 3) of rays (N, 3), 0 to 255 times `weight`, before the chip."""
     chunks = min(CHUNKS, len(wedges))
+    bearings = _bearings(moving.boxes, x, y)
     for chunk in numba.prange(chunks):
-        _chunk(scene, moving, directions, footprint, wedge_start, wedges, x, y, heading, z, weight, lit, chunk, chunks)
+        _chunk(
+            scene, moving, bearings, directions, footprint, wedge_start, wedges, x, y, heading, z, weight, lit, chunk,
+            chunks,
+        )  # fmt: skip
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _bearings(boxes: F64, x: float, y: float) -> F64:
+    """Where boxes are seen from a point (B, 3): azimuth on the map, half the angle they take at most, distance."""
+    seen = np.empty((len(boxes), 3))
+    for b in range(len(boxes)):
+        px, py = boxes[b, 0] - x, boxes[b, 1] - y
+        away, radius = math.sqrt(px * px + py * py), math.sqrt(boxes[b, 8])
+        seen[b, 0] = math.atan2(py, px)
+        seen[b, 1] = math.asin(radius / away) if away > radius else math.pi
+        seen[b, 2] = away - radius
+    return seen
 
 
 @numba.njit(cache=True, error_model="numpy")
 def _chunk(
     scene: Scene,
     moving: Bodies,
+    bearings: F64,
     directions: F32,
     footprint: F32,
     wedge_start: I32,
@@ -167,21 +185,45 @@ def _chunk(
     turn_cos, turn_sin = math.cos(heading), math.sin(heading)
     seen_in = np.zeros(len(boxes), dtype=np.int32)
     noted = np.empty(len(boxes) + len(moved), dtype=np.int32)
-    notes = np.empty((len(boxes) + len(moved), 11))
+    notes = np.empty((len(boxes) + len(moved), 14))
     covers = np.empty((COVERS, 2))
     for wedge in range(chunk, len(wedges), chunks):
         low, high = wedges[wedge, 0] + heading, wedges[wedge, 1] + heading
-        count, reach = _look(boxes, start, members, grid, rows, columns, ceiling, x, y, z, turn_cos, turn_sin, low,
-                             high, wedges[wedge, 2], seen_in, wedge + 1, noted, notes, covers)  # fmt: skip
+        count, reach, along_x = _look(
+            boxes, start, members, grid, rows, columns, ceiling, x, y, z, turn_cos, turn_sin, low, high,
+            wedges[wedge, 2], seen_in, wedge + 1, noted, notes, covers,
+        )  # fmt: skip
         fixed = count
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
         for body in range(len(moved)):
-            count = _note_moving(moved, body, len(boxes), x, y, z, turn_cos, turn_sin, low, high, reach, noted, notes,
-                                 count)  # fmt: skip
-        middle = 0.5 * (wedges[wedge, 0] + wedges[wedge, 1])
-        major_x, major_y = _major(middle, heading)
+            off = middle - bearings[body, 0]
+            off -= 2.0 * math.pi * round(off / (2.0 * math.pi))
+            if abs(off) <= half + bearings[body, 1] and bearings[body, 2] <= 1.415 * reach:
+                _note(notes, count, moved, body, x, y, z, turn_cos, turn_sin, 0.0)
+                noted[count] = len(boxes) + body
+                count += 1
+        level_x, level_y = math.cos(middle - heading), math.sin(middle - heading)
+        # The axis along which the look measured distances, as the robot sees it.
+        sign = 1.0 if (math.cos(middle) if along_x else math.sin(middle)) > 0.0 else -1.0
+        major_x, major_y = (sign * turn_cos, -sign * turn_sin) if along_x else (sign * turn_sin, sign * turn_cos)
+        major = level_x * major_x + level_y * major_y
+        # In a strip, all rays of a wedge are one ray seen from above.
+        column = high - low < 1e-4
+        if column:
+            for k in range(count):
+                enter, leave, face = _enter(
+                    notes[k, 0], notes[k, 1], notes[k, 2] * level_x + notes[k, 3] * level_y,
+                    notes[k, 2] * level_y - notes[k, 3] * level_x, notes[k, 4], notes[k, 5],
+                )  # fmt: skip
+                notes[k, 11], notes[k, 12], notes[k, 13] = enter, leave, face
         for i in range(wedge_start[wedge], wedge_start[wedge + 1]):
             dx, dy, dz = float(directions[i, 0]), float(directions[i, 1]), float(directions[i, 2])
-            distance, which, face = _meet(notes, fixed, count, dx, dy, dz, dx * major_x + dy * major_y, z, ceiling)
+            ahead = dx * level_x + dy * level_y
+            if column:
+                distance, which, face = _meet_in_column(notes, fixed, count, ahead, dz, major, z, ceiling)
+            else:
+                ahead = dx * major_x + dy * major_y
+                distance, which, face = _meet(notes, fixed, count, dx, dy, dz, ahead, z, ceiling)
             if distance >= 1e8:
                 continue
             # Where it is, which way its face looks, and where on its surface.
@@ -217,13 +259,13 @@ def _chunk(
             # The texture, at the level its size in the picture asks for.
             per_width, per_height = size[surface, 0], size[surface, 1]
             u, v = u * per_width, v * per_height
-            column = min(max(math.floor(u), 0), table[surface, 1] - 1)
-            row = min(max(math.floor(v), 0), table[surface, 2] - 1)
-            texture = tiles[table[surface, 0] + row * table[surface, 1] + column]
-            u, v = u - column, v - row
+            across = min(max(math.floor(u), 0), table[surface, 1] - 1)
+            down = min(max(math.floor(v), 0), table[surface, 2] - 1)
+            texture = tiles[table[surface, 0] + down * table[surface, 1] + across]
+            u, v = u - across, v - down
             # The footprint is an ellipse, longer by 1 / slope: its mean radius is a fair middle of blur and flicker.
-            across = distance * float(footprint[i]) * side
-            level = _half_log2(across * across * per_width * per_height / max(slope, 1e-3))
+            reach = distance * float(footprint[i]) * side
+            level = _half_log2(reach * reach * per_width * per_height / max(slope, 1e-3))
             blue, green, red = _sample(texels, level_start, levels, side, texture, level, u, v)
 
             shines = float(glow[texture])
@@ -263,18 +305,6 @@ def _chunk(
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _major(azimuth: float, heading: float) -> tuple[float, float]:
-    """The axis of the map that is nearest to an azimuth, as a unit vector in the robot's frame."""
-    cos, sin = math.cos(azimuth + heading), math.sin(azimuth + heading)
-    turn_cos, turn_sin = math.cos(heading), math.sin(heading)
-    if abs(cos) >= abs(sin):
-        sign = 1.0 if cos > 0.0 else -1.0
-        return sign * turn_cos, -sign * turn_sin
-    sign = 1.0 if sin > 0.0 else -1.0
-    return sign * turn_sin, sign * turn_cos
-
-
-@numba.njit(cache=True, error_model="numpy")
 def _look(
     boxes: F64,
     cell_start: I32,
@@ -296,13 +326,14 @@ def _look(
     noted: I32,
     notes: F64,
     covers: F64,
-) -> tuple[int, float]:
-    """Note the boxes that rays between two azimuths of the map may meet, nearest first; how many, and how far it went.
+) -> tuple[int, float, bool]:
+    """Note the boxes that rays between two azimuths of the map may meet, nearest first.
 
     Distances are measured along the axis of the map that the wedge is nearest to, and slopes are heights per such
     distance: along that axis every slab of cells is crossed by all rays of the wedge at once. A body that both edges
     meet is met by all rays between, being convex; once the walk is past it, it hides what is lower than the line over
     its top. When that line reaches the ceiling, nothing more can be seen.
+    Returns how many were noted, how far it went, and whether along x.
     """
     cos_a, sin_a, cos_b, sin_b = math.cos(low), math.sin(low), math.cos(high), math.sin(high)
     along_x = abs(cos_a + cos_b) >= abs(sin_a + sin_b)
@@ -373,14 +404,7 @@ def _look(
                 off = aside - most * ahead
                 if off > 0.0 and off * off > square * (1.0 + most * most):
                     continue
-                cos, sin = boxes[box, 2], boxes[box, 3]
-                ox, oy = cos * px + sin * py, cos * py - sin * px
-                notes[count, 0], notes[count, 1] = ox, oy
-                notes[count, 2], notes[count, 3] = cos * turn_cos + sin * turn_sin, sin * turn_cos - cos * turn_sin
-                notes[count, 4], notes[count, 5] = boxes[box, 4], boxes[box, 5]
-                notes[count, 6], notes[count, 7] = boxes[box, 6] - z, over
-                notes[count, 8] = near
-                notes[count, 9], notes[count, 10] = cos, sin
+                _note(notes, count, boxes, box, x, y, z, turn_cos, turn_sin, near)
                 noted[count] = box
                 count += 1
                 if waiting == COVERS:
@@ -389,6 +413,7 @@ def _look(
                     ax, ay, bx, by = float(sign), tan_a, float(sign), tan_b
                 else:
                     ax, ay, bx, by = tan_a, float(sign), tan_b, float(sign)
+                cos, sin, ox, oy = boxes[box, 2], boxes[box, 3], notes[count - 1, 0], notes[count - 1, 1]
                 enter_a = _enter(ox, oy, cos * ax + sin * ay, cos * ay - sin * ax, boxes[box, 4], boxes[box, 5])[0]
                 if enter_a >= 1e17 or enter_a <= 0.0:
                     continue
@@ -408,45 +433,35 @@ def _look(
         slab += sign
         near = far
         far += size
-    return count, near
+    return count, near, along_x
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _note_moving(
-    moved: F64,
-    body: int,
-    first: int,
+def _note(
+    notes: F64,
+    number: int,
+    boxes: F64,
+    box: int,
     x: float,
     y: float,
     z: float,
     turn_cos: float,
     turn_sin: float,
-    low: float,
-    high: float,
-    reach: float,
-    noted: I32,
-    notes: F64,
-    count: int,
-) -> int:
-    """Note a moving body where it may be seen between two azimuths; how many notes there are then."""
-    px, py = x - moved[body, 0], y - moved[body, 1]
-    radius = math.sqrt(moved[body, 8])
-    middle = 0.5 * (low + high)
-    cos, sin = math.cos(middle), math.sin(middle)
-    ahead, aside = -(cos * px + sin * py), -(cos * py - sin * px)
-    if ahead < -radius or ahead - radius > 1.415 * reach:
-        return count
-    if abs(aside) > radius + max(ahead + radius, 0.0) * (0.51 * (high - low)) + 1e-6:
-        return count
-    cos, sin = moved[body, 2], moved[body, 3]
-    notes[count, 0], notes[count, 1] = cos * px + sin * py, cos * py - sin * px
-    notes[count, 2], notes[count, 3] = cos * turn_cos + sin * turn_sin, sin * turn_cos - cos * turn_sin
-    notes[count, 4], notes[count, 5] = moved[body, 4], moved[body, 5]
-    notes[count, 6], notes[count, 7] = moved[body, 6] - z, moved[body, 7] - z
-    notes[count, 8] = 0.0
-    notes[count, 9], notes[count, 10] = cos, sin
-    noted[count] = first + body
-    return count + 1
+    near: float,
+) -> None:
+    """Write down a box as rays from the eye meet it.
+
+    The eye in the box's frame; cosine and sine of its yaw against the robot's; half sizes; lower and upper edge against
+    the eye; where the slab begins in which it was found; cosine and sine of its yaw on the map. Three places are free.
+    """
+    px, py = x - boxes[box, 0], y - boxes[box, 1]
+    cos, sin = boxes[box, 2], boxes[box, 3]
+    notes[number, 0], notes[number, 1] = cos * px + sin * py, cos * py - sin * px
+    notes[number, 2], notes[number, 3] = cos * turn_cos + sin * turn_sin, sin * turn_cos - cos * turn_sin
+    notes[number, 4], notes[number, 5] = boxes[box, 4], boxes[box, 5]
+    notes[number, 6], notes[number, 7] = boxes[box, 6] - z, boxes[box, 7] - z
+    notes[number, 8] = near
+    notes[number, 9], notes[number, 10] = cos, sin
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -462,7 +477,7 @@ def _meet(
         face = 4
     for k in range(count):
         if distance * ahead <= notes[k, 8] and k < fixed:
-            continue
+            continue  # found beyond what was met already
         enter, leave, side = _enter(
             notes[k, 0], notes[k, 1], notes[k, 2] * dx + notes[k, 3] * dy, notes[k, 2] * dy - notes[k, 3] * dx,
             notes[k, 4], notes[k, 5],
@@ -484,6 +499,41 @@ def _meet(
         else:
             distance, which, face = enter, k, side
     return distance, which, face
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _meet_in_column(
+    notes: F64, fixed: int, count: int, ahead: float, dz: float, major: float, z: float, ceiling: float
+) -> tuple[float, int, int]:
+    """As `_meet`, for a ray in a wedge of one azimuth, where the notes say how far off boxes begin and end."""
+    slope = dz / max(ahead, 1e-9)
+    distance, which, face = 1e9, -1, 5
+    if slope < 0.0:
+        distance = -z / slope
+    elif slope > 0.0:
+        distance = (ceiling - z) / slope
+        face = 4
+    for k in range(count):
+        if k < fixed and distance * major <= notes[k, 8]:
+            continue
+        enter, leave = notes[k, 11], notes[k, 12]
+        if enter >= distance or leave <= 0.0:
+            continue
+        below, above = notes[k, 6], notes[k, 7]
+        if enter < 0.0:
+            enter = 0.0
+            if below <= 0.0 <= above:
+                continue
+        rise = enter * slope
+        if rise > above:
+            if slope < 0.0 and above / slope <= leave and above / slope < distance:
+                distance, which, face = above / slope, k, 5
+        elif rise < below:
+            if slope > 0.0 and below / slope <= leave and below / slope < distance:
+                distance, which, face = below / slope, k, 4
+        else:
+            distance, which, face = enter, k, int(notes[k, 13])
+    return distance / max(ahead, 1e-9), which, face
 
 
 @numba.njit(cache=True, error_model="numpy")
