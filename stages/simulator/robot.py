@@ -32,13 +32,15 @@ X, Y, HEADING, SPEED, TURNING, TOUCHING, COLLISIONS, WAY = range(8)
 class Drive:
     """A drive: `times` (N,) s, `poses` (N, 3), and where the wheels had brought the robot by then, `rolled_to` (N, 3).
 
-    The last two differ only where somebody lifted the robot. `collisions`: how often it came into contact.
+    The last two differ only where somebody lifted the robot. `collisions`: how often it came into contact. `events`:
+    what was done to it, and in which row; what was to happen after its end did not.
     """
 
     times: F64
     poses: F64
     rolled_to: F64
     collisions: int
+    events: tuple[tuple[int, Event], ...]
 
 
 def at_rest(pose: npt.ArrayLike) -> F64:
@@ -148,6 +150,7 @@ def drive(
     poses = np.empty((most, 3))
     poses[0] = state[:3]
     rolled_to: dict[int, F64] = {}
+    happened: list[tuple[int, Event]] = []
     done, along = 1, 0.0
     for event in [*sorted(events, key=lambda event: event.at), None]:
         until = most if event is None else min(most, round(event.at * rate) + 1)
@@ -157,7 +160,8 @@ def drive(
         done += filled
         if arrived or event is None:
             break
-        rolled_to[done - 1] = poses[done - 1].copy()
+        rolled_to.setdefault(done - 1, poses[done - 1].copy())
+        happened.append((done - 1, event))
         put_down(state, event)
         poses[done - 1] = state[:3]
         if event.to is not None:
@@ -166,7 +170,7 @@ def drive(
     before = poses.copy()
     for number, pose in rolled_to.items():
         before[number] = pose
-    return Drive(np.arange(done) / rate, poses, before, int(state[COLLISIONS]))
+    return Drive(np.arange(done) / rate, poses, before, int(state[COLLISIONS]), tuple(happened))
 
 
 def put_down(state: F64, event: Event) -> None:

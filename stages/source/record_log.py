@@ -46,5 +46,9 @@ class RecordLog(Stage):
         draw_plan(world, path.with_suffix(".plan.png"), driven)
         grid = write_grid(world, path.parent / f"{path.stem}.grid")
         pictures = sum(len(drive.stamps) for drive in drives)
+        collisions = sum(drive.collisions for drive in drives)
+        ctx.fact("collisions", collisions)
+        if collisions:
+            print(f"{path}: on its way the robot came into contact with something {collisions} times")
         print(f"{path}: {pictures} pictures; floor plan, camera.yaml and {grid} beside it")
         return self.Out()

@@ -76,9 +76,9 @@ class SimulatedRecording:
         bias = draw_bias(world.odometry, stream(world.seed, "odometry bias", self.day))
         self.rolled = odometry(driven.poses, world.odometry, bias, self._stream("odometry"), driven.rolled_to)
         self.times = self._stamps(driven.times)
-        put = np.flatnonzero((driven.poses != driven.rolled_to).any(axis=1))
-        self.put = self.times[put]
-        """Stamps (ns) of the moments at which somebody had lifted the robot."""
+        self.lifted = [(int(self.times[row]), event) for row, event in driven.events]
+        """When (ns) somebody put the robot down again, and what had been done to it."""
+        put = np.unique([row for row, _ in driven.events]).astype(np.int64)
         # Up to that moment it was where its wheels had brought it: nobody flies from one place to the other
         self._true_seconds = np.insert(driven.times, put, driven.times[put])
         self.true_poses = np.insert(driven.poses, put, driven.rolled_to[put], axis=0)

@@ -47,7 +47,7 @@ def _write(log: LogWriter, recording: SimulatedRecording, quality: int) -> None:
         elif topic == "scan":
             _write_scan(log, recording, number, arrival)
         elif topic == "event":
-            said = json.dumps(asdict(recording.events[number]))
+            said = json.dumps(asdict(recording.lifted[number][1]))
             log.write("/ground_truth/event", "std_msgs/msg/String", arrival, {"data": said})
         else:
             _write_picture(log, recording, number, arrival, quality)
@@ -58,7 +58,7 @@ def _arrivals(recording: SimulatedRecording) -> list[tuple[int, str, int]]:
     found = [(int(stamp) + WHEEL_TRANSIT, "odometry", number) for number, stamp in enumerate(recording.times)]
     found += [(int(stamp) + WHEEL_TRANSIT, "truth", number) for number, stamp in enumerate(recording.true_times)]
     found += [(int(stamp) + RING_TRANSIT, "scan", number) for number, stamp in enumerate(recording.ring_times)]
-    found += [(int(stamp), "event", number) for number, stamp in enumerate(recording.put)]
+    found += [(stamp, "event", number) for number, (stamp, _) in enumerate(recording.lifted)]
     return found + [(arrival, "picture", number) for number, (arrival, _, _) in enumerate(recording.sent)]
 
 

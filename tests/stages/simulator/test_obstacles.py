@@ -164,3 +164,18 @@ def test_a_kidnapped_robot_goes_on_from_the_nearest_point_of_its_route():
     assert len(driven.times) < 0.5 * len(whole.times)
     steps = np.hypot(*(driven.rolled_to[1:] - driven.poses[:-1])[:, :2].T)
     assert steps.max() <= ROBOT.speed * 0.05 * 1.001
+
+
+def test_what_happens_at_one_moment_happens_in_its_order_and_what_comes_too_late_does_not():
+    line = ((1.0, 2.0), (3.0, 2.0))
+    late, one, other = Event(at=500.0, turn=1.0), Event(at=2.0, to=(2.0, 2.0, 0.0)), Event(at=2.0, turn=-0.5)
+    driven = drive(line, ROBOT, 20.0, room=hall(), events=[late, one, other])
+    assert driven.events == ((40, one), (40, other))
+    np.testing.assert_allclose(driven.poses[40], [2.0, 2.0, -0.5])
+    assert driven.rolled_to[40, 0] < 1.9
+
+
+def test_nothing_done_to_a_robot_is_an_event_too():
+    driven = drive(((1.0, 2.0), (3.0, 2.0)), ROBOT, 20.0, room=hall(), events=[Event(at=1.0)])
+    assert [row for row, _ in driven.events] == [20]
+    np.testing.assert_array_equal(driven.poses, driven.rolled_to)
