@@ -28,7 +28,7 @@ from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
 
 from .recording import UnreadableRecording
-from .simulated import EPOCH, ring_scan, simulation_digest
+from .simulated import EPOCH, refuse_no_room, ring_scan, simulation_digest
 
 F64 = npt.NDArray[np.float64]
 
@@ -90,6 +90,10 @@ class ClosedLoop(Source):
         self._rays = camera_rays(self._camera, self.world.sensor.vignetting, self.world.robot.radius)
         self._bias = draw_bias(self.world.odometry, stream(self.world.seed, "odometry bias", self.day))
         self._first = self._first_pose(world)
+        refuse_no_room(self.world, self._room, self._first.tolist(), "start")
+        for event in self.events:
+            if event.to is not None:
+                refuse_no_room(self.world, self._room, event.to, "events")
 
     def inputs_digest(self) -> str | None:
         """sha256 over the world and the code that simulates it."""

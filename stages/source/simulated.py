@@ -16,12 +16,12 @@ from omninav.stages.geometry import catadioptric, odometry_noise, se2
 from omninav.stages.simulator import tours
 from omninav.stages.simulator.cameras import Rays, camera_of, camera_rays, shutter_times
 from omninav.stages.simulator.config import Event, WorldConfig
-from omninav.stages.simulator.obstacles import Obstacles, gather
+from omninav.stages.simulator.obstacles import Obstacles, gather, nearest
 from omninav.stages.simulator.odometry import draw_bias, odometry
 from omninav.stages.simulator.people import Person, Track
 from omninav.stages.simulator.ranges import azimuths, measure, round_bodies
 from omninav.stages.simulator.renderer import render
-from omninav.stages.simulator.robot import drive, reach
+from omninav.stages.simulator.robot import NOBODY, drive, reach
 from omninav.stages.simulator.streams import stream
 from omninav.stages.simulator.world import World
 from omninav.stages.values.image import Pixels
@@ -71,6 +71,9 @@ class SimulatedRecording:
         except tours.NoWay as why:
             raise UnreadableRecording(f"route '{self.route}': {why}") from None
         line = tours.wandered(self._world, way, world.robot.wander, self._stream("line"))
+        for event in self.events:
+            if event.to is not None:
+                refuse_no_room(world, self._room, event.to, "events")
         driven = drive(line, world.robot, world.timing.odometry, room=self._room, events=self.events)
         self._seconds, self.driven, self.collisions = driven.times, driven.poses, driven.collisions
         bias = draw_bias(world.odometry, stream(world.seed, "odometry bias", self.day))
@@ -187,6 +190,16 @@ class SimulatedRecording:
         """sha256 over the world, the route, the day, the events and the code that renders it."""
         events = json.dumps([dataclasses.asdict(event) for event in self.events])
         return digest_text(simulation_digest(self.world), self.route, str(self.day), events)
+
+
+def refuse_no_room(world: WorldConfig, room: Obstacles, place: Sequence[float], where: str) -> None:
+    """Raise `UnreadableRecording` for a place (x, y, heading) where the robot has no room to stand."""
+    clear = nearest(room, NOBODY, float(place[0]), float(place[1]))[0]
+    if clear < world.robot.radius:
+        raise UnreadableRecording(
+            f"{where}: {place[0]:g}, {place[1]:g} of world '{world.name}' is {max(clear, 0.0):.2f} m from an obstacle, "
+            f"and the robot's radius is {world.robot.radius:g} m; choose another place on the floor plan"
+        )
 
 
 def in_order(days: int | Sequence[int]) -> list[int]:

@@ -197,3 +197,11 @@ def test_the_driver_wanders_without_touching_anything(seed: int, monkeypatch: py
 
 def test_a_world_without_any_route_can_be_started_anywhere():
     assert Loop(world=WorldConfig(camera=SMALL), start=(2.0, 2.0, 0.0)).step() is not None
+
+
+def test_a_place_without_room_is_refused():
+    said = r"start: 3.7, 2.9 of world 'home_store_demo' is 0\.00 m from an obstacle, and the robot's radius is 0\.25 m"
+    with pytest.raises(UnreadableRecording, match=said):
+        Loop(start=(3.7, 2.9, 0.0))
+    with pytest.raises(UnreadableRecording, match=r"events: 0\.1, 0\.1 of world"):
+        Loop(events=(Event(at=1.0, to=(0.1, 0.1, 0.0)),))
