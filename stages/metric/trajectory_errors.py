@@ -17,9 +17,9 @@ from omninav.stages.values.pose import Motion, Pose
 class TrajectoryErrors(Stage):
     """Errors of the estimate against ground truth, with those of odometry alone and of the belief's mean beside them.
 
-    Per log: `frames`; `driven_m`, the length of the true path; `position_error_m` and `heading_error_deg` (mean, standard
-    deviation `std`, median, p90, max); `loss_rate`, the share of
-    frames further than `lost_m` from the truth; `converged_after_frames`, how many frames went by before the error
+    Per log: `frames`; `driven_m`, the length of the true path; `position_error_m` and `heading_error_deg` (mean,
+    standard deviation `std`, median, p90, max); `loss_rate`, the share of frames further than `lost_m` from the
+    truth; `converged_after_frames`, how many frames went by before the error
     stayed below 1 m and 20 degrees for ten frames (None if it never did); the errors and loss rate again under
     `after_convergence`. `odometry_alone` starts at the first true pose. The top level is the last log, and `logs` has
     one entry per log where there are several. Frames without truth or without estimate are left out and counted.
