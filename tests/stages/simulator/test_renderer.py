@@ -23,6 +23,7 @@ from omninav.stages.simulator.config import (
     WorldConfig,
 )
 from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.people import Person
 from omninav.stages.simulator.renderer import Scene, render
 from omninav.stages.simulator.world import World
 from omninav.stages.values.camera import Camera, Cylindrical, Donut, Equirectangular, HyperbolicMirror, Perspective
@@ -265,7 +266,8 @@ def test_the_number_of_threads_does_not_change_a_picture(demo: Scene) -> None:
         pictures = []
         for number in (1, threads):
             numba.set_num_threads(number)
-            pictures.append(render(demo, rays, (5.8, 4.5, 0.4), EYE, noise=2.0, key=3))
+            people = (Person((7.0, 4.6), 0.3), Person((4.6, 4.4), 2.0, look=5, stride=1.0))
+            pictures.append(render(demo, rays, (5.8, 4.5, 0.4), EYE, noise=2.0, key=3, people=people))
     finally:
         numba.set_num_threads(threads)
     np.testing.assert_array_equal(*pictures)
