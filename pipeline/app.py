@@ -103,6 +103,11 @@ def _launch(arguments: list[str]) -> int:
     from hydra.errors import HydraException
 
     words, folders = _words(arguments)
+    of_conditions = _words_of_conditions(words)
+
+    def job(config: Any) -> None:
+        _job(config, arguments, of_conditions)
+
     _offer_plugins()
     if {"-m", "--multirun"} & set(arguments):
         _refuse_misspelled_sweep(words, folders)
@@ -110,9 +115,9 @@ def _launch(arguments: list[str]) -> int:
         outcomes = Path(place) / "outcomes"
         os.environ[OUTCOMES] = str(outcomes)
         os.environ["HYDRA_FULL_ERROR"] = "1"  # what Hydra does not understand is raised, and said by us
-        sys.argv = ["omninav", *arguments]
+        sys.argv = ["omninav", *(word for word in arguments if word not in of_conditions)]
         try:
-            hydra.main(config_path=f"pkg://{CONF}", config_name="config", version_base="1.3")(_job)()
+            hydra.main(config_path=f"pkg://{CONF}", config_name="config", version_base="1.3")(job)()
         except SystemExit as stop:  # a flag that Hydra does not know
             if stop.code:
                 return 2
@@ -126,6 +131,13 @@ def _launch(arguments: list[str]) -> int:
                 raise ProblemsFound(misfits(words, folders, str(error))) from None
         codes = [int(line) for line in outcomes.read_text().split()] if outcomes.exists() else []
     return max(codes, default=0)
+
+
+def _words_of_conditions(words: Sequence[str]) -> list[str]:
+    """Where an experiment is asked for, the words that are for each of its conditions and not for the experiment."""
+    own = ("experiment", "profile", "runs", "cache", "hydra")
+    keys = [word.lstrip("+~").partition("=")[0].replace("/", ".").partition(".")[0] for word in words]
+    return [word for word, key in zip(words, keys, strict=True) if key not in own] if "experiment" in keys else []
 
 
 def _refuse_misspelled_sweep(words: Sequence[str], folders: Sequence[str]) -> None:
@@ -155,7 +167,7 @@ def _words(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     return read.overrides, [read.config_dir] if read.config_dir else []
 
 
-def _job(config: Any) -> None:
+def _job(config: Any, arguments: Sequence[str], of_conditions: Sequence[str]) -> None:
     """One run. Never raises and never exits: in a sweep the other jobs go on, and the exit code is left in a file."""
     from .engine import StageFailed
     from .problems import BadInput, ProblemsFound
@@ -164,7 +176,7 @@ def _job(config: Any) -> None:
     code, error = 0, ""
     try:
         if config.get("experiment") is not None:
-            code = _experiment(config, sweep)
+            code = _experiment(config, arguments, of_conditions, sweep)
         else:
             _run(config, sweep)
     except ProblemsFound as found:
@@ -209,23 +221,31 @@ def _run(config: Any, sweep: tuple[Path, str, str] | None) -> None:
     print(f"report: {_shown(run.folder / 'report.html')}", flush=True)
 
 
-def _experiment(config: Any, sweep: tuple[Path, str, str] | None) -> int:
+def _experiment(
+    config: Any, arguments: Sequence[str], of_conditions: Sequence[str], sweep: tuple[Path, str, str] | None
+) -> int:
     """An experiment: every condition and repetition of its file, and its page. 1 where a job failed."""
     from hydra import compose
-    from hydra.core.hydra_config import HydraConfig
+    from hydra.errors import HydraException
     from omegaconf import OmegaConf
 
     from .experiment_run import run_experiment
-    from .problems import BadInput
+    from .overrides import misfits
+    from .problems import BadInput, ProblemsFound
 
     if sweep is not None:
         raise BadInput("an experiment has its own sweep: leave out -m, and write what varies into its file")
-    typed = list(HydraConfig.get().overrides.task)
-    own = [w for w in typed if not w.lstrip("+").startswith(("experiment=", "experiment/", "experiment.", "profile="))]
     plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
-    run, well = run_experiment(
-        plain, lambda words: complete(compose("config", overrides=list(words))), own, ["omninav", *sys.argv[1:]]
-    )
+    folders = _words(arguments)[1]
+
+    def composed(words: Sequence[str]) -> dict[str, Any]:
+        try:
+            return complete(compose("config", overrides=list(words)))
+        except HydraException as error:
+            raise ProblemsFound(misfits(words, folders, str(error))) from None
+
+    words = [*of_conditions, f"cache={plain['cache'] or 'null'}"]
+    run, well = run_experiment(plain, composed, words, ["omninav", *arguments])
     print(f"page: {_shown(run.folder / (run.experiment.name + '.html'))}", flush=True)
     return 0 if well else 1
 
@@ -374,6 +394,7 @@ def _offer_plugins() -> None:
 
 
 def _check(arguments: list[str]) -> int:
+    from .closed_loop import truth_readers
     from .graph import LIFETIMES
     from .run import input_digests, plan
 
@@ -384,7 +405,7 @@ def _check(arguments: list[str]) -> int:
     before, tick, after = (len(graph.of_lifetime(kind)) for kind in LIFETIMES)
     print(f"{planned.variant}: nothing wrong with it. {len(graph.nodes)} nodes, {len(graph.wires)} wires")
     print(f"{before} stages run before the loop, {tick} every tick, {after} after it")
-    readers = graph.readers_of(f"{graph.source.name}.truth") if graph.source else []
+    readers = truth_readers(graph)
     print(f"ground truth is read by: {', '.join(readers) or 'nobody'}")
     return 0
 

@@ -6,7 +6,7 @@ stages, parameters, wires and logs. The seed is part of the key only where a fro
 """
 
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -35,17 +35,17 @@ class CachedFront:
     before: Mapping[str, Any] = field(default_factory=dict)
 
 
-def front_nodes(graph: Graph, artifacts: bool = False) -> frozenset[str]:
+def front_nodes(graph: Graph, artifacts: bool = False, without: Collection[str] = ()) -> frozenset[str]:
     """The names of the front's nodes; empty where the source listens to the graph (a simulator in a closed loop).
 
     With `artifacts`, what follows from the logs and the artifacts: the front that runs share which differ in their
-    seed only.
+    seed only. `without` these nodes (which draw random numbers) and what follows from them.
     """
     source = graph.source
-    if source is None or graph.inputs_of(source.name):
+    if source is None or source.name in without or graph.inputs_of(source.name):
         return frozenset()
     front = {source.name}
-    before = {node.name for node in graph.of_lifetime("before")}
+    before = {node.name for node in graph.of_lifetime("before")} - set(without)
     for node in graph.of_lifetime("tick"):
         wires = graph.inputs_of(node.name)
         ready = all(
@@ -57,7 +57,7 @@ def front_nodes(graph: Graph, artifacts: bool = False) -> frozenset[str]:
             )
             for w in wires
         )
-        if wires and ready:
+        if wires and ready and node.name not in without:
             front.add(node.name)
     return frozenset(front)
 

@@ -88,11 +88,12 @@ def repeat(given: Mapping[str, Any], tell: Tell) -> None:
         facts[artifact.name] = made
         (folder / f"{artifact.name}.omap").unlink(missing_ok=True)  # the cache keeps it
     shared: CachedFront | None = None
+    drew: set[str] = set()
     for number, seed in enumerate(seeds):
         place = run.memory / f"seed_{seed}"
         record = bool(given["shared"]) and shared is None and number + 1 < len(seeds)
         engine, recorded = _once(
-            graph, artifacts, seed, place, cache if given["shared"] else None, shared, record, tell
+            graph, artifacts, seed, place, cache if given["shared"] else None, shared, record, drew, tell
         )
         shared = recorded or shared
         result = {"key": given["key"], "seed": seed, "metrics": results_of(engine)[0], "timing": stage_times(engine)}
@@ -124,15 +125,20 @@ def _once(
     cache: Cache | None,
     shared: CachedFront | None,
     record: bool,
+    drew: set[str],
     tell: Tell,
 ) -> tuple[Engine, CachedFront | None]:
-    """One repetition; with `record` also the front that the others may share, where nothing in it was drawn."""
+    """One repetition; with `record` also the front that the others may share.
+
+    `drew`: nodes known to draw random numbers, which cannot be shared. Where one shows up that was not known to, it is
+    added and nothing is shared yet.
+    """
     step = _heartbeat(tell)
     if shared is not None:
         engine = Engine(graph, artifacts, seed, place, place, every_s=math.inf, front=shared, progress=step)
         engine.run()
         return engine, None
-    nodes = front_nodes(graph, artifacts=True)
+    nodes = front_nodes(graph, artifacts=True, without=drew)
     boundary = front_boundary(graph, nodes) if record and nodes else []
     with cached_front(graph, cache, seed) as front:
         known = usable(front)
@@ -143,9 +149,11 @@ def _once(
         keep_front(engine, front, cache, seed)
     if not boundary:
         return engine, None
-    before = [node.name for node in graph.of_lifetime("before")]
+    before = [node.name for node in graph.of_lifetime("before") if node.name not in drew]
     notes = {name: engine.calls[name].ctx.notes() for name in sorted(nodes | set(before))}
-    if any(note["drew"] for note in notes.values()):
+    found = {name for name, note in notes.items() if note["drew"]}
+    if found:
+        drew |= found
         return engine, None
     engine.spools.pop("shared").flush()
     given = {origin: value for origin, value in engine.values.items() if origin.partition(".")[0] in before}

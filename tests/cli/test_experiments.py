@@ -1,0 +1,228 @@
+"""Experiments as files: every repetition of every condition, one page, verdicts; killed and continued; failing jobs."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+STAGES = '''
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from omninav.pipeline import Context, Outputs, Source, Stage, State, Tick, Value
+from omninav.pipeline.results import Metrics
+
+
+class Number(Value):
+    value: float
+
+
+class Count(Source):
+    """Counts the frames of a drive."""
+
+    frames: int = 20
+
+    class Place(State):
+        next: int = 0
+
+    class Out(Outputs):
+        tick: Tick
+        number: Number
+
+    def step(self, ctx: Context, place: Place) -> Out | None:
+        index = place.next
+        place.next += 1
+        return self.Out(tick=Tick(index, index), number=Number(float(index))) if index < self.frames else None
+
+
+class Table(Stage):
+    """What does not depend on the seed; says in a file how often it was computed."""
+
+    bias: float = 0.0
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, number: Number) -> Out:
+        with Path("computed").open("a") as file:
+            file.write(f"{self.bias} {number.value}\\n")
+        return self.Out(number=Number(self.bias))
+
+
+class Noisy(Stage):
+    """What does."""
+
+    sigma: float = 0.1
+    wait_s: float = 0.0
+    raises: bool = False
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, number: Number) -> Out:
+        time.sleep(self.wait_s)
+        if self.raises and ctx.tick.index == 3:
+            raise ValueError("the third is too many")
+        return self.Out(number=Number(abs(number.value + self.sigma * ctx.rng.standard_normal())))
+
+
+class Score(Stage):
+    """The mean error."""
+
+    class Out(Outputs):
+        metrics: Metrics
+
+    def step(self, ctx: Context, errors: Sequence[Number]) -> Out:
+        return self.Out(metrics=Metrics({"error_m": sum(e.value for e in errors) / len(errors), "frames": len(errors)}))
+'''
+VARIANT = """\
+# @package _global_
+variant: dice
+nodes:
+  source: null
+  counter: {_target_: my_stages.Count, frames: 20}
+  table: {_target_: my_stages.Table, bias: 0.0}
+  noisy: {_target_: my_stages.Noisy, sigma: 0.1, wait_s: 0.0, raises: false}
+  score: {_target_: my_stages.Score}
+wires:
+  table: {number: counter.number}
+  noisy: {number: table.number}
+  score: {errors: {from: noisy.number, collect: true}}
+"""
+EXPERIMENT = """\
+# @package experiment
+name: dice
+title: A table of dice
+about: Whether a bias is seen.
+variant: dice
+sweep:
+  method: {fair: nodes.table.bias=1.0, loaded: nodes.table.bias=2.0}
+  tour: {TT1: nodes.counter.frames=20, TT2: nodes.counter.frames=30}
+repetitions: 6
+measures:
+  error: {title: Error (cm), of: [after.error_m, error_m], times: 100.0}
+page: {rows: [method], columns: tour}
+published:
+  error: {fair: {TT1: 102, TT2: 30}}
+claims:
+  - {says: fair is better than loaded, measure: error, of: {method: fair}, below: {method: loaded}, paper: better}
+  - {says: fair is as good as the paper's, measure: error, of: {method: fair}, at_most: published}
+  - {says: loaded is best, measure: error, of: {method: loaded}, lowest: true}
+profiles:
+  quick: {repetitions: 2}
+"""
+TWICE = 2 * 2 * (20 + 30)
+"""Lines in `computed`: in two conditions, each frame once until it is known that `noisy` draws, and once after."""
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    (tmp_path / "my_stages.py").write_text(STAGES)
+    (tmp_path / "mine/variant").mkdir(parents=True)
+    (tmp_path / "mine/experiment").mkdir()
+    (tmp_path / "mine/variant/dice.yaml").write_text(VARIANT)
+    (tmp_path / "mine/experiment/dice.yaml").write_text(EXPERIMENT)
+    return tmp_path
+
+
+MINE = ("--config-dir", "mine", "+experiment=dice")
+
+
+def results(folder: Path) -> dict[str, bytes]:
+    kept = sorted(folder.rglob("seed_*.json"))
+    return {
+        str(path.relative_to(folder)): json.dumps(json.loads(path.read_text())["metrics"]).encode() for path in kept
+    }
+
+
+def test_a_page_with_verdicts_and_what_repetitions_share_computed_once(omninav, place: Path):
+    ended = omninav(*MINE, check=True)
+    folder = place / "runs/dice_paper"
+    assert "page: runs/dice_paper/dice.html" in ended.stdout
+    better, published, best = json.loads((folder / "verdicts.json").read_text())
+    assert better["holds"] is True
+    assert better["paper"] == "better"
+    assert [case["difference"] for case in better["cases"]] == pytest.approx([-100.0, -100.0], abs=10.0)
+    assert published["holds"] is False
+    assert [case["holds"] for case in published["cases"]] == [True, False]
+    assert best["holds"] is False
+    page = (folder / "dice.md").read_text()
+    assert "(102.0)" in page
+    assert (folder / "dice.png").stat().st_size > 1000
+    assert len((place / "computed").read_text().split("\n")) - 1 == TWICE
+    assert len(results(folder)) == 4 * 6
+    assert not list(folder.rglob("*.spool"))
+
+    again = omninav(*MINE, check=True)
+    assert len((place / "computed").read_text().split("\n")) - 1 == TWICE
+    assert again.stdout == ended.stdout
+
+    one = results(folder)
+    omninav(*MINE, "+experiment.shared=false", "runs=alone", "cache=null", check=True)
+    assert results(place / "alone/dice_paper") == one
+    assert len((place / "computed").read_text().split("\n")) - 1 == TWICE + 6 * 2 * (20 + 30)
+
+
+def test_a_killed_experiment_goes_on_where_it_was(omninav, place: Path):
+    command = [sys.executable, "-m", "omninav.pipeline", *MINE, "nodes.noisy.wait_s=0.02", "runs=killed"]
+    process = subprocess.Popen(
+        command, cwd=place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    )
+    folder = place / "killed/dice_paper"
+    while len(results(folder)) < 5:
+        assert process.poll() is None
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("seed_*.json")}
+    assert 5 <= len(before) < 24
+    omninav(*MINE, "nodes.noisy.wait_s=0.02", "runs=killed", check=True)
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+    omninav(*MINE, check=True)
+    assert results(folder) == results(place / "runs/dice_paper")
+
+
+def test_a_failing_job_is_named_on_the_page_and_the_others_finish(omninav, place: Path):
+    file = place / "mine/experiment/dice.yaml"
+    file.write_text(EXPERIMENT.replace("loaded: nodes.table.bias=2.0", "loaded: nodes.noisy.raises=true"))
+    ended = omninav(*MINE, "profile=quick")
+    assert ended.returncode == 1
+    said = "stage 'noisy' (my_stages.Noisy) failed at tick 3 (log 0, frame 0): ValueError: the third is too many"
+    assert f"method loaded, tour TT1: {said}" in ended.stdout
+    folder = place / "runs/dice_quick"
+    assert f"method loaded, tour TT2: {said}" in (folder / "dice.md").read_text()
+    assert "the third is too many" in (folder / "dice.html").read_text()
+    assert len(results(folder)) == 4
+    better, published, _ = json.loads((folder / "verdicts.json").read_text())
+    assert better["holds"] is None
+    assert published["holds"] is False
+    assert "Traceback" in (folder / "conditions/method_loaded_tour_TT1/run.log").read_text()
+
+
+def test_what_is_wrong_with_a_file_is_said_before_anything_runs(omninav, place: Path):
+    wrong = EXPERIMENT.replace("below: {method: loaded}", "below: {method: loadad}").replace(
+        "columns: tour", "columns: tours"
+    )
+    (place / "mine/experiment/dice.yaml").write_text(wrong)
+    ended = omninav(*MINE)
+    assert ended.returncode == 2
+    assert "there is no 'loadad'" in ended.stderr
+    assert "did you mean 'loaded'?" in ended.stderr
+    assert "there is no 'tours'" in ended.stderr
+    (place / "mine/experiment/dice.yaml").write_text(EXPERIMENT.replace("bias=2.0", "biass=2.0"))
+    ended = omninav(*MINE)
+    assert ended.returncode == 2
+    assert "biass" in ended.stderr
+    assert not (place / "runs").exists()
+
+
+def test_a_profile_that_is_not_there_is_answered_with_those_that_are(omninav, place: Path):
+    ended = omninav(*MINE, "profile=quik")
+    assert ended.returncode == 2
+    assert "did you mean 'profile=quick'?" in ended.stderr
