@@ -189,8 +189,8 @@ class Companion:
         self._phase = float(rng.uniform(0.0, 1.0))
         self._sway = rng.uniform(0.0, 2.0 * math.pi, 2)
 
-    def at(self, seconds: float, track: Track) -> Person | None:
-        """This person at a time, from where the robot was up to then; nobody while the robot has no past to follow."""
+    def at(self, seconds: float, track: Track, others: Sequence[Person]) -> Person | None:
+        """This person at a time, from where the robot was up to then; nobody where there is no room beside `others`."""
         last = int(np.searchsorted(track.times, seconds, side="right"))
         if last < 2:
             return None
@@ -206,26 +206,30 @@ class Companion:
         near = 1.05 + 0.35 * math.sin(0.21 * seconds + self._sway[0])
         behind = near + 7.0 * back
         followed = self._on_track(poses, gait, behind)
-        if back > 0.5:
-            position = followed
-        else:
+        places = [self._on_track(poses, gait, behind + 0.7 * k) for k in range(5)]
+        if back <= 0.5:
             bearing = self._bearing + 0.4 * math.sin(0.13 * seconds + self._sway[1])
-            options = [facing + b for b in (bearing, -bearing, 1.2 * bearing, math.pi)]
-            reach = np.array([0.5 * near, near])
-            points = np.array([(x + r * math.cos(b), y + r * math.sin(b)) for b in options for r in reach])
-            free = (self._clearance(points) > RADIUS).reshape(-1, 2).all(axis=1)
-            if not free.any():
-                position = followed
-            else:
-                beside = points[2 * int(np.argmax(free)) + 1]
-                part = min(1.0, max(0.0, 2.0 * back)) ** 2
-                position = (1.0 - part) * beside + part * followed
-        if np.hypot(position[0] - x, position[1] - y) < NEAREST:
-            return None  # nobody lets a robot drive over them
+            options = facing + np.array([bearing, -bearing, 1.2 * bearing, math.pi])
+            beside = np.array([x, y]) + near * np.stack([np.cos(options), np.sin(options)], axis=-1)
+            part = (2.0 * back) ** 2
+            places = [*((1.0 - part) * beside + part * followed), *places]
+        position = next((place for place in places if self._has_room(place, x, y, others)), None)
+        if position is None:
+            return None
         towards = math.atan2(y - position[1], x - position[0])
         moving = float(np.hypot(*(poses[-1, :2] - poses[max(0, len(poses) - 20), :2]))) > 0.05
         stride = 2.5 * seconds if moving else 0.0
         return Person((float(position[0]), float(position[1])), towards, RADIUS, self.height, self.look, stride)
+
+    def _has_room(self, place: F64, x: float, y: float, others: Sequence[Person]) -> bool:
+        """Whether one can stand at a place: on nobody's feet, and if near the robot at (x, y) with nothing between."""
+        if math.hypot(place[0] - x, place[1] - y) < NEAREST:
+            return False
+        if any(math.dist(place, other.position) < 2.2 * RADIUS for other in others):
+            return False
+        between = np.array([place, [0.5 * (place[0] + x), 0.5 * (place[1] + y)]])
+        clear = self._clearance(between) > (0.8 * RADIUS, 0.0)
+        return bool(clear[0] and (clear[1] or math.dist(place, (x, y)) > 2.0))
 
     def _on_track(self, poses: F64, gait: F64, distance: float) -> F64:
         """The point of the robot's way that lies `distance` m back along it, or its start."""
@@ -261,8 +265,11 @@ class Crowd:
         last = max(0, int(np.searchsorted(track.times, seconds, side="right")) - 1)
         x, y = track.poses[last, :2]
         people = [aside for p in people if (aside := self._aside(p, float(x), float(y))) is not None]
-        beside = [companion.at(seconds, track) for companion in self._companions]
-        return (*people, *(person for person in beside if person is not None))
+        for companion in self._companions:
+            person = companion.at(seconds, track, people)
+            if person is not None:
+                people.append(person)
+        return tuple(people)
 
     def _aside(self, person: Person, x: float, y: float) -> Person | None:
         """A person as far from the robot as it takes, or nobody where that is no place to stand."""

@@ -65,6 +65,15 @@ def test_some_keep_the_robot_company_and_nobody_is_run_over(busy: World, track: 
     assert beside > 40  # of 100 moments
 
 
+def test_nobody_stands_on_the_feet_of_a_companion(busy: World, track: Track) -> None:
+    for seconds in np.arange(10.0, 60.0, 0.5):
+        people = busy.people_at(seconds, track)
+        beside = positions(people[len(busy.people_at(seconds)) :])
+        for number, place in enumerate(beside):
+            others = np.vstack([positions(people[: len(people) - len(beside)]), beside[:number]])
+            assert np.hypot(*(others - place).T).min() > 0.5
+
+
 def test_nobody_knows_where_the_robot_will_go(busy: World, track: Track) -> None:
     known = track.times <= 30.0
     assert busy.people_at(30.0, track) == busy.people_at(30.0, Track(track.times[known], track.poses[known]))
