@@ -263,3 +263,15 @@ def test_a_piece_of_a_log_is_the_same_bytes_twice(name: str, tmp_path: Path) -> 
     for log in ("one.mcap", "two.mcap"):
         record(SimulatedRecording(short, "piece", 1), tmp_path / log)
     assert (tmp_path / "one.mcap").read_bytes() == (tmp_path / "two.mcap").read_bytes()
+
+
+def test_the_store_in_the_documentation_is_one() -> None:
+    text = (CONF.parents[1] / "docs" / "worlds.md").read_text().split("```yaml\n")[1].split("```")[0]
+    described = OmegaConf.merge(OmegaConf.load(CONF / "empty.yaml"), OmegaConf.create(text))
+    plain = {key: value for key, value in OmegaConf.to_container(described).items() if key != "defaults"}  # type: ignore[union-attr]
+    config, problems = convert(plain, WorldConfig, "world")
+    assert not problems
+    for day in (0, 1):
+        world = World(config, day)
+        for route in config.routes.values():
+            assert length(tours.plan(world, route)) > 70
