@@ -166,7 +166,7 @@ def _condition(cell: Any) -> dict[str, Any]:
 
 
 def draw(experiment: Experiment, results: Results) -> bytes:
-    """The first measure of all conditions: lines along a numeric factor, or bars; spread over repetitions as error bars.
+    """The first measure of all conditions: lines along a numeric factor, or bars; error bars are the spread.
 
     The paper's figures are hollow diamonds. Empty where nothing has run.
     """

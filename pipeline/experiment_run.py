@@ -18,8 +18,8 @@ from .files import digest_text, write_whole
 from .graph import Graph
 from .problems import BadInput, Problem, ProblemsFound
 from .progress import Progress
-from .repetitions import condition_key, finished
-from .run import LIBRARIES, Plan, digests_of, git_commit, plan, version
+from .repetitions import artifact_key, condition_key, finished
+from .run import LIBRARIES, Plan, git_commit, plan, version
 
 Compose = Callable[[Sequence[str]], dict[str, Any]]
 """Words of the command line -> the plain, complete configuration they describe."""
@@ -220,21 +220,29 @@ class ExperimentRun:
     def _make_maps(self) -> None:
         """One job for each map that an unfinished condition needs, so that no condition waits for another's."""
         jobs: dict[str, Job] = {}
-        needs: dict[str, list[Cell]] = {}
+        needs: dict[str, list[tuple[Cell, str, Path]]] = {}
         for cell in self._unfinished():
             assert cell.planned is not None
             for artifact in cell.planned.artifacts:
-                if artifact.graph is None or not cell.config.get("cache"):
+                if artifact.graph is None:
                     continue
-                key = digest_text(artifact.graph.digest(), artifact.origin, *digests_of(artifact.graph).values())[:8]
-                name = f"{artifact.name} {key}"
-                given = {"config": cell.config, "folder": str(self.folder / "maps" / name.replace(" ", "_"))}
-                log = self.folder / "maps" / f"{name.replace(' ', '_')}.log"
-                jobs.setdefault(name, Job(name, "omninav.pipeline.repetitions:prepare", given, log))
-                needs.setdefault(name, []).append(cell)
-        for name, error in self._through(list(jobs.values()), "maps").items():
-            for cell in needs[name]:
-                cell.error = f"its {name.split()[0]} could not be made: {error}"
+                name = f"{artifact.name} {artifact_key(artifact)[:12]}"
+                folder = self.folder / "maps" / name.replace(" ", "_")
+                needs.setdefault(name, []).append((cell, artifact.name, folder / f"{artifact.name}.omap"))
+                if not (folder / f"{artifact.name}.omap").exists():
+                    given = {"config": cell.config, "name": artifact.name, "folder": str(folder)}
+                    jobs.setdefault(
+                        name, Job(name, "omninav.pipeline.repetitions:prepare", given, folder.with_suffix(".log"))
+                    )
+        failed = self._through(list(jobs.values()), "maps")
+        for name, users in needs.items():
+            for cell, artifact_name, file in users:
+                if name in failed:
+                    cell.error = f"its {artifact_name} could not be made: {failed[name]}"
+                spec = cell.config["artifacts"][artifact_name]
+                cell.config = cell.config | {
+                    "artifacts": cell.config["artifacts"] | {artifact_name: spec | {"file": str(file), "graph": None}}
+                }
 
     # repetitions
 
@@ -251,6 +259,7 @@ class ExperimentRun:
                     "config": cell.config,
                     "folder": str(cell.folder),
                     "key": cell.key,
+                    "code": cell.planned.graph.digest() if cell.planned is not None else "",
                     "seeds": [seed for seed in cell.seeds if seed not in cell.results],
                     "shared": cell.shared,
                 },

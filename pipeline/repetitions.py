@@ -14,12 +14,12 @@ from typing import Any
 from .artifact import Cache
 from .crew import Tell
 from .engine import Engine
-from .files import digest_text, write_whole
+from .files import digest_file, digest_text, write_whole
 from .front import CachedFront, cached_front, front_boundary, front_nodes
 from .graph import Graph
 from .problems import BadInput
 from .results import Metrics
-from .run import Plan, Run, digests_of, keep_front, notes_of, obtain, plan, results_of, stage_times, usable
+from .run import ArtifactPlan, Plan, Run, keep_front, notes_of, obtain, plan, results_of, stage_times, usable
 from .spool import Spool
 from .value import Value
 
@@ -41,12 +41,32 @@ def measured(graph: Graph) -> Graph:
 def condition_key(planned: Plan) -> str:
     """The hash of everything but the seed that decides a condition's results. Its logs must be there."""
     graph = measured(planned.graph)
-    parts = [graph.digest(), *digests_of(graph).values()]
+    parts = [graph.digest(), *known_digests(graph)]
     for artifact in planned.artifacts:
-        made = artifact.graph
-        parts += [artifact.name, artifact.origin]
-        parts += [made.digest(), *digests_of(made).values()] if made is not None else [str(artifact.file)]
+        parts += [artifact.name, artifact_key(artifact)]
     return digest_text("condition", *parts)
+
+
+def artifact_key(artifact: ArtifactPlan) -> str:
+    """The hash of everything that decides an artifact's content. Its logs must be there."""
+    if artifact.graph is None:
+        assert artifact.file is not None
+        return digest_file(artifact.file)
+    return digest_text("artifact", artifact.graph.digest(), artifact.origin, *known_digests(artifact.graph))
+
+
+_DIGESTS: dict[str, str] = {}
+
+
+def known_digests(graph: Graph) -> list[str]:
+    """The content hashes of the files that a graph reads. Opening a long log takes seconds: once will do."""
+    found = []
+    for node in graph.nodes.values():
+        key = f"{node.target} {json.dumps(node.parameters, sort_keys=True, default=str)}"
+        if key not in _DIGESTS:
+            _DIGESTS[key] = node.stage.inputs_digest() or ""
+        found.append(_DIGESTS[key])
+    return [digest for digest in found if digest]
 
 
 def finished(folder: Path, key: str, seeds: Sequence[int]) -> dict[int, dict[str, Any]]:
@@ -70,13 +90,13 @@ def repeat(given: Mapping[str, Any], tell: Tell) -> None:
 
     Without `shared` nothing but the map comes from the cache or from the repetition before: all is timed as on a robot.
 
-    `given`: `config` (plain), `folder`, `key`, `seeds`, `shared`. Raises `BadInput` where the code has changed
-    since the key was made.
+    `given`: `config` (plain; its artifacts are files by now), `folder`, `key`, `code`, `seeds`, `shared`. Raises
+    `BadInput` where the code has changed since the experiment was started.
     """
     folder, seeds = Path(given["folder"]), list(given["seeds"])
     planned = plan(given["config"])
-    if condition_key(planned) != given["key"]:
-        raise BadInput("code or logs have changed while the experiment ran; type the same command again")
+    if planned.graph.digest() != given["code"]:
+        raise BadInput("the code has changed while the experiment ran; type the same command again")
     cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
     graph = measured(planned.graph)
     run = Run(folder)
@@ -109,12 +129,14 @@ def repeat(given: Mapping[str, Any], tell: Tell) -> None:
 
 
 def prepare(given: Mapping[str, Any], tell: Tell) -> None:
-    """Make the artifacts that a condition needs and leave them in the cache: `config` (plain), `folder` for scratch."""
+    """Make an artifact for conditions: `config` (plain) of one of them, its `name`, the `folder` to leave it in."""
     planned = plan(given["config"])
+    cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
     run = Run(Path(given["folder"]))
     for artifact in planned.artifacts:
-        obtain(run, artifact, BASE_SEED, Cache(Path(str(planned.config["cache"]))), math.inf, _alive(tell))
-    shutil.rmtree(run.folder, ignore_errors=True)
+        if artifact.name == given["name"]:
+            obtain(run, artifact, BASE_SEED, cache, math.inf, _alive(tell))
+    shutil.rmtree(run.memory, ignore_errors=True)
 
 
 def _once(

@@ -1,6 +1,7 @@
 """What every configuration file promises: it opens with what it is and a command that composes."""
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from omegaconf import OmegaConf
 
 from omninav.pipeline.app import complete
 from omninav.pipeline.catalog import resolve
+from omninav.pipeline.experiment import read_experiment
 from omninav.pipeline.run import plan
 from omninav.pipeline.stage import signature
 
@@ -20,6 +22,10 @@ FILES = [
 each = pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.stem}")
 
 
+def group(path: Path) -> str:
+    return path.relative_to(CONF).parts[0]
+
+
 def head(path: Path) -> list[str]:
     return path.read_text().split("\n")[:2]
 
@@ -27,16 +33,17 @@ def head(path: Path) -> list[str]:
 @each
 def test_its_first_line_is_its_package_and_its_second_says_what_it_is(path: Path):
     package, said = head(path)
-    role = path.parent.name
-    wanted = "_global_" if role in ("variant", "results", "experiment", "ablation") else None
+    role = group(path)
+    wanted = "_global_" if role in ("variant", "results", "ablation") else None
     assert package in ([f"# @package {wanted}"] if wanted else [f"# @package nodes.{role}", f"# @package {role}"])
     assert re.match(r"# .{10,}\.  omninav \S", said), said
 
 
 @each
 def test_the_command_in_its_head_composes(path: Path):
-    command = head(path)[1].partition("  omninav ")[2].split()
-    assert f"{path.parent.name}={path.stem}" in command, command
+    command = shlex.split(head(path)[1].partition("  omninav ")[2])
+    option = path.relative_to(CONF / group(path)).with_suffix("")
+    assert f"{'+' if group(path) == 'experiment' else ''}{group(path)}={option}" in command, command
     with initialize_config_module("omninav.conf", version_base="1.3"):
         compose("config", overrides=[word for word in command if not word.startswith("-")])
 
@@ -56,6 +63,17 @@ def test_every_variant_builds(path: Path):
         planned = plan(complete(compose("config", overrides=[f"variant={path.stem}"])))
     assert planned.variant == path.stem
     assert planned.graph.nodes
+
+
+@pytest.mark.parametrize("path", sorted((CONF / "experiment").rglob("*.yaml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("profile", ["paper", "quick"])
+def test_every_experiment_can_be_read(path: Path, profile: str):
+    option = path.relative_to(CONF / "experiment").with_suffix("")
+    with initialize_config_module("omninav.conf", version_base="1.3"):
+        config = OmegaConf.to_container(compose("config", overrides=[f"+experiment={option}"]), resolve=True)
+    experiment = read_experiment(config["experiment"], profile)
+    assert experiment.claims or path.stem == "home_store"
+    assert experiment.conditions()
 
 
 def test_every_group_is_listed_before_the_variant():
