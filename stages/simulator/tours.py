@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from itertools import pairwise
 
 import cv2
@@ -44,7 +45,7 @@ def plan(world: World, route: Route) -> F64:
         points = np.asarray(route.waypoints, dtype=np.float64)
         if len(points) and _straight(world, points, radius):
             return _cut(points, route.length)
-    ways = _Ways(world)
+    ways = _ways(world)
     goals = ways.open_to(_goals(world, ways, route))
     line = [np.asarray(next(goals, (math.nan, math.nan)))]
     if np.isnan(line[0]).any():
@@ -187,6 +188,12 @@ def _at_random(world: World, ways: "_Ways", route: Route, start: Point, rng: np.
 
 
 # Ways over the floor
+
+
+@lru_cache(maxsize=1)
+def _ways(world: World) -> "_Ways":
+    """Ways of the world that was asked for last: its routes share them."""
+    return _Ways(world)
 
 
 class _Ways:
