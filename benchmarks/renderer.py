@@ -16,13 +16,14 @@ from .table import Row
 
 WORLDS = ("home_store_demo", "home_store_small", "home_store_mid", "home_store")
 CAMERAS = (("640x480 mirror", MirrorCamera(), 30.0), ("720x180 panorama", CylinderCamera(), 50.0))
-POSES = 10
+POSES = 8
 """Places all over the free floor, each seen a few times."""
 
 
 def rows() -> list[Row]:
     """Frames per second, with people, lights, vignetting and noise; how long a world takes to build, and memory."""
-    found = []
+    found: list[Row] = []
+    first: dict[str, float] = {}
     for name in WORLDS:
         start = time.perf_counter()
         world = _world(name)
@@ -34,12 +35,17 @@ def rows() -> list[Row]:
             taken = []
             for pose, people in _moments(world):
                 render(scene, rays, pose, 0.9, noise=2.0, people=people)
+                tries = []
                 for key in range(5):
                     start = time.perf_counter()
                     render(scene, rays, pose, 0.9, noise=2.0, key=key, people=people)
-                    taken.append(time.perf_counter() - start)
+                    tries.append(time.perf_counter() - start)
+                taken.append(min(tries))  # a place's own price, whatever else the machine does
             rate = 1.0 / float(np.median(taken))
-            found.append(Row(f"{camera}, {name} ({extent})", rate, "1/s", limit=least, higher_is_better=True))
+            first.setdefault(camera, rate)
+            peer = {} if name == WORLDS[0] else {"peer": f"in {WORLDS[0]}", "peer_value": first[camera]}
+            what = f"{camera}, {name} ({extent})"
+            found.append(Row(what, rate, "1/s", **peer, limit=least, higher_is_better=True))  # type: ignore[arg-type]
         found.append(Row(f"a day of {name} ready to be seen", built, "s", limit=20.0))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     found.append(Row("memory of a process that has built and seen all of them", peak, "MB", limit=1000.0))
