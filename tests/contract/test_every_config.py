@@ -35,7 +35,8 @@ def test_its_first_line_is_its_package_and_its_second_says_what_it_is(path: Path
     package, said = head(path)
     role = group(path)
     wanted = "_global_" if role in ("variant", "results", "ablation") else None
-    assert package in ([f"# @package {wanted}"] if wanted else [f"# @package nodes.{role}", f"# @package {role}"])
+    packages = [wanted] if wanted else [f"nodes.{role}", role, f"world.{role}"]
+    assert package in [f"# @package {name}" for name in packages]
     assert re.match(r"# .{10,}\.  omninav \S", said), said
 
 
