@@ -108,12 +108,11 @@ def repeat(given: Mapping[str, Any], tell: Tell) -> None:
         facts[artifact.name] = made
         (folder / f"{artifact.name}.omap").unlink(missing_ok=True)  # the cache keeps it
     shared: CachedFront | None = None
-    drew: set[str] = set()
     for number, seed in enumerate(seeds):
         place = run.memory / f"seed_{seed}"
         record = bool(given["shared"]) and shared is None and number + 1 < len(seeds)
         engine, recorded = _once(
-            graph, artifacts, seed, place, cache if given["shared"] else None, shared, record, drew, tell
+            graph, artifacts, seed, place, cache if given["shared"] else None, shared, record, tell
         )
         shared = recorded or shared
         result = {"key": given["key"], "seed": seed, "metrics": results_of(engine)[0], "timing": stage_times(engine)}
@@ -147,40 +146,47 @@ def _once(
     cache: Cache | None,
     shared: CachedFront | None,
     record: bool,
-    drew: set[str],
     tell: Tell,
 ) -> tuple[Engine, CachedFront | None]:
-    """One repetition; with `record` also the front that the others may share.
-
-    `drew`: nodes known to draw random numbers, which cannot be shared. Where one shows up that was not known to, it is
-    added and nothing is shared yet.
-    """
+    """One repetition; with `record` also the front that the others may share."""
     step = _heartbeat(tell)
     if shared is not None:
         engine = Engine(graph, artifacts, seed, place, place, every_s=math.inf, front=shared, progress=step)
         engine.run()
         return engine, None
-    nodes = front_nodes(graph, artifacts=True, without=drew)
-    boundary = front_boundary(graph, nodes) if record and nodes else []
     with cached_front(graph, cache, seed) as front:
         known = usable(front)
+        wanted = _recordable(graph, known) if record else []
         engine = Engine(
-            graph, artifacts, seed, place, place, every_s=math.inf, front=known, progress=step, recorded=boundary
+            graph, artifacts, seed, place, place, every_s=math.inf, front=known, progress=step, recorded=wanted
         )
         engine.run()
         keep_front(engine, front, cache, seed)
-    if not boundary:
+    # Only now is it known which stages draw random numbers: they and what follows from them are run every time.
+    drew = {name for name, call in engine.calls.items() if call.ctx.drew}
+    nodes = front_nodes(graph, artifacts=True, without=drew)
+    boundary = front_boundary(graph, nodes)
+    if not nodes or not set(boundary) <= set(wanted):
         return engine, None
     before = [node.name for node in graph.of_lifetime("before") if node.name not in drew]
     notes = {name: engine.calls[name].ctx.notes() for name in sorted(nodes | set(before))}
-    found = {name for name, note in notes.items() if note["drew"]}
-    if found:
-        drew |= found
-        return engine, None
     engine.spools.pop("shared").flush()
     given = {origin: value for origin, value in engine.values.items() if origin.partition(".")[0] in before}
     replay = Spool(place / "shared.spool")
     return engine, CachedFront(nodes | frozenset(before), tuple(boundary), "", "", replay, notes, given)
+
+
+def _recordable(graph: Graph, known: CachedFront | None) -> list[str]:
+    """What may have to be shared: all that nodes read of the front, but what is too large to keep over a log.
+
+    Of the part that comes from the cache there is only its boundary.
+    """
+    nodes = front_nodes(graph, artifacts=True)
+    inside = known.nodes if known is not None and known.replay is not None else frozenset()
+    read = {wire.origin for wire in graph.wires if wire.from_node in nodes - inside}
+    small = {origin for origin in read if not getattr(getattr(graph.port(origin), "type", None), "bulky", False)}
+    tick = {f"{graph.source.name}.tick"} if graph.source is not None else set()
+    return sorted(small | tick | set(known.boundary if known is not None and inside else ()))
 
 
 def _heartbeat(tell: Tell) -> Callable[[int, int | None], None]:
