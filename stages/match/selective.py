@@ -12,7 +12,7 @@ from omninav.stages.values.similarity import Similarities
 
 from .candidates import check_alike, near_belief
 
-EXPONENTS = {"sqrt": 0.5, "cube_root": 1.0 / 3.0, "none": 0.0}
+EXPONENTS = {"sqrt": 0.5, "cube_root": 1.0 / 3.0, "three_quarters": 0.75, "none": 0.0}
 
 
 class SelectiveMatch(Stage):
@@ -20,14 +20,15 @@ class SelectiveMatch(Stage):
 
     Gross & Koenig 2004, section 2: S = max_k (sum of the k largest s_j) sqrt(1 / (k n)); s_j is the intersection of
     segment j's histograms, or 1 - |difference| / (sqrt(3) 255) of its colours. All k are tried (erratum 21).
-    `penalty`: sqrt as in the paper; cube_root: k^-1/3 n^-2/3, which wants more segments; none: the mean of all.
+    `penalty`: sqrt as in the paper; cube_root: k^-1/3 n^-2/3, which wants more segments; three_quarters: k^-3/4 n^-1/4,
+    which is content with fewer; none: the mean of all.
     `headings`: how many turns of each reference are compared. `radius`: with `near` wired, references within so many
     reaches (port `reach`, else of `reach_m`) of a particle are compared, and `strangers` of the others, in turns, which
     stand for all of them; in maps of up to `whole_up_to` references all are; 0 compares all. A sensor that looks
     farther than `radius` misses some. Raises BadInput where map and view are of other kinds.
     """
 
-    penalty: Literal["sqrt", "cube_root", "none"] = "sqrt"
+    penalty: Literal["sqrt", "cube_root", "three_quarters", "none"] = "sqrt"
     headings: Annotated[int, Bounds(ge=1)] = 36
     radius: Annotated[float, Bounds(ge=0)] = 4.5
     strangers: Annotated[int, Bounds(ge=0)] = 256
