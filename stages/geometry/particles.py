@@ -18,12 +18,18 @@ AROUND = np.array(list(itertools.product((-1, 0, 1), repeat=3)), np.int64).T
 
 def weighted_moments(poses: Array, weights: Array) -> tuple[Array, Array]:
     """Mean pose (3,) and covariance (3, 3) of weighted poses (N, 3); the heading's mean is circular."""
-    return _moments(np.ascontiguousarray(poses, np.float64), np.ascontiguousarray(weights, np.float64))
+    mean = weighted_mean(poses, weights)
+    return mean, _covariance(np.ascontiguousarray(poses, np.float64), np.ascontiguousarray(weights, np.float64), mean)
+
+
+def weighted_mean(poses: Array, weights: Array) -> Array:
+    """Mean pose (3,) of weighted poses (N, 3); the heading's mean is circular."""
+    return _mean(np.ascontiguousarray(poses, np.float64), np.ascontiguousarray(weights, np.float64))
 
 
 @numba.njit(cache=True, nogil=True)
-def _moments(poses: Array, weights: Array) -> tuple[Array, Array]:
-    mean, covariance = np.zeros(3), np.zeros((3, 3))
+def _mean(poses: Array, weights: Array) -> Array:
+    mean = np.zeros(3)
     total = sine = cosine = 0.0
     for n in range(len(poses)):
         total += weights[n]
@@ -33,7 +39,15 @@ def _moments(poses: Array, weights: Array) -> tuple[Array, Array]:
         cosine += weights[n] * np.cos(poses[n, 2])
     mean[:2] /= total
     mean[2] = np.arctan2(sine, cosine)
+    return mean
+
+
+@numba.njit(cache=True, nogil=True)
+def _covariance(poses: Array, weights: Array, mean: Array) -> Array:
+    covariance = np.zeros((3, 3))
+    total = 0.0
     for n in range(len(poses)):
+        total += weights[n]
         x, y, turn = poses[n, 0] - mean[0], poses[n, 1] - mean[1], poses[n, 2] - mean[2]
         turn -= 2 * np.pi * np.floor((turn + np.pi) / (2 * np.pi))
         covariance[0, 0] += weights[n] * x * x
@@ -43,7 +57,7 @@ def _moments(poses: Array, weights: Array) -> tuple[Array, Array]:
         covariance[1, 2] += weights[n] * y * turn
         covariance[2, 2] += weights[n] * turn * turn
     covariance[1, 0], covariance[2, 0], covariance[2, 1] = covariance[0, 1], covariance[0, 2], covariance[1, 2]
-    return mean, covariance / total
+    return covariance / total
 
 
 def heaviest_mode(poses: Array, weights: Array, radius: float = 1.0) -> tuple[Array, Array, float]:

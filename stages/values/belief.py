@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
-from omninav.stages.geometry.particles import heaviest_mode, weighted_moments
+from omninav.stages.geometry.particles import heaviest_mode, weighted_mean
 
 from .pose import Pose
 
@@ -47,7 +47,7 @@ class Particles(Belief):
 
     def estimate(self) -> PoseEstimate:
         mode, covariance, share = heaviest_mode(self.poses, self.weights)
-        mean, _ = weighted_moments(self.poses, self.weights)
+        mean = weighted_mean(self.poses, self.weights)
         return PoseEstimate(Pose(*map(float, mode)), covariance, share, Pose(*map(float, mean)))
 
 
