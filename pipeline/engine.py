@@ -126,7 +126,7 @@ class Engine:
     `artifacts` are the static values that wires name `artifacts.x`. `folder` is where "after" stages may write;
     `memory` is where checkpoints and spools live (None: nothing is kept, and nothing can be collected). `wanted` are
     outputs whose last value is returned by `run`. `recorded` outputs are spooled together, tick by tick, under the name
-    `shared`.
+    `shared`. `progress` hears of every tick; it and `doing` hear what a stage with a long step says meanwhile.
     """
 
     def __init__(
@@ -142,6 +142,7 @@ class Engine:
         front: Front | None = None,
         progress: Callable[[int, int | None], None] = lambda done, total: None,
         recorded: Sequence[str] = (),
+        doing: Callable[[str], None] = lambda words: None,
     ) -> None:
         self.graph, self.memory, self.wanted, self.every_s = graph, memory, wanted, every_s
         self.identity, self.front, self.progress = identity, front, progress
@@ -150,6 +151,7 @@ class Engine:
         self.calls: dict[str, Call] = {}
         for node in graph.nodes.values():
             ctx = Context(node.name, np.random.default_rng([seed, zlib.crc32(node.name.encode())]), folder)
+            ctx.progress, ctx.doing = progress, doing
             origins = [*wanted, *(o for wire in graph.wires for o in (wire.origin, wire.initial) if o)]
             ctx.read = frozenset(port for name, _, port in (o.partition(".") for o in origins) if name == node.name)
             wires = [wire for wire in graph.inputs_of(node.name) if not wire.collect]

@@ -26,6 +26,7 @@ class Progress:
         self._every = 0.1 if self._live else 2.0
         self._due = self._now = 0.0
         self._name = ""
+        self._ended: tuple[str, int] | None = None
         self._started = 0.0
         self._first = self._done = 0
         self._total: int | None = None
@@ -41,6 +42,8 @@ class Progress:
 
     def update(self, name: str, done: int, total: int | None = None) -> None:
         """`done` frames of `total` (None: not known) have gone through the graph `name`."""
+        if (name, done) == self._ended:
+            return
         if name != self._name:
             self._begin(name, done)
         self._done, self._total = done, total
@@ -48,6 +51,15 @@ class Progress:
         if now >= self._due:
             self._due = now + self._every
             self._show(now)
+        if done == total:  # what is printed from now on stands below
+            self._ended = (name, done)
+            self._close()
+
+    def say(self, words: str) -> None:
+        """What takes long and has no frames yet; in a terminal it stands until something else is shown."""
+        self._close()
+        self._stream.write(f"\r\x1b[K{words} …" if self._live else json.dumps({"doing": words}) + "\n")
+        self._stream.flush()
 
     def _begin(self, name: str, done: int) -> None:
         self._close()

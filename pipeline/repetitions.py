@@ -7,7 +7,7 @@ records what follows from log and map alone (a frame's table of similarities), a
 import json
 import math
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -104,7 +104,7 @@ def repeat(given: Mapping[str, Any], tell: Tell) -> None:
     artifacts: dict[str, Value] = {}
     facts: dict[str, Any] = {}
     for artifact in planned.artifacts:
-        artifacts[artifact.name], made = obtain(run, artifact, BASE_SEED, cache, math.inf, _alive(tell))
+        artifacts[artifact.name], made = obtain(run, artifact, BASE_SEED, cache, math.inf, Heartbeat(tell))
         facts[artifact.name] = made
         (folder / f"{artifact.name}.omap").unlink(missing_ok=True)  # the cache keeps it
     shared: CachedFront | None = None
@@ -134,7 +134,7 @@ def prepare(given: Mapping[str, Any], tell: Tell) -> None:
     run = Run(Path(given["folder"]))
     for artifact in planned.artifacts:
         if artifact.name == given["name"]:
-            obtain(run, artifact, BASE_SEED, cache, math.inf, _alive(tell))
+            obtain(run, artifact, BASE_SEED, cache, math.inf, Heartbeat(tell))
     shutil.rmtree(run.memory, ignore_errors=True)
 
 
@@ -149,7 +149,7 @@ def _once(
     tell: Tell,
 ) -> tuple[Engine, CachedFront | None]:
     """One repetition; with `record` also the front that the others may share."""
-    step = _heartbeat(tell)
+    step = Heartbeat(tell).step
     if shared is not None:
         engine = Engine(graph, artifacts, seed, place, place, every_s=math.inf, front=shared, progress=step)
         engine.run()
@@ -189,18 +189,20 @@ def _recordable(graph: Graph, known: CachedFront | None) -> list[str]:
     return sorted(small | tick | set(known.boundary if known is not None and inside else ()))
 
 
-def _heartbeat(tell: Tell) -> Callable[[int, int | None], None]:
-    """Every hundredth frame a word, so that a job whose experiment was killed ends soon."""
-    return lambda done, total: tell({"frames": done, "of": total}) if done % 100 == 0 else None
+class Heartbeat:
+    """A job's progress, told to its experiment every hundredth frame: a job whose experiment was killed ends soon."""
 
-
-class _alive:  # noqa: N801 - stands where a Progress stands
     def __init__(self, tell: Tell) -> None:
-        self._step = _heartbeat(tell)
+        self._tell = tell
 
     def update(self, name: str, done: int, total: int | None = None) -> None:
-        """A graph's frames so far."""
-        self._step(done, total)
+        """`done` frames of `total` have gone through the graph `name`, as `Progress` hears it."""
+        self.step(done, total)
+
+    def step(self, done: int, total: int | None = None) -> None:
+        """The same, of the only graph there is."""
+        if done % 100 == 0:
+            self._tell({"frames": done, "of": total})
 
 
 def simulate(given: Mapping[str, Any], tell: Tell) -> None:
@@ -212,7 +214,7 @@ def simulate(given: Mapping[str, Any], tell: Tell) -> None:
     shutil.rmtree(part, ignore_errors=True)
     part.mkdir(parents=True)
     planned = plan(given["config"])
-    engine = Engine(planned.graph, {}, planned.seed)
+    engine = Engine(planned.graph, {}, planned.seed, progress=Heartbeat(tell).step)
     engine.run()
     write_whole(part / "facts.json", json.dumps(notes_of(engine)["facts"], indent=1, sort_keys=True) + "\n")
     shutil.rmtree(folder, ignore_errors=True)

@@ -76,6 +76,7 @@ class Context:
     `rng` is the only source of randomness, seeded by the run's seed and the node's name. `tick` is the current
     turn of the loop. `folder` is the run's folder, where an "after" stage may put files (through `files.write_whole`).
     `count` and `fact` go into the manifest: things dropped, by kind, and things worth knowing about the run.
+    `progress` (done, total or None) and `doing` (in words) are for a stage whose one step takes long: they are shown.
     """
 
     def __init__(self, node: str, rng: "np.random.Generator | None" = None, folder: Path | None = None) -> None:
@@ -87,6 +88,8 @@ class Context:
         self.facts: dict[str, Any] = {}
         self.drew = False
         self.read: frozenset[str] | None = None
+        self.progress: Callable[[int, int | None], None] = lambda done, total: None
+        self.doing: Callable[[str], None] = lambda words: None
         self._rng = rng
 
     def is_read(self, port: str) -> bool:

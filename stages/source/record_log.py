@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.problems import BadInput
 from omninav.stages.simulator.config import Event, WorldConfig
@@ -13,6 +15,12 @@ from omninav.stages.simulator.world import World
 from .camera_yaml import write_camera
 from .simulated import SimulatedRecording, in_order
 from .simulated_log import record
+
+
+def metres(drive: SimulatedRecording) -> float:
+    """How far the robot truly drove (m); being carried elsewhere is no driving."""
+    steps = np.hypot(*np.diff(drive.true_poses[:, :2], axis=0).T)
+    return float(steps[np.diff(drive.true_times) > 1].sum())  # put down 1 ns after it was taken up
 
 
 class RecordLog(Stage):
@@ -38,8 +46,10 @@ class RecordLog(Stage):
         if path.suffix != ".mcap":
             raise BadInput("simulate: name the log to write: log=out.mcap")
         days = in_order(self.day)
+        ctx.doing(f"building {self.world.name} and planning {self.route}")
         drives = [SimulatedRecording(self.world, self.route, day, self.events) for day in days]
-        record(drives, path)
+        ctx.doing("the first picture (for a minute, where the renderer was never compiled before)")
+        record(drives, path, progress=ctx.progress)
         path.with_suffix(".camera.yaml").write_text(write_camera(drives[0].camera))
         world = World(self.world, days[0])
         driven = {f"{self.route}, day {drive.day}": drive.truth for drive in drives}
@@ -47,7 +57,16 @@ class RecordLog(Stage):
         grid = write_grid(world, path.parent / f"{path.stem}.grid")
         pictures = sum(len(drive.stamps) for drive in drives)
         collisions = sum(drive.collisions for drive in drives)
-        ctx.fact("collisions", collisions)
+        people = [self.world.day(day).people for day in days]
+        for name, value in (
+            ("route", self.route),
+            ("day", self.day),
+            ("length_m", round(sum(metres(drive) for drive in drives), 1)),
+            ("frames", pictures),
+            ("people", people[0] if len(people) == 1 else people),
+            ("collisions", collisions),
+        ):
+            ctx.fact(name, value)
         if collisions:
             print(f"{path}: on its way the robot came into contact with something {collisions} times")
         print(f"{path}: {pictures} pictures; floor plan, camera.yaml and {grid} beside it")

@@ -1,7 +1,8 @@
 """Simulated drives as MCAP logs."""
 
+import itertools
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -22,21 +23,29 @@ WHEEL_TRANSIT, RING_TRANSIT = 2_000_000, 5_000_000
 """Nanoseconds from the stamp of odometry and of a range reading to its arrival."""
 
 
-def record(recordings: SimulatedRecording | Sequence[SimulatedRecording], path: Path, quality: int = 90) -> None:
+def record(
+    recordings: SimulatedRecording | Sequence[SimulatedRecording],
+    path: Path,
+    quality: int = 90,
+    progress: Callable[[int, int | None], None] = lambda done, total: None,
+) -> None:
     """Write a simulated drive, or several one after the other, as an MCAP log; the same drives give the same bytes.
 
     Topics as every recording has them: JPEG pictures, camera information, odometry, truth, ranges (`/scan`); what was
     done to the robot stands on `/ground_truth/event` as JSON; camera.yaml is attached. Odometry, truth and ranges come
-    at their own rates. Log times run behind header stamps as a camera's, a wheel's and a ring's do.
+    at their own rates. Log times run behind header stamps as a camera's, a wheel's and a ring's do. `progress` hears of
+    every picture: how many are written, of how many.
     """
     drives = [recordings] if isinstance(recordings, SimulatedRecording) else recordings
+    total = sum(len(drive.sent) for drive in drives)
+    written = itertools.count(1)
     with LogWriter(path) as log:
         log.attach("camera.yaml", write_camera(drives[0].camera).encode(), "application/yaml")
         for drive in drives:
-            _write(log, drive, quality)
+            _write(log, drive, quality, lambda: progress(next(written), total))
 
 
-def _write(log: LogWriter, recording: SimulatedRecording, quality: int) -> None:
+def _write(log: LogWriter, recording: SimulatedRecording, quality: int, wrote_picture: Callable[[], None]) -> None:
     for arrival, topic, number in sorted(_arrivals(recording)):
         if topic == "odometry":
             _write_odometry(log, recording, number, arrival)
@@ -51,6 +60,7 @@ def _write(log: LogWriter, recording: SimulatedRecording, quality: int) -> None:
             log.write("/ground_truth/event", "std_msgs/msg/String", arrival, {"data": said})
         else:
             _write_picture(log, recording, number, arrival, quality)
+            wrote_picture()
 
 
 def _arrivals(recording: SimulatedRecording) -> list[tuple[int, str, int]]:

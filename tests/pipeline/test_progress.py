@@ -77,3 +77,21 @@ def test_the_live_line_tells_name_frames_rate_and_time_left():
         live_line("map", 50, 100, 25.0, 62.0) == f"map  {'━' * 12}{'─' * 12}  50/100 frames  25.0 frames/s  1:02 left"
     )
     assert live_line("map", 50, None, 25.0, None) == "map  50 frames  25.0 frames/s"
+
+
+def test_what_has_no_frames_yet_is_said_at_once_and_gives_way_to_the_first_frame():
+    for stream, expected in ((io.StringIO(), '{"doing": "compiling"}\n'), (Terminal(), "compiling …")):
+        with Progress(stream, Clock()) as progress:
+            progress.say("compiling")
+            assert stream.getvalue().endswith(expected)
+            progress.update("simulate", 1, 2)
+    assert stream.getvalue().count("\n") == 1
+
+
+def test_what_is_printed_after_the_last_frame_stands_on_a_line_of_its_own():
+    stream = Terminal()
+    with Progress(stream, Clock()) as progress:
+        progress.update("simulate", 2, 2)
+        assert stream.getvalue().endswith("\n")
+        progress.update("simulate", 2, 2)
+    assert stream.getvalue().count("\n") == 1
