@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     command = COMMANDS.get(arguments[0]) if arguments else None
     if command is None and arguments and arguments[0].isidentifier():
         return _unknown_command(arguments[0])
-    from .problems import BadInput, ProblemsFound
+    from .problems import BadInput, ProblemsFound, unreadable_yaml
 
     try:
         _refuse_null_groups(arguments)
@@ -70,6 +70,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("stopped; `omninav resume runs/latest` goes on", file=sys.stderr)
         return 130
+    except Exception as error:
+        bad = unreadable_yaml(error)
+        if bad is None:
+            raise
+        print(bad, file=sys.stderr)
+        return 2
 
 
 def _refuse_null_groups(arguments: Sequence[str]) -> None:
@@ -170,7 +176,7 @@ def _words(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
 def _job(config: Any, arguments: Sequence[str], of_conditions: Sequence[str]) -> None:
     """One run. Never raises and never exits: in a sweep the other jobs go on, and the exit code is left in a file."""
     from .engine import StageFailed
-    from .problems import BadInput, ProblemsFound
+    from .problems import BadInput, ProblemsFound, unreadable_yaml
 
     sweep = _sweep_folder()
     code, error = 0, ""
@@ -186,10 +192,12 @@ def _job(config: Any, arguments: Sequence[str], of_conditions: Sequence[str]) ->
     except StageFailed as failed:
         code, error = 1, str(failed)
     except KeyboardInterrupt:
-        code, error = 130, "stopped; `omninav resume runs/latest` goes on"
+        on = "the same command" if config.get("experiment") is not None else "`omninav resume runs/latest`"
+        code, error = 130, f"stopped; {on} goes on"
     except Exception as unknown:  # a defect of ours: one line here, the trace in run.log
-        code, error = 1, f"{type(unknown).__name__}: {unknown}"
-        if sweep is None and not isinstance(unknown, OSError):
+        bad = unreadable_yaml(unknown)
+        code, error = (2, str(bad)) if bad else (1, f"{type(unknown).__name__}: {unknown}")
+        if bad is None and sweep is None and not isinstance(unknown, OSError):
             import traceback
 
             traceback.print_exc()
@@ -490,12 +498,20 @@ def _variants(arguments: list[str]) -> int:
 
 
 def _simulate(arguments: list[str]) -> int:
-    from .engine import Engine
-    from .run import plan
+    from .progress import Progress
 
-    with _composed(["variant=simulate", *arguments]) as config:
-        planned = plan(complete(config))
-    Engine(planned.graph, {}, planned.seed).run()
+    with Progress(unit="pictures") as progress:
+        progress.say("reading the configuration")
+        from .engine import Engine
+        from .run import plan
+
+        with _composed(["variant=simulate", *arguments]) as config:
+            planned = plan(complete(config))
+
+        def step(done: int, total: int | None) -> None:
+            progress.update("simulate", done, total)
+
+        Engine(planned.graph, {}, planned.seed, progress=step, doing=progress.say).run()
     return 0
 
 
@@ -552,6 +568,8 @@ def _resume(arguments: list[str]) -> int:
     if len(arguments) != 1:
         raise BadInput("resume: give one run folder: omninav resume runs/latest")
     here, folder = Path.cwd(), Path(arguments[0]).resolve()
+    if (folder / "experiment.json").is_file():
+        return _resume_experiment(folder)
     ended = status(folder) == "complete"
     try:
         with Progress() as progress:
@@ -566,6 +584,18 @@ def _resume(arguments: list[str]) -> int:
     _print(results_table(metrics))
     print(f"report: {_shown(run.folder / 'report.html')}")
     return 0
+
+
+def _resume_experiment(folder: Path) -> int:
+    """An experiment goes on when its command is typed again, where it was typed."""
+    import json
+    import shlex
+
+    manifest = json.loads((folder / "experiment.json").read_text())
+    words, place = manifest["argv"][1:], Path(manifest["cwd"])
+    print(f"{shlex.join(['omninav', *words])}   (in {place})", flush=True)
+    os.chdir(place)
+    return main(words)
 
 
 def _doctor(arguments: list[str]) -> int:

@@ -1,6 +1,7 @@
 """What is wrong with a configuration: where, what, and what to type. All of it at once."""
 
 import difflib
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -31,6 +32,18 @@ class ProblemsFound(Exception):
 
 class BadInput(Exception):
     """Input that cannot be used. The message is one line: where (file, topic, record), what, and what to do."""
+
+
+def unreadable_yaml(error: BaseException) -> BadInput | None:
+    """What is wrong with a YAML file that could not be parsed, in one line; None where the error is another one."""
+    yaml = sys.modules.get("yaml")  # who met a YAML error has imported it
+    if yaml is None or not isinstance(error, yaml.YAMLError):
+        return None
+    mark, said = getattr(error, "problem_mark", None), getattr(error, "problem", None) or str(error).split("\n")[0]
+    where = f"{mark.name}, line {mark.line + 1}, column {mark.column + 1}" if mark else "a configuration file"
+    return BadInput(
+        f"{where}: this is no YAML: {said}; mind indentation, colons, quotes and brackets around this place"
+    )
 
 
 def format_problems(problems: Iterable[Problem]) -> str:
