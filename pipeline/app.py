@@ -195,9 +195,9 @@ def _job(config: Any, arguments: Sequence[str], of_conditions: Sequence[str]) ->
         on = "the same command" if config.get("experiment") is not None else "`omninav resume runs/latest`"
         code, error = 130, f"stopped; {on} goes on"
     except Exception as unknown:  # a defect of ours: one line here, the trace in run.log
-        bad = unreadable_yaml(unknown)
-        code, error = (2, str(bad)) if bad else (1, f"{type(unknown).__name__}: {unknown}")
-        if bad is None and sweep is None and not isinstance(unknown, OSError):
+        no_yaml = unreadable_yaml(unknown)
+        code, error = (2, str(no_yaml)) if no_yaml else (1, f"{type(unknown).__name__}: {unknown}")
+        if no_yaml is None and sweep is None and not isinstance(unknown, OSError):
             import traceback
 
             traceback.print_exc()

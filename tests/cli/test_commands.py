@@ -218,7 +218,7 @@ def test_the_embedded_default_leaves_everything_a_run_should(demo: Path):
     assert metrics["frames"] == len((demo / "trajectory.tum").read_text().split("\n")) - 1
     for name in ("position_error_m", "heading_error_deg"):
         assert set(metrics[name]) == {"mean", "median", "std", "p90", "max"}
-        assert set(metrics["odometry_alone"][name]) == {"mean", "median", "p90", "max"}
+        assert set(metrics["odometry_alone"][name]) == set(metrics[name])
     assert metrics["map"]["references"] > 50
 
 

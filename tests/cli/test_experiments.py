@@ -2,10 +2,12 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -121,17 +123,48 @@ ONCE = 2 * (20 + 30)
 """Lines in `computed`: in two conditions, each frame once."""
 
 
+def with_files(place: Path) -> Path:
+    (place / "my_stages.py").write_text(STAGES)
+    (place / "mine/variant").mkdir(parents=True)
+    (place / "mine/experiment").mkdir()
+    (place / "mine/variant/dice.yaml").write_text(VARIANT)
+    (place / "mine/experiment/dice.yaml").write_text(EXPERIMENT)
+    return place
+
+
 @pytest.fixture
 def place(tmp_path: Path) -> Path:
-    (tmp_path / "my_stages.py").write_text(STAGES)
-    (tmp_path / "mine/variant").mkdir(parents=True)
-    (tmp_path / "mine/experiment").mkdir()
-    (tmp_path / "mine/variant/dice.yaml").write_text(VARIANT)
-    (tmp_path / "mine/experiment/dice.yaml").write_text(EXPERIMENT)
-    return tmp_path
+    return with_files(tmp_path)
 
 
 MINE = ("--config-dir", "mine", "+experiment=dice")
+TT1 = "~experiment.sweep.tour.TT2"
+"""Half of the conditions."""
+
+
+@dataclass
+class Finished:
+    """The whole experiment, run once for several tests; `go` runs a command in its folder."""
+
+    place: Path
+    said: str
+
+    def go(self, *words: str) -> str:
+        command = [sys.executable, "-m", "omninav.pipeline", *words]
+        ended = subprocess.run(command, cwd=self.place, capture_output=True, text=True, timeout=120)
+        assert ended.returncode == 0, ended.stdout + ended.stderr
+        return ended.stdout
+
+    def computed(self) -> int:
+        """How many frames of the table were computed so far."""
+        return len((self.place / "computed").read_text().split("\n")) - 1
+
+
+@pytest.fixture(scope="module")
+def dice(tmp_path_factory: pytest.TempPathFactory) -> Finished:
+    finished = Finished(with_files(tmp_path_factory.mktemp("dice")), "")
+    finished.said = finished.go(*MINE)
+    return finished
 
 
 def results(folder: Path) -> dict[str, bytes]:
@@ -141,10 +174,9 @@ def results(folder: Path) -> dict[str, bytes]:
     }
 
 
-def test_a_page_with_verdicts_and_what_repetitions_share_computed_once(omninav, place: Path):
-    ended = omninav(*MINE, check=True)
-    folder = place / "runs/dice_paper"
-    assert "page: runs/dice_paper/dice.html" in ended.stdout
+def test_a_page_with_verdicts_and_what_repetitions_share_computed_once(dice: Finished):
+    folder = dice.place / "runs/dice_paper"
+    assert "page: runs/dice_paper/dice.html" in dice.said
     better, published, best = json.loads((folder / "verdicts.json").read_text())
     assert better["holds"] is True
     assert better["paper"] == "better"
@@ -155,37 +187,43 @@ def test_a_page_with_verdicts_and_what_repetitions_share_computed_once(omninav, 
     page = (folder / "dice.md").read_text()
     assert "(102.0)" in page
     assert (folder / "dice.png").stat().st_size > 1000
-    assert len((place / "computed").read_text().split("\n")) - 1 == ONCE
+    assert dice.computed() == ONCE
     assert len(results(folder)) == 4 * 6
     assert not list(folder.rglob("*.spool"))
 
-    again = omninav(*MINE, check=True)
-    assert len((place / "computed").read_text().split("\n")) - 1 == ONCE
-    assert again.stdout == ended.stdout
 
-    one = results(folder)
-    omninav(*MINE, "+experiment.shared=false", "runs=alone", "cache=null", check=True)
-    assert results(place / "alone/dice_paper") == one
-    assert len((place / "computed").read_text().split("\n")) - 1 == (1 + 6) * ONCE
+def test_a_finished_experiment_is_found_and_its_folder_can_be_resumed(dice: Finished):
+    before = dice.computed()
+    assert dice.go("resume", "runs/dice_paper").split("\n")[1:] == dice.said.split("\n")
+    assert dice.computed() == before
 
 
-def test_a_killed_experiment_goes_on_where_it_was(omninav, place: Path):
-    command = [sys.executable, "-m", "omninav.pipeline", *MINE, "nodes.noisy.wait_s=0.02", "runs=killed"]
+def test_repetitions_that_share_nothing_give_the_same(dice: Finished):
+    before = dice.computed()
+    dice.go(*MINE, TT1, "+experiment.shared=false", "runs=alone", "cache=null")
+    alone, shared = results(dice.place / "alone/dice_paper"), results(dice.place / "runs/dice_paper")
+    assert len(alone) == 2 * 6
+    assert alone.items() <= shared.items()
+    assert dice.computed() - before == 2 * 6 * 20
+
+
+def test_a_killed_experiment_goes_on_where_it_was(dice: Finished):
+    command = [sys.executable, "-m", "omninav.pipeline", *MINE, TT1, "nodes.noisy.wait_s=0.02", "runs=killed"]
     process = subprocess.Popen(
-        command, cwd=place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+        command, cwd=dice.place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
     )
-    folder = place / "killed/dice_paper"
+    folder = dice.place / "killed/dice_paper"
     while len(results(folder)) < 5:
         assert process.poll() is None
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("seed_*.json")}
-    assert 5 <= len(before) < 24
-    omninav(*MINE, "nodes.noisy.wait_s=0.02", "runs=killed", check=True)
+    assert 5 <= len(before) < 12
+    dice.go("resume", "killed/dice_paper")
     assert {path: path.stat().st_mtime_ns for path in before} == before
-    omninav(*MINE, check=True)
-    assert results(folder) == results(place / "runs/dice_paper")
+    assert len(results(folder)) == 12
+    assert results(folder).items() <= results(dice.place / "runs/dice_paper").items()
 
 
 def test_a_failing_job_is_named_on_the_page_and_the_others_finish(omninav, place: Path):
@@ -219,6 +257,10 @@ def test_what_is_wrong_with_a_file_is_said_before_anything_runs(omninav, place: 
     ended = omninav(*MINE)
     assert ended.returncode == 2
     assert "biass" in ended.stderr
+    (place / "mine/experiment/dice.yaml").write_text(EXPERIMENT + "  slow: [1\n")
+    ended = omninav(*MINE)
+    assert ended.returncode == 2
+    assert re.fullmatch(r"\S+/mine/experiment/dice.yaml, line \d+, column \d+: this is no YAML: .*\n", ended.stderr)
     assert not (place / "runs").exists()
 
 

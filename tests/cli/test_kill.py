@@ -37,7 +37,7 @@ def test_a_killed_run_resumes_to_the_same_bytes(tmp_path: Path, demo: Path, shar
         if process.poll() is not None:
             break
     kills = 0
-    while process.poll() is None and kills < 4:
+    while process.poll() is None and kills < 3:
         time.sleep(moments.uniform(0.0, 4.0))
         if process.poll() is None:
             stop(process)

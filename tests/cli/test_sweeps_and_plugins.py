@@ -11,12 +11,12 @@ SHORT = "nodes.source.stop=12"  # of tour and drive, where a result is not looke
 
 
 def test_a_sweep_runs_every_combination_and_has_one_page(omninav, shared_cache: Path, tmp_path: Path):
-    omninav("-m", "match=selective,l2", "seed=0,1,2", f"cache={shared_cache}", check=True)
+    omninav("-m", "match=selective,l2", "seed=0,1", SHORT, f"cache={shared_cache}", check=True)
     (sweep,) = (tmp_path / "runs").glob("*_sweep")
-    manifests = [json.loads((sweep / str(n) / "manifest.json").read_text()) for n in range(6)]
-    assert [m["status"] for m in manifests] == ["complete"] * 6
+    manifests = [json.loads((sweep / str(n) / "manifest.json").read_text()) for n in range(4)]
+    assert [m["status"] for m in manifests] == ["complete"] * 4
     assert manifests[0]["overrides"].startswith("match=selective seed=0")
-    assert all((sweep / str(n) / "report.html").exists() for n in range(6))
+    assert all((sweep / str(n) / "report.html").exists() for n in range(4))
     page = next(sweep.glob("*.html")).read_text()
     assert all(m["overrides"].split()[0] in page for m in manifests)
 
