@@ -291,6 +291,8 @@ class _Ways:
         for turn in range(60):
             inner = slice(1 + turn % 2, len(points) - 1, 2)
             count = len(points[inner])
+            if count == 0:  # of two or three points all are ends in one of the turns
+                continue
             before, after = points[turn % 2 :: 2][:count], points[2 + turn % 2 :: 2][:count]
             drawn = points[inner] + 0.4 * (0.5 * (before + after) - points[inner])
             back = np.einsum("ij,ij->i", points[inner] - before, after - points[inner]) < 0.0
