@@ -35,7 +35,8 @@ def test_its_first_line_is_its_package_and_its_second_says_what_it_is(path: Path
     package, said = head(path)
     role = group(path)
     wanted = "_global_" if role in ("variant", "results", "ablation") else None
-    packages = [wanted] if wanted else [f"nodes.{role}", role, f"world.{role}"]
+    of_a_stage = "_target_" in (yaml.safe_load(path.read_text()) or {})
+    packages = [wanted] if wanted else [f"nodes.{role}"] if of_a_stage else [role, f"world.{role}"]
     assert package in [f"# @package {name}" for name in packages]
     assert re.match(r"# .{10,}\.  omninav \S", said), said
 

@@ -14,6 +14,7 @@ from omninav.stages.simulator.config import Delivery, Event, MirrorCamera, Odome
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.source.log import LogSource, Position
 from omninav.stages.source.opening import open_recording
+from omninav.stages.source.record_log import RecordLog
 from omninav.stages.source.recording import UnreadableRecording
 from omninav.stages.source.simulated import SimulatedRecording
 from omninav.stages.source.simulated_log import record
@@ -164,3 +165,21 @@ def test_several_days_in_one_log_are_read_as_one_drive_after_another(tmp_path: P
 def test_days_that_cannot_be_are_refused():
     with pytest.raises(UnreadableRecording, match=r"days are numbered from 0; type day=1 or day=\[0,1,2\]"):
         LogSource(world=WORLD, route="there", day=(0, -1)).setup(Context("source"))
+
+
+def test_what_a_written_log_states_does_not_count_the_metres_it_was_carried(tmp_path: Path) -> None:
+    """Wheels without errors know how far they rolled, and nothing of being lifted."""
+    said = Context("record")
+    RecordLog(world=EXACT, route="there", day=(0, 1), log=str(tmp_path / "out.mcap"), events=KIDNAPPED).step(said)
+    drives = [SimulatedRecording(EXACT, "there", day, KIDNAPPED) for day in (0, 1)]
+    rolled = sum(np.hypot(*np.diff(drive.rolled[:, :2], axis=0).T).sum() for drive in drives)
+    jumped = sum(np.hypot(*np.diff(drive.true_poses[:, :2], axis=0).T).sum() for drive in drives)
+    assert said.facts.pop("length_m") == pytest.approx(rolled, abs=0.06)
+    assert jumped > rolled + 0.5
+    assert said.facts == {
+        "route": "there",
+        "day": (0, 1),
+        "frames": sum(len(drive.stamps) for drive in drives),
+        "people": [EXACT.day(0).people, EXACT.day(1).people],
+        "collisions": sum(drive.collisions for drive in drives),
+    }
