@@ -12,6 +12,7 @@ from typing import Any
 
 import yaml
 
+from .artifact import Cache
 from .crew import Job, work_through
 from .experiment import Condition, Experiment, read_experiment, words_of
 from .files import digest_text, write_whole
@@ -213,7 +214,8 @@ class ExperimentRun:
             try:
                 cell.planned = plan(cell.config)
                 cell.key = condition_key(cell.planned)
-                cell.results = finished(cell.folder, cell.key, cell.seeds)
+                place = cell.config.get("cache") if cell.shared else None  # what is timed is timed anew
+                cell.results = finished(cell.folder, cell.key, cell.seeds, Cache(Path(place)) if place else None)
             except (ProblemsFound, BadInput) as wrong:
                 cell.error = str(wrong)
 

@@ -69,20 +69,25 @@ def known_digests(graph: Graph) -> list[str]:
     return [digest for digest in found if digest]
 
 
-def finished(folder: Path, key: str, seeds: Sequence[int]) -> dict[int, dict[str, Any]]:
-    """The results that lie in a condition's folder and belong to this key, by seed."""
+def finished(folder: Path, key: str, seeds: Sequence[int], cache: Cache | None = None) -> dict[int, dict[str, Any]]:
+    """The results of a condition by seed: those in its folder that belong to this key, and those in the cache.
+
+    Through the cache experiments share the conditions that they have in common.
+    """
     found = {}
     for seed in seeds:
-        path = _result(folder, seed)
-        if path.exists():
-            result = json.loads(path.read_text())
+        for path in _results(folder, key, seed, cache):
+            result = json.loads(path.read_text()) if path.exists() else {}
             if result.get("key") == key:
                 found[seed] = result
+                break
     return found
 
 
-def _result(folder: Path, seed: int) -> Path:
-    return folder / f"seed_{seed}.json"
+def _results(folder: Path, key: str, seed: int, cache: Cache | None) -> list[Path]:
+    """Where a repetition's result lies."""
+    kept = [] if cache is None else [cache.path(digest_text("repetition", key, str(seed)), ".json")]
+    return [folder / f"seed_{seed}.json", *kept]
 
 
 def repeat(given: Mapping[str, Any], tell: Tell) -> None:
@@ -122,7 +127,8 @@ def repeat(given: Mapping[str, Any], tell: Tell) -> None:
             spool.close()
         if recorded is None:
             shutil.rmtree(place, ignore_errors=True)
-        write_whole(_result(folder, seed), json.dumps(result, indent=1, sort_keys=True, default=str) + "\n")
+        for path in _results(folder, given["key"], seed, cache if given["shared"] else None):
+            write_whole(path, json.dumps(result, indent=1, sort_keys=True, default=str) + "\n")
         tell({"seed": seed})
     shutil.rmtree(run.memory, ignore_errors=True)
 
