@@ -183,6 +183,7 @@ def _lines(experiment: Experiment, results: Results, along: str, panels: str | N
     boxes = experiment.labels(panels) if panels else [""]
     series = [factor for factor in experiment.sweep if factor not in (along, panels)]
     combinations = list(itertools.product(*(experiment.labels(factor) for factor in series)))
+    heights: list[float] = []
     with picture(4.6 * len(boxes) + 0.4, 3.8) as drawn:
         grid = drawn.canvas.subplots(1, len(boxes), squeeze=False, sharey=True)[0]
         for axes, box in zip(grid, boxes, strict=True):
@@ -193,6 +194,7 @@ def _lines(experiment: Experiment, results: Results, along: str, panels: str | N
                     for x in experiment.labels(along)
                 ]
                 known = [(x, list(found.values())) for x, found in points if found]
+                heights += [float(np.mean(values)) for _, values in known]
                 axes.errorbar(
                     [x for x, _ in known],
                     [float(np.mean(v)) for _, v in known],
@@ -207,7 +209,7 @@ def _lines(experiment: Experiment, results: Results, along: str, panels: str | N
                 )
             axes.set_title(box)
             axes.set_xlabel(along)
-            axes.set_ylim(bottom=0)
+        _scale(grid[0], heights)
         grid[0].set_ylabel(measure.title)
         grid[0].legend()
     return drawn.content
@@ -217,6 +219,7 @@ def _bars(experiment: Experiment, results: Results) -> bytes:
     name, measure = next(iter(experiment.measures.items()))
     columns, rows = experiment.labels(experiment.page.columns), _row_labels(experiment)
     width = 0.8 / len(rows)
+    all_heights: list[float] = []
     with picture(max(5.0, 1.1 + 0.42 * len(columns) * (len(rows) + 1)), 3.6) as drawn:
         axes = drawn.canvas.subplots()
         for index, labels in enumerate(rows):
@@ -227,6 +230,7 @@ def _bars(experiment: Experiment, results: Results) -> bytes:
             ]
             heights = [float(np.mean(v)) if v else 0.0 for v in found]
             spreads = [float(np.std(v)) if v else 0.0 for v in found]
+            all_heights += heights
             colour = PALETTE[index % len(PALETTE)]
             title = ", ".join(labels.values())
             axes.bar(
@@ -249,10 +253,20 @@ def _bars(experiment: Experiment, results: Results) -> bytes:
             axes.plot([], [], "D", color="white", markeredgecolor="#111111", markersize=5, label="paper")
         axes.set_xticks(np.arange(len(columns)), columns)
         axes.set_ylabel(measure.title)
-        axes.set_ylim(bottom=0)
+        _scale(axes, all_heights)
         axes.grid(axis="x", visible=False)
         axes.legend(ncols=2)
     return drawn.content
+
+
+def _scale(axes: Any, heights: Sequence[float]) -> None:
+    """From zero up; in powers of ten where the highest would hide the lowest."""
+    above = [height for height in heights if height > 0]
+    if above and max(above) > 20 * min(above):
+        axes.set_yscale("log")
+        axes.set_ylim(bottom=0.5 * min(above))
+    else:
+        axes.set_ylim(bottom=0)
 
 
 def verdict_lines(verdicts: Sequence[Mapping[str, Any]]) -> list[str]:
