@@ -141,7 +141,12 @@ def _remark(run: "ExperimentRun", number_: int) -> str:
 
 
 def _facts(facts: Mapping[str, Any]) -> str:
-    return ", ".join(f"{key.replace('_', ' ')} {value}" for key, value in facts.items())
+    return ", ".join(_in_words(key, value) for key, value in facts.items())
+
+
+def _in_words(name: str, value: Any) -> str:
+    words = name.removesuffix("_m").replace("_", " ")
+    return f"{words} {value} m" if name.endswith("_m") else f"{words} {value}"
 
 
 def _condition(cell: Any) -> dict[str, Any]:
