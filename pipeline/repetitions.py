@@ -138,6 +138,7 @@ def prepare(given: Mapping[str, Any], tell: Tell) -> None:
     planned = plan(given["config"])
     cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
     run = Run(Path(given["folder"]))
+    run.folder.mkdir(parents=True, exist_ok=True)  # nothing else makes it where the cache has the artifact
     for artifact in planned.artifacts:
         if artifact.name == given["name"]:
             obtain(run, artifact, BASE_SEED, cache, math.inf, Heartbeat(tell))
