@@ -12,6 +12,9 @@ Ints = npt.NDArray[np.int64]
 LANES = 8
 """Headings are padded to a multiple of this, so that the inner loops are whole vector instructions."""
 
+EXPONENTS = {"sqrt": 0.5, "cube_root": 1.0 / 3.0, "three_quarters": 0.75, "none": 0.0}
+"""Penalties on the number k of segments by name: the exponent of 1 / k (the rest of 1 goes to 1 / n)."""
+
 LARGEST_COLOUR_DISTANCE = float(np.sqrt(3.0) * 255.0)
 """Distance of black and white in blue-green-red 0..255."""
 

@@ -3,7 +3,7 @@
 from typing import Annotated, Literal
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.segments import similarities
+from omninav.stages.geometry.segments import EXPONENTS, similarities
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures
 from omninav.stages.values.maps import ReferenceGraph
@@ -11,8 +11,6 @@ from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
 from .candidates import check_alike, near_belief
-
-EXPONENTS = {"sqrt": 0.5, "cube_root": 1.0 / 3.0, "three_quarters": 0.75, "none": 0.0}
 
 
 class SelectiveMatch(Stage):

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context
 from omninav.stages.geometry.nearby import NearestCells
-from omninav.stages.geometry.segments import penalties, sorting_network
+from omninav.stages.geometry.segments import EXPONENTS, penalties, sorting_network
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
@@ -18,8 +18,6 @@ from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
 from .near_references import Array, Floats, Ints, NearReferences
-
-EXPONENTS = {"sqrt": 0.5, "cube_root": 1.0 / 3.0, "none": 0.0}
 
 
 # Sums over the bins may be taken in any order, which lets them be vector instructions.
@@ -135,7 +133,7 @@ class ExpectedObservation(NearReferences):
     `penalty` as in `selective`.
     """
 
-    penalty: Literal["sqrt", "cube_root", "none"] = "sqrt"
+    penalty: Literal["sqrt", "cube_root", "three_quarters", "none"] = "sqrt"
 
     def step(  # type: ignore[override]
         self,
