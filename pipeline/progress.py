@@ -31,6 +31,7 @@ class Progress:
         self._first = self._done = 0
         self._total: int | None = None
         self._shown: int | None = None
+        self._note = ""
 
     def __enter__(self) -> "Progress":
         return self
@@ -40,13 +41,18 @@ class Progress:
     ) -> None:
         self._close()
 
-    def update(self, name: str, done: int, total: int | None = None) -> None:
-        """`done` frames of `total` (None: not known) have gone through the graph `name`."""
+    def begin(self, name: str, done: int, total: int | None = None) -> None:
+        """`done` were there before; only what comes after them counts for the rate and the time left."""
+        self._begin(name, done)
+        self._done, self._total = done, total
+
+    def update(self, name: str, done: int, total: int | None = None, note: str = "") -> None:
+        """`done` frames of `total` (None: not known) have gone through the graph `name`; `note` is shown with it."""
         if (name, done) == self._ended:
             return
         if name != self._name:
-            self._begin(name, done)
-        self._done, self._total = done, total
+            self._begin(name, done - 1)
+        self._done, self._total, self._note = done, total, note
         self._now = now = self._clock()
         if now >= self._due:
             self._due = now + self._every
@@ -61,11 +67,11 @@ class Progress:
         self._stream.write(f"\r\x1b[K{words} …" if self._live else json.dumps({"doing": words}) + "\n")
         self._stream.flush()
 
-    def _begin(self, name: str, done: int) -> None:
+    def _begin(self, name: str, before: int) -> None:
         self._close()
-        now = self._clock()
-        self._name, self._started, self._first = name, now, done - 1
-        self._shown, self._due = None, now + self._every
+        self._now = now = self._clock()
+        self._name, self._started, self._first, self._note = name, now, before, ""
+        self._shown, self._due, self._ended = None, now + self._every, None
 
     def _close(self) -> None:
         if self._name and self._shown != self._done:
@@ -78,28 +84,46 @@ class Progress:
     def _show(self, now: float) -> None:
         self._shown = self._done
         seconds = now - self._started
-        rate = (self._done - self._first) / seconds if seconds > 0 else 0.0
+        rate = (self._done - self._first) / seconds if seconds > 0 and self._done > self._first else None
         left = (self._total - self._done) / rate if self._total is not None and rate else None
         if self._live:
-            self._stream.write("\r\x1b[K" + live_line(self._name, self._done, self._total, rate, left, self._unit))
+            line = live_line(self._name, self._done, self._total, rate, left, self._unit, self._note)
+            self._stream.write("\r\x1b[K" + line)
         else:
             said = {"graph": self._name, self._unit: self._done, "of": self._total}
             said |= {
-                f"{self._unit}_per_second": round(rate, 1),
+                f"{self._unit}_per_second": None if rate is None else _rounded(rate),
                 "seconds_left": None if left is None else round(left, 1),
             }
+            said |= {"note": self._note} if self._note else {}
             self._stream.write(json.dumps(said) + "\n")
         self._stream.flush()
 
 
-def live_line(name: str, done: int, total: int | None, rate: float, left: float | None, unit: str = "frames") -> str:
-    """The line in the terminal: `name  ━━━━────  120/300 frames  48.2 frames/s  0:04 left`."""
+def _rounded(rate: float) -> float:
+    """A tenth of a thing is enough where there are many a second; two digits where one takes long."""
+    return round(rate, 1) if rate >= 1 else float(f"{rate:.2g}")
+
+
+def live_line(
+    name: str,
+    done: int,
+    total: int | None,
+    rate: float | None,
+    left: float | None,
+    unit: str = "frames",
+    note: str = "",
+) -> str:
+    """The line in the terminal: `name  ━━━━────  120/300 frames  48.2 frames/s  0:04 left`; slow ones `12.5 s each`."""
     words = [name]
     if total:
         full = min(24, 24 * done // total)
         words.append("━" * full + "─" * (24 - full))
     words.append(f"{done}/{total} {unit}" if total is not None else f"{done} {unit}")
-    words.append(f"{rate:.1f} {unit}/s")
+    if rate is not None:
+        words.append(f"{rate:.1f} {unit}/s" if rate >= 1 else f"{1 / rate:.1f} s each")
     if left is not None and (total is None or done < total):
-        words.append(f"{int(left) // 60}:{int(left) % 60:02d} left")
-    return "  ".join(words)
+        minutes, seconds = divmod(int(left), 60)
+        hours, minutes_only = divmod(minutes, 60)
+        words.append((f"{hours}:{minutes_only:02d}:{seconds:02d}" if hours else f"{minutes}:{seconds:02d}") + " left")
+    return "  ".join([*words, note] if note else words)

@@ -95,3 +95,37 @@ def test_what_is_printed_after_the_last_frame_stands_on_a_line_of_its_own():
         assert stream.getvalue().endswith("\n")
         progress.update("simulate", 2, 2)
     assert stream.getvalue().count("\n") == 1
+
+
+def test_only_what_this_attempt_did_counts_for_the_rate():
+    stream, clock = io.StringIO(), Clock()
+    with Progress(stream, clock, unit="repetitions") as progress:
+        progress.begin("table", 400, 404)
+        for done in (401, 402, 403, 404):
+            clock.now += 50.0
+            progress.update("table", done, 404)
+    lines = [json.loads(line) for line in stream.getvalue().splitlines()]
+    assert [line["repetitions_per_second"] for line in lines] == [0.02] * 4
+    assert [line["seconds_left"] for line in lines] == [150.0, 100.0, 50.0, 0.0]
+
+
+def test_what_was_finished_before_has_no_rate():
+    stream, clock = io.StringIO(), Clock()
+    with Progress(stream, clock, unit="repetitions") as progress:
+        progress.begin("table", 404, 404)
+        clock.now += 1e-6
+        progress.update("table", 404, 404)
+    (line,) = stream.getvalue().splitlines()
+    assert json.loads(line) == {
+        "graph": "table",
+        "repetitions": 404,
+        "of": 404,
+        "repetitions_per_second": None,
+        "seconds_left": None,
+    }
+
+
+def test_what_takes_longer_than_a_second_is_told_in_seconds_and_long_waits_in_hours():
+    bar = "─" * 24
+    assert live_line("t", 1, 200, 0.02, 9950.0, "maps") == f"t  {bar}  1/200 maps  50.0 s each  2:45:50 left"
+    assert live_line("t", 0, 200, None, None, "maps", "1 running") == f"t  {bar}  0/200 maps  1 running"
