@@ -36,7 +36,7 @@ class Claim:
 
     One case for each condition that has the labels of `of`. Its figure is compared with: `at_most` (a number,
     `published`, or the labels of another condition), `below`, `above` or `not_above` (the labels of another condition),
-    or the best of the others (`lowest`). `times` multiplies the other side.
+    or the best of the others (`lowest`: none of them is lower beyond the interval). `times` multiplies the other side.
     """
 
     says: str

@@ -165,7 +165,10 @@ def _against_samples(
 
 
 def _lowest(experiment: Experiment, claim: Claim, labels: Labels, results: Results) -> Case:
-    """Against the best of all conditions that differ from this one only in the factors the claim fixes."""
+    """Against the best of all conditions that differ from this one only in the factors the claim fixes.
+
+    Where the interval of the difference holds 0 the two are alike, and nothing is better than this one.
+    """
     fixed = [factor for factor in experiment.sweep if factor in claim.of]
     rivals = []
     for combination in itertools.product(*(experiment.labels(factor) for factor in fixed)):
@@ -179,7 +182,7 @@ def _lowest(experiment: Experiment, claim: Claim, labels: Labels, results: Resul
         return Case(where, _mean(ours), None, "the best of the others", None, None, None)
     _, facing, found = min(rivals, key=lambda rival: rival[0])
     against = "the best of the others: " + ", ".join(facing[factor] for factor in fixed)
-    return _against_samples("at_most", where, ours, found, against)
+    return _against_samples("not_above", where, ours, found, against)
 
 
 def _where(experiment: Experiment, labels: Labels) -> str:
