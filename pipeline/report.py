@@ -29,6 +29,8 @@ WIDEST_NAME = 24
 """Of a run at the head of a column, in characters."""
 BESIDE = ("mean_pose.", "odometry_alone.after_convergence.")
 """What a comparison leaves out, because it says little about which run is better."""
+UNMEASURED = ("frames", "map", "logs")
+"""What every run states, whether or not anything was measured in it."""
 Rows = list[dict[str, Any]]
 
 
@@ -106,7 +108,8 @@ def _results(metrics: Mapping[str, Any]) -> dict[str, Any]:
             condition = ", ".join(words(part) for part in leaf.place) or "all frames"
             rows.append({"condition": condition, "cells": cells, "plain": not leaf.place})
         quantities.append({"name": title(name), "unit": unit(name), "rows": rows})
-    return {"columns": columns, "quantities": quantities, "figures": single}
+    measured = any(path.partition(".")[0] not in UNMEASURED for path in _by_path(metrics))
+    return {"columns": columns, "quantities": quantities, "figures": single, "measured": measured}
 
 
 def _single(leaf: Leaf) -> dict[str, str]:

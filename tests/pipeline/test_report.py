@@ -130,6 +130,13 @@ def test_a_run_without_truth_says_why_there_are_no_errors(tmp_path):
     assert "no ground truth" in text_of(report(tmp_path, metrics={"frames": 3}))
 
 
+def test_a_drive_that_was_measured_is_not_said_to_lack_errors(tmp_path):
+    metrics = {"frames": 300, "drive": {"collisions": 0, "distance_m": 22.1}}
+    said = text_of(report(tmp_path, metrics=metrics))
+    assert "collisions 0" in said
+    assert "no measured errors" not in said
+
+
 def test_a_filter_that_never_converged_is_said_to_have_never_done_so(tmp_path):
     metrics = {**METRICS, "converged_after_frames": None, "after_convergence": None}
     assert "Converged after never" in text_of(report(tmp_path, metrics=metrics))
