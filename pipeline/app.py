@@ -5,7 +5,10 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .experiment_run import ExperimentRun
 
 CONF = "omninav.conf"
 OUTCOMES = "OMNINAV_OUTCOMES"
@@ -233,29 +236,42 @@ def _experiment(
     config: Any, arguments: Sequence[str], of_conditions: Sequence[str], sweep: tuple[Path, str, str] | None
 ) -> int:
     """An experiment: every condition and repetition of its file, and its page. 1 where a job failed."""
+    from .problems import BadInput
+
+    if sweep is not None:
+        raise BadInput("an experiment has its own sweep: leave out -m, and write what varies into its file")
+    run = _planned_experiment(config, arguments, of_conditions)
+    well = run.run()
+    print(f"page: {_shown(run.folder / (run.experiment.name + '.html'))}", flush=True)
+    return 0 if well else 1
+
+
+def _planned_experiment(
+    config: Any, arguments: Sequence[str], of_conditions: Sequence[str], place: Sequence[str] = ()
+) -> "ExperimentRun":
+    """The experiment of a composed configuration, with every condition checked. Raises `ProblemsFound`.
+
+    `place` says where configurations are looked for, where Hydra was not started with `--config-dir`.
+    """
     from hydra import compose
     from hydra.errors import HydraException
     from omegaconf import OmegaConf
 
-    from .experiment_run import run_experiment
+    from .experiment_run import plan_experiment
     from .overrides import misfits
-    from .problems import BadInput, ProblemsFound
+    from .problems import ProblemsFound
 
-    if sweep is not None:
-        raise BadInput("an experiment has its own sweep: leave out -m, and write what varies into its file")
     plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
     folders = _words(arguments)[1]
 
     def composed(words: Sequence[str]) -> dict[str, Any]:
         try:
-            return complete(compose("config", overrides=list(words)))
+            return complete(compose("config", overrides=[*place, *words]))
         except HydraException as error:
             raise ProblemsFound(misfits(words, folders, str(error))) from None
 
     words = [*of_conditions, f"cache={plain['cache'] or 'null'}"]
-    run, well = run_experiment(plain, composed, words, ["omninav", *arguments])
-    print(f"page: {_shown(run.folder / (run.experiment.name + '.html'))}", flush=True)
-    return 0 if well else 1
+    return plan_experiment(plain, composed, words, ["omninav", *arguments])
 
 
 def _print(renderable: Any) -> None:
@@ -404,9 +420,14 @@ def _offer_plugins() -> None:
 def _check(arguments: list[str]) -> int:
     from .closed_loop import truth_readers
     from .graph import LIFETIMES
+    from .overrides import search
     from .run import input_digests, plan
 
-    with _composed(arguments) as config:
+    words, folders = _words(arguments)
+    of_conditions = _words_of_conditions(words)
+    with _composed([word for word in arguments if word not in of_conditions]) as config:
+        if config.get("experiment") is not None:
+            return _check_experiment(_planned_experiment(config, arguments, of_conditions, search(folders)))
         planned = plan(complete(config))
     input_digests(planned)  # opens every log and map
     graph = planned.graph
@@ -414,6 +435,23 @@ def _check(arguments: list[str]) -> int:
     print(f"{planned.variant}: nothing wrong with it. {len(graph.nodes)} nodes, {len(graph.wires)} wires")
     print(f"{before} stages run before the loop, {tick} every tick, {after} after it")
     readers = truth_readers(graph)
+    print(f"ground truth is read by: {', '.join(readers) or 'nobody'}")
+    return 0
+
+
+def _check_experiment(run: "ExperimentRun") -> int:
+    """What an experiment would run. Its conditions are composed and checked by now."""
+    from .closed_loop import truth_readers
+
+    experiment = run.experiment
+    run.open_inputs()
+    factors = ", ".join(f"{len(experiment.labels(factor))} {factor}" for factor in experiment.sweep)
+    runs = sum(len(cell.seeds) for cell in run.all_cells)
+    print(f"{experiment.name}, profile {run.profile}: nothing wrong with it")
+    print(f"{len(run.cells)} conditions ({factors}), each with {experiment.repetitions} repetitions")
+    beside = len(run.all_cells) - len(run.cells)
+    print(f"{runs} runs in all, {beside} of them beside the experiment; {len(experiment.claims)} claims are judged")
+    readers = sorted({name for cell in run.cells if cell.planned for name in truth_readers(cell.planned.graph)})
     print(f"ground truth is read by: {', '.join(readers) or 'nobody'}")
     return 0
 

@@ -19,7 +19,7 @@ from .files import digest_text, write_whole
 from .graph import Graph
 from .problems import BadInput, Problem, ProblemsFound
 from .progress import Progress
-from .repetitions import artifact_key, condition_key, finished
+from .repetitions import artifact_key, condition_key, finished, known_digests
 from .run import LIBRARIES, Plan, git_commit, plan, version
 
 Compose = Callable[[Sequence[str]], dict[str, Any]]
@@ -69,6 +69,46 @@ class Log:
         return facts
 
 
+class FramesOfJobs:
+    """How many frames jobs have done, of how many: what each one told last, added up."""
+
+    def __init__(self, jobs: int) -> None:
+        self._jobs = jobs
+        self._told: dict[str, tuple[int, int | None]] = {}
+        self._ended: set[str] = set()
+
+    def heard(self, job: str, word: Mapping[str, Any]) -> None:
+        """A job told its `frames` and `of`, as `Heartbeat` does."""
+        if "frames" in word:
+            self._told[job] = word["frames"], word.get("of")
+
+    def end(self, job: str, well: bool = True) -> None:
+        """A job has come to its end: all its frames are done, or it failed and does no more."""
+        done, total = self._told.get(job, (0, 0))
+        done = total if well and total else done
+        self._told[job] = done, done
+        self._ended.add(job)
+
+    @property
+    def ended(self) -> int:
+        """How many jobs have come to their end."""
+        return len(self._ended)
+
+    @property
+    def done(self) -> int:
+        """Frames done in all jobs."""
+        return sum(done for done, _ in self._told.values())
+
+    @property
+    def total(self) -> int | None:
+        """Frames in all jobs; those that have told nothing count as the mean of the others. None: nothing is known."""
+        known = [total for done, total in self._told.values() if total]
+        silent = self._jobs - len(self._told)
+        if any(total is None for _, total in self._told.values()) or (silent and not known):
+            return None
+        return sum(known) + (silent * max(1, round(sum(known) / len(known))) if silent else 0)
+
+
 class ExperimentRun:
     """An experiment on its way through its phases: logs, maps, repetitions. `folder` is the same for every attempt."""
 
@@ -80,7 +120,9 @@ class ExperimentRun:
         words: Sequence[str],
         runs: Path,
         argv: Sequence[str],
+        file: str,
     ) -> None:
+        self.file = file
         self.experiment, self.profile, self.compose = experiment, profile, compose
         self.folder = (runs / f"{experiment.name}_{profile}").resolve()
         self.argv = list(argv)
@@ -137,9 +179,17 @@ class ExperimentRun:
         if problems:
             raise ProblemsFound(dict.fromkeys(problems))
 
+    def open_inputs(self) -> None:
+        """Open every log and map that the conditions name. Raises `BadInput` where one cannot be read."""
+        for cell in self.all_cells:
+            assert cell.planned is not None
+            known_digests(cell.planned.graph)
+            for artifact in cell.planned.artifacts:
+                artifact_key(artifact)
+
     def run(self) -> bool:
         """All phases. Returns whether every job came to its end."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        write_whole(self.folder / "experiment.yaml", self.file)
         self._state("running")
         self._write_logs()
         self._key()
@@ -288,25 +338,31 @@ class ExperimentRun:
                     print(f"{cell.name}: {error}", flush=True)
                 self.write_page()
 
-            show()
+            progress.begin(self.experiment.name, sum(len(cell.results) for cell in self.all_cells), total)
             work_through(jobs, self.cores, heard, ended)
 
     def _through(self, jobs: Sequence[Job], what: str) -> dict[str, str]:
         if not jobs:
             return {}
-        done = [0]
-        with Progress(unit=what) as progress:
-            progress.update(f"{self.experiment.name}: {what}", 0, len(jobs))
+        frames, name = FramesOfJobs(len(jobs)), f"{self.experiment.name}: {what}"
+        with Progress() as progress:
+
+            def show() -> None:
+                if frames.done != frames.total or frames.ended == len(jobs):
+                    progress.update(name, frames.done, frames.total, f"{frames.ended} of {len(jobs)} {what} done")
 
             def heard(job: Job, word: Any) -> None:
-                progress.update(f"{self.experiment.name}: {what}", done[0], len(jobs))
+                frames.heard(job.name, word)
+                show()
 
             def ended(job: Job, error: str | None) -> None:
-                done[0] += 1
+                frames.end(job.name, not error)
                 if error:
                     print(f"{job.name}: {error}", flush=True)
-                progress.update(f"{self.experiment.name}: {what}", done[0], len(jobs))
+                show()
 
+            progress.say(f"{name}: {len(jobs)} to make")
+            progress.begin(name, 0)
             return work_through(jobs, self.cores, heard, ended)
 
     def _state(self, status: str) -> None:
@@ -326,19 +382,13 @@ class ExperimentRun:
         write_whole(self.folder / "experiment.json", json.dumps(manifest, indent=1) + "\n")
 
 
-def run_experiment(
+def plan_experiment(
     config: Mapping[str, Any], compose: Compose, words: Sequence[str], argv: Sequence[str]
-) -> tuple[ExperimentRun, bool]:
-    """Run the experiment of a composed configuration. Returns it, and whether every job came to its end.
-
-    Raises `ProblemsFound` where the file or any condition is wrong, before anything has run.
-    """
+) -> ExperimentRun:
+    """The experiment of a composed configuration, checked. Raises `ProblemsFound` where it or a condition is wrong."""
     profile = str(config.get("profile") or "paper")
     experiment = read_experiment(config["experiment"], profile)
-    run = ExperimentRun(experiment, profile, compose, words, Path(str(config.get("runs", "runs"))), argv)
+    file = yaml.safe_dump(dict(config["experiment"]), sort_keys=False, allow_unicode=True, width=120)
+    run = ExperimentRun(experiment, profile, compose, words, Path(str(config.get("runs", "runs"))), argv, file)
     run.check()
-    write_whole(
-        run.folder / "experiment.yaml",
-        yaml.safe_dump(dict(config["experiment"]), sort_keys=False, allow_unicode=True, width=120),
-    )
-    return run, run.run()
+    return run

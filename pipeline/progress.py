@@ -71,7 +71,7 @@ class Progress:
         self._close()
         self._now = now = self._clock()
         self._name, self._started, self._first, self._note = name, now, before, ""
-        self._shown, self._due, self._ended = None, now + self._every, None
+        self._shown, self._due = None, now + self._every
 
     def _close(self) -> None:
         if self._name and self._shown != self._done:

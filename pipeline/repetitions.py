@@ -197,7 +197,7 @@ def _recordable(graph: Graph, known: CachedFront | None) -> list[str]:
 
 
 class Heartbeat:
-    """A job's progress, told to its experiment every hundredth frame: a job whose experiment was killed ends soon."""
+    """A job's progress, told to its experiment at some frames: a job whose experiment was killed ends soon."""
 
     def __init__(self, tell: Tell) -> None:
         self._tell = tell
@@ -208,7 +208,7 @@ class Heartbeat:
 
     def step(self, done: int, total: int | None = None) -> None:
         """The same, of the only graph there is."""
-        if done % 100 == 0:
+        if done == 1 or done % 25 == 0 or done == total:
             self._tell({"frames": done, "of": total})
 
 

@@ -268,3 +268,20 @@ def test_a_profile_that_is_not_there_is_answered_with_those_that_are(omninav, pl
     ended = omninav(*MINE, "profile=quik")
     assert ended.returncode == 2
     assert "did you mean 'profile=quick'?" in ended.stderr
+
+
+def test_check_checks_every_condition_and_runs_none(omninav, place: Path):
+    said = omninav("check", *MINE, check=True).stdout.splitlines()
+    assert said[:2] == [
+        "dice, profile paper: nothing wrong with it",
+        "4 conditions (2 method, 2 tour), each with 6 repetitions",
+    ]
+    assert "24 runs in all" in said[2]
+    said = omninav("check", *MINE, "profile=quick", "nodes.noisy.sigma=0.2", check=True).stdout
+    assert "each with 2 repetitions" in said
+    (place / "mine/experiment/dice.yaml").write_text(EXPERIMENT.replace("bias=2.0", "biass=2.0"))
+    ended = omninav("check", *MINE)
+    assert ended.returncode == 2
+    assert "method loaded, tour TT1: nodes.table.biass" in ended.stderr
+    assert "method fair" not in ended.stderr
+    assert not (place / "runs").exists()
