@@ -20,7 +20,8 @@ from .verdicts import Case, Results, Verdict, judge, key_of, samples
 if TYPE_CHECKING:
     from .experiment_run import ExperimentRun
 
-LAYERS = {"True": "holds", "False": "does not hold", "None": "not judged"}
+MARKS = {"holds": "held", "does not hold": "broken", "not judged": "quiet"}
+"""How a verdict looks."""
 
 
 def write_page(run: "ExperimentRun") -> Path:
@@ -38,6 +39,8 @@ def write_page(run: "ExperimentRun") -> Path:
     drawing = draw(experiment, results)
     if drawing:
         write_whole(folder / f"{experiment.name}.png", drawing)
+    first = run.cells[0].words
+    common = [word for word in first if all(word in cell.words for cell in run.cells)]
     said: dict[str, Any] = {
         "experiment": experiment,
         "profile": run.profile,
@@ -46,7 +49,11 @@ def write_page(run: "ExperimentRun") -> Path:
         "tables": [_table(experiment, results, name) for name in experiment.measures],
         "remarks": [_remark(run, number) for number in range(len(experiment.remarks))],
         "logs": [(log.name, _facts(log.facts)) for log in run.logs.values()],
-        "conditions": [_condition(cell) for cell in run.cells],
+        "conditions": [_condition(cell, common) for cell in run.cells],
+        "common_words": common,
+        "made": _made(folder),
+        "marks": MARKS,
+        "tiles": _tiles(run, verdicts),
         "failures": [(cell.name, cell.error) for cell in run.all_cells if cell.error],
         "missing": sum(len(cell.seeds) - len(cell.results) for cell in run.all_cells if not cell.error),
         "repetitions": experiment.repetitions,
@@ -90,16 +97,17 @@ def _held(holds: bool | None) -> str:
 
 def _case(case: Case, measure: Measure) -> dict[str, str]:
     digits = measure.digits
-    interval = ""
+    difference = interval = ""
     if case.difference is not None and case.interval is not None:
         low, high = (f"{end:+.{digits}f}" for end in case.interval)
-        interval = f"{case.difference:+.{digits}f} [{low}, {high}]"
+        difference, interval = f"{case.difference:+.{digits}f}", f"[{low}, {high}]"
     return {
         "where": case.where,
         "ours": number(case.ours, digits),
         "other": number(case.other, digits),
         "against": case.against,
-        "difference": interval,
+        "difference": difference,
+        "interval": interval,
         "holds": _held(case.holds),
     }
 
@@ -120,8 +128,14 @@ def _table(experiment: Experiment, results: Results, name: str) -> dict[str, Any
                     "paper": number(experiment.published_figure(name, here), measure.digits),
                 }
             )
-        rows.append({"head": [labels[factor] for factor in page.rows], "cells": cells})
-    return {"title": measure.title, "heads": list(page.rows), "columns": columns, "rows": rows, "printed": printed}
+        rows.append({"head": [labels[factor] for factor in page.rows] or ["all"], "cells": cells})
+    return {
+        "title": measure.title,
+        "heads": list(page.rows) or [""],
+        "columns": columns,
+        "rows": rows,
+        "printed": printed,
+    }
 
 
 def _row_labels(experiment: Experiment) -> list[Labels]:
@@ -149,7 +163,33 @@ def _in_words(name: str, value: Any) -> str:
     return f"{words} {value} m" if name.endswith("_m") else f"{words} {value}"
 
 
-def _condition(cell: Any) -> dict[str, Any]:
+def _made(folder: Path) -> str:
+    """With which omninav, as experiment.json states it."""
+    path = folder / "experiment.json"
+    stated: dict[str, Any] = json.loads(path.read_text()) if path.exists() else {}
+    if not stated:
+        return ""
+    commit, dirty, _ = str(stated.get("git_commit") or "").partition("-dirty")
+    known = f", commit {commit[:12]}" + (" with changes that are not committed" if dirty else "") if commit else ""
+    return f"Made with omninav {stated.get('omninav')}{known}"
+
+
+def _tiles(run: "ExperimentRun", verdicts: Sequence[Verdict]) -> list[dict[str, str]]:
+    """What one looks for first: how many claims hold, and how much has run."""
+    done = sum(len(cell.results) for cell in run.cells)
+    wanted = sum(len(cell.seeds) for cell in run.cells)
+    claims = [
+        {"value": f"{sum(v.holds is True for v in verdicts)}", "of": f"of {len(verdicts)}", "name": "claims hold"}
+    ]
+    return [
+        *(claims if verdicts else []),
+        {"value": str(len(run.cells)), "of": "", "name": "conditions"},
+        {"value": str(done), "of": f"of {wanted}", "name": "repetitions done"},
+        {"value": run.profile, "of": "", "name": "profile"},
+    ]
+
+
+def _condition(cell: Any, common: Sequence[str]) -> dict[str, Any]:
     first: Mapping[str, Any] = next(iter(cell.results.values()), {})
     metrics = first.get("metrics", {})
     frames = metrics.get("frames")
@@ -157,7 +197,7 @@ def _condition(cell: Any) -> dict[str, Any]:
     map_size = metrics.get("map", {})
     return {
         "name": cell.name,
-        "words": " ".join(cell.words),
+        "own_words": shlex.join(word for word in cell.words if word not in common),
         "done": f"{len(cell.results)}/{len(cell.seeds)}",
         "frames": "" if frames is None else str(frames),
         "length": "" if length is None else f"{length:.0f}",

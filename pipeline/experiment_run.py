@@ -361,7 +361,7 @@ class ExperimentRun:
                     print(f"{job.name}: {error}", flush=True)
                 show()
 
-            progress.say(f"{name}: {len(jobs)} to make")
+            progress.say(f"{self.experiment.name}: {len(jobs)} {what} to make")
             progress.begin(name, 0)
             return work_through(jobs, self.cores, heard, ended)
 

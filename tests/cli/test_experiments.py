@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from omninav.pipeline.experiment_run import FramesOfJobs
+
 STAGES = '''
 import time
 from collections.abc import Sequence
@@ -186,6 +188,10 @@ def test_a_page_with_verdicts_and_what_repetitions_share_computed_once(dice: Fin
     assert best["holds"] is False
     page = (folder / "dice.md").read_text()
     assert "(102.0)" in page
+    assert not [line for line in page.split("\n") if line.endswith(" ")]
+    stated = json.loads((folder / "experiment.json").read_text())
+    assert f"Made with omninav {stated['omninav']}" in page
+    assert f"Made with omninav {stated['omninav']}" in (folder / "dice.html").read_text()
     assert (folder / "dice.png").stat().st_size > 1000
     assert dice.computed() == ONCE
     assert len(results(folder)) == 4 * 6
@@ -285,3 +291,18 @@ def test_check_checks_every_condition_and_runs_none(omninav, place: Path):
     assert "method loaded, tour TT1: nodes.table.biass" in ended.stderr
     assert "method fair" not in ended.stderr
     assert not (place / "runs").exists()
+
+
+def test_frames_of_jobs_add_up_and_silent_ones_count_as_the_mean_of_the_others():
+    frames = FramesOfJobs(3)
+    assert (frames.done, frames.total) == (0, None)
+    frames.heard("training", {"frames": 100, "of": 3000})
+    assert (frames.done, frames.total) == (100, 9000)
+    frames.heard("tt1", {"frames": 1, "of": 400})
+    frames.heard("tt1", {"seed": 3})
+    assert (frames.done, frames.total) == (101, 3400 + 1700)
+    frames.end("tt1")
+    assert (frames.done, frames.ended) == (500, 1)
+    frames.end("training", well=False)
+    frames.end("cached")
+    assert (frames.done, frames.total, frames.ended) == (500, 500, 3)
