@@ -450,7 +450,8 @@ def _check_experiment(run: "ExperimentRun") -> int:
     print(f"{experiment.name}, profile {run.profile}: nothing wrong with it")
     print(f"{len(run.cells)} conditions ({factors}), each with {experiment.repetitions} repetitions")
     beside = len(run.all_cells) - len(run.cells)
-    print(f"{runs} runs in all, {beside} of them beside the experiment; {len(experiment.claims)} claims are judged")
+    print(f"{runs} runs in all" + (f", {beside} of them beside the conditions" if beside else ""))
+    print(f"claims to be judged: {len(experiment.claims)}")
     readers = sorted({name for cell in run.cells if cell.planned for name in truth_readers(cell.planned.graph)})
     print(f"ground truth is read by: {', '.join(readers) or 'nobody'}")
     return 0
