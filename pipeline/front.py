@@ -2,7 +2,8 @@
 
 A node is in the front when it is the source of a recorded log, or gets all its inputs from the front or from before the
 loop, without delays. What other nodes read of the front is its boundary; it is spooled tick by tick under the hash of
-stages, parameters, wires and logs. The seed is part of the key only where a front stage drew random numbers.
+stages, parameters, wires and logs. The seed is part of the key only where a stage of the front, or one before the loop
+that it follows from, drew random numbers.
 """
 
 import shutil
@@ -39,7 +40,7 @@ def front_nodes(graph: Graph, artifacts: bool = False, without: Collection[str] 
     """The names of the front's nodes; empty where the source listens to the graph (a simulator in a closed loop).
 
     With `artifacts`, what follows from the logs and the artifacts: the front that runs share which differ in their
-    seed only. `without` these nodes (which draw random numbers) and what follows from them.
+    seed only. `without` these nodes (those `following` from draws of random numbers).
     """
     source = graph.source
     if source is None or source.name in without or graph.inputs_of(source.name):
@@ -74,8 +75,8 @@ def _draws_on_artifacts(graph: Graph, name: str) -> bool:
     )
 
 
-def front_key(graph: Graph, nodes: frozenset[str]) -> str:
-    """The hash of everything but the seed that decides what the front gives."""
+def lineage(graph: Graph, nodes: frozenset[str]) -> frozenset[str]:
+    """The nodes of a front and those before the loop that they follow from."""
     before = {node.name for node in graph.of_lifetime("before")}
     closure, waiting = set(nodes), list(nodes)
     while waiting:
@@ -83,6 +84,21 @@ def front_key(graph: Graph, nodes: frozenset[str]) -> str:
             if wire.from_node in before and wire.from_node not in closure:
                 closure.add(wire.from_node)
                 waiting.append(wire.from_node)
+    return frozenset(closure)
+
+
+def following(graph: Graph, names: Collection[str]) -> frozenset[str]:
+    """These nodes and all that follows from them without delays."""
+    found = set(names)
+    for name in graph.nodes:  # in running order: what a node reads undelayed stands before it
+        if any(wire.from_node in found for wire in graph.inputs_of(name)):
+            found.add(name)
+    return frozenset(found)
+
+
+def front_key(graph: Graph, nodes: frozenset[str]) -> str:
+    """The hash of everything but the seed that decides what the front gives."""
+    closure = lineage(graph, nodes)
     digests = [f"{name}:{graph.nodes[name].stage.inputs_digest()}" for name in sorted(closure)]
     return digest_text("front", graph.digest(closure), *digests)
 
@@ -132,7 +148,7 @@ def seeded(key: str, seed: int) -> str:
 
 
 def keep(front: CachedFront, cache: Cache, seed: int, spool: Path, notes: Mapping[str, Mapping[str, Any]]) -> None:
-    """Put a recorded front into the cache. `notes` are those of its nodes: what they counted, and whether they drew."""
+    """Put a recorded front into the cache. `notes` are those of its `lineage`: counts, facts, and who drew."""
     drew = any(note["drew"] for note in notes.values())
     key = seeded(front.key, seed) if drew else front.key
     with whole_file(cache.path(key, ".front")) as part:

@@ -15,7 +15,7 @@ from .artifact import Cache
 from .crew import Tell
 from .engine import Engine
 from .files import digest_file, digest_text, write_whole
-from .front import CachedFront, cached_front, front_boundary, front_nodes
+from .front import CachedFront, cached_front, following, front_boundary, front_nodes
 from .graph import Graph
 from .problems import BadInput
 from .results import Metrics
@@ -170,12 +170,12 @@ def _once(
         engine.run()
         keep_front(engine, front, cache, seed)
     # Only now is it known which stages draw random numbers: they and what follows from them are run every time.
-    drew = {name for name, call in engine.calls.items() if call.ctx.drew}
-    nodes = front_nodes(graph, artifacts=True, without=drew)
+    seeded = following(graph, [name for name, call in engine.calls.items() if call.ctx.drew])
+    nodes = front_nodes(graph, artifacts=True, without=seeded)
     boundary = front_boundary(graph, nodes)
     if not nodes or not set(boundary) <= set(wanted):
         return engine, None
-    before = [node.name for node in graph.of_lifetime("before") if node.name not in drew]
+    before = [node.name for node in graph.of_lifetime("before") if node.name not in seeded]
     notes = {name: engine.calls[name].ctx.notes() for name in sorted(nodes | set(before))}
     engine.spools.pop("shared").flush()
     given = {origin: value for origin, value in engine.values.items() if origin.partition(".")[0] in before}

@@ -21,7 +21,7 @@ from .artifact import Cache, read_artifact, read_header, write_artifact
 from .catalog import UnknownStage, entries, resolve
 from .engine import Engine, StageFailed
 from .files import digest_file, digest_text, write_whole
-from .front import CachedFront, cached_front, keep, seeded
+from .front import CachedFront, cached_front, keep, lineage, seeded
 from .graph import Graph, build
 from .problems import BadInput, Problem, ProblemsFound, suggest
 from .results import Figure, Metrics, Table
@@ -359,7 +359,8 @@ def keep_front(engine: Engine, front: CachedFront | None, cache: Cache | None, s
     if cache is not None and front is not None and front.key and front.replay is None:
         spool = engine.spools["front"]
         spool.flush()
-        keep(front, cache, seed, spool.path, {name: engine.calls[name].ctx.notes() for name in sorted(front.nodes)})
+        names = sorted(lineage(engine.graph, front.nodes))
+        keep(front, cache, seed, spool.path, {name: engine.calls[name].ctx.notes() for name in names})
 
 
 def notes_of(engine: Engine) -> dict[str, Any]:

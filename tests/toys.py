@@ -279,3 +279,13 @@ class Surveyor(Stage):
 
     def step(self, ctx: Context) -> Out:
         return self.Out(plan=Surveyed(1.0))
+
+
+class Dice(Stage):
+    """A number that is drawn before the loop."""
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context) -> Out:
+        return self.Out(number=Number(float(ctx.rng.random())))
