@@ -36,7 +36,8 @@ class Claim:
 
     One case for each condition that has the labels of `of`. Its figure is compared with: `at_most` (a number,
     `published`, or the labels of another condition), `below`, `above` or `not_above` (the labels of another condition),
-    or the best of the others (`lowest`: none of them is lower beyond the interval). `times` multiplies the other side.
+    or all others (`lowest`: `not_above` each of them, those that differ in the factors of `among`, by default of `of`).
+    `not_above` allows `MARGIN` of the other side. `times` multiplies the other side.
     """
 
     says: str
@@ -47,6 +48,7 @@ class Claim:
     above: Mapping[str, Any] | None = None
     not_above: Mapping[str, Any] | None = None
     lowest: bool = False
+    among: tuple[str, ...] = ()
     times: float = 1.0
     paper: str = ""
 
@@ -103,7 +105,7 @@ class Experiment:
     def conditions(self) -> list["Condition"]:
         """Every combination of the sweep's labels, the last factor changing fastest."""
         factors = [
-            [(factor, str(label), words or "") for label, words in self.sweep[factor].items()] for factor in self.sweep
+            [(factor, str(label), words) for label, words in self.sweep[factor].items()] for factor in self.sweep
         ]
         return [
             Condition({factor: label for factor, label, _ in chosen}, " ".join(words for _, _, words in chosen))
@@ -143,6 +145,7 @@ def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
     """The experiment that a file describes, at the scale of a profile. Raises `ProblemsFound` with all problems.
 
     A profile changes entries of the file: mappings key by key, the labels of a factor and everything else as a whole.
+    A file that stands on another (its `defaults`) takes a label or a measure of that one out by setting it to null.
     """
     profiles = plain.get("profiles") or {}
     if profile not in {"paper", *profiles}:
@@ -152,6 +155,8 @@ def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
     for key, value in (profiles.get(profile) or {}).items():
         both = isinstance(value, Mapping) and isinstance(scaled.get(key), Mapping)
         scaled[key] = {**scaled[key], **value} if both else value
+    scaled["sweep"] = {factor: _kept(labels) for factor, labels in (scaled.get("sweep") or {}).items()}
+    scaled["measures"] = _kept(scaled.get("measures") or {})
     arguments, problems = convert_fields(scaled, Experiment, "experiment")
     if problems:
         raise ProblemsFound(problems)
@@ -160,6 +165,13 @@ def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
     if problems:
         raise ProblemsFound(problems)
     return experiment
+
+
+def _kept(entries: Any) -> Any:
+    """A mapping without what is null in it; anything else as it is, for whoever checks its type."""
+    if not isinstance(entries, Mapping):
+        return entries
+    return {key: value for key, value in entries.items() if value is not None}
 
 
 def words_of(text: str) -> list[str]:

@@ -16,6 +16,10 @@ Results = Mapping[tuple[tuple[str, str], ...], Mapping[int, Mapping[str, Any]]]
 
 RESAMPLES = 4999
 CONFIDENCE = 0.95
+LEAST = 6
+"""Repetitions below which an interval says nothing: no verdict is made from it."""
+MARGIN = 0.05
+"""Share of the other side by which "no worse" may be worse. More data cannot show that two figures are equal."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +27,7 @@ class Case:
     """A claim for one condition: our mean, what it is compared with, the difference's interval, whether it holds.
 
     `difference` is ours less the other side; `interval` its 95 % bootstrap interval over the repetitions. `holds` is
-    None where a condition has no results.
+    None where a condition has no results, and where the repetitions cannot decide.
     """
 
     where: str
@@ -159,30 +163,33 @@ def _against_samples(
     differences = np.array([ours[seed] - theirs[seed] for seed in both])
     low, high = bootstrap_interval(differences)
     mean = float(differences.mean())
-    holds = {"at_most": mean <= 1e-9, "below": high < 0.0, "above": low > 0.0, "not_above": low <= 0.0}[side]
     ours_mean = float(np.mean([ours[seed] for seed in both]))
-    return Case(where, ours_mean, ours_mean - mean, against, mean, (low, high), holds)
+    other = ours_mean - mean
+    holds: bool | None
+    if side == "at_most":
+        holds = mean <= 1e-9
+    elif len(both) < LEAST:
+        holds = None
+    elif side == "not_above":  # better or within the margin; worse; or not decided
+        holds = True if high <= MARGIN * abs(other) else False if low > 0.0 else None
+    else:
+        holds = high < 0.0 if side == "below" else low > 0.0
+    return Case(where, ours_mean, other, against, mean, (low, high), holds)
 
 
 def _lowest(experiment: Experiment, claim: Claim, labels: Labels, results: Results) -> Case:
-    """Against the best of all conditions that differ from this one only in the factors the claim fixes.
-
-    Where the interval of the difference holds 0 the two are alike, and nothing is better than this one.
-    """
-    fixed = [factor for factor in experiment.sweep if factor in claim.of]
-    rivals = []
-    for combination in itertools.product(*(experiment.labels(factor) for factor in fixed)):
-        facing = labels | dict(zip(fixed, combination, strict=True))
-        found = samples(experiment, results, claim.measure, facing)
-        if facing != labels and found:
-            rivals.append((float(np.mean(list(found.values()))), facing, found))
-    ours = samples(experiment, results, claim.measure, labels)
-    where = _where(experiment, labels)
-    if not rivals or not ours:
-        return Case(where, _mean(ours), None, "the best of the others", None, None, None)
-    _, facing, found = min(rivals, key=lambda rival: rival[0])
-    against = "the best of the others: " + ", ".join(facing[factor] for factor in fixed)
-    return _against_samples("not_above", where, ours, found, against)
+    """Not above any condition that differs from this one only in the claim's factors; the closest call is shown."""
+    varied = claim.among or tuple(factor for factor in experiment.sweep if factor in claim.of)
+    where, ours = _where(experiment, labels), samples(experiment, results, claim.measure, labels)
+    cases = []
+    for combination in itertools.product(*(experiment.labels(factor) for factor in varied)):
+        facing = labels | dict(zip(varied, combination, strict=True))
+        if facing != labels:
+            against = ", ".join(facing[factor] for factor in varied)
+            theirs = samples(experiment, results, claim.measure, facing)
+            cases.append(_against_samples("not_above", where, ours, theirs, against))
+    worst = {False: 0, None: 1, True: 2}
+    return min(cases, key=lambda case: (worst[case.holds], -(case.difference or 0.0)))
 
 
 def _where(experiment: Experiment, labels: Labels) -> str:
