@@ -20,7 +20,7 @@ from .verdicts import Case, Results, Verdict, judge, key_of, samples
 if TYPE_CHECKING:
     from .experiment_run import ExperimentRun
 
-MARKS = {"holds": "held", "does not hold": "broken", "not judged": "quiet"}
+MARKS = {"holds": "held", "does not hold": "broken", "undecided": "quiet"}
 """How a verdict looks."""
 
 
@@ -92,7 +92,7 @@ def _verdict(experiment: Experiment, verdict: Verdict) -> dict[str, Any]:
 
 
 def _held(holds: bool | None) -> str:
-    return {True: "holds", False: "does not hold", None: "not judged"}[holds]
+    return {True: "holds", False: "does not hold", None: "undecided"}[holds]
 
 
 def _case(case: Case, measure: Measure) -> dict[str, str]:
