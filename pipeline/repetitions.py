@@ -4,6 +4,7 @@ Logs are simulated once and read by all conditions. The map and the features com
 records what follows from log and map alone (a frame's table of similarities), and the others read it.
 """
 
+import copy
 import json
 import math
 import shutil
@@ -16,7 +17,7 @@ from .crew import Tell
 from .engine import Engine
 from .files import digest_file, digest_text, write_whole
 from .front import CachedFront, cached_front, following, front_boundary, front_nodes
-from .graph import Graph
+from .graph import Graph, Node
 from .problems import BadInput
 from .results import Metrics
 from .run import ArtifactPlan, Plan, Run, keep_front, notes_of, obtain, plan, results_of, stage_times, usable
@@ -155,7 +156,8 @@ def _once(
     record: bool,
     tell: Tell,
 ) -> tuple[Engine, CachedFront | None]:
-    """One repetition; with `record` also the front that the others may share."""
+    """One repetition; with `record` also the front that the others may share. What grows in place is its own."""
+    artifacts = {name: copy.deepcopy(value) if value.in_place else value for name, value in artifacts.items()}
     step = Heartbeat(tell).step
     if shared is not None:
         engine = Engine(graph, artifacts, seed, place, place, every_s=math.inf, front=shared, progress=step)
@@ -170,7 +172,9 @@ def _once(
         engine.run()
         keep_front(engine, front, cache, seed)
     # Only now is it known which stages draw random numbers: they and what follows from them are run every time.
-    seeded = following(graph, [name for name, call in engine.calls.items() if call.ctx.drew])
+    # What grows in place has grown by now: it starts anew too.
+    drew = [name for name, call in engine.calls.items() if call.ctx.drew]
+    seeded = following(graph, [*drew, *(node.name for node in graph.of_lifetime("before") if _grows(node))])
     nodes = front_nodes(graph, artifacts=True, without=seeded)
     boundary = front_boundary(graph, nodes)
     if not nodes or not set(boundary) <= set(wanted):
@@ -181,6 +185,10 @@ def _once(
     given = {origin: value for origin, value in engine.values.items() if origin.partition(".")[0] in before}
     replay = Spool(place / "shared.spool")
     return engine, CachedFront(nodes | frozenset(before), tuple(boundary), "", "", replay, notes, given)
+
+
+def _grows(node: Node) -> bool:
+    return any(getattr(port.type, "in_place", False) for port in node.signature.outputs.values())
 
 
 def _recordable(graph: Graph, known: CachedFront | None) -> list[str]:

@@ -9,6 +9,7 @@ from omninav.pipeline.front import following
 from omninav.pipeline.graph import Graph, build
 from omninav.pipeline.repetitions import _once
 from omninav.pipeline.run import results_of
+from toys import Ledger
 
 SEEDS = (0, 1, 2)
 STAGES = {
@@ -75,3 +76,38 @@ def test_a_front_that_follows_from_a_draw_before_the_loop_is_found_again_for_its
 
 def test_what_follows_from_a_node_is_found_through_nodes_before_the_loop_and_in_it():
     assert following(graph("through a node before the loop"), ["dice"]) == {"dice", "twice", "sum", "all"}
+
+
+def test_what_grows_in_place_starts_anew_for_each_seed(tmp_path: Path):
+    """A ledger from before the loop, and one that is an artifact, into which each of twenty frames enters a number."""
+    for number, start in enumerate(("new.ledger", "artifacts.ledger")):
+        wire = {"from": "enter.ledger", "delay": 1, "initial": start}
+        nodes = {
+            "source": "Count",
+            "new": "NewLedger",
+            "noise": "Noise",
+            "enter": "Enter",
+            "look": "Look",
+            "all": "Collected",
+        }
+        config = {
+            "nodes": {name: {"_target_": f"toys.{stage}"} for name, stage in nodes.items()},
+            "wires": {
+                "noise": {"number": "source.number"},
+                "enter": {"number": "noise.number", "ledger": wire},
+                "look": {"ledger": wire},
+                "all": {"numbers": {"from": "look.number", "collect": True}},
+            },
+        }
+        ledger = Ledger([])
+        grown = build(config, {"ledger": Ledger}).leading_to(["all.metrics"])
+        shared, sizes = None, []
+        for seed in SEEDS:
+            folder = tmp_path / f"{number}_{seed}"
+            folder.mkdir()
+            engine, recorded = _once(
+                grown, {"ledger": ledger}, seed, folder, None, shared, shared is None, lambda words: None
+            )
+            shared = recorded or shared
+            sizes.append(results_of(engine)[0]["numbers"]["all"])
+        assert sizes == [sizes[0]] * len(SEEDS), start
