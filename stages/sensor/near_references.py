@@ -267,11 +267,13 @@ class Field:
     def __init__(self, values: Floats, floor: float, top: float, power: float, stands_for: Array | None = None) -> None:
         flat = values.ravel()
         self.headings = values.shape[1]
+        self._values, self._floor = values, floor
         each = np.ones(len(values)) if stands_for is None else stands_for
         self._above = np.flatnonzero(flat > floor)
         counted = each[self._above // self.headings]
         self._raised = np.cumsum(counted * (flat[self._above].astype(np.float64) / top) ** power)
         self._references = np.cumsum(each)
+        self._low = np.cumsum(each * (self.headings - np.bincount(self._above // self.headings, minlength=len(values))))
         size = self.headings * float(self._references[-1])
         self._peaks = float(self._raised[-1]) if len(self._above) else 0.0
         self._flat = max(size - float(counted.sum()), 0.0) * (floor / top) ** power
@@ -279,14 +281,22 @@ class Field:
         """Mean weight over the map: how well the view fits anywhere."""
 
     def draw(self, rng: np.random.Generator, number: int) -> Ints:
-        """Cells drawn by weight: (number,) flat indices. What falls to the floor is any cell."""
+        """Cells drawn by weight: (number,) flat indices. What falls to the floor is any cell that lies on it."""
         chance = rng.random(number) * (self._peaks + self._flat)
-        anywhere: Ints = self.anywhere(rng, number) * self.headings + rng.integers(self.headings, size=number)
+        on_floor = self._on_floor(rng, number)
         if not len(self._above):
-            return anywhere
+            return on_floor
         peaks = self._above[_drawn(self._raised, chance)]
-        drawn: Ints = np.where(chance < self._peaks, peaks, anywhere)
+        drawn: Ints = np.where(chance < self._peaks, peaks, on_floor)
         return drawn
+
+    def _on_floor(self, rng: np.random.Generator, number: int) -> Ints:
+        """Cells on the floor, drawn by how many their references stand for; of no meaning where there are none."""
+        references = _drawn(self._low, rng.random(number) * float(self._low[-1]))
+        low = np.cumsum(self._values[references] <= self._floor, axis=1)
+        headings = (low <= (rng.random(number) * low[:, -1])[:, None]).sum(axis=1)
+        cells: Ints = references * self.headings + np.minimum(headings, self.headings - 1)
+        return cells
 
     def anywhere(self, rng: np.random.Generator, number: int) -> Ints:
         """References drawn from the whole map, alike for all of them: (number,) rows of the compared ones."""

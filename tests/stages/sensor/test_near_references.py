@@ -127,12 +127,21 @@ def test_some_references_stand_for_the_whole_map() -> None:
 def test_cells_are_drawn_by_weight_and_by_how_many_they_stand_for() -> None:
     field = np.full((3, 4), 0.1, np.float32)
     field[0, 1] = field[2, 3] = 1.0
-    drawn = Field(field, 0.5, 1.0, 2.0, np.array([1.0, 5.0, 3.0])).draw(np.random.default_rng(0), 40_000)
-    # By hand: peaks 1 and 3; on the floor, 0.25 for each of 36 - 4 cells: 8.
+    each = np.array([1.0, 5.0, 3.0])
+    drawn = Field(field, 0.5, 1.0, 2.0, each).draw(np.random.default_rng(0), 40_000)
+    # By hand: each cell weighs its value, or the floor, squared, as often as its reference counts.
+    weights = (np.maximum(field, 0.5) ** 2 * each[:, None]).ravel()
     shares = np.bincount(drawn, minlength=12) / 40_000
-    assert shares[1] == pytest.approx((1 + 8 / 36) / 12, abs=0.006)
-    assert shares[11] == pytest.approx((3 + 8 * 3 / 36) / 12, abs=0.01)
-    assert shares[4:8].sum() == pytest.approx(8 * 20 / 36 / 12, abs=0.01)
+    assert shares == pytest.approx(weights / weights.sum(), abs=0.01)
+    assert shares[1] == pytest.approx(1 / 12, abs=0.004)
+
+
+@pytest.mark.parametrize("floor", [0.0, 2.0])
+def test_where_all_or_nothing_rises_above_the_floor_cells_are_drawn_by_weight_too(floor: float) -> None:
+    field = np.array([[0.2, 0.4], [0.8, 0.6]], np.float32)
+    drawn = Field(field, floor, 1.0, 1.0).draw(np.random.default_rng(0), 40_000)
+    weights = np.maximum(field, floor).ravel()
+    assert np.bincount(drawn, minlength=4) / 40_000 == pytest.approx(weights / weights.sum(), abs=0.01)
 
 
 def test_the_power_follows_from_how_much_similarity_varies_between_places() -> None:
