@@ -423,7 +423,8 @@ class WorldConfig:
     blocks: tuple[Block, ...] = ()
     hangings: tuple[Hanging, ...] = ()
     lamps: tuple[Lamp, ...] = ()
-    ambient: Spread = 0.45
+    ambient: Annotated[float, Bounds(ge=0, lt=1)] = 0.45
+    """Share of the light that comes from all around; lamps and windows give the rest."""
     goods: Annotated[int, Bounds(ge=1)] = 56
     """Different goods in the whole world."""
     assortment: Annotated[int, Bounds(ge=1)] = 56

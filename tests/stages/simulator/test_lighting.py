@@ -7,6 +7,7 @@ import time
 import numpy as np
 import pytest
 
+from omninav.pipeline.ports import convert
 from omninav.stages.simulator.bodies import Box, box_array
 from omninav.stages.simulator.config import Day, Hanging, Lamp, Room, WorldConfig
 from omninav.stages.simulator.demo import DEMO
@@ -38,6 +39,15 @@ def test_the_floor_has_a_mean_of_one_with_everything_on() -> None:
     for ambient in (0.0, 0.45):
         light = light_map(lights, ambient, NOTHING, 3.0, CORNER, (8.0, 8.0), 0.2)
         assert abs(light[0].mean() - 1.0) < 0.02
+
+
+def test_ambient_light_is_a_share_below_one_and_nothing_else_is_taken() -> None:
+    _, problems = convert({"ambient": 1.0}, WorldConfig, "world")
+    assert [str(problem) for problem in problems] == [
+        "world.ambient: 1.0 is out of bounds, expected float >= 0 and < 1"
+    ]
+    lights = [Light((2.0, 2.0, 3.0))]
+    assert light_map(lights, 0.999, NOTHING, 3.0, CORNER, (4.0, 4.0), 0.2)[0].mean() == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_wall_up_to_the_ceiling_keeps_a_room_dark_and_a_low_one_does_not() -> None:
