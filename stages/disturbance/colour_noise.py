@@ -13,9 +13,12 @@ Ints = npt.NDArray[np.int64]
 
 
 def random_parts(rng: np.random.Generator, whole: int, parts: int) -> Ints:
-    """`whole` split into `parts` whole numbers >= 0, each split as likely as any other: (parts,)."""
-    cuts = np.sort(rng.integers(0, whole + 1, size=parts - 1))
-    return np.diff(np.concatenate([[0], cuts, [whole]]))
+    """`whole` split into `parts` whole numbers >= 0, each split as likely as any other: (parts,).
+
+    A row of `whole` things and `parts` - 1 bars between them: each choice of the bars' places is one split.
+    """
+    bars = np.sort(rng.choice(whole + parts - 1, size=parts - 1, replace=False))
+    return np.diff(np.concatenate([[-1], bars, [whole + parts - 1]])) - 1
 
 
 def sectors(rng: np.random.Generator, rows: int, columns: int, share: float, width: float) -> Mask:

@@ -1,10 +1,12 @@
 """Occlusion by colour noise."""
 
+from collections import Counter
+
 import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.disturbance.colour_noise import ColourNoise, rectangles, sectors
+from omninav.stages.disturbance.colour_noise import ColourNoise, random_parts, rectangles, sectors
 from omninav.stages.values.image import Panorama
 
 GREY = Panorama(np.full((60, 360, 3), 7, dtype=np.uint8), 0.5, -0.5)
@@ -32,6 +34,16 @@ def test_sectors_reach_over_the_full_height():
 def test_every_column_is_as_likely_to_be_covered():
     masks = [sectors(np.random.default_rng(seed), 1, 36, 0.4, 40 / 360)[0] for seed in range(3000)]
     assert np.mean(masks, axis=0) == pytest.approx(0.4, abs=4 * np.sqrt(0.24 / 3000))
+
+
+def test_every_split_is_as_likely_as_any_other():
+    rng = np.random.default_rng(0)
+    seen = Counter(tuple(random_parts(rng, 4, 3).tolist()) for _ in range(15_000))
+    assert len(seen) == 15  # (4 + 2 over 2)
+    assert all(sum(split) == 4 for split in seen)
+    excess = sum((count - 1000) ** 2 / 1000 for count in seen.values())
+    assert excess < 36.1  # chi square with 14 degrees of freedom: one in a thousand
+    assert random_parts(rng, 5, 1).tolist() == [5]
 
 
 def test_the_pattern_follows_the_frame_and_not_the_seed():
