@@ -22,7 +22,7 @@ from .catalog import UnknownStage, entries, resolve
 from .engine import Engine, StageFailed
 from .files import digest_file, digest_text, write_whole
 from .front import CachedFront, cached_front, keep, lineage, seeded
-from .graph import Graph, build
+from .graph import ARTIFACTS, Graph, build
 from .problems import BadInput, Problem, ProblemsFound, suggest
 from .results import Figure, Metrics, Table
 from .value import VALUE_TYPES, Value
@@ -67,6 +67,7 @@ def plan(config: Mapping[str, Any]) -> Plan:
     problems: list[Problem] = []
     artifacts: list[ArtifactPlan] = []
     types: dict[str, Any] = {}
+    config = without_absent(config)
     _load_stages(config)
     for key in ("seed",):
         if not isinstance(config.get(key, 0), int) or isinstance(config.get(key, 0), bool) or config.get(key, 0) < 0:
@@ -104,6 +105,33 @@ def plan(config: Mapping[str, Any]) -> Plan:
     if problems or graph is None:
         raise ProblemsFound(dict.fromkeys(problems))
     return Plan(config, graph, tuple(artifacts), saves)
+
+
+def without_absent(config: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A configuration without its artifacts that are `optional` and not given, and without the wires from them.
+
+    A port that cannot do without its wire is then a problem like every missing wire.
+    """
+    specs = config.get("artifacts") or {}
+    absent = {
+        f"{ARTIFACTS}.{name}"
+        for name, spec in specs.items()
+        if isinstance(spec, Mapping) and spec.get("optional") and spec.get("file") is None and spec.get("log") is None
+    }
+    if not absent:
+        return config
+    kept = {name: spec for name, spec in specs.items() if f"{ARTIFACTS}.{name}" not in absent}
+    wires = {
+        node: {port: wire for port, wire in ports.items() if _origin(wire) not in absent}
+        if isinstance(ports, Mapping)
+        else ports
+        for node, ports in (config.get("wires") or {}).items()
+    }
+    return {**config, "artifacts": kept, "wires": wires}
+
+
+def _origin(wire: Any) -> Any:
+    return wire.get("from") if isinstance(wire, Mapping) else wire
 
 
 def _load_stages(config: Mapping[str, Any]) -> None:

@@ -51,6 +51,27 @@ class Particles(Belief):
         return PoseEstimate(Pose(*map(float, mode)), covariance, share, Pose(*map(float, mean)))
 
 
+class GaussianMixture(Belief):
+    """Weighted Gaussians over the pose. `means`: (K, 3) x, y (m), heading (rad), map frame. `covariances`: (K, 3, 3)
+    in m, m, rad. `weights`: (K,), not negative; a belief's sum to 1, a hypothesis's need not. K may be 0.
+    """
+
+    means: Array
+    covariances: Array
+    weights: Array
+
+    def __len__(self) -> int:
+        return len(self.weights)
+
+    def estimate(self) -> PoseEstimate:
+        """The heaviest component. Raises ValueError where there is none."""
+        heaviest = int(np.argmax(self.weights))
+        mean = weighted_mean(self.means, self.weights)
+        share = float(self.weights[heaviest] / self.weights.sum())
+        pose = Pose(*map(float, self.means[heaviest]))
+        return PoseEstimate(pose, self.covariances[heaviest], share, Pose(*map(float, mean)))
+
+
 class SinglePose(Belief):
     """A belief that is one pose, with no doubt expressed (nearest-image matching)."""
 

@@ -1,0 +1,66 @@
+"""Spectra of what stands around the robot: sizes that do not change when it turns, and the turn between two."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+FloatArray = npt.NDArray[np.float32]
+Complex = npt.NDArray[np.complex128]
+
+
+def packed(spectrum: Complex) -> FloatArray:
+    """A spectrum (channels, frequencies) as one vector: all real parts, then all imaginary ones."""
+    return np.concatenate([spectrum.real.ravel(), spectrum.imag.ravel()]).astype(np.float32)
+
+
+def unpacked(vectors: FloatArray, channels: int) -> Complex:
+    """What `packed` made vectors (..., D) of: (..., channels, frequencies)."""
+    half = vectors.shape[-1] // 2
+    values = vectors[..., :half].astype(np.float64) + 1j * vectors[..., half:].astype(np.float64)
+    return values.reshape(*vectors.shape[:-1], channels, half // channels)
+
+
+def spectral_distances(values: FloatArray, kept: FloatArray, channels: int, segments: int) -> Array:
+    """Euclidean distance between the sizes of two spectra's coefficients, (D,) and (R, D): (R,).
+
+    In the unit of the samples: the root of the summed squares over channels and segments of two signals that differ in
+    these sizes (Parseval; each frequency but the lowest and the half of an even number of segments stands for two).
+    """
+    here, there = np.abs(unpacked(values, channels)), np.abs(unpacked(kept, channels))
+    share = _share(here.shape[-1], segments)
+    distances: Array = np.sqrt((share * (there - here) ** 2).sum(axis=(-2, -1)))
+    return distances
+
+
+def best_turns(values: FloatArray, kept: FloatArray, channels: int, segments: int, steps: int = 360) -> Array:
+    """How far the robot stands turned, counter-clockwise, from its heading in each kept view (R, D): (R,) rad.
+
+    The greatest circular cross-correlation of the two signals, over all channels, at `steps` turns; between them by the
+    parabola through the three values around the greatest. Samples run clockwise around the robot (as a panorama's
+    columns): a robot turned by t sees what it saw at azimuth a now at azimuth a - t, further on by t.
+    """
+    here, there = unpacked(values, channels), unpacked(kept, channels)
+    frequencies = here.shape[-1]
+    cross = (_share(frequencies, segments) * np.conj(there) * here).sum(axis=-2)
+    # A signal delayed by t has its coefficient k turned by exp(-i k t): the correlation at t is sum Re(cross e^{ikt}).
+    angles = 2.0 * math.pi * np.arange(steps) / steps
+    waves = np.exp(1j * np.outer(np.arange(frequencies), angles))
+    correlation = (cross @ waves).real
+    best = correlation.argmax(axis=-1)
+    rows = np.arange(len(correlation))
+    before, top, after = (correlation[rows, (best + step) % steps] for step in (-1, 0, 1))
+    bend = before + after - 2.0 * top
+    part = np.where(bend < 0.0, 0.5 * (before - after) / np.where(bend < 0.0, bend, -1.0), 0.0)
+    turns: Array = (best + part) * (2.0 * math.pi / steps)
+    return np.mod(turns + math.pi, 2.0 * math.pi) - math.pi
+
+
+def _share(frequencies: int, segments: int) -> Array:
+    # How much of the signal's energy a coefficient stands for, for a spectrum divided by sqrt(segments).
+    share = np.full(frequencies, 2.0)
+    share[0] = 1.0
+    if segments % 2 == 0 and frequencies == segments // 2 + 1:
+        share[-1] = 1.0
+    return share

@@ -1,0 +1,42 @@
+"""Distances between a view at several headings and kept views."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+FloatArray = npt.NDArray[np.float32]
+
+
+def all_distances(turned: FloatArray, kept: FloatArray) -> Array:
+    """Euclidean distances of each row of `turned` (H, D) to each kept vector (R, D): (R, H)."""
+    here, there = turned.astype(np.float64), kept.astype(np.float64)
+    squares = (there**2).sum(axis=1)[:, None] + (here**2).sum(axis=1) - 2.0 * (there @ here.T)
+    distances: Array = np.sqrt(np.maximum(squares, 0.0))
+    return distances
+
+
+def turned_distances(turned: FloatArray, kept: FloatArray) -> Array:
+    """Distance to each kept vector (R, D) at the best heading: (R,)."""
+    nearest: Array = all_distances(turned, kept).min(axis=1)
+    return nearest
+
+
+def turns_of_nearest(turned: FloatArray, kept: FloatArray) -> Array:
+    """How far the robot stands turned, counter-clockwise, from its heading in each kept view (R, D): (R,) rad.
+
+    Row h of `turned` (H, D) is what a robot turned by 2 pi h / H further would see: where it is the best fit, the robot
+    stands turned by -2 pi h / H. Between two rows by the parabola through the three squared distances around the best.
+    """
+    headings = len(turned)
+    if headings < 3:
+        return np.zeros(len(kept))
+    squares = all_distances(turned, kept) ** 2
+    best = squares.argmin(axis=1)
+    rows = np.arange(len(kept))
+    before, here, after = (squares[rows, (best + step) % headings] for step in (-1, 0, 1))
+    bend = before + after - 2.0 * here
+    part = np.where(bend > 0.0, 0.5 * (before - after) / np.where(bend > 0.0, bend, 1.0), 0.0)
+    turns: Array = -(best + part) * (2.0 * math.pi / headings)
+    return np.mod(turns + math.pi, 2.0 * math.pi) - math.pi

@@ -1,0 +1,150 @@
+"""Maps that are learned while they are used: views, and for each the places where it may be seen."""
+
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Value
+
+from .pose import PoseSource
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+
+class ViewMixtures(Value):
+    """Views and for each a mixture of Gaussians over the poses from which it is seen (Porta & Kroese 2004, section 3;
+    Gross, Koenig & Mueller 2005, equations 9 and 10). Changed in place by the stage that learns it.
+
+    Views: `views` (R, D) float32 as `WholeView.values`; `kind` the class of view; `names` (R,), numbers that are never
+    given again; `born` (R,), the map's step at which each came. Components, of all views in one list: `owner` (C,) row
+    of the view; `means` (C, 3) x, y (m), heading (rad); `covariances` (C, 3, 3); `weights` (C,) in [0, 1], which need not
+    sum to 1; `counts` (C,) how many observations each has taken in (eta). A component's heading is that of a robot that
+    sees the view as it was kept: the pose that fits a view seen turned by t has the heading plus t.
+    `steps`: views learned from so far. `next_name`: the number for the next view. `pose_source`: what the first pose came
+    from.
+    """
+
+    in_place = True
+
+    views: npt.NDArray[np.float32]
+    kind: str
+    names: Ints
+    born: Ints
+    owner: Ints
+    means: Array
+    covariances: Array
+    weights: Array
+    counts: Array
+    steps: int
+    next_name: int
+    pose_source: PoseSource
+
+    @classmethod
+    def empty(cls) -> "ViewMixtures":
+        """A map with no view yet; what its views are is settled by the first."""
+        none = np.empty(0, np.int64)
+        return cls(
+            np.empty((0, 0), np.float32),
+            "",
+            none,
+            none,
+            none,
+            np.empty((0, 3)),
+            np.empty((0, 3, 3)),
+            np.empty(0),
+            np.empty(0),
+            0,
+            0,
+            "estimate",
+        )
+
+    def __len__(self) -> int:
+        return len(self.views)
+
+    def add_view(self, values: npt.NDArray[np.float32], kind: str) -> int:
+        """Keep a view, with no place yet; gives its row. Raises ValueError where it is not of the map's kind."""
+        if not len(self) and not self.next_name:
+            self._put(views=np.empty((0, len(values)), np.float32), kind=kind)
+        if kind != self.kind or len(values) != self.views.shape[1]:
+            raise ValueError(f"{kind} of {len(values)} numbers in a map of {self.kind} of {self.views.shape[1]}")
+        self._append("views", values)
+        self._append("names", np.int64(self.next_name))
+        self._append("born", np.int64(self.steps))
+        self._put(next_name=self.next_name + 1)
+        return len(self) - 1
+
+    def add_component(self, owner: int, mean: Array, covariance: Array, weight: float, count: float) -> int:
+        """Give a view one more place; gives the component's row."""
+        self._append("owner", np.int64(owner))
+        self._append("means", mean)
+        self._append("covariances", covariance)
+        self._append("weights", np.float64(weight))
+        self._append("counts", np.float64(count))
+        return len(self.weights) - 1
+
+    def put_mixture(self, owner: int, means: Array, covariances: Array, weights: Array, counts: Array) -> None:
+        """Replace all places of a view."""
+        self.keep_components(self.owner != owner)
+        for row in range(len(weights)):
+            self.add_component(owner, means[row], covariances[row], float(weights[row]), float(counts[row]))
+
+    def keep_components(self, kept: Mask) -> None:
+        """Drop all other components (C,)."""
+        if not kept.all():
+            for name in ("owner", "means", "covariances", "weights", "counts"):
+                self._put(**{name: getattr(self, name)[kept]})
+
+    def keep_views(self, kept: Mask) -> None:
+        """Drop all other views (R,) and their components. The order of the rest stays."""
+        if kept.all():
+            return
+        self.keep_components(kept[self.owner])
+        row = np.cumsum(kept) - 1
+        self._put(owner=row[self.owner])
+        for name in ("views", "names", "born"):
+            self._put(**{name: getattr(self, name)[kept]})
+
+    def step(self) -> None:
+        """Count one more view learned from."""
+        self._put(steps=self.steps + 1)
+
+    def take_poses_from(self, source: PoseSource) -> None:
+        """Say where the first pose came from."""
+        self._put(pose_source=source)
+
+    def _put(self, **fields: object) -> None:
+        for name, value in fields.items():
+            setattr(self, name, value)
+
+    def _append(self, name: str, row: Any) -> None:
+        # The field is a view of an array with room to grow, which doubles when it is full: N appends copy O(N).
+        rows: npt.NDArray[Any] = getattr(self, name)
+        rooms: dict[str, npt.NDArray[Any]] = self.__dict__.setdefault("_rooms", {})
+        room = rooms.get(name)
+        if room is None or rows.base is not room or len(rows) == len(room):
+            room = rooms[name] = np.empty((max(64, 2 * len(rows)), *rows.shape[1:]), rows.dtype)
+            room[: len(rows)] = rows
+        room[len(rows)] = row
+        self._put(**{name: room[: len(rows) + 1]})
+
+
+class ViewEvent(Value):
+    """What a tick did to a map of views: small, so that its life can be told when the drive has ended.
+
+    `views` and `components`: how many there are after the tick. `inserted`, `removed`: names of views. `why`: of the
+    removal. `changed`: (n,) names of views whose mixtures were changed, with, of each, `weights` (n,) of its heaviest
+    component, `places` (n, 2) its x, y (m), and `parts` (n,) how many components it has.
+    """
+
+    views: int
+    components: int
+    inserted: Ints
+    removed: Ints
+    why: Literal["", "forgotten", "merged", "full"]
+    changed: Ints
+    weights: Array
+    places: Array
+    parts: Ints

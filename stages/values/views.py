@@ -1,0 +1,90 @@
+"""Whole views as one vector each: what a map that is learned while it is used keeps of a view."""
+
+from abc import abstractmethod
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Value
+from omninav.stages.geometry.spectra import best_turns, spectral_distances
+from omninav.stages.geometry.turned_vectors import turned_distances, turns_of_nearest
+
+Array = npt.NDArray[np.float64]
+FloatArray = npt.NDArray[np.float32]
+
+
+class WholeView(Value):
+    """A view described by one vector. `values`: (D,) float32, what a map keeps of it.
+
+    A view knows how far it is from kept ones and how far the robot has turned between them, so that maps and their
+    stages need not know what the vector means.
+    """
+
+    values: FloatArray
+
+    @abstractmethod
+    def distances(self, kept: FloatArray) -> Array:
+        """Distances to kept views (R, D) of the same kind: (R,), 0 for equal views, whatever the robot's heading."""
+
+    @abstractmethod
+    def turns(self, kept: FloatArray) -> Array:
+        """How far the robot stands turned, counter-clockwise, from its heading in each kept view (R, D): (R,) rad."""
+
+
+class Coefficients(WholeView):
+    """Coefficients of a linear projection of the panorama (DCT, PCA).
+
+    `turned`: (H, D), row h what a robot turned counter-clockwise by 2 pi h / H would see; row 0 is `values`. A single
+    row compares views as they are, at one heading only, and all turns are 0.
+    """
+
+    turned: FloatArray
+
+    def distances(self, kept: FloatArray) -> Array:
+        return turned_distances(self.turned, kept)
+
+    def turns(self, kept: FloatArray) -> Array:
+        return turns_of_nearest(self.turned, kept)
+
+
+class Spectrum(WholeView):
+    """Fourier coefficients of averaged segments around the robot.
+
+    `values` holds a spectrum of (channels, frequencies) complex numbers as float32: all real parts, then all imaginary
+    ones. Its size alone does not change when the robot turns. `channels`: how many; `segments`: how many samples around
+    the robot they were made from.
+    """
+
+    channels: int
+    segments: int
+
+    def distances(self, kept: FloatArray) -> Array:
+        return spectral_distances(self.values, kept, self.channels, self.segments)
+
+    def turns(self, kept: FloatArray) -> Array:
+        return best_turns(self.values, kept, self.channels, self.segments)
+
+
+class ViewLimit(Value):
+    """The distance between views within which they count as the same place's: delta_y, E_max. In the views' unit.
+
+    `settled`: False while it is still being measured.
+    """
+
+    distance: float
+    settled: bool = True
+
+
+class Neighbours(Value):
+    """The map's views within the limit of the present one, nearest first.
+
+    `rows`: (J,) their rows in the map. `distances`: (J,) in the views' unit. `similarities`: (J,) in [0, 1], 1 at
+    distance 0, falling to 0 at the limit. `turns`: (J,) how far the robot stands turned, counter-clockwise, from its
+    heading in each of them, radians. `nearest`: the distance to the nearest view of the whole map, inf without one.
+    """
+
+    rows: npt.NDArray[np.int64]
+    distances: Array
+    similarities: Array
+    turns: Array
+    nearest: float
