@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from omninav.stages.geometry.se2 import between
+from omninav.stages.geometry.se2 import between, wrap
 from omninav.stages.simulator.config import OdometryNoise, Robot
 from omninav.stages.simulator.odometry import Bias, draw_bias, odometry
 from omninav.stages.simulator.robot import drive
@@ -76,6 +76,17 @@ def test_noise_grows_with_the_root_of_the_way_and_of_the_turn() -> None:
     assert ends[:, 0].std() == pytest.approx(0.02, rel=0.08)
     assert math.degrees(ends[:, 2].std()) == pytest.approx(0.7, rel=0.08)
     assert math.degrees(turned.std()) == pytest.approx(1.2, rel=0.08)
+
+
+def test_over_a_whole_drive_noise_and_biases_add_up_to_what_their_spreads_say() -> None:
+    """The heading at the end of a circle, from the four parts that the settings name."""
+    angles = np.linspace(0.0, 2 * math.pi, 801)
+    circle = np.stack([3 * np.sin(angles), 3 - 3 * np.cos(angles), angles], axis=1)
+    way, turn, noise = 6 * math.pi, 2 * math.pi, OdometryNoise()
+    days = [np.random.default_rng(day) for day in range(1500)]
+    ends = wrap(np.array([odometry(circle, noise, draw_bias(noise, day), day)[-1, 2] for day in days]))
+    by_hand = 0.0122**2 * way + 0.021**2 * turn + (0.0044 * way) ** 2 + (0.015 * turn) ** 2
+    assert np.sqrt(np.mean(ends**2)) == pytest.approx(math.sqrt(by_hand), rel=0.06)
 
 
 def test_the_biases_of_many_days_have_the_stated_spread() -> None:

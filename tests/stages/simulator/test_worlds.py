@@ -80,6 +80,14 @@ def test_tours_keep_clear_of_everything_on_the_first_and_on_the_last_day(name: s
             assert length(line) > 10
 
 
+def test_a_days_line_is_beside_the_route_by_the_stated_share_of_its_spread() -> None:
+    """Root mean square of draws cut off at 2 (0.959), of straight lines between (2/3) ** 0.5: 0.783."""
+    hall = World(WorldConfig(size=(1010.0, 10.0)))
+    line = np.array([[5.0, 5.0], [1005.0, 5.0]])
+    offs = [tours.wandered(hall, line, 0.1, np.random.default_rng(day))[20:-20, 1] - 5.0 for day in range(12)]
+    assert np.sqrt(np.mean(np.square(offs))) == pytest.approx(0.0783, rel=0.04)
+
+
 @pytest.mark.parametrize(
     ("name", "route", "least", "most"),
     [
