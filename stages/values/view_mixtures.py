@@ -20,11 +20,11 @@ class ViewMixtures(Value):
 
     Views: `views` (R, D) float32 as `WholeView.values`; `kind` the class of view; `names` (R,), numbers that are never
     given again; `born` (R,), the map's step at which each came. Components, of all views in one list: `owner` (C,) row
-    of the view; `means` (C, 3) x, y (m), heading (rad); `covariances` (C, 3, 3); `weights` (C,) in [0, 1], which need not
-    sum to 1; `counts` (C,) how many observations each has taken in (eta). A component's heading is that of a robot that
-    sees the view as it was kept: the pose that fits a view seen turned by t has the heading plus t.
-    `steps`: views learned from so far. `next_name`: the number for the next view. `pose_source`: what the first pose came
-    from.
+    of the view; `means` (C, 3) x, y (m), heading (rad); `covariances` (C, 3, 3); `weights` (C,) in [0, 1], which need
+    not sum to 1; `counts` (C,) how many observations each has taken in (eta). A component's heading is that of a robot
+    that sees the view as it was kept: the pose that fits a view seen turned by t has the heading plus t.
+    `steps`: views learned from so far. `next_name`: the number for the next view. `pose_source`: what the first pose
+    came from.
     """
 
     in_place = True
