@@ -1,6 +1,6 @@
 """Position and heading errors against ground truth, frame by frame."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -21,11 +21,17 @@ class TrajectoryErrors(Stage):
     standard deviation `std`, median, p90, max); `loss_rate`, the share of frames further than `lost_m` from the
     truth; `converged_after_frames`, how many frames went by before the error
     stayed below 1 m and 20 degrees for ten frames (None if it never did); the errors and loss rate again under
-    `after_convergence`. `odometry_alone` starts at the first true pose. The top level is the last log, and `logs` has
-    one entry per log where there are several. Frames without truth or without estimate are left out and counted.
+    `after_convergence`. `odometry_alone` starts at the first true pose, and says how far off it ended. The top level is
+    the last log, and `logs` has one entry per log where there are several. Frames without truth or without estimate are
+    left out and counted.
+
+    `settle_steps`: the errors and loss rate stand once more under `after_settling`, without so many frames at each
+    log's start: the same frames for every method, where `after_convergence` leaves out more of a method that stays lost
+    for longer. None: they do not.
     """
 
     lost_m: Annotated[float, Bounds(gt=0)] = 2.5
+    settle_steps: Annotated[int, Bounds(ge=0)] | None = None
 
     class Out(Outputs):
         """`metrics`: for metrics.json."""
@@ -41,7 +47,8 @@ class TrajectoryErrors(Stage):
         motion: Sequence[Motion | None],
     ) -> Out:
         """The whole run at once."""
-        per_log = [drive_metrics(drive, self.lost_m) for drive in drives(ticks, estimates, truth, motion)]
+        found = drives(ticks, estimates, truth, motion)
+        per_log = [drive_metrics(drive, self.lost_m, self.settle_steps) for drive in found]
         if not per_log:
             return self.Out(metrics=Metrics({"frames": 0}))
         values = dict(per_log[-1])
@@ -50,7 +57,7 @@ class TrajectoryErrors(Stage):
         return self.Out(metrics=Metrics(values))
 
 
-def drive_metrics(drive: Drive, lost_m: float) -> dict[str, Any]:
+def drive_metrics(drive: Drive, lost_m: float, settle_steps: int | None = None) -> dict[str, Any]:
     """Figures of one drive, named as in metrics.json; only `frames` where there is no ground truth."""
     result: dict[str, Any] = {"frames": len(drive)}
     if not drive.has_truth:
@@ -62,22 +69,31 @@ def drive_metrics(drive: Drive, lost_m: float) -> dict[str, Any]:
     result["frames_without_estimate"] = int((known(drive.truth) & ~known(drive.estimate)).sum())
     if not scored.any():
         return result
-    truth, estimate = drive.truth[scored], drive.estimate[scored]
+    truth, estimate, frames = drive.truth[scored], drive.estimate[scored], np.flatnonzero(scored)
     settled = first_settled(position_errors(estimate, truth), heading_errors_deg(estimate, truth))
+    windows = {"after_convergence": settled}  # the scored frame from which on each counts
+    if settle_steps is not None:
+        windows["after_settling"] = int(np.searchsorted(frames, settle_steps))
+    result |= _errors_over(windows, estimate, truth, lost_m)
+    for name, start in windows.items():
+        if start is not None and result[name] is not None:
+            result[name]["frames"] = len(truth) - start
+    result["converged_after_frames"] = None if settled is None else int(frames[settled])
+    result["mean_pose"] = _errors_over(windows, drive.mean[scored], truth, lost_m)
     odometry = drive.odometry_alone()
-    result |= pose_errors(estimate, truth, lost_m)
-    result["converged_after_frames"] = None if settled is None else int(np.flatnonzero(scored)[settled])
-    result["after_convergence"] = None if settled is None else pose_errors(estimate[settled:], truth[settled:], lost_m)
-    result["mean_pose"] = _errors_and_after(drive.mean[scored], truth, settled, lost_m)
     if odometry is not None:
-        result["odometry_alone"] = _errors_and_after(odometry[scored], truth, settled, lost_m)
+        result["odometry_alone"] = _errors_over(windows, odometry[scored], truth, lost_m)
+        result["odometry_alone"]["final_error_m"] = float(position_errors(odometry[scored], truth)[-1])
     return result
 
 
-def _errors_and_after(poses: Array, truth: Array, settled: int | None, lost_m: float) -> dict[str, Any]:
-    """Errors over all frames, and over those after the estimate's convergence, so that like is compared with like."""
-    after = None if settled is None else pose_errors(poses[settled:], truth[settled:], lost_m)
-    return pose_errors(poses, truth, lost_m) | {"after_convergence": after}
+def _errors_over(windows: Mapping[str, int | None], poses: Array, truth: Array, lost_m: float) -> dict[str, Any]:
+    """Errors over all frames, and in each window, the estimate's for all poses: so like is compared with like."""
+    within = {
+        name: None if start is None or start >= len(poses) else pose_errors(poses[start:], truth[start:], lost_m)
+        for name, start in windows.items()
+    }
+    return pose_errors(poses, truth, lost_m) | within
 
 
 def pose_errors(poses: Array, truth: Array, lost_m: float) -> dict[str, Any]:

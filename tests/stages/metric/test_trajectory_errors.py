@@ -51,6 +51,29 @@ def test_a_filter_that_never_settles_says_so():
     assert found["after_convergence"] is None
 
 
+def test_the_settling_window_is_the_same_whoever_is_lost_for_how_long():
+    quick, slow = [at(5.0)] * 2 + [at(0.5)] * 18, [at(5.0)] * 8 + [at(0.5)] * 12
+    truth = [Pose(0, 0, 0)] * 20
+    found = [measured(estimates, truth, settle_steps=5) for estimates in (quick, slow)]
+    assert [each["after_convergence"]["position_error_m"]["mean"] for each in found] == [0.5, 0.5]
+    # of the 15 frames from the sixth on the slow one is lost in three
+    assert [each["after_settling"]["position_error_m"]["mean"] for each in found] == pytest.approx([0.5, 1.4])
+    assert [each["after_settling"]["loss_rate"] for each in found] == pytest.approx([0.0, 0.2])
+    assert [each["after_settling"]["frames"] for each in found] == [15, 15]
+
+
+def test_the_settling_window_counts_frames_of_each_log_also_those_that_are_not_scored():
+    truth = [None, None, *[Pose(0, 0, 0)] * 4] * 2
+    found = measured([at(float(x)) for x in range(12)], truth, logs=[0] * 6 + [1] * 6, settle_steps=4)
+    assert [log["after_settling"]["position_error_m"]["mean"] for log in found["logs"]] == [4.5, 10.5]
+    assert found["mean_pose"]["after_settling"]["position_error_m"]["mean"] == 11.5
+    assert measured([at(0.0)] * 3, [Pose(0, 0, 0)] * 3, settle_steps=3)["after_settling"] is None
+
+
+def test_without_a_settling_window_nothing_is_said_of_one():
+    assert "after_settling" not in measured([at(0.0)] * 3, [Pose(0, 0, 0)] * 3)
+
+
 def test_frames_without_truth_or_estimate_are_left_out_and_counted():
     found = measured([at(0.0), at(99.0), None, at(1.0)], [Pose(0, 0, 0), None, Pose(0, 0, 0), Pose(0, 0, 0)])
     assert (found["frames"], found["frames_without_truth"], found["frames_without_estimate"]) == (4, 1, 1)
@@ -72,6 +95,7 @@ def test_odometry_alone_is_measured_like_the_estimate():
     found = measured([at(float(x)) for x in range(4)], truth, motion)
     assert found["position_error_m"]["max"] == 0.0
     assert found["driven_m"] == 3.0
+    assert found["odometry_alone"]["final_error_m"] == 1.5
     assert found["odometry_alone"]["position_error_m"] == pytest.approx(
         {"mean": 0.75, "std": 1.25**0.5 / 2, "median": 0.75, "p90": 1.35, "max": 1.5}
     )

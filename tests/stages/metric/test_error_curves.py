@@ -1,0 +1,71 @@
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.geometry.se2 import between
+from omninav.stages.metric.error_curves import ErrorCurves, lap_ends
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.pose import Motion, Pose
+
+
+def circle(laps: float, per_lap: int = 40, radius: float = 5.0) -> np.ndarray:
+    """Poses around a circle, starting at the origin."""
+    turn = 2 * np.pi * np.arange(round(laps * per_lap)) / per_lap
+    return np.stack([radius * np.sin(turn), radius * (1 - np.cos(turn)), turn], axis=1)
+
+
+def curves(truth: np.ndarray, errors: np.ndarray, stretched: float = 1.0, logs: list[int] | None = None, **parameters):
+    """Of a drive whose estimates lie so many metres beside the truth, and whose odometry stretches each step."""
+    steps = [None, *[Motion(*map(float, step)) for step in between(truth[:-1], truth[1:]) * [stretched, stretched, 1]]]
+    poses = [Pose(*map(float, row)) for row in truth]
+    estimates = [
+        PoseEstimate(Pose(pose.x + float(error), pose.y, pose.heading), np.eye(3), 1.0, pose)
+        for pose, error in zip(poses, errors, strict=True)
+    ]
+    ticks = [Tick(i, i * 10**9, log, i) for i, log in enumerate(logs or [0] * len(truth))]
+    return ErrorCurves(**parameters).step(Context("curves"), ticks, estimates, poses, steps).metrics.values
+
+
+def test_a_lap_ends_where_the_path_is_nearest_to_its_start_again():
+    path = circle(3)[:, :2]
+    assert lap_ends(path, path[0], 2.0) == [40, 80]
+    assert lap_ends(circle(3.5)[:, :2], path[0], 2.0) == [40, 80, 120]
+    assert lap_ends(circle(0.5)[:, :2], path[0], 2.0) == []
+    assert lap_ends(np.zeros((9, 2)), np.zeros(2), 2.0) == []
+
+
+def test_each_lap_has_its_own_errors():
+    errors = np.repeat([0.4, 0.2, 0.1], 40)
+    laps = curves(circle(3), errors)["laps"]
+    assert [lap["frames"] for lap in laps] == [40, 40, 40]
+    assert [lap["position_error_m"]["mean"] for lap in laps] == pytest.approx([0.4, 0.2, 0.1])
+    assert [lap["odometry_error_m"]["mean"] for lap in laps] == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+
+
+def test_over_the_steps_each_entry_is_the_mean_of_its_share():
+    found = curves(circle(1), np.arange(40.0), points=4)["over_steps"]
+    assert found["step"] == [4.5, 14.5, 24.5, 34.5]
+    assert found["position_error_m"] == pytest.approx([4.5, 14.5, 24.5, 34.5])
+
+
+def test_over_the_distance_odometry_is_that_of_the_first_lap():
+    straight = np.zeros((7, 3))
+    straight[:, 0] = np.arange(7.0)
+    found = curves(straight, np.zeros(7), stretched=1.1, distance_m=2.0)["over_distance"]
+    assert found["distance_m"] == [1.0, 3.0, 5.0, 7.0]
+    assert found["first_lap_odometry_error_m"] == pytest.approx([0.05, 0.25, 0.45, 0.6])
+    one, three = (curves(circle(laps), np.zeros(40 * laps), stretched=1.1)["over_distance"] for laps in (1, 3))
+    assert one["first_lap_odometry_error_m"] == pytest.approx(three["first_lap_odometry_error_m"])
+
+
+def test_no_frame_at_a_distance_is_no_error_there():
+    jump = np.zeros((4, 3))
+    jump[:, 0] = [0.0, 0.5, 2.5, 2.6]
+    assert curves(jump, np.ones(4))["over_distance"]["position_error_m"] == [1.0, None, 1.0]
+
+
+def test_the_last_log_is_drawn_and_nothing_without_truth():
+    found = curves(circle(2), np.repeat([1.0, 0.5], 40), logs=[0] * 40 + [1] * 40)
+    assert [lap["position_error_m"]["max"] for lap in found["laps"]] == pytest.approx([0.5])
+    ticks = [Tick(i, i, 0, i) for i in range(3)]
+    assert ErrorCurves().step(Context("curves"), ticks, [None] * 3, [None] * 3, [None] * 3).metrics.values == {}
