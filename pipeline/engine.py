@@ -4,6 +4,7 @@
 delayed values wait in `channels`; what "after" stages collect goes to spools on disk.
 """
 
+import math
 import time
 import zlib
 from array import array
@@ -86,7 +87,7 @@ class Call:
             elif wire.hold:
                 key = f"{wire.origin}#held"
             self.inputs.append((wire.to_port, key, instead, port.optional))
-        self.times = array("d")
+        self.times = array("d")  # seconds, one for each tick; NaN where it did not run
 
     def run(self, values: dict[str, Any]) -> bool:
         """Run the stage on the values of this tick and put its outputs there. False where a source has ended."""
@@ -97,6 +98,7 @@ class Call:
                 value = values[instead]
             if value is None and not optional:
                 self.ctx.counts[self.skips] += 1
+                self.times.append(math.nan)
                 for _, origin in self.outputs:
                     values[origin] = None
                 return True
