@@ -1,16 +1,20 @@
 """Which references of a map are worth comparing, and whether they can be compared at all."""
 
 import math
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import KDTree
 
+from omninav.pipeline import Bounds, Context, Outputs
 from omninav.pipeline.problems import BadInput
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.reach import Reach
+from omninav.stages.values.similarity import Similarities
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -30,27 +34,20 @@ class Candidates(NamedTuple):
 
 
 def near_belief(
-    poses: Array, near: Particles | None, radius: float, whole: int, strangers: int, turn: int
+    poses: Array, near: Particles | None, radius: float, aside: float, whole: int, strangers: int, turn: int
 ) -> Candidates:
     """The references within `radius` metres of any particle, and `strangers` of the others.
 
-    Strangers are taken at equal steps along the map, others at each `turn`, so that all of them have their turn; each
-    stands for as many as the step is long, and sums with `stands_for` are unbiased for the whole map. All references
-    are compared where there is no belief, where `radius` is 0, where none is near, and where there are at most `whole`.
+    Around particles set aside only those within `aside` metres are taken: such hypotheses lie all over the map, and
+    what they are weighed by lies next to them. Strangers are taken at equal steps along the map, others at each `turn`,
+    so that all of them have their turn; each stands for as many as the step is long, and sums with `stands_for` are
+    unbiased for the whole map. All references are compared where there is no belief, where `radius` is 0, where none is
+    near, and where there are at most `whole`.
     """
     if near is None or radius <= 0.0 or len(poses) <= whole:
         return Candidates()
-    places = np.floor(near.poses[:, :2] / (radius / 2)).astype(np.int64)
-    low = places.min(axis=0)
-    height = int(places[:, 1].max() - low[1]) + 1
-    numbers = np.unique((places[:, 0] - low[0]) * height + places[:, 1] - low[1])  # far faster than unique rows
-    cells = np.column_stack([numbers // height, numbers % height]) + low
-    if len(cells) > len(poses):
-        return Candidates()
-    # A particle lies within radius / 2 * sqrt(1/2) of its cell's centre: the reach grows by that much.
-    reach = radius * (1.0 + math.sqrt(0.5) / 2)
-    tree: Any = KDTree((cells + 0.5) * (radius / 2))  # type: ignore[no-untyped-call]
-    near_any = np.isfinite(tree.query(poses[:, :2], distance_upper_bound=reach)[0])
+    tracked = len(near.poses) - near.aside
+    near_any = within(poses, near.poses[:tracked], radius) | within(poses, near.poses[tracked:], aside)
     others = np.flatnonzero(~near_any)
     if len(others) == len(poses) or len(others) <= strangers:
         return Candidates()
@@ -62,6 +59,57 @@ def near_belief(
         stands_for[others[taken]] = step
     chosen = np.flatnonzero(stands_for)
     return Candidates(chosen, stands_for[chosen])
+
+
+def within(poses: Array, places: Array, radius: float) -> npt.NDArray[np.bool_]:
+    """Which poses (R, >= 2) lie within `radius` metres of any place (N, >= 2), and some a little farther: (R,).
+
+    Where the places are spread over more cells of half a radius than there are poses, all do.
+    """
+    if radius <= 0.0 or not len(places):
+        return np.zeros(len(poses), np.bool_)
+    cell = radius / 2
+    cells = np.floor(places[:, :2] / cell).astype(np.int64)
+    low = cells.min(axis=0)
+    height = int(cells[:, 1].max() - low[1]) + 1
+    numbers = np.unique((cells[:, 0] - low[0]) * height + cells[:, 1] - low[1])  # far faster than unique rows
+    if len(numbers) > len(poses):
+        return np.ones(len(poses), np.bool_)
+    # A place lies within half a cell's diagonal of its cell's centre: the radius grows by that much.
+    tree: Any = KDTree((np.column_stack([numbers // height, numbers % height]) + low + 0.5) * cell)  # type: ignore[no-untyped-call]
+    found: npt.NDArray[np.bool_] = np.isfinite(
+        tree.query(poses[:, :2], distance_upper_bound=radius + cell * math.sqrt(0.5))[0]
+    )
+    return found
+
+
+@dataclass(kw_only=True, eq=False)
+class NearBelief:
+    """What stages that compare the references near a belief have in common: a mixin, beside `Stage`.
+
+    `headings`: how many turns of each reference are compared. `radius`: with `near` wired, references within so many
+    reaches (port `reach`, else of `reach_m`) of a particle are compared, within `radius_aside` of one that is set
+    aside, and `strangers` of the others, in turns, which stand for all of them; in maps of up to `whole_up_to`
+    references all are; 0 compares all. A sensor that looks farther than `radius` misses some.
+    """
+
+    headings: Annotated[int, Bounds(ge=1)] = 36
+    radius: Annotated[float, Bounds(ge=0)] = 4.5
+    radius_aside: Annotated[float, Bounds(ge=0)] = 1.0
+    strangers: Annotated[int, Bounds(ge=0)] = 256
+    whole_up_to: Annotated[int, Bounds(ge=0)] = 1000
+    reach_m: Annotated[float, Bounds(gt=0)] = 0.5
+
+    class Out(Outputs):
+        """How alike view and references are."""
+
+        similarities: Similarities
+
+    def candidates(self, ctx: Context, map: ReferenceGraph, near: Particles | None, reach: Reach | None) -> Candidates:
+        """The references to compare at this tick."""
+        unit = self.reach_m if reach is None else reach.metres
+        radius, aside = self.radius * unit, self.radius_aside * unit
+        return near_belief(map.poses, near, radius, aside, self.whole_up_to, self.strangers, ctx.tick.index)
 
 
 def check_alike(features: SegmentFeatures, map: ReferenceGraph) -> bool:
