@@ -1,0 +1,57 @@
+"""Events of a map of views, and its hard limit."""
+
+import numpy as np
+
+from omninav.stages.mapping.view_cap import within_cap
+from omninav.stages.mapping.view_events import view_event
+from omninav.stages.values.view_mixtures import ViewMixtures
+
+
+def made_map(weights, counts=None):
+    map = ViewMixtures.empty()
+    for name, parts in enumerate(weights):
+        row = map.add_view(np.array([name, 0.0], np.float32), "Coefficients")
+        for part, weight in enumerate(parts):
+            count = 1.0 if counts is None else counts[name]
+            map.add_component(row, np.array([name, part, 0.0]), np.eye(3), weight, count)
+        map.step()
+    return map
+
+
+def test_an_event_names_what_came_and_what_went():
+    map = made_map([[0.5], [0.2], [0.9]])
+    before = map.names
+    map.keep_views(np.array([True, False, True]))
+    map.add_view(np.array([7.0, 0.0], np.float32), "Coefficients")
+    event = view_event(map, before, np.array([2, 2, 1]), "forgotten")
+    assert (event.views, event.components) == (3, 2)
+    assert event.inserted.tolist() == [3]
+    assert event.removed.tolist() == [1]
+    assert event.why == "forgotten"
+    assert event.changed.tolist() == [2], "each once, and none that is gone"
+
+
+def test_an_event_has_the_heaviest_part_of_each_changed_view():
+    map = made_map([[0.1, 0.6, 0.3], [0.2], []])
+    event = view_event(map, map.names, np.array([2, 0, 1]))
+    assert event.changed.tolist() == [0, 1, 2]
+    assert event.weights.tolist() == [0.6, 0.2, 0.0]
+    assert event.places.tolist() == [[0.0, 1.0], [1.0, 0.0], [0.0, 0.0]]
+    assert event.parts.tolist() == [3, 1, 0]
+    assert event.why == ""
+
+
+def test_above_the_limit_the_views_of_the_least_weight_go_first():
+    assert within_cap(made_map([[0.5], [0.2, 0.1], [0.9], [0.4]]), 2).tolist() == [True, False, True, False]
+    assert within_cap(made_map([[0.5], [0.2]]), 2).all()
+    assert within_cap(made_map([[0.5], [0.2]]), 0).all(), "0: no limit"
+
+
+def test_of_equally_heavy_views_those_seldom_seen_go_first_and_then_the_oldest():
+    assert within_cap(made_map([[1.0]] * 3, counts=[5, 1, 5]), 1).tolist() == [False, False, True]
+
+
+def test_a_view_of_this_very_step_stays_though_it_has_no_weight_yet():
+    map = made_map([[0.5], [0.2]])
+    map.add_view(np.array([7.0, 0.0], np.float32), "Coefficients")
+    assert within_cap(map, 2).tolist() == [True, False, True]
