@@ -1,0 +1,84 @@
+"""Whole views by the low frequencies of their cosine transform."""
+
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.values.image import Panorama
+from omninav.stages.values.views import Coefficients
+
+from .strip import Channels, averaged_strip
+
+Array = npt.NDArray[np.float64]
+FloatArray = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
+
+
+def cosine_basis(size: int) -> Array:
+    """The orthonormal cosine basis (DCT-II): (size, size), row k the wave of frequency k."""
+    waves = np.cos(np.pi / size * np.outer(np.arange(size), np.arange(size) + 0.5))
+    waves[0] *= np.sqrt(0.5)
+    basis: Array = waves * np.sqrt(2.0 / size)
+    return basis
+
+
+def lowest_frequencies(rows: int, columns: int, number: int, mean: bool) -> tuple[Ints, Ints]:
+    """The first `number` frequencies (down, across) of a transform, by their sum, then by the one down.
+
+    `mean`: whether the first one is (0, 0).
+    """
+    down, across = np.divmod(np.arange(rows * columns), columns)
+    order = np.lexsort((down, down + across))[0 if mean else 1 :][:number]
+    return down[order], across[order]
+
+
+class CosineTransform(Stage):
+    """The first coefficients of the orthonormal discrete cosine transform of the averaged panorama.
+
+    Porta & Kröse 2004, section 3: a standard compression that needs no set of images to learn from. The panorama is
+    averaged to `rows` x `columns` (0..255, brightness or colour), so distances are root sums of squares of grey levels
+    over that strip. `coefficients` of each channel are kept, from the lowest frequencies; `mean` False leaves the first
+    (DC) out, which is the brightness of the whole picture (erratum 19). `headings` 1 is the paper's form, which
+    compares views as they are: a transform of an unturned panorama never matches another heading. More headings, which
+    must divide `columns`, compare at that many turns, and tell by which the view is turned.
+    """
+
+    coefficients: Annotated[int, Bounds(ge=1)] = 64
+    mean: bool = False
+    rows: Annotated[int, Bounds(ge=1)] = 16
+    columns: Annotated[int, Bounds(ge=1)] = 72
+    channels: Channels = "brightness"
+    headings: Annotated[int, Bounds(ge=1)] = 36
+
+    class Out(Outputs):
+        """The description of the view."""
+
+        view: Coefficients
+
+    def __post_init__(self) -> None:
+        """Headings are whole columns apart, and there are as many coefficients as asked for."""
+        if self.columns % self.headings:
+            raise ValueError(f"headings: {self.headings} do not divide {self.columns} columns; write columns: 72")
+        if self.coefficients > self.rows * self.columns - (not self.mean):
+            raise ValueError(
+                f"coefficients: a strip of {self.rows} x {self.columns} has fewer than {self.coefficients}"
+            )
+
+    def setup(self, ctx: Context) -> None:
+        """The waves, once for all."""
+        self._down, self._across = lowest_frequencies(self.rows, self.columns, self.coefficients, self.mean)
+        self._vertical = cosine_basis(self.rows)[: self._down.max() + 1]
+        waves = cosine_basis(self.columns)[: self._across.max() + 1]
+        # Seen by a robot turned counter-clockwise, all columns move right: the same as waves moved to the left.
+        step = self.columns // self.headings
+        self._turned = np.stack([np.roll(waves, -step * heading, axis=1) for heading in range(self.headings)])
+
+    def step(self, ctx: Context, panorama: Panorama) -> Out:
+        """Describe one panorama."""
+        strip = averaged_strip(panorama.pixels, self.rows, self.columns, self.channels)
+        columns = np.tensordot(self._vertical, strip, axes=(1, 0))  # (frequencies down, columns, channels)
+        waves = np.tensordot(self._turned, columns, axes=(2, 1))  # (headings, across, down, channels)
+        turned: FloatArray = waves[:, self._across, self._down].reshape(self.headings, -1).astype(np.float32)
+        return self.Out(view=Coefficients(turned[0].copy(), turned))

@@ -1,0 +1,78 @@
+"""The map's views that look like the present one."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.problems import BadInput
+from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.views import Neighbours, ViewLimit, WholeView
+
+Array = npt.NDArray[np.float64]
+Shape = Literal["linear", "quadratic", "cosine", "step"]
+
+
+def similarity(distances: Array, limit: float, shape: Shape) -> Array:
+    """How alike views at these distances are: 1 at 0, falling to 0 at `limit` (`step`: 1 up to there)."""
+    share = np.clip(distances / limit, 0.0, 1.0) if limit > 0.0 else (distances > 0.0).astype(np.float64)
+    match shape:
+        case "linear":
+            alike: Array = 1.0 - share
+        case "quadratic":
+            alike = 1.0 - share**2
+        case "cosine":
+            alike = 0.5 + 0.5 * np.cos(np.pi * share)
+        case "step":
+            alike = (share < 1.0).astype(np.float64)
+    return alike
+
+
+class ViewNeighbours(Stage):
+    """The views of the map within the limit of the present one, with a similarity that falls to 0 there.
+
+    Porta & Kröse 2004, equations 4 and 5 (lambda); Gross, Koenig & Müller 2005, section 2.2 (S, whose shape is not
+    given: erratum 12a). `shape` of S over distance: linear, quadratic (1 - d²/E²), cosine, or step (1 up to the limit).
+    `count` 0: all of them; else the nearest `count` of the whole map, limit or none, as in section 2 of the former: S
+    then falls to 0 at the one that follows them. Before there is a limit there are no neighbours.
+    Raises BadInput where the map's views are not of this kind.
+    """
+
+    shape: Shape = "linear"
+    count: Annotated[int, Bounds(ge=0)] = 0
+
+    class Out(Outputs):
+        """Who is near."""
+
+        neighbours: Neighbours
+
+    def step(self, ctx: Context, view: WholeView, map: ViewMixtures, limit: ViewLimit | None) -> Out:
+        """Look through the map."""
+        check_kind(view, map)
+        if not len(map):
+            none = np.zeros(0)
+            return self.Out(neighbours=Neighbours(np.zeros(0, np.int64), none, none, none, np.inf))
+        distances = view.distances(map.views)
+        nearest = float(distances.min())
+        if self.count:
+            order = np.argsort(distances, kind="stable")
+            rows = order[: self.count]
+            within = float(distances[order[min(self.count, len(order) - 1)]])
+        else:
+            within = 0.0 if limit is None else limit.distance
+            rows = np.flatnonzero(distances < within)
+            rows = rows[np.argsort(distances[rows], kind="stable")]
+        near = distances[rows]
+        turns = view.turns(map.views[rows]) if len(rows) else np.zeros(0)
+        return self.Out(neighbours=Neighbours(rows, near, similarity(near, within, self.shape), turns, nearest))
+
+
+def check_kind(view: WholeView, map: ViewMixtures) -> None:
+    """Raises BadInput where view and map do not describe views alike."""
+    kind, size = type(view).__name__, len(view.values)
+    if len(map) and (map.kind != kind or map.views.shape[1] != size):
+        raise BadInput(
+            f"map: its views are {map.kind} of {map.views.shape[1]} numbers, the present one is {kind} of {size}; "
+            "use the features it was learned with, or learn it anew"
+        )
