@@ -7,14 +7,17 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.log import LogWriter, standard_types
-from omninav.stages.values.belief import Particles, PoseEstimate
+from omninav.stages.values.belief import GaussianMixture, Particles, PoseEstimate
 from omninav.stages.values.command import Command
 from omninav.stages.values.drives import Array, Drive, drives, known
+from omninav.stages.values.map_places import AnyMap
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.view_mixtures import ViewMixtures
 
-from .thin_belief import thin
+from .thin_belief import heaviest, thin
 
+Shown = Particles | GaussianMixture
 Fields = dict[str, Any]
 FRAME = "map"
 
@@ -26,10 +29,11 @@ class ResultLog(Stage):
     |---|---|---|
     | `/estimate/pose` | PoseWithCovarianceStamped | the estimate per frame; 6 x 6 covariance, plane entries only |
     | `/estimate/path` | Path | all of a log's estimates, at its end |
-    | `/belief` | PoseArray | the belief in at most `particles` poses per frame |
+    | `/belief` | PoseArray | the belief in at most `particles` poses per frame; of a mixture, its Gaussians' means |
+    | `/belief/gaussians` | MarkerArray | a mixture's Gaussians: the axes of their ellipses, one sigma each way |
     | `/odom` | Odometry | odometry alone, from the log's first frame, in the frame `odom` |
     | `/ground_truth/pose` | PoseStamped | where the log has it |
-    | `/map` | MarkerArray | the map's references and edges, once per log |
+    | `/map` | MarkerArray | a graph's references and edges, once per log; what mixtures were learned, at the end |
     | `/command` | TwistStamped | what a driver asked for, in a closed loop |
     | `/tf` | TFMessage | `map` to `odom`, once per log: odometry laid where `odometry alone` starts |
 
@@ -48,8 +52,8 @@ class ResultLog(Stage):
         truth: Sequence[Pose | None],
         motion: Sequence[Motion | None],
         estimates: Sequence[PoseEstimate | None] | None = None,
-        beliefs: Sequence[Particles | None] | None = None,
-        map: ReferenceGraph | None = None,
+        beliefs: Sequence[Shown | None] | None = None,
+        map: AnyMap | None = None,
         commands: Sequence[Command | None] | None = None,
     ) -> Out:
         """The whole run at once."""
@@ -57,10 +61,14 @@ class ResultLog(Stage):
             return self.Out()
         if estimates is None:
             estimates = [None] * len(ticks)
-        remaining: Iterator[Particles | None] = iter(beliefs if beliefs is not None else [])
+        remaining: Iterator[Shown | None] = iter(beliefs if beliefs is not None else [])
         with LogWriter(ctx.folder / "result.mcap") as log:
+            stamp = 0
             for drive in drives(ticks, estimates, truth, motion):
                 self._write_drive(log, drive, remaining, map)
+                stamp = int(drive.stamps[-1])
+            if isinstance(map, ViewMixtures) and len(map):
+                log.write("/map", "visualization_msgs/msg/MarkerArray", stamp, mixture_markers(map, stamp))
             for tick, command in zip(ticks, commands or (), strict=bool(commands)):
                 if command is not None:
                     twist = {"linear": {"x": command.speed}, "angular": {"z": command.turning}}
@@ -68,11 +76,9 @@ class ResultLog(Stage):
                     log.write("/command", "geometry_msgs/msg/TwistStamped", tick.stamp, fields)
         return self.Out()
 
-    def _write_drive(
-        self, log: LogWriter, drive: Drive, beliefs: Iterator[Particles | None], map: ReferenceGraph | None
-    ) -> None:
+    def _write_drive(self, log: LogWriter, drive: Drive, beliefs: Iterator[Shown | None], map: AnyMap | None) -> None:
         first, last = int(drive.stamps[0]), int(drive.stamps[-1])
-        if map is not None and len(map):
+        if isinstance(map, ReferenceGraph) and len(map):
             log.write("/map", "visualization_msgs/msg/MarkerArray", first, map_markers(map, first))
         odometry = drive.odometry_alone()
         own = None if odometry is None else drive.odometry()
@@ -92,9 +98,17 @@ class ResultLog(Stage):
                 fields = {"header": header(stamp), "pose": pose}
                 log.write("/estimate/pose", "geometry_msgs/msg/PoseWithCovarianceStamped", stamp, fields)
             belief = next(beliefs, None)
-            if belief is not None:
+            if isinstance(belief, Particles):
                 fields = {"header": header(stamp), "poses": pose_messages(thin(belief, self.particles).poses)}
                 log.write("/belief", "geometry_msgs/msg/PoseArray", stamp, fields)
+            elif belief is not None:
+                belief = heaviest(belief, self.particles)
+                fields = {"header": header(stamp), "poses": pose_messages(belief.means)}
+                log.write("/belief", "geometry_msgs/msg/PoseArray", stamp, fields)
+                marker = _gaussians(
+                    stamp, "belief", (0.8, 0.47, 0.65), belief.means, belief.covariances, belief.weights
+                )
+                log.write("/belief/gaussians", "visualization_msgs/msg/MarkerArray", stamp, {"markers": [marker]})
         poses = [
             {"header": header(int(stamp)), "pose": ros_pose(pose)}
             for stamp, pose in zip(drive.stamps[has_estimate], drive.estimate[has_estimate], strict=True)
@@ -142,9 +156,37 @@ def map_markers(map: ReferenceGraph, stamp: int) -> Fields:
     }
 
 
-def _marker(
-    stamp: int, namespace: str, kind: int, size: float, colour: tuple[float, ...], points: list[Fields]
+def mixture_markers(map: ViewMixtures, stamp: int) -> Fields:
+    """A map of mixtures (visualization_msgs/MarkerArray): its places as points, their ellipses as two axes each."""
+    colour = (0.35, 0.4, 0.45)
+    places = _marker(stamp, "places", 8, 0.1, (*colour, 1.0), _points(map.means[:, :2]))
+    places["colors"] = _colours(colour, map.weights)
+    return {"markers": [places, _gaussians(stamp, "ellipses", colour, map.means, map.covariances, map.weights)]}
+
+
+def _gaussians(
+    stamp: int, namespace: str, colour: tuple[float, float, float], means: Array, covariances: Array, weights: Array
 ) -> Fields:
+    """Gaussians (K, …) as a list of lines: the two axes of each, one standard deviation to either side."""
+    spread, axes = np.linalg.eigh(covariances[:, :2, :2])
+    arms = np.swapaxes(axes * np.sqrt(np.maximum(spread, 0.0))[:, None, :], 1, 2)  # (K, axis, xy)
+    ends = means[:, None, None, :2] + np.stack([-arms, arms], axis=2)
+    marker = _marker(stamp, namespace, 5, 0.02, (*colour, 1.0), _points(ends.reshape(-1, 2)))
+    marker["colors"] = _colours(colour, np.repeat(weights, 4))
+    return marker
+
+
+def _points(places: Array) -> list[Any]:
+    point = standard_types().types["geometry_msgs/msg/Point"]
+    return [point(x, y, 0.0) for x, y in places.tolist()]
+
+
+def _colours(colour: tuple[float, float, float], weights: Array) -> list[Any]:
+    rgba = standard_types().types["std_msgs/msg/ColorRGBA"]
+    return [rgba(*colour, weight) for weight in np.clip(weights, 0.1, 1.0).tolist()]
+
+
+def _marker(stamp: int, namespace: str, kind: int, size: float, colour: tuple[float, ...], points: list[Any]) -> Fields:
     return {
         "header": header(stamp),
         "ns": namespace,

@@ -6,12 +6,23 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.picture import Picture, picture
-from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.map_places import AnyMap
+from omninav.stages.values.view_mixtures import ViewMixtures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Picture", "draw_map", "draw_pose", "extent_of", "fitting_height", "picture", "plan_axes"]
+__all__ = [
+    "Picture",
+    "draw_gaussians",
+    "draw_map",
+    "draw_pose",
+    "extent_of",
+    "faded",
+    "fitting_height",
+    "picture",
+    "plan_axes",
+]
 
 Array = npt.NDArray[np.float64]
 
@@ -30,17 +41,60 @@ def plan_axes(axes: "Axes", extent: tuple[float, float, float, float] | None = N
         axes.set_ylim(extent[2], extent[3])
 
 
-def draw_map(axes: "Axes", map: ReferenceGraph | None, label: bool = True) -> None:
-    """Reference views as grey dots, joined by their edges."""
+def draw_map(axes: "Axes", map: AnyMap | None, label: bool = True) -> None:
+    """Reference views as grey dots, joined by their edges; of mixtures every component's mean, as dark as it weighs."""
     if map is None or not len(map):
         return
     from matplotlib.collections import LineCollection
 
+    if isinstance(map, ViewMixtures):
+        size = float(np.clip(3000 / max(len(map.weights), 1), 1.5, 9))
+        name = f"views ({len(map)}) at {len(map.weights)} places" if label else None
+        x, y = map.means[:, :2].T
+        colours = faded(REFERENCE, np.clip(map.weights, 0.15, 1))
+        axes.scatter(x, y, s=size, c=colours, linewidths=0, zorder=1.5, label=name)
+        return
     if len(map.edges):
         axes.add_collection(LineCollection(list(map.poses[map.edges][:, :, :2]), colors=EDGE, linewidths=0.7, zorder=1))
     size = float(np.clip(3000 / len(map), 1.5, 9))
     name = f"references ({len(map)})" if label else None
     axes.scatter(map.poses[:, 0], map.poses[:, 1], s=size, color=REFERENCE, linewidths=0, zorder=1.5, label=name)
+
+
+def draw_gaussians(
+    axes: "Axes", means: Array, covariances: Array, weights: Array, colour: str, sigmas: float = 2.0, zorder: float = 3
+) -> None:
+    """Gaussians over the pose, (K, 3) and (K, 3, 3), as ellipses of `sigmas` standard deviations in the plane.
+
+    An ellipse is as opaque as its weight (K,) in [0, 1] says, but never invisible.
+    """
+    if not len(means):
+        return
+    from matplotlib.collections import EllipseCollection
+
+    spread, axes_of = np.linalg.eigh(covariances[:, :2, :2])  # ascending: the long axis is the last
+    diameters = 2 * sigmas * np.sqrt(np.maximum(spread, 0.0))
+    axes.add_collection(
+        EllipseCollection(
+            widths=diameters[:, 1],
+            heights=diameters[:, 0],
+            angles=np.degrees(np.arctan2(axes_of[:, 1, 1], axes_of[:, 0, 1])),
+            units="xy",
+            offsets=means[:, :2],
+            offset_transform=axes.transData,
+            facecolors=faded(colour, np.clip(0.35 * weights, 0.04, 0.35)),
+            edgecolors=faded(colour, np.clip(weights, 0.12, 1.0)),
+            linewidths=0.7,
+            zorder=zorder,
+        )
+    )
+
+
+def faded(colour: str, opacity: Array) -> Array:
+    """A colour with opacities (N,) in [0, 1]: (N, 4) red, green, blue, opacity."""
+    from matplotlib.colors import to_rgb
+
+    return np.column_stack([np.tile(to_rgb(colour), (len(opacity), 1)), opacity])
 
 
 def draw_pose(axes: "Axes", pose: Array, length: float, colour: str, label: str | None = None) -> None:

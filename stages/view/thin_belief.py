@@ -1,4 +1,4 @@
-"""A belief in few particles, small enough to be kept for every frame."""
+"""A belief in few particles or Gaussians, small enough to be kept for every frame."""
 
 from typing import Annotated
 
@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.values.belief import Belief, Particles
+from omninav.stages.values.belief import Belief, GaussianMixture, Particles
 
 Array = npt.NDArray[np.float64]
 
@@ -14,20 +14,22 @@ Array = npt.NDArray[np.float64]
 class ThinBelief(Stage):
     """At most `particles` equally weighted particles that stand for a belief, chosen without chance.
 
-    Beliefs of other kinds are shown by the one pose that they stand for.
+    Of a mixture, as many of its heaviest Gaussians. Other beliefs are shown by the one pose that they stand for.
     """
 
     particles: Annotated[int, Bounds(ge=1)] = 300
 
     class Out(Outputs):
-        """`belief`: particles, map frame."""
+        """`belief`: particles or Gaussians, map frame."""
 
-        belief: Particles
+        belief: Particles | GaussianMixture
 
     def step(self, ctx: Context, belief: Belief) -> Out:
         """One belief, thinned."""
         if isinstance(belief, Particles):
             return self.Out(belief=thin(belief, self.particles))
+        if isinstance(belief, GaussianMixture):
+            return self.Out(belief=heaviest(belief, self.particles))
         pose = belief.estimate().pose
         return self.Out(belief=Particles(np.array([[pose.x, pose.y, pose.heading]]), np.ones(1)))
 
@@ -40,3 +42,11 @@ def thin(belief: Particles, particles: int) -> Particles:
     middles = (np.arange(particles) + 0.5) / particles * edges[-1]
     chosen = np.minimum(np.searchsorted(edges, middles), len(edges) - 1)
     return Particles(belief.poses[chosen], np.full(particles, 1 / particles))
+
+
+def heaviest(belief: GaussianMixture, components: int) -> GaussianMixture:
+    """The mixture's `components` heaviest Gaussians in their order, with the weights that they have."""
+    if len(belief) <= components:
+        return belief
+    kept = np.sort(np.argsort(-belief.weights, kind="stable")[:components])
+    return GaussianMixture(belief.means[kept], belief.covariances[kept], belief.weights[kept])

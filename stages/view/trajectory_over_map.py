@@ -8,7 +8,7 @@ from omninav.pipeline import Context, Outputs, Stage, Tick
 from omninav.pipeline.results import Figure
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.drives import Array, Drive, drives, known
-from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.map_places import AnyMap, map_poses
 from omninav.stages.values.pose import Motion, Pose
 
 from .style import ESTIMATE, MARK, ODOMETRY, TRUTH, draw_map, extent_of, fitting_height, picture, plan_axes
@@ -30,7 +30,7 @@ class TrajectoryOverMap(Stage):
         estimates: Sequence[PoseEstimate | None],
         truth: Sequence[Pose | None],
         motion: Sequence[Motion | None],
-        map: ReferenceGraph | None = None,
+        map: AnyMap | None = None,
     ) -> Out:
         """The whole run at once."""
         logs = drives(ticks, estimates, truth, motion)
@@ -55,7 +55,7 @@ class TrajectoryOverMap(Stage):
         return self.Out(figure=last, earlier=earlier)
 
 
-def _caption(drive: Drive, map: ReferenceGraph | None) -> str:
+def _caption(drive: Drive, map: AnyMap | None) -> str:
     words = [f"The estimate of {len(drive)} frames"]
     words.append("over the true path." if drive.has_truth else "; this log has no ground truth.")
     if drive.odometry_alone() is not None:
@@ -66,7 +66,7 @@ def _caption(drive: Drive, map: ReferenceGraph | None) -> str:
     return " ".join(words).replace(" ;", ";")
 
 
-def _draw(logs: Sequence[Drive], map: ReferenceGraph | None) -> bytes:
+def _draw(logs: Sequence[Drive], map: AnyMap | None) -> bytes:
     columns = min(len(logs), 2)
     rows = -(-len(logs) // columns)
     extent = _shown(logs, map)
@@ -103,10 +103,10 @@ def _draw(logs: Sequence[Drive], map: ReferenceGraph | None) -> bytes:
     return drawn.content
 
 
-def _shown(logs: Sequence[Drive], map: ReferenceGraph | None) -> tuple[float, float, float, float] | None:
+def _shown(logs: Sequence[Drive], map: AnyMap | None) -> tuple[float, float, float, float] | None:
     """Truth and map, or estimate and map: what strays (odometry, a lost filter) leaves the picture, not shrinks it."""
     kept = [drive.truth if drive.has_truth else drive.estimate for drive in logs]
-    return extent_of(*kept, *([map.poses] if map is not None else []), margin=0.08)
+    return extent_of(*kept, map_poses(map), margin=0.08)
 
 
 def _broken_at_jumps(drive: Drive) -> tuple[Array, Array]:
