@@ -3,11 +3,13 @@
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+from omninav.stages.geometry.se2 import wrap
 
 from .bodies import Coverings, Tiling
 from .streams import stream
@@ -26,6 +28,18 @@ NEAREST = 0.6
 """Metres from the robot's middle that people keep."""
 COMPANIONS = 4
 """People at most who take an interest in the robot at a time."""
+PACE = 1.3
+"""Metres a second that nobody exceeds."""
+APART = 2.1 * RADIUS
+"""Metres between the middles of people who do not let one another pass."""
+RUN_OVER = 0.58
+"""Metres from the robot's middle where nobody stays who cannot get out of its way."""
+SIGHT, LOST = 5.0, 3.0
+"""Metres from the robot from which somebody may come or go unseen; metres from where somebody would like to be."""
+AWAY = 5.0
+"""Seconds that somebody is gone at least."""
+STEP = 0.2
+"""Seconds of a step of those who walk near the robot."""
 
 
 @dataclass(frozen=True)
@@ -189,66 +203,64 @@ class Companion:
         self._phase = float(rng.uniform(0.0, 1.0))
         self._sway = rng.uniform(0.0, 2.0 * math.pi, 2)
 
-    def at(self, seconds: float, track: Track, others: Sequence[Person]) -> Person | None:
-        """This person at a time, from where the robot was up to then; nobody where there is no room beside `others`."""
-        last = int(np.searchsorted(track.times, seconds, side="right"))
-        if last < 2:
-            return None
-        poses = track.poses[max(0, last - 2000) : last]
+    def wish(self, seconds: float, track: Track, others: F64) -> F64 | None:
+        """Where (2,) this person would like to be, from where the robot was up to then; None: no room but `others`'."""
+        poses = track.poses[-2000:]
         x, y = poses[-1, :2]
         gait = np.cumsum(np.hypot(*np.diff(poses[::-1, :2], axis=0).T))
-        span = max(1, int(np.searchsorted(track.times[:last], seconds - 3.0)))
-        recent = track.poses[span - 1 : last, 2]
+        span = max(1, int(np.searchsorted(track.times, seconds - 3.0)))
+        recent = track.poses[span - 1 :, 2]
         facing = math.atan2(float(np.sin(recent).mean()), float(np.cos(recent).mean()))
         # Away for a third of the time, near for the rest, and a few seconds between
         beat = math.cos(2.0 * math.pi * (seconds / self._period + self._phase))
         back = 1.0 / (1.0 + math.exp(-12.0 * (beat - 0.5)))
         near = 1.05 + 0.35 * math.sin(0.21 * seconds + self._sway[0])
         behind = near + 7.0 * back
-        followed = self._on_track(poses, gait, behind)
-        places = [self._on_track(poses, gait, behind + 0.7 * k) for k in range(5)]
+        followed = _back_along(poses, gait, behind)
+        places = [_back_along(poses, gait, behind + 0.7 * k) for k in range(5)]
         if back <= 0.5:
             bearing = self._bearing + 0.4 * math.sin(0.13 * seconds + self._sway[1])
             options = facing + np.array([bearing, -bearing, 1.2 * bearing, math.pi])
             beside = np.array([x, y]) + near * np.stack([np.cos(options), np.sin(options)], axis=-1)
             part = (2.0 * back) ** 2
             places = [*((1.0 - part) * beside + part * followed), *places]
-        position = next((place for place in places if self._has_room(place, x, y, others)), None)
-        if position is None:
-            return None
-        towards = math.atan2(y - position[1], x - position[0])
-        moving = float(np.hypot(*(poses[-1, :2] - poses[max(0, len(poses) - 20), :2]))) > 0.05
-        stride = 2.5 * seconds if moving else 0.0
-        return Person((float(position[0]), float(position[1])), towards, RADIUS, self.height, self.look, stride)
+        return next((place for place in places if self._has_room(place, x, y, others)), None)
 
-    def _has_room(self, place: F64, x: float, y: float, others: Sequence[Person]) -> bool:
+    def _has_room(self, place: F64, x: float, y: float, others: F64) -> bool:
         """Whether one can stand at a place: on nobody's feet, and if near the robot at (x, y) with nothing between."""
         if math.hypot(place[0] - x, place[1] - y) < NEAREST:
             return False
-        if any(math.dist(place, other.position) < 2.2 * RADIUS for other in others):
+        if len(others) and np.hypot(*(others - place).T).min() < 2.2 * RADIUS:
             return False
         between = np.array([place, [0.5 * (place[0] + x), 0.5 * (place[1] + y)]])
         clear = self._clearance(between) > (0.8 * RADIUS, 0.0)
         return bool(clear[0] and (clear[1] or math.dist(place, (x, y)) > 2.0))
 
-    def _on_track(self, poses: F64, gait: F64, distance: float) -> F64:
-        """The point of the robot's way that lies `distance` m back along it, or its start."""
-        found = int(np.searchsorted(gait, distance))
-        point: F64 = poses[max(0, len(poses) - 2 - found), :2]
-        return point
+
+def _back_along(poses: F64, gait: F64, distance: float) -> F64:
+    """The point of the robot's way that lies `distance` m back along it, or its start."""
+    found = int(np.searchsorted(gait, distance))
+    point: F64 = poses[max(0, len(poses) - 2 - found), :2]
+    return point
+
+
+X, Y, HEADING, WAY, GONE = range(5)
+"""What the crowd's state (P, 5) holds of each person: place, facing, metres walked, since when (s) it is gone or -1."""
 
 
 class Crowd:
     """The people of a world on a day: walkers all over, of whom a few keep the robot company where its track is known.
 
-    The same seed, day, time and track give the same people, in whatever order times are asked for.
+    Nobody walks faster than `PACE` or through anything. Who is in the robot's way steps aside; who cannot is gone for a
+    while, and comes back out of its sight. The same seed, day, time and track give the same people, in whatever order
+    times are asked for.
     """
 
     def __init__(self, seed: int, day: int, count: int, size: tuple[float, float], clearance: Clearance) -> None:
         rng = stream(seed, "people", day)
         near = min(COMPANIONS, (count + 4) // 8)
         self._companions = [Companion(stream(seed, "companion", day, k), clearance) for k in range(near)]
-        self._walkers = []
+        self._walkers: list[Walker] = []
         self._clearance = clearance
         for number in range(count - near):
             points = rng.uniform((0.0, 0.0), size, (200, 2))
@@ -256,28 +268,160 @@ class Crowd:
             if len(free):
                 start = (float(free[0, 0]), float(free[0, 1]))
                 self._walkers.append(Walker(stream(seed, "walker", day, number), start, clearance))
+        self._everybody: list[Walker | Companion] = [*self._walkers, *self._companions]
+        self._known: tuple[Track, list[F64]] | None = None
 
     def at(self, seconds: float, track: Track | None = None) -> tuple[Person, ...]:
-        """Everybody at a time in seconds. Walkers make room for the robot."""
-        people = [walker.at(max(0.0, seconds)) for walker in self._walkers]
+        """Everybody at a time in seconds; who keeps the robot company only where its track is known."""
         if track is None or not len(track.times):
-            return tuple(people)
-        last = max(0, int(np.searchsorted(track.times, seconds, side="right")) - 1)
-        x, y = track.poses[last, :2]
-        people = [aside for p in people if (aside := self._aside(p, float(x), float(y))) is not None]
-        for companion in self._companions:
-            person = companion.at(seconds, track, people)
-            if person is not None:
-                people.append(person)
+            return tuple(walker.at(max(0.0, seconds)) for walker in self._walkers)
+        known = self._known
+        if known is None or known[0].times is not track.times or known[0].poses is not track.poses:
+            self._known = known = track, [self.gathered(track)]
+        states, begin = known[1], float(track.times[0])
+        whole = max(0, math.floor((seconds - begin) / STEP + 1e-9))
+        while len(states) <= whole + 1:
+            now = begin + STEP * (len(states) - 1)
+            states.append(self.went_on(states[-1], now, now + STEP, track))
+        part = min(max((seconds - begin) / STEP - whole, 0.0), 1.0)
+        state = states[whole].copy()
+        there = (state[:, GONE] < 0.0) & (states[whole + 1][:, GONE] < 0.0)
+        change = states[whole + 1] - states[whole]
+        change[:, HEADING] = wrap(change[:, HEADING])
+        state[there] += part * change[there]
+        later = states[whole + 1][:, [X, Y]]
+        strolls = [
+            who.at(begin + STEP * whole).position == tuple(states[whole][number, :2])
+            and who.at(begin + STEP * (whole + 1)).position == tuple(later[number])
+            for number, who in enumerate(self._walkers)
+        ]
+        return self.seen(state, seconds, strolls)
+
+    def gathered(self, track: Track) -> F64:
+        """Everybody when a drive begins (P, 5): walkers first."""
+        now = float(track.times[0])
+        state = np.zeros((len(self._everybody), 5))
+        state[:, GONE] = now - AWAY
+        return self._moved(state, now, 0.0, Track(track.times[:1], track.poses[:1]), begins=True)
+
+    def went_on(self, state: F64, seconds: float, until: float, track: Track) -> F64:
+        """Everybody (P, 5) some time later, from where the robot was up to `seconds`: nobody knows what comes next."""
+        steps = math.ceil((until - seconds) / STEP - 1e-9)
+        last = max(1, int(np.searchsorted(track.times, seconds + 1e-9, side="right")))
+        known = Track(track.times[:last], track.poses[:last])
+        for number in range(steps):
+            end = until if number == steps - 1 else seconds + STEP
+            state = self._moved(state, end, end - seconds, known)
+            seconds = end
+        return state
+
+    def seen(self, state: F64, seconds: float, strolls: Sequence[bool] | None = None) -> tuple[Person, ...]:
+        """Who is there, and as what one sees them; `strolls`: which walkers nobody keeps from it."""
+        people = []
+        for number, (row, who) in enumerate(zip(state, self._everybody, strict=True)):
+            if row[GONE] < 0.0:
+                at = float(row[X]), float(row[Y])
+                strolling = who.at(max(0.0, seconds)) if isinstance(who, Walker) else None
+                free = strolling is not None and (strolling.position == at if strolls is None else strolls[number])
+                if strolling is not None and free:
+                    people.append(strolling)
+                else:
+                    stride = math.pi * float(row[WAY]) / STEP_LENGTH
+                    people.append(Person(at, float(row[HEADING]), RADIUS, who.height, who.look, stride))
         return tuple(people)
 
-    def _aside(self, person: Person, x: float, y: float) -> Person | None:
-        """A person as far from the robot as it takes, or nobody where that is no place to stand."""
-        off = np.array(person.position) - (x, y)
-        distance = float(np.hypot(*off))
-        if distance >= NEAREST:
-            return person
-        moved = np.array([(x, y)]) + off / max(distance, 1e-6) * NEAREST
-        if self._clearance(moved)[0] < 0.5 * RADIUS:
-            return None
-        return replace(person, position=(float(moved[0, 0]), float(moved[0, 1])))
+    def _moved(self, before: F64, now: float, took: float, track: Track, begins: bool = False) -> F64:
+        """Everybody one step later: each in turn goes where it likes, as far as the others and the robot let it."""
+        state = before.copy()
+        robot = _expected(track, now)
+        for number, who in enumerate(self._everybody):
+            there = state[:, GONE] < 0.0
+            there[number] = False
+            if isinstance(who, Walker):
+                there[: len(self._walkers)] = False  # walkers pass one another
+                wish: F64 | None = np.array(who.at(max(0.0, now)).position)
+            else:
+                wish = who.wish(now, track, state[there, :2])
+            row = state[number]
+            if row[GONE] >= 0.0 or begins:
+                self._come(row, wish, now, robot, state[there, :2], 0.0 if begins else SIGHT)
+            else:
+                goal = row[:2].copy() if wish is None else wish
+                if isinstance(who, Companion) and math.dist(goal, row[:2]) > 1.2 and not _lost(row, goal, robot):
+                    goal = _along_track(track.poses[-2000:, :2], row[:2])
+                self._walk(row, goal, now, took, robot, state[there, :2])
+                if isinstance(who, Companion):
+                    row[HEADING] = math.atan2(robot[1] - row[Y], robot[0] - row[X])
+        return state
+
+    def _come(self, row: F64, wish: F64 | None, now: float, robot: F64, others: F64, away: float) -> None:
+        """Somebody who was gone is there again, if far from the robot and on nobody's feet."""
+        if wish is None or now - row[GONE] < AWAY or math.dist(wish, robot) < max(away, NEAREST):
+            return
+        if not len(others) or np.hypot(*(others - wish).T).min() >= APART:
+            row[[X, Y]], row[GONE] = wish, -1.0
+            row[HEADING] = math.atan2(robot[1] - wish[1], robot[0] - wish[0])
+
+    def _walk(self, row: F64, goal: F64, now: float, took: float, robot: F64, others: F64) -> None:
+        """A step towards where somebody would like to be, or aside where others or the robot are in the way."""
+        place = row[:2].copy()
+        if _lost(row, goal, robot):
+            row[GONE] = now
+            return
+        far = PACE * took
+        length = min(math.dist(goal, place), far)
+        if length < far:  # it was chosen for having room
+            step, free = goal, not len(others) or np.hypot(*(others - goal).T).min() >= APART
+        else:
+            step = place + (goal - place) / math.dist(goal, place) * far
+            free = self._lets(step[None], place, others)[0]
+        if not free or math.dist(step, robot) < NEAREST:
+            bearings = 2.0 * math.pi / 16 * np.arange(16)
+            options = place + far * np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
+            options = np.concatenate([place[None], options])
+            from_robot = np.hypot(*(options - robot).T)
+            lets = self._lets(options, place, others)
+            lets[0] = True
+            cost = np.hypot(*(options - goal).T) + 100.0 * np.maximum(NEAREST - from_robot, 0.0)
+            best = int(np.argmin(np.where(lets, cost, np.inf)))
+            step = options[best]
+            if from_robot[best] < RUN_OVER:
+                row[GONE] = now
+                return
+        gone = math.dist(step, place)
+        row[:2] = step
+        row[WAY] += gone
+        if gone > 1e-6:
+            row[HEADING] = math.atan2(step[1] - place[1], step[0] - place[0])
+
+    def _lets(self, places: F64, start: F64, others: F64) -> npt.NDArray[np.bool_]:
+        """Whether one can go from `start` to each of some places (N, 2): not into things, nor closer to others."""
+        room = min(0.8 * RADIUS, float(self._clearance(start[None])[0]))
+        free: npt.NDArray[np.bool_] = self._clearance(places) >= room
+        if len(others):
+            gaps = np.hypot(*(places[:, None] - others).transpose(2, 0, 1))
+            free &= (gaps >= np.minimum(APART, np.hypot(*(others - start).T))).all(axis=1)
+        return free
+
+
+def _lost(row: F64, goal: F64, robot: F64) -> bool:
+    """Whether somebody has given up, and nobody sees it."""
+    return math.dist(goal, row[:2]) > LOST and math.dist(row[:2], robot) > SIGHT
+
+
+def _expected(track: Track, now: float) -> F64:
+    """Where (2,) the robot will be soon if it goes on as it does; where it is if that is not known."""
+    at: F64 = track.poses[-1, :2]
+    if len(track.times) < 2:
+        return at
+    took = float(track.times[-1] - track.times[-2])
+    speed: F64 = (at - track.poses[-2, :2]) / took
+    return at if float(np.hypot(*speed)) > PACE else at + speed * (now - float(track.times[-1]))
+
+
+def _along_track(way: F64, place: F64) -> F64:
+    """The point of the robot's way (N, 2) some 0.8 m on from where it comes nearest to a place."""
+    nearest = int(np.argmin(((way - place) ** 2).sum(axis=1)))
+    gone = np.cumsum(np.hypot(*np.diff(way[nearest:], axis=0).T))
+    point: F64 = way[min(nearest + 1 + int(np.searchsorted(gone, 0.8)), len(way) - 1)]
+    return point

@@ -245,13 +245,14 @@ class World:
     # Who walks there
 
     @cached_property
-    def _crowd(self) -> people.Crowd:
+    def crowd(self) -> people.Crowd:
+        """The people of this day."""
         count = self.config.day(self.day).people
         return people.Crowd(self.config.seed, self.day, count, self.config.size, self.clearance)
 
     def people_at(self, seconds: float, track: people.Track | None = None) -> tuple[people.Person, ...]:
         """The people of this day at a time; some keep the robot company where its `track` up to then is known."""
-        return self._crowd.at(seconds, track)
+        return self.crowd.at(seconds, track)
 
     # Room to drive
 

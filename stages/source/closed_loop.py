@@ -44,11 +44,13 @@ def _nowhere() -> F64:
 class Simulation(State):
     """The robot as it is: its state (see `robot`; empty before the first tick), odometry pose, ticks made.
 
-    `track` (N, 4): time (s) and pose at the last ticks; people who keep it company follow it.
+    `track` (N, 4): time (s) and pose at the last ticks; people who keep it company follow it. `crowd` (P, 5): where
+    everybody is.
     """
 
     robot: F64 = field(default_factory=_nowhere)
     track: F64 = field(default_factory=lambda: np.zeros((0, 4)))
+    crowd: F64 = field(default_factory=lambda: np.zeros((0, 5)))
     odometry: F64 = field(default_factory=lambda: np.zeros(3))
     ticks: int = 0
 
@@ -131,8 +133,7 @@ class ClosedLoop(Source):
 
     def _perceive(self, ctx: Context, simulation: Simulation, motion: Motion | None) -> Out:
         pose, now = simulation.robot[:3], simulation.ticks / self.rate
-        simulation.track = np.vstack([simulation.track, [now, *pose]])[-REMEMBERED:]
-        people = self._people(simulation)
+        people = self._meet(simulation, now)
         metres = measure(self._room, round_bodies(people)[None], pose[None], self.world.ranges, ctx.rng)[0]
         stamp = EPOCH + self.day * 86400 * 10**9 + 8 * 3600 * 10**9 + round(now * 1e9)
         return self.Out(
@@ -158,11 +159,20 @@ class ClosedLoop(Source):
         seen = render(self._scene, self._rays, pose, eye, exposure=exposure, noise=sensor.noise, key=key, people=people)
         return Image(seen)
 
+    def _meet(self, simulation: Simulation, now: float) -> tuple[Person, ...]:
+        """The robot is where it is now, and people have walked on until then: everybody who is about."""
+        crowd, before = self._world.crowd, simulation.track
+        simulation.track = np.vstack([before, [now, *simulation.robot[:3]]])[-REMEMBERED:]
+        track = Track(simulation.track[:, 0], simulation.track[:, 1:])
+        if len(before):
+            simulation.crowd = crowd.went_on(simulation.crowd, float(before[-1, 0]), now, track)
+        else:
+            simulation.crowd = crowd.gathered(track)
+        return self._people(simulation)
+
     def _people(self, simulation: Simulation) -> tuple[Person, ...]:
         """Who is about at the last tick that was made."""
-        track = simulation.track
-        now = float(track[-1, 0]) if len(track) else 0.0
-        return self._world.people_at(now, Track(track[:, 0], track[:, 1:]))
+        return self._world.crowd.seen(simulation.crowd, float(simulation.track[-1, 0]))
 
     def _first_pose(self, world: World) -> F64:
         if self.start is not None:

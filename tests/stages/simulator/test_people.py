@@ -13,6 +13,7 @@ from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.people import PARTS, Person, Track, figures
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.world import World
+from omninav.stages.source.simulated import SimulatedRecording
 from omninav.stages.values.camera import Equirectangular
 
 BUSY = dataclasses.replace(DEMO, days=(Day(people=12),))
@@ -66,12 +67,35 @@ def test_some_keep_the_robot_company_and_nobody_is_run_over(busy: World, track: 
 
 
 def test_nobody_stands_on_the_feet_of_a_companion(busy: World, track: Track) -> None:
+    walkers = {person.height for person in busy.people_at(0.0)}
     for seconds in np.arange(10.0, 60.0, 0.5):
         people = busy.people_at(seconds, track)
-        beside = positions(people[len(busy.people_at(seconds)) :])
-        for number, place in enumerate(beside):
-            others = np.vstack([positions(people[: len(people) - len(beside)]), beside[:number]])
-            assert np.hypot(*(others - place).T).min() > 0.5
+        places = positions(people)
+        for number, person in enumerate(people):
+            if person.height not in walkers:
+                assert np.hypot(*(np.delete(places, number, axis=0) - places[number]).T).min() > 0.5
+
+
+@pytest.mark.parametrize("route", ["tour", "drive"])
+def test_over_a_drive_everybody_walks_and_nobody_jumps(route: str) -> None:
+    """A person is known by its height; who is gone is so for seconds, and neither goes nor comes near the robot."""
+    drive = SimulatedRecording(BUSY, route, 0)
+    seconds = np.arange(0.0, drive.true_times[-1] * 1e-9 - drive.true_times[0] * 1e-9, 0.05)
+    last: dict[float, tuple[float, tuple[float, float]]] = {}
+    fastest, gone, seen = 0.0, 0, 0
+    for now in seconds:
+        for person in drive._people(float(now)):
+            then, place = last.get(person.height, (now, person.position))
+            seen += 1
+            if now - then < 0.06:
+                fastest = max(fastest, math.dist(place, person.position) / 0.05)
+            else:
+                gone += 1
+                assert now - then >= 5.0 - 0.2
+            last[person.height] = (now, person.position)
+    assert 1.0 < fastest < 1.31
+    assert gone <= 4
+    assert seen > 0.85 * 12 * len(seconds)
 
 
 def test_nobody_knows_where_the_robot_will_go(busy: World, track: Track) -> None:
