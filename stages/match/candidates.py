@@ -2,11 +2,11 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
+import numba
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import KDTree
 
 from omninav.pipeline import Bounds, Context, Outputs
 from omninav.pipeline.problems import BadInput
@@ -21,6 +21,8 @@ Ints = npt.NDArray[np.int64]
 
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 """Multiples of it, less their whole part, fill an interval evenly from the first on."""
+
+CELLS_PER_RADIUS = 4
 
 
 class Candidates(NamedTuple):
@@ -62,25 +64,36 @@ def near_belief(
 
 
 def within(poses: Array, places: Array, radius: float) -> npt.NDArray[np.bool_]:
-    """Which poses (R, >= 2) lie within `radius` metres of any place (N, >= 2), and some a little farther: (R,).
-
-    Where the places are spread over more cells of half a radius than there are poses, all do.
-    """
+    """Which poses (R, >= 2) lie within `radius` metres of any place (N, >= 2), and some up to 1.36 as far: (R,)."""
     if radius <= 0.0 or not len(places):
         return np.zeros(len(poses), np.bool_)
-    cell = radius / 2
+    cell = radius / CELLS_PER_RADIUS
     cells = np.floor(places[:, :2] / cell).astype(np.int64)
     low = cells.min(axis=0)
     height = int(cells[:, 1].max() - low[1]) + 1
     numbers = np.unique((cells[:, 0] - low[0]) * height + cells[:, 1] - low[1])  # far faster than unique rows
-    if len(numbers) > len(poses):
-        return np.ones(len(poses), np.bool_)
     # A place lies within half a cell's diagonal of its cell's centre: the radius grows by that much.
-    tree: Any = KDTree((np.column_stack([numbers // height, numbers % height]) + low + 0.5) * cell)  # type: ignore[no-untyped-call]
-    found: npt.NDArray[np.bool_] = np.isfinite(
-        tree.query(poses[:, :2], distance_upper_bound=radius + cell * math.sqrt(0.5))[0]
+    found: npt.NDArray[np.bool_] = _near_cells(
+        poses[:, :2] / cell - low - 0.5, numbers, height, CELLS_PER_RADIUS + math.sqrt(0.5)
     )
     return found
+
+
+@numba.njit(cache=True, nogil=True)
+def _near_cells(points: Array, numbers: Ints, height: int, reach: float) -> npt.NDArray[np.bool_]:
+    # In units of cells; cell (i, j) has the number i * height + j, and `numbers` ascend.
+    out, columns = np.zeros(len(points), np.bool_), numbers[-1] // height + 1
+    for n in range(len(points)):
+        x, y = points[n, 0], points[n, 1]
+        for i in range(max(0, math.ceil(x - reach)), min(columns, math.floor(x + reach) + 1)):
+            half = math.sqrt(max(0.0, reach * reach - (x - i) * (x - i)))
+            first, last = max(0, math.ceil(y - half)), min(height - 1, math.floor(y + half))
+            if first <= last:
+                at = np.searchsorted(numbers, i * height + first)
+                if at < len(numbers) and numbers[at] <= i * height + last:
+                    out[n] = True
+                    break
+    return out
 
 
 @dataclass(kw_only=True, eq=False)

@@ -1,32 +1,14 @@
 """The map's views that look like the present one."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.problems import BadInput
+from omninav.stages.geometry.view_similarity import Shape, similarity
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Neighbours, ViewLimit, WholeView
-
-Array = npt.NDArray[np.float64]
-Shape = Literal["linear", "quadratic", "cosine", "step"]
-
-
-def similarity(distances: Array, limit: float, shape: Shape) -> Array:
-    """How alike views at these distances are: 1 at 0, falling to 0 at `limit` (`step`: 1 up to there)."""
-    share = np.clip(distances / limit, 0.0, 1.0) if limit > 0.0 else (distances > 0.0).astype(np.float64)
-    match shape:
-        case "linear":
-            alike: Array = 1.0 - share
-        case "quadratic":
-            alike = 1.0 - share**2
-        case "cosine":
-            alike = 0.5 + 0.5 * np.cos(np.pi * share)
-        case "step":
-            alike = (share < 1.0).astype(np.float64)
-    return alike
 
 
 class ViewNeighbours(Stage):

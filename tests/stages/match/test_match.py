@@ -68,7 +68,7 @@ def test_near_a_belief_every_reference_within_the_radius_is_compared_for_itself(
     near = np.flatnonzero(gap <= radius)
     assert set(near) <= set(chosen)
     assert (stands_for[np.isin(chosen, near)] == 1).all()
-    assert (gap[chosen] > 1.8 * radius).sum() <= 20
+    assert (gap[chosen] > 1.36 * radius).sum() <= 20
     assert (np.diff(chosen) > 0).all()
 
 
@@ -81,7 +81,7 @@ def test_around_particles_set_aside_only_the_next_references_are_compared() -> N
     assert stands_for is not None
     near = (gaps_to(map, tracked) <= 3.0) | (gaps_to(map, hypotheses) <= 0.5)
     assert set(np.flatnonzero(near)) <= set(chosen)
-    farther = (gaps_to(map, tracked) <= 1.8 * 3.0) | (gaps_to(map, hypotheses) <= 1.8 * 0.5)
+    farther = (gaps_to(map, tracked) <= 1.36 * 3.0) | (gaps_to(map, hypotheses) <= 1.36 * 0.5)
     assert set(chosen) <= set(np.flatnonzero(farther))
     assert (stands_for == 1).all()
     alone, _ = near_belief(map.poses, belief, 3.0, 0.0, 0, 0, 0)
