@@ -85,7 +85,7 @@ def _reconstructed(
         back, back_covariance = last.copy(), last_covariance.copy()
         if turn == 0:
             gap = _wrapped(back - ahead[number - 1])
-            missed = gap @ np.linalg.solve(ahead_covariance[number - 1] + back_covariance, gap)
+            missed = float(gap @ np.linalg.solve(ahead_covariance[number - 1] + back_covariance, gap))
         fresh = np.empty((number, 3))
         for k in range(number - 1, -1, -1):
             share = ahead_covariance[k] @ np.linalg.inv(ahead_covariance[k] + back_covariance)
