@@ -1,0 +1,1 @@
+"""Beliefs of one kind as beliefs of another."""
