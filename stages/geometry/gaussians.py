@@ -114,7 +114,9 @@ def drawn(means: Array, covariances: Array, weights: Array, number: int, rng: np
         raise ValueError("a mixture without weight has no poses to draw")
     chosen = np.searchsorted(upto, rng.random(number) * upto[-1], side="right")
     chosen = np.minimum(chosen, np.flatnonzero(weights > 0.0)[-1])  # rounding must not end on one without weight
-    poses = means[chosen] + np.einsum("nij,nj->ni", _triangular(covariances)[chosen], rng.standard_normal((number, 3)))
+    poses: Array = means[chosen] + np.einsum(
+        "nij,nj->ni", _triangular(covariances)[chosen], rng.standard_normal((number, 3))
+    )
     poses[:, 2] = wrap(poses[:, 2])
     return poses
 

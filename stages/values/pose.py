@@ -24,5 +24,15 @@ class Motion(Value):
     turn: float
 
 
+class UncertainMotion(Value):
+    """A motion as a turn (rad), a way (m, negative: backwards) and a turn (rad), and how uncertain each is.
+
+    `sigmas`: their standard deviations. `geometry/odometry_motion.py` moves poses and Gaussians by it.
+    """
+
+    way: tuple[float, float, float]
+    sigmas: tuple[float, float, float]
+
+
 PoseSource = Literal["truth", "odometry", "estimate"]
 """Where a stored pose comes from: the log's ground truth, its odometry, or the system's own estimate."""
