@@ -127,8 +127,8 @@ def _draw_belief(axes: "Axes", belief: Shown) -> None:
     if isinstance(belief, Particles):
         axes.scatter(x, y, s=5, color=PARTICLE, alpha=0.6, linewidths=0, zorder=3, label="particles")
     else:
-        draw_gaussians(axes, belief.means, belief.covariances, belief.weights, PARTICLE)
         colours = faded(PARTICLE, np.clip(belief.weights, 0.15, 1))
+        draw_gaussians(axes, belief.means, belief.covariances, colours)
         axes.scatter(x, y, s=6, c=colours, linewidths=0, zorder=3, label="Gaussians")
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.picture import Picture, picture
+from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.map_places import AnyMap
 from omninav.stages.values.view_mixtures import ViewMixtures
 
@@ -16,6 +17,7 @@ __all__ = [
     "Picture",
     "draw_gaussians",
     "draw_map",
+    "draw_plan",
     "draw_pose",
     "extent_of",
     "faded",
@@ -62,11 +64,11 @@ def draw_map(axes: "Axes", map: AnyMap | None, label: bool = True) -> None:
 
 
 def draw_gaussians(
-    axes: "Axes", means: Array, covariances: Array, weights: Array, colour: str, sigmas: float = 2.0, zorder: float = 3
+    axes: "Axes", means: Array, covariances: Array, colours: Array, sigmas: float = 2.0, zorder: float = 3
 ) -> None:
     """Gaussians over the pose, (K, 3) and (K, 3, 3), as ellipses of `sigmas` standard deviations in the plane.
 
-    An ellipse is as opaque as its weight (K,) in [0, 1] says, but never invisible.
+    `colours` (K, 4) are those of the lines; the inside is a third as opaque.
     """
     if not len(means):
         return
@@ -82,11 +84,23 @@ def draw_gaussians(
             units="xy",
             offsets=means[:, :2],
             offset_transform=axes.transData,
-            facecolors=faded(colour, np.clip(0.35 * weights, 0.04, 0.35)),
-            edgecolors=faded(colour, np.clip(weights, 0.12, 1.0)),
+            facecolors=colours * (1, 1, 1, 0.33),
+            edgecolors=colours,
             linewidths=0.7,
             zorder=zorder,
         )
+    )
+
+
+def draw_plan(axes: "Axes", plan: FloorPlan | None) -> None:
+    """What stands on the floor, in grey."""
+    if plan is None:
+        return
+    from matplotlib.collections import PolyCollection
+
+    # edges in the same grey, so that no seams show between the boxes of a grid
+    axes.add_collection(
+        PolyCollection(list(plan.outlines), facecolors=EDGE, edgecolors=EDGE, linewidths=0.6, zorder=0.5)
     )
 
 
