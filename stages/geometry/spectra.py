@@ -28,10 +28,20 @@ def spectral_distances(values: FloatArray, kept: FloatArray, channels: int, segm
     In the unit of the samples: the root of the summed squares over channels and segments of two signals that differ in
     these sizes (Parseval; each frequency but the lowest and the half of an even number of segments stands for two).
     """
-    here, there = np.abs(unpacked(values, channels)), np.abs(unpacked(kept, channels))
-    share = _share(here.shape[-1], segments)
-    distances: Array = np.sqrt((share * (there - here) ** 2).sum(axis=(-2, -1)))
+    half = values.shape[-1] // 2
+    share = np.sqrt(np.tile(_share(half // channels, segments), channels)).astype(np.float32)
+    gaps = _sizes(kept)
+    gaps -= _sizes(values)
+    gaps *= share
+    distances: Array = np.sqrt(np.einsum("rd,rd->r", gaps, gaps)).astype(np.float64)
     return distances
+
+
+def _sizes(vectors: FloatArray) -> FloatArray:
+    # In single precision and without complex numbers: four times as fast over a whole map.
+    half = vectors.shape[-1] // 2
+    sizes: FloatArray = np.sqrt(vectors[..., :half] ** 2 + vectors[..., half:] ** 2)
+    return sizes
 
 
 def best_turns(values: FloatArray, kept: FloatArray, channels: int, segments: int, steps: int = 360) -> Array:

@@ -18,9 +18,16 @@ def all_distances(turned: FloatArray, kept: FloatArray) -> Array:
 
 
 def turned_distances(turned: FloatArray, kept: FloatArray) -> Array:
-    """Distance to each kept vector (R, D) at the best heading: (R,)."""
-    nearest: Array = all_distances(turned, kept).min(axis=1)
-    return nearest
+    """Distance to each kept vector (R, D) at the best heading: (R,).
+
+    The best heading is found in single precision, which does for ordering; the distance at it is exact, 0 for equals.
+    """
+    squares = kept @ (-2.0 * turned.T)
+    squares += np.einsum("rd,rd->r", kept, kept)[:, None]
+    squares += np.einsum("hd,hd->h", turned, turned)
+    gaps = kept - turned[squares.argmin(axis=1)]
+    distances: Array = np.sqrt(np.einsum("rd,rd->r", gaps, gaps)).astype(np.float64)
+    return distances
 
 
 def turns_of_nearest(turned: FloatArray, kept: FloatArray) -> Array:
