@@ -448,7 +448,9 @@ def _check_experiment(run: "ExperimentRun") -> int:
     factors = ", ".join(f"{len(experiment.labels(factor))} {factor}" for factor in experiment.sweep)
     runs = sum(len(cell.seeds) for cell in run.all_cells)
     print(f"{experiment.name}, profile {run.profile}: nothing wrong with it")
-    print(f"{len(run.cells)} conditions ({factors}), each with {experiment.repetitions} repetitions")
+    over = f" over each of {len(experiment.drives)} drives" if experiment.drives else ""
+    conditions = len(experiment.conditions())
+    print(f"{conditions} conditions ({factors}), each with {experiment.repetitions} repetitions{over}")
     beside = len(run.all_cells) - len(run.cells)
     print(f"{runs} runs in all" + (f", {beside} of them beside the conditions" if beside else ""))
     print(f"claims to be judged: {len(experiment.claims)}")

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .experiment import Experiment, Labels, Measure, figure_of
+from .experiment import Condition, Curve, Experiment, Labels, Measure, figure_of, space_of
 from .files import write_whole
 from .picture import PALETTE, picture
 from .report import render
-from .verdicts import Case, Results, Verdict, judge, key_of, samples
+from .series import series_at
+from .verdicts import Array, Case, Results, Verdict, judge, key_of, pooled, samples
 
 if TYPE_CHECKING:
     from .experiment_run import ExperimentRun
@@ -25,20 +26,20 @@ MARKS = {"holds": "held", "does not hold": "broken", "undecided": "quiet"}
 
 
 def write_page(run: "ExperimentRun") -> Path:
-    """Write `<name>.md`, `<name>.html`, `<name>.png` and `verdicts.json` into the experiment's folder.
+    """Write `<name>.md`, `<name>.html`, its pictures and `verdicts.json` into the experiment's folder.
 
     All of it follows from the repetitions' results as they stand; conditions that failed or are still to run say so.
     """
     experiment, folder = run.experiment, run.folder
-    results: Results = {key_of(cell.condition.labels): cell.results for cell in run.cells}
+    results = run.results
     verdicts = judge(experiment, results)
     write_whole(
         folder / "verdicts.json",
         json.dumps([verdict.plain() for verdict in verdicts], indent=1, ensure_ascii=False) + "\n",
     )
-    drawing = draw(experiment, results)
-    if drawing:
-        write_whole(folder / f"{experiment.name}.png", drawing)
+    pictures = pictures_of(experiment, results)
+    for drawing in pictures:
+        write_whole(folder / drawing["file"], drawing.pop("content"))
     first = run.cells[0].words
     common = [word for word in first if all(word in cell.words for cell in run.cells)]
     said: dict[str, Any] = {
@@ -56,13 +57,16 @@ def write_page(run: "ExperimentRun") -> Path:
         "tiles": _tiles(run, verdicts),
         "failures": [(cell.name, cell.error) for cell in run.all_cells if cell.error],
         "missing": sum(len(cell.seeds) - len(cell.results) for cell in run.all_cells if not cell.error),
-        "repetitions": experiment.repetitions,
-        "picture": f"{experiment.name}.png" if drawing else "",
+        "repetitions": experiment.runs_of_a_condition,
+        "seeds": experiment.repetitions,
+        "pictures": pictures,
     }
     write_whole(folder / f"{experiment.name}.md", render("experiment.md", **said))
-    image = "data:image/png;base64," + base64.b64encode(drawing).decode() if drawing else ""
+    for drawing in pictures:
+        content = base64.b64encode((folder / drawing["file"]).read_bytes()).decode()
+        drawing["file"] = f"data:image/png;base64,{content}"
     path = folder / f"{experiment.name}.html"
-    write_whole(path, render("experiment.html", **(said | {"picture": image})))
+    write_whole(path, render("experiment.html", **said))
     return path
 
 
@@ -75,8 +79,16 @@ def number(value: float | None, digits: int) -> str:
 
 
 def mean_and_spread(values: Sequence[float], digits: int) -> str:
-    """Mean ± standard deviation; a dash where there is nothing."""
-    return f"{number(float(np.mean(values)), digits)} ± {number(float(np.std(values)), digits)}" if values else "–"
+    """Mean ± standard deviation; the one value where it is alone, a dash where there is nothing."""
+    if len(values) < 2:
+        return number(values[0], digits) if values else "–"
+    return f"{number(float(np.mean(values)), digits)} ± {number(float(np.std(values)), digits)}"
+
+
+def beside_the_mean(values: Sequence[float], ran: int, digits: int) -> list[str]:
+    """What a mean does not say: the median, and how many of those that have run have a figure at all."""
+    said = [f"median {number(float(np.median(values)), digits)}"] if len(values) > 1 else []
+    return [*said, f"{len(values)} of {ran}"] if len(values) < ran else said
 
 
 def _verdict(experiment: Experiment, verdict: Verdict) -> dict[str, Any]:
@@ -96,13 +108,14 @@ def _held(holds: bool | None) -> str:
 
 
 def _case(case: Case, measure: Measure) -> dict[str, str]:
-    digits = measure.digits
+    digits = max(2, measure.digits) if case.ratio else measure.digits
     difference = interval = ""
     if case.difference is not None and case.interval is not None:
         low, high = (f"{end:+.{digits}f}" for end in case.interval)
         difference, interval = f"{case.difference:+.{digits}f}", f"[{low}, {high}]"
     return {
         "where": case.where,
+        "survivors": f"{case.judged} of {case.repetitions}" if case.judged < case.repetitions else "",
         "ours": number(case.ours, digits),
         "other": number(case.other, digits),
         "against": case.against,
@@ -121,10 +134,16 @@ def _table(experiment: Experiment, results: Results, name: str) -> dict[str, Any
         cells = []
         for column in columns:
             here = labels | {page.columns: column}
+            ran = len(results.get(key_of(here), {}))
             found = list(samples(experiment, results, name, here).values())
+            beside = beside_the_mean(found, ran, measure.digits)
+            if measure.pooled:
+                whole = pooled(experiment, results, name, here)
+                found, beside = [] if whole is None else [whole], []
             cells.append(
                 {
                     "ours": mean_and_spread(found, measure.digits),
+                    "beside": ", ".join(beside),
                     "paper": number(experiment.published_figure(name, here), measure.digits),
                 }
             )
@@ -147,10 +166,11 @@ def _remark(run: "ExperimentRun", number_: int) -> str:
     remark = run.experiment.remarks[number_]
     measure = Measure("", (remark.measure,), remark.times)
     parts = []
-    for cell in run.beside[number_]:
-        found = [figure_of(measure, result) for result in cell.results.values()]
+    for label in run.experiment.labels(remark.over):
+        cells = [cell for cell in run.beside[number_] if cell.condition.labels[remark.over] == label]
+        found = [figure_of(measure, result) for cell in cells for result in cell.results.values()]
         known = [figure for figure in found if figure is not None]
-        parts.append(f"{cell.condition.labels[remark.over]} {number(float(np.mean(known)), 1) if known else 'not run'}")
+        parts.append(f"{label} {number(float(np.mean(known)), 1) if known else 'not run'}")
     return remark.says.replace("{}", "; ".join(parts))
 
 
@@ -210,21 +230,102 @@ def _condition(cell: Any, common: Sequence[str]) -> dict[str, Any]:
 # the picture
 
 
-def draw(experiment: Experiment, results: Results) -> bytes:
-    """The first measure of all conditions: lines along a numeric factor, or bars; error bars are the spread.
-
-    The paper's figures are hollow diamonds. Empty where nothing has run.
-    """
+def pictures_of(experiment: Experiment, results: Results) -> list[dict[str, Any]]:
+    """Pictures of measures and curves: `file`, `title`, `caption`, `content` (PNG). None where nothing has run."""
     if not any(results.values()):
-        return b""
-    page = experiment.page
-    if page.along:
-        return _lines(experiment, results, page.along, page.panels)
-    return _bars(experiment, results)
+        return []
+    page, found = experiment.page, []
+    for index, name in enumerate(page.drawn or list(experiment.measures)[:1]):
+        measure = experiment.measures[name]
+        content = (
+            _lines(experiment, results, name, page.along, page.panels)
+            if page.along
+            else _bars(experiment, results, name)
+        )
+        caption = f"{measure.title}: mean, and standard deviation over the repetitions"
+        if experiment.published.get(name) and not page.along:
+            caption += "; diamonds are the paper's figures"
+        file = experiment.name + (f"_{name}" if index else "")
+        found.append({"file": f"{file}.png", "title": measure.title, "caption": f"{caption}.", "content": content})
+    for index, curve in enumerate(experiment.curves):
+        content = _curve(experiment, results, curve)
+        caption = (
+            f"{curve.title} along {curve.along}: mean of the repetitions, and between which two a half of them lies"
+        )
+        file = f"{experiment.name}_curve_{index + 1}.png"
+        found.append({"file": file, "title": curve.title, "caption": f"{caption}.", "content": content})
+    return [drawing for drawing in found if drawing["content"]]
 
 
-def _lines(experiment: Experiment, results: Results, along: str, panels: str | None) -> bytes:
-    name, measure = next(iter(experiment.measures.items()))
+def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
+    """A line for each condition: the mean of the repetitions' series, in a band that holds the middle half of them."""
+    boxes = experiment.labels(curve.panels) if curve.panels else [""]
+    conditions = [condition for condition in experiment.conditions() if condition.fits(curve.only)]
+    shown = [f for f in experiment.sweep if f != curve.panels and f not in curve.only]
+    colours = {
+        name: PALETTE[n % len(PALETTE)] for n, name in enumerate(dict.fromkeys(_named(c, shown) for c in conditions))
+    }
+    heights: list[float] = []
+    with picture(4.6 * len(boxes) + 0.4, 3.8) as drawn:
+        grid = drawn.canvas.subplots(1, len(boxes), squeeze=False, sharey=True)[0]
+        for axes, box in zip(grid, boxes, strict=True):
+            here = [c for c in conditions if not curve.panels or c.labels[curve.panels] == box]
+            alike: dict[str, tuple[Array, Array]] = {}
+            for condition in here:
+                runs = list(results.get(key_of(condition.labels), {}).values())
+                for label, path in curve.beside.items():
+                    x, y = series_of(runs, path, curve.at)
+                    if len(x):
+                        alike.setdefault(label, (x, curve.times * np.nanmean(y, axis=0)))
+                x, y = series_of(runs, curve.of, curve.at)
+                if not len(x):
+                    continue
+                y = curve.times * y
+                name, middle = _named(condition, shown), np.nanmean(y, axis=0)
+                heights += [float(each) for each in middle]
+                marker = "o" if len(x) <= 30 else None
+                axes.plot(
+                    x, middle, color=colours[name], label=name or "ours", linewidth=1.5, marker=marker, markersize=3
+                )
+                if len(y) > 1:
+                    low, high = np.nanpercentile(y, [25, 75], axis=0)
+                    axes.fill_between(x, low, high, color=colours[name], alpha=0.18, linewidth=0)
+            for index, (label, (x, y)) in enumerate(alike.items()):
+                heights += [float(each) for each in y]
+                axes.plot(x, y, color="#555555", linestyle=("--", ":", "-.")[index % 3], linewidth=1.3, label=label)
+            axes.set_title(box)
+            axes.set_xlabel(curve.along)
+        if not heights:
+            return b""
+        _scale(grid[0], heights)
+        grid[0].set_ylabel(curve.title)
+        grid[0].legend()
+    return drawn.content
+
+
+def series_of(runs: Sequence[Mapping[str, Any]], path: str, at_path: str = "") -> tuple[Array, Array]:
+    """Where the entries of a series lie (N,), and the series of all runs that have it (runs, N); NaN where one ends.
+
+    Entries that no run has a figure for are left out.
+    """
+    found = [(series_at(space_of(run), path), series_at(space_of(run), at_path) if at_path else []) for run in runs]
+    found = [(y, x or [float(n + 1) for n in range(len(y))]) for y, x in found if y]
+    longest = max((len(y) for y, _ in found), default=0)
+    filled = np.full((2, len(found), longest), np.nan)
+    for row, (y, x) in enumerate(found):
+        filled[0, row, : len(x)] = [np.nan if each is None else each for each in x[:longest]]
+        filled[1, row, : len(y)] = [np.nan if each is None else each for each in y]
+    there = np.isfinite(filled).any(axis=1).all(axis=0)
+    return np.nanmean(filled[0][:, there], axis=0) if there.any() else np.empty(0), filled[1][:, there]
+
+
+def _named(condition: Condition, factors: Sequence[str]) -> str:
+    return ", ".join(condition.labels[factor] for factor in factors)
+
+
+def _lines(experiment: Experiment, results: Results, name: str, along: str, panels: str | None) -> bytes:
+    """Lines along a numeric factor; error bars are the spread."""
+    measure = experiment.measures[name]
     boxes = experiment.labels(panels) if panels else [""]
     series = [factor for factor in experiment.sweep if factor not in (along, panels)]
     combinations = list(itertools.product(*(experiment.labels(factor) for factor in series)))
@@ -260,8 +361,9 @@ def _lines(experiment: Experiment, results: Results, along: str, panels: str | N
     return drawn.content
 
 
-def _bars(experiment: Experiment, results: Results) -> bytes:
-    name, measure = next(iter(experiment.measures.items()))
+def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
+    """Bars; error bars are the spread, hollow diamonds the paper's figures."""
+    measure = experiment.measures[name]
     columns, rows = experiment.labels(experiment.page.columns), _row_labels(experiment)
     width = 0.8 / len(rows)
     all_heights: list[float] = []

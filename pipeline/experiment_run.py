@@ -17,10 +17,11 @@ from .crew import Job, work_through
 from .experiment import Condition, Experiment, read_experiment, words_of
 from .files import digest_text, write_whole
 from .graph import Graph
-from .problems import BadInput, Problem, ProblemsFound
+from .problems import BadInput, Problem, ProblemsFound, suggest
 from .progress import Progress
 from .repetitions import artifact_key, condition_key, finished, known_digests
 from .run import LIBRARIES, Plan, git_commit, plan, version
+from .verdicts import Results, key_of
 
 Compose = Callable[[Sequence[str]], dict[str, Any]]
 """Words of the command line -> the plain, complete configuration they describe."""
@@ -28,9 +29,10 @@ Compose = Callable[[Sequence[str]], dict[str, Any]]
 
 @dataclass
 class Cell:
-    """A condition of the experiment, or a run beside it, on its way: configuration, folder, results by seed, error."""
+    """A condition over one drive, or a run beside it, on its way: configuration, folder, results by seed, error."""
 
     condition: Condition
+    drive: str
     variant: str
     words: tuple[str, ...]
     folder: Path
@@ -44,8 +46,8 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """The condition's labels, and the variant where it stands beside the experiment."""
-        return self.condition.name
+        """The condition's labels, and the drive where there are several."""
+        return ", ".join(part for part in (self.condition.name, self.drive and f"drive {self.drive}") if part)
 
 
 @dataclass
@@ -129,33 +131,61 @@ class ExperimentRun:
         self.cores = experiment.cores or len(os.sched_getaffinity(0))
         self.started = datetime.now()
         self.logs: dict[str, Log] = {}
+        drives = experiment.drives or {"": ""}
         self.cells = [
-            self._cell(condition, experiment.variant, (experiment.set, condition.words), words)
+            self._cell(condition, drive, experiment.variant, (experiment.set, condition.words, driven), words)
             for condition in experiment.conditions()
+            for drive, driven in drives.items()
         ]
         self.beside: list[list[Cell]] = []
         for remark in experiment.remarks:
             row = []
             for label, own in experiment.sweep[remark.over].items():
                 condition = Condition({remark.over: str(label)}, str(own or ""))
-                row.append(self._cell(condition, remark.variant, (remark.set, condition.words), words, beside=True))
+                for drive, driven in drives.items():
+                    parts = (remark.set, condition.words, driven)
+                    row.append(self._cell(condition, drive, remark.variant, parts, words, beside=True))
             self.beside.append(row)
+
+    @property
+    def groups(self) -> list[tuple[str, ...]]:
+        """Stages whose time is measured together."""
+        return sorted({measure.stages for measure in self.experiment.measures.values() if measure.stages})
 
     @property
     def all_cells(self) -> list[Cell]:
         """Conditions and the runs beside them."""
         return [*self.cells, *(cell for row in self.beside for cell in row)]
 
+    @property
+    def results(self) -> Results:
+        """What has run, by condition and repetition: a number for each seed over each drive."""
+        found: dict[tuple[tuple[str, str], ...], dict[int, dict[str, Any]]] = {}
+        drives = list(self.experiment.drives) or [""]
+        for cell in self.cells:
+            first = drives.index(cell.drive) * self.experiment.repetitions
+            of_condition = found.setdefault(key_of(cell.condition.labels), {})
+            of_condition |= {first + seed: result for seed, result in cell.results.items()}
+        return found
+
     def _cell(
-        self, condition: Condition, variant: str, parts: Sequence[str], words: Sequence[str], beside: bool = False
+        self,
+        condition: Condition,
+        drive: str,
+        variant: str,
+        parts: Sequence[str],
+        words: Sequence[str],
+        beside: bool = False,
     ) -> Cell:
         own = [word for part in (self.experiment.common, *parts) for word in words_of(part)]
         named = any(word.startswith("variant=") for word in own)  # a condition may be of another variant
         typed = (*([] if named else [f"variant={variant}"]), *own, *words)
-        name = re.sub(r"[^A-Za-z0-9.]+", "_", condition.name + (f" {variant}" if beside else "")).strip("_")
+        said = " ".join(part for part in (condition.name, drive, variant if beside else "") if part)
+        name = re.sub(r"[^A-Za-z0-9.]+", "_", said).strip("_")
         seeds = (0,) if beside else tuple(range(self.experiment.repetitions))
         cell = Cell(
             condition,
+            drive,
             variant,
             typed,
             self.folder / "conditions" / name,
@@ -176,8 +206,22 @@ class ExperimentRun:
                 cell.planned = plan(cell.config)
             except ProblemsFound as found:
                 problems += [Problem(f"{cell.name}: {p.where}", p.what, p.hint) for p in found.problems]
+        problems += self._unknown_stages()
         if problems:
             raise ProblemsFound(dict.fromkeys(problems))
+
+    def _unknown_stages(self) -> list[Problem]:
+        """Stages whose time is asked for and that no condition has."""
+        graphs = [cell.planned.graph for cell in self.all_cells if cell.planned is not None]
+        there = sorted({name for graph in graphs for name in graph.nodes})
+        return [
+            Problem(
+                f"experiment.measures.{measure}", f"no condition has a stage '{stage}'", suggest(stage, there, "stages")
+            )
+            for measure, asked in self.experiment.measures.items()
+            for stage in asked.stages
+            if graphs and stage not in there
+        ]
 
     def open_inputs(self) -> None:
         """Open every log and map that the conditions name. Raises `BadInput` where one cannot be read."""
@@ -241,16 +285,18 @@ class ExperimentRun:
         if source is None or "world" not in source.parameters or source.parameters.get("log") is not None:
             return
         world = cell.config["world"]
-        identity = json.dumps([world, route, day], sort_keys=True)
+        events = config["nodes"][source.name].get("events") or []
+        identity = json.dumps([world, route, day, events], sort_keys=True)
         if identity not in self.logs:
             digest = source.stage.inputs_digest() or digest_text(identity)
-            name = f"{world.get('name', 'world')} {route} day {day}"
+            name = f"{world.get('name', 'world')} {route} day {day}{' with events' if events else ''}"
             made = self.compose(["variant=simulate"])
             place = Path(str(cell.config.get("cache") or self.folder)).resolve() / "logs"
             folder = place / f"{re.sub('[^A-Za-z0-9]+', '_', name)}_{digest[:12]}"
             for node in made["nodes"].values():
                 if isinstance(node, dict) and "world" in node:
-                    node |= {"world": world, "route": route, "day": day, "log": f"{folder}.part/drive.mcap"}
+                    node |= {"world": world, "route": route, "day": day, "events": events}
+                    node["log"] = f"{folder}.part/drive.mcap"
             self.logs[identity] = Log(name, made, folder)
         config["nodes"][source.name]["log"] = str(self.logs[identity].file)
 
@@ -263,7 +309,7 @@ class ExperimentRun:
                 continue
             try:
                 cell.planned = plan(cell.config)
-                cell.key = condition_key(cell.planned)
+                cell.key = condition_key(cell.planned, self.groups)
                 place = cell.config.get("cache") if cell.shared else None  # what is timed is timed anew
                 cell.results = finished(cell.folder, cell.key, cell.seeds, Cache(Path(place)) if place else None)
             except (ProblemsFound, BadInput) as wrong:
@@ -314,6 +360,7 @@ class ExperimentRun:
                     "code": cell.planned.graph.digest() if cell.planned is not None else "",
                     "seeds": [seed for seed in cell.seeds if seed not in cell.results],
                     "shared": cell.shared,
+                    "groups": self.groups,
                 },
                 cell.folder / "run.log",
             )

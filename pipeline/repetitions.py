@@ -39,10 +39,13 @@ def measured(graph: Graph) -> Graph:
     return graph.leading_to(origins)
 
 
-def condition_key(planned: Plan) -> str:
-    """The hash of everything but the seed that decides a condition's results. Its logs must be there."""
+def condition_key(planned: Plan, groups: Sequence[Sequence[str]] = ()) -> str:
+    """The hash of everything but the seed that decides a condition's results. Its logs must be there.
+
+    `groups`: stages whose time together is among them.
+    """
     graph = measured(planned.graph)
-    parts = [graph.digest(), *known_digests(graph)]
+    parts = [graph.digest(), *known_digests(graph), *("+".join(group) for group in groups)]
     for artifact in planned.artifacts:
         parts += [artifact.name, artifact_key(artifact)]
     return digest_text("condition", *parts)
@@ -96,8 +99,9 @@ def repeat(given: Mapping[str, Any], tell: Tell) -> None:
 
     Without `shared` nothing but the map comes from the cache or from the repetition before: all is timed as on a robot.
 
-    `given`: `config` (plain; its artifacts are files by now), `folder`, `key`, `code`, `seeds`, `shared`. Raises
-    `BadInput` where the code has changed since the experiment was started.
+    `given`: `config` (plain; its artifacts are files by now), `folder`, `key`, `code`, `seeds`, `shared`, `groups` (of
+    stages whose time together is measured). Raises `BadInput` where the code has changed since the experiment was
+    started.
     """
     folder, seeds = Path(given["folder"]), list(given["seeds"])
     planned = plan(given["config"])
@@ -121,7 +125,8 @@ def repeat(given: Mapping[str, Any], tell: Tell) -> None:
             graph, artifacts, seed, place, cache if given["shared"] else None, shared, record, tell
         )
         shared = recorded or shared
-        result = {"key": given["key"], "seed": seed, "metrics": results_of(engine)[0], "timing": stage_times(engine)}
+        result = {"key": given["key"], "seed": seed, "metrics": results_of(engine)[0]}
+        result["timing"] = stage_times(engine, given.get("groups") or ())
         result |= notes_of(engine)
         result["artifacts"] = facts
         for spool in engine.spools.values():

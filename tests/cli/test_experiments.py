@@ -83,7 +83,14 @@ class Score(Stage):
         metrics: Metrics
 
     def step(self, ctx: Context, errors: Sequence[Number]) -> Out:
-        return self.Out(metrics=Metrics({"error_m": sum(e.value for e in errors) / len(errors), "frames": len(errors)}))
+        found = [e.value for e in errors]
+        laps = [{"error_m": sum(found[n : n + 5]) / 5 / (1 + n)} for n in range(0, len(found), 5)]
+        steps = {"step": list(range(len(found))), "error_m": found, "odometry_m": [0.1 * n for n in range(len(found))]}
+        error = sum(found) / len(found)
+        lucky = error if ctx.rng.random() < 0.5 else None
+        return self.Out(
+            metrics=Metrics({"error_m": error, "lucky_m": lucky, "frames": len(found), "laps": laps, "steps": steps})
+        )
 '''
 VARIANT = """\
 # @package _global_
@@ -121,6 +128,40 @@ claims:
 profiles:
   quick: {repetitions: 2}
 """
+LAPS = """\
+# @package experiment
+name: laps
+title: Laps of dice
+about: Whether errors fall from lap to lap.
+variant: dice
+set: nodes.noisy.wait_s=0.001
+sweep:
+  method: {fair: nodes.table.bias=1.0, loaded: nodes.table.bias=2.0}
+  noise: {low: nodes.noisy.sigma=0.1, high: nodes.noisy.sigma=0.3}
+without: [{method: fair, noise: high}]
+drives: {short: nodes.counter.frames=20, long: nodes.counter.frames=30}
+repetitions: 3
+measures:
+  error: {title: Error (m), of: [error_m], digits: 2}
+  last: {title: Last lap (m), of: [laps.*.error_m], take: last, digits: 2}
+  rise: {title: Largest rise (m), of: [laps.*.error_m], take: largest_rise, digits: 2}
+  lucky: {title: Error of the lucky (m), of: [lucky_m], digits: 2}
+  time: {title: Time (ms), of: [p95_ms], stages: [noisy], digits: 2}
+page: {rows: [method], columns: noise, drawn: [error, last]}
+curves:
+  - {title: Error (m), along: lap, of: laps.*.error_m}
+  - title: Error along the way (m)
+    along: step
+    of: steps.error_m
+    at: steps.step
+    panels: noise
+    only: {method: loaded}
+    beside: {odometry alone: steps.odometry_m}
+claims:
+  - {says: errors fall, measure: rise, below: 0.0}
+  - {says: half of the loaded one's, measure: error, of: {method: fair}, ratio_to: {method: loaded}, at_most: 0.6}
+  - {says: the lucky are better, measure: lucky, of: {method: fair}, at_most: 2.0}
+"""
 ONCE = 2 * (20 + 30)
 """Lines in `computed`: in two conditions, each frame once."""
 
@@ -131,6 +172,7 @@ def with_files(place: Path) -> Path:
     (place / "mine/experiment").mkdir()
     (place / "mine/variant/dice.yaml").write_text(VARIANT)
     (place / "mine/experiment/dice.yaml").write_text(EXPERIMENT)
+    (place / "mine/experiment/laps.yaml").write_text(LAPS)
     return place
 
 
@@ -213,6 +255,32 @@ def test_repetitions_that_share_nothing_give_the_same(dice: Finished):
     assert dice.computed() - before == 2 * 6 * 20
 
 
+def test_series_within_runs_drives_as_repetitions_and_times_of_stages(omninav, place: Path):
+    said = omninav("check", "--config-dir", "mine", "+experiment=laps", check=True).stdout
+    assert "3 conditions (2 method, 2 noise), each with 3 repetitions over each of 2 drives" in said
+    omninav("--config-dir", "mine", "+experiment=laps", check=True)
+    folder = place / "runs/laps_paper"
+    fall, half, lucky = json.loads((folder / "verdicts.json").read_text())
+    assert fall["holds"] is True
+    assert [case["repetitions"] for case in fall["cases"]] == [6, 6, 6]
+    assert half["cases"][0]["ratio"] is True
+    assert half["ours"] == pytest.approx(0.5, abs=0.05)
+    assert half["holds"] is True
+    assert lucky["holds"] is None
+    judged = lucky["cases"][0]["judged"]
+    assert 0 < judged < 6
+    page = (folder / "laps.md").read_text()
+    assert f", {judged} of 6" in page
+    assert f"({judged} of 6)" in page
+    assert "seeds 0 to 2 over 2 drives (short, long)" in page
+    assert re.search(r"\*\*Time \(ms\)\*\*\n(.*\n){3}\| fair \| [1-9]", page)
+    pictures = ["laps.png", "laps_curve_1.png", "laps_curve_2.png", "laps_last.png"]
+    assert sorted(path.name for path in folder.glob("*.png")) == pictures
+    assert all(f"({name})" in page for name in pictures)
+    assert (folder / "laps.html").read_text().count("data:image/png") == 4
+    assert len(results(folder)) == 3 * 2 * 3
+
+
 def test_a_killed_experiment_goes_on_where_it_was(dice: Finished):
     command = [sys.executable, "-m", "omninav.pipeline", *MINE, TT1, "nodes.noisy.wait_s=0.02", "runs=killed"]
     process = subprocess.Popen(
@@ -263,6 +331,11 @@ def test_what_is_wrong_with_a_file_is_said_before_anything_runs(omninav, place: 
     ended = omninav(*MINE)
     assert ended.returncode == 2
     assert "biass" in ended.stderr
+    (place / "mine/experiment/dice.yaml").write_text(EXPERIMENT.replace("times: 100.0", "stages: [nosy]"))
+    ended = omninav(*MINE)
+    assert ended.returncode == 2
+    assert "no condition has a stage 'nosy'" in ended.stderr
+    assert "did you mean 'noisy'?" in ended.stderr
     (place / "mine/experiment/dice.yaml").write_text(EXPERIMENT + "  slow: [1\n")
     ended = omninav(*MINE)
     assert ended.returncode == 2

@@ -4,11 +4,17 @@ import numpy as np
 import pytest
 
 from omninav.pipeline.experiment import read_experiment
-from omninav.pipeline.verdicts import bootstrap_interval, judge, key_of
+from omninav.pipeline.problems import ProblemsFound
+from omninav.pipeline.verdicts import Verdict, bootstrap_interval, judge, key_of, pooled
 
 
 def held(claim: dict[str, object], **errors: list[float]) -> bool | None:
     """Whether a claim about the method `a` holds, with these errors of the methods by seed."""
+    return judged(claim, **errors).holds
+
+
+def judged(claim: dict[str, object], **errors: list[float]) -> Verdict:
+    """The verdict on it. An error of NaN is one that a repetition does not have."""
     file = {
         "name": "test",
         "title": "A test",
@@ -22,12 +28,13 @@ def held(claim: dict[str, object], **errors: list[float]) -> bool | None:
     }
     results = {
         key_of({"method": name}): {
-            seed: {"metrics": {"error": value}, "timing": {}, "facts": {}} for seed, value in enumerate(values)
+            seed: {"metrics": {"error": None if np.isnan(value) else value}, "timing": {}, "facts": {}}
+            for seed, value in enumerate(values)
         }
         for name, values in errors.items()
     }
     (verdict,) = judge(read_experiment(file, "paper"), results)
-    return verdict.holds
+    return verdict
 
 
 CLEAR, ALIKE = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [2.0, 1.0, 4.0, 3.0, 6.0, 5.0]
@@ -63,6 +70,22 @@ def test_the_interval_of_a_mean_is_the_normal_one_for_many_values():
         ({"not_above": {"method": "b"}}, NEAR, CLEAR, True),
         ({"not_above": {"method": "b"}}, CLEAR, ALIKE, None),
         ({"not_above": {"method": "b"}}, FAR, CLEAR, False),
+        ({"at_least": 3.5}, CLEAR, FAR, True),
+        ({"at_least": 3.6}, CLEAR, FAR, False),
+        ({"at_least": {"method": "b"}}, CLEAR, FAR, False),
+        ({"below": 7.0}, CLEAR, FAR, True),
+        ({"below": 3.6}, CLEAR, FAR, False),
+        ({"above": 0.5}, CLEAR, FAR, True),
+        ({"below": "published"}, CLEAR, FAR, True),
+        ({"not_above": 3.5}, [3.5, 3.4, 3.6, 3.5, 3.4, 3.6], FAR, True),
+        ({"no_worse": {"method": "b"}}, CLEAR, ALIKE, True),
+        ({"no_worse": {"method": "b"}}, CLEAR, FAR, True),
+        ({"no_worse": {"method": "b"}}, NEAR, CLEAR, False),
+        ({"no_worse": {"method": "b"}}, FAR, CLEAR, False),
+        ({"ratio_to": {"method": "b"}, "at_most": 0.26}, CLEAR, FAR, True),
+        ({"ratio_to": {"method": "b"}, "at_most": 0.25}, CLEAR, FAR, False),
+        ({"ratio_to": {"method": "b"}, "below": 0.5}, CLEAR, FAR, True),
+        ({"ratio_to": {"method": "b"}, "below": 1.0}, CLEAR, ALIKE, False),
         ({"lowest": True}, CLEAR, FAR, True),
         ({"lowest": True}, NEAR, CLEAR, True),
         ({"lowest": True}, CLEAR, ALIKE, None),
@@ -88,3 +111,74 @@ def test_the_best_must_stand_against_every_other():
     wide = [-50.0, 70.0, -40.0, 60.0, -30.0, 44.0]
     assert np.mean(wide) < 9.5
     assert held({"lowest": True}, a=[10.0] * 6, b=wide, c=[9.0] * 6) is False
+
+
+def test_a_ratio_is_that_of_the_means_and_its_interval_holds_it():
+    (case,) = judged({"ratio_to": {"method": "b"}, "at_most": 0.5}, a=CLEAR, b=FAR).cases
+    assert case.ours == pytest.approx(3.5 / 13.5)
+    assert case.difference == pytest.approx(3.5 / 13.5 - 0.5)
+    low, high = (end + 0.5 for end in case.interval)
+    assert low < 3.5 / 13.5 < high
+    assert bootstrap_interval(np.full(4, 2.0), np.full(4, 8.0)) == (0.25, 0.25)
+
+
+def test_a_ratio_s_interval_is_paired():
+    """Errors that are always half of the other method's, however much they vary from seed to seed."""
+    theirs = np.array([1.0, 20.0, 3.0, 40.0, 5.0, 60.0])
+    assert bootstrap_interval(theirs / 2, theirs) == pytest.approx((0.5, 0.5))
+
+
+def test_a_claim_about_survivors_does_not_hold_but_it_may_fail():
+    survivors = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, np.nan]
+    verdict = judged({"at_most": 4.0}, a=survivors)
+    assert verdict.holds is None
+    assert (verdict.cases[0].judged, verdict.cases[0].repetitions) == (6, 7)
+    assert held({"at_most": 3.0}, a=survivors) is False
+    assert held({"below": {"method": "b"}}, a=survivors, b=[*FAR, 17.0]) is None
+    assert held({"below": {"method": "b"}}, a=survivors[:6], b=[*FAR, 17.0]) is True  # the seventh has not run yet
+
+
+def test_a_condition_is_not_compared_with_itself():
+    verdict = judged({"of": {}, "at_most": {"method": "b"}}, a=CLEAR, b=FAR)
+    assert [case.where for case in verdict.cases] == ["a"]
+
+
+@pytest.mark.parametrize(
+    ("claim", "said"),
+    [
+        ({"below": "publisht"}, "expected a number"),
+        ({"below": 1.0, "above": 2.0}, "makes one comparison"),
+        ({"ratio_to": {"method": "b"}, "below": {"method": "b"}}, "a ratio is compared with a number"),
+        ({"ratio_to": {"method": "c"}, "below": 1.0}, "there is no 'c'"),
+    ],
+)
+def test_a_claim_that_says_nothing_clear_is_refused(claim: dict[str, object], said: str):
+    with pytest.raises(ProblemsFound, match=said):
+        held(claim, a=CLEAR, b=FAR)
+
+
+def test_a_pooled_deviation_is_over_all_frames_of_all_repetitions_and_nothing_is_judged_by_it():
+    runs = [np.array([1.0, 2.0, 3.0]), np.array([7.0, 9.0])]
+    file = {
+        "name": "test",
+        "title": "A test",
+        "about": "",
+        "variant": "none",
+        "sweep": {"method": {"a": ""}},
+        "measures": {"sigma": {"title": "Sigma", "of": ["late.error"], "pooled": True, "times": 100.0}},
+        "page": {"rows": [], "columns": "method"},
+    }
+    results = {
+        key_of({"method": "a"}): {
+            seed: {
+                "metrics": {"late": {"error": {"mean": run.mean(), "std": run.std()}, "frames": len(run)}},
+                "timing": {},
+                "facts": {},
+            }
+            for seed, run in enumerate(runs)
+        }
+    }
+    found = pooled(read_experiment(file, "paper"), results, "sigma", {"method": "a"})
+    assert found == pytest.approx(100 * np.concatenate(runs).std())
+    with pytest.raises(ProblemsFound, match="pooled"):
+        read_experiment(file | {"claims": [{"says": "small", "measure": "sigma", "at_most": 1.0}]}, "paper")

@@ -1,0 +1,92 @@
+"""Figures out of nested results: a path leads to a number or to a series of them, of which one figure is taken."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+
+Take = Literal["mean", "median", "min", "max", "first", "last", "change", "ratio", "slope", "largest_rise"]
+"""What is taken of a series: `change` is the last less the first, `ratio` the last over the first, `slope` that of the
+line that fits best (per entry), `largest_rise` the largest step upwards from one entry to the next."""
+
+
+def at(result: Any, path: str) -> Any:
+    """What lies at a path of names joined by points, None where there is nothing.
+
+    In a list a number counts its entries (`logs.0`, `laps.-1`), and `*` stands for each of them
+    (`laps.*.position_error_m.mean`): the result is a list then, with None where an entry has nothing there.
+    """
+    head, _, rest = path.partition(".")
+    if isinstance(result, Mapping):
+        found = result.get(head)
+    elif not isinstance(result, list | tuple):
+        return None
+    elif head == "*":
+        return [at(entry, rest) if rest else entry for entry in result]
+    else:
+        place = int(head) if head.lstrip("-").isdigit() else len(result)
+        found = result[place] if -len(result) <= place < len(result) else None
+    return at(found, rest) if rest else found
+
+
+def series_at(result: Any, path: str) -> list[float | None]:
+    """The series at a path; empty where there is none. What is no number is None."""
+    found = at(result, path)
+    return [float(each) if _is_number(each) else None for each in found] if isinstance(found, list | tuple) else []
+
+
+def figure_at(result: Any, path: str, take: Take = "mean", part: tuple[float, float] = (0.0, 1.0)) -> float | None:
+    """The number at a path, or what is taken of the series there; several paths joined by + are added.
+
+    `part` is the share of a series that counts, from its start: (0.75, 1) is its last quarter. None where there is
+    nothing.
+    """
+    figures = []
+    for each in path.split("+"):
+        found = at(result, each.strip())
+        if isinstance(found, list | tuple):
+            found = taken([float(value) if _is_number(value) else None for value in found], take, part)
+        if not _is_number(found):
+            return None
+        figures.append(float(found))
+    return sum(figures)
+
+
+def taken(series: Sequence[float | None], take: Take, part: tuple[float, float] = (0.0, 1.0)) -> float | None:
+    """One figure of a series. Entries that are None are left out; None where too few are there."""
+    first, last = int(np.floor(part[0] * len(series))), int(np.ceil(part[1] * len(series)))
+    places = [place for place in range(first, last) if series[place] is not None]
+    values = np.array([series[place] for place in places], dtype=np.float64)
+    needed = 2 if take in ("change", "ratio", "slope", "largest_rise") else 1
+    if len(values) < needed or (take == "ratio" and values[0] == 0.0):
+        return None
+    match take:
+        case "first":
+            return float(values[0])
+        case "last":
+            return float(values[-1])
+        case "change":
+            return float(values[-1] - values[0])
+        case "ratio":
+            return float(values[-1] / values[0])
+        case "slope":
+            return float(np.polyfit(places, values, 1)[0])
+        case "largest_rise":
+            return float(np.diff(values).max())
+        case _:
+            return float(getattr(np, take)(values))
+
+
+def pooled_deviation(means: Sequence[float], deviations: Sequence[float], counts: Sequence[float]) -> float:
+    """Standard deviation of all entries of several groups, from each group's mean, standard deviation and size.
+
+    The law of total variance: the mean of the groups' variances and the variance of their means, both weighted.
+    """
+    weights = np.asarray(counts, dtype=np.float64) / np.sum(counts)
+    centre = float(np.sum(weights * np.asarray(means)))
+    within = float(np.sum(weights * np.asarray(deviations) ** 2))
+    return float(np.sqrt(within + np.sum(weights * (np.asarray(means) - centre) ** 2)))
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))

@@ -1,0 +1,66 @@
+"""Figures out of nested results, worked by hand."""
+
+import numpy as np
+import pytest
+
+from omninav.pipeline.series import at, figure_at, pooled_deviation, series_at, taken
+
+RESULT = {
+    "error_m": {"mean": 2.0},
+    "logs": [{"error_m": {"mean": 3.0}}, {"error_m": {"mean": 1.0}}],
+    "laps": [{"error_m": {"mean": 0.4}}, {"frames": 3}, {"error_m": {"mean": 0.1}}],
+    "growth": {"references": [10, 20, 30, 31]},
+}
+
+
+def test_a_path_leads_through_names_numbers_and_stars():
+    assert at(RESULT, "error_m.mean") == 2.0
+    assert at(RESULT, "logs.-1.error_m.mean") == 1.0
+    assert at(RESULT, "logs.2.error_m.mean") is None
+    assert at(RESULT, "logs.first") is None
+    assert series_at(RESULT, "laps.*.error_m.mean") == [0.4, None, 0.1]
+    assert series_at(RESULT, "growth.references") == [10.0, 20.0, 30.0, 31.0]
+    assert series_at(RESULT, "error_m") == series_at(RESULT, "nothing.*.there") == []
+
+
+@pytest.mark.parametrize(
+    ("take", "figure"),
+    [
+        ("mean", 22.75),
+        ("median", 25.0),
+        ("min", 10.0),
+        ("max", 31.0),
+        ("first", 10.0),
+        ("last", 31.0),
+        ("change", 21.0),
+        ("ratio", 3.1),
+        ("slope", 7.3),  # entries -1.5, -0.5, 0.5, 1.5 off their middle: (-15 - 10 + 15 + 46.5) / 5
+        ("largest_rise", 10.0),
+    ],
+)
+def test_what_is_taken_of_a_series(take, figure):
+    assert figure_at(RESULT, "growth.references", take) == pytest.approx(figure)
+
+
+def test_a_part_of_a_series_counts_from_its_start():
+    assert figure_at(RESULT, "growth.references", "change", (0.5, 1.0)) == 1.0
+    assert figure_at(RESULT, "growth.references", "mean", (0.0, 0.5)) == 15.0
+
+
+def test_entries_that_are_not_there_are_left_out_and_too_few_give_nothing():
+    assert figure_at(RESULT, "laps.*.error_m.mean", "slope") == pytest.approx(-0.15)
+    assert taken([None, 1.0], "change") is None
+    assert taken([None], "mean") is None
+    assert taken([0.0, 1.0], "ratio") is None
+
+
+def test_paths_joined_by_plus_are_added_and_one_that_is_missing_leaves_none():
+    assert figure_at(RESULT, "error_m.mean + logs.0.error_m.mean") == 5.0
+    assert figure_at(RESULT, "error_m.mean + logs.5.error_m.mean") is None
+
+
+def test_the_pooled_deviation_is_that_of_all_entries_together():
+    rng = np.random.default_rng(4)
+    groups = [rng.normal(centre, spread, size) for centre, spread, size in ((0, 1, 30), (5, 2, 80), (-3, 0.1, 7))]
+    found = pooled_deviation(*zip(*((g.mean(), g.std(), len(g)) for g in groups), strict=True))
+    assert found == pytest.approx(np.concatenate(groups).std())
