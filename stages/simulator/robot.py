@@ -173,6 +173,15 @@ def drive(
     return Drive(np.arange(done) / rate, poses, before, int(state[COLLISIONS]), tuple(happened))
 
 
+def around(state: F64, seconds: npt.ArrayLike) -> F64:
+    """Poses (N, 3) of a robot some moments before and after now, with the motion that its `state` (8,) has."""
+    offset = np.asarray(seconds, dtype=np.float64)
+    middle = state[HEADING] + 0.5 * state[TURNING] * offset
+    way = state[SPEED] * offset
+    x, y = state[X] + way * np.cos(middle), state[Y] + way * np.sin(middle)
+    return np.stack([x, y, state[HEADING] + state[TURNING] * offset], axis=-1)
+
+
 def put_down(state: F64, event: Event) -> None:
     """Somebody lifts a robot and puts it down: its `state` (8,) is at rest then, and nothing is counted as driven."""
     state[:3] = compose(state[:3] if event.to is None else event.to, (0.0, 0.0, event.turn))

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
 from omninav.stages.geometry.se2 import between, compose
 from omninav.stages.simulator import tours
-from omninav.stages.simulator.cameras import camera_of, camera_rays
+from omninav.stages.simulator.cameras import camera_of, camera_rays, shutter_times
 from omninav.stages.simulator.config import Event, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.obstacles import gather
@@ -17,7 +17,7 @@ from omninav.stages.simulator.odometry import draw_bias, measured
 from omninav.stages.simulator.people import Person, Track
 from omninav.stages.simulator.ranges import measure, round_bodies
 from omninav.stages.simulator.renderer import render
-from omninav.stages.simulator.robot import COLLISIONS, WAY, at_rest, limits, put_down, reach, steer
+from omninav.stages.simulator.robot import COLLISIONS, WAY, around, at_rest, limits, put_down, reach, steer
 from omninav.stages.simulator.streams import stream
 from omninav.stages.simulator.world import World
 from omninav.stages.values.camera import Camera
@@ -61,7 +61,8 @@ class ClosedLoop(Source):
     It starts at rest where the world's `route` starts, or at `start` (x, y in metres, heading in radians), and goes on
     for `seconds`, `rate` ticks each. The command of the tick before holds until this tick. `motion` is what its wheels
     say, absent at the first tick. Noise is drawn from the run's seed, goods and textures from the world's. Without a
-    command it brakes. A picture that is lost or late on its way (`world.delivery`) is absent, and counted.
+    command it brakes. Pictures are blurred as in a log (`world.sensor.shutter`), by the motion at their tick: nobody
+    knows the next command. A picture that is lost or late on its way (`world.delivery`) is absent, and counted.
     """
 
     world: WorldConfig = DEMO
@@ -138,7 +139,7 @@ class ClosedLoop(Source):
         stamp = EPOCH + self.day * 86400 * 10**9 + 8 * 3600 * 10**9 + round(now * 1e9)
         return self.Out(
             tick=Tick(index=simulation.ticks, stamp=stamp, frame=simulation.ticks, first_of_log=simulation.ticks == 0),
-            image=self._look(ctx, pose, now, people),
+            image=self._look(ctx, simulation.robot, now, people),
             camera=self._camera,
             odometry=_pose(simulation.odometry),
             motion=motion,
@@ -147,7 +148,7 @@ class ClosedLoop(Source):
             tally=DriveTally(int(simulation.robot[COLLISIONS]), float(simulation.robot[WAY])),
         )
 
-    def _look(self, ctx: Context, pose: F64, now: float, people: tuple[Person, ...]) -> Image | None:
+    def _look(self, ctx: Context, robot: F64, now: float, people: tuple[Person, ...]) -> Image | None:
         sensor, delivery = self.world.sensor, self.world.delivery
         fate, key = ctx.rng.uniform(size=2), int(ctx.rng.integers(2**62))
         if fate[0] < delivery.dropped or fate[1] < delivery.late:
@@ -156,7 +157,10 @@ class ClosedLoop(Source):
         swing = float(np.sin(2 * np.pi * now / sensor.exposure_period))
         exposure = sensor.exposure * (1.0 + sensor.exposure_drift * swing)
         eye = self.world.camera.height
-        seen = render(self._scene, self._rays, pose, eye, exposure=exposure, noise=sensor.noise, key=key, people=people)
+        poses = around(robot, shutter_times(sensor, 0.0))
+        seen = render(
+            self._scene, self._rays, poses, eye, exposure=exposure, noise=sensor.noise, key=key, people=people
+        )
         return Image(seen)
 
     def _meet(self, simulation: Simulation, now: float) -> tuple[Person, ...]:

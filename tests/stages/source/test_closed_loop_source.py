@@ -10,8 +10,11 @@ import pytest
 from omninav.pipeline import Context
 from omninav.pipeline.codec import decode, encode, encode_state, restore_state
 from omninav.stages.driving.wall_avoider import Memory, WallAvoider, free_ahead, roomier_side
-from omninav.stages.simulator.config import Delivery, Event, MirrorCamera, OdometryNoise, Ranges, WorldConfig
+from omninav.stages.simulator.cameras import shutter_times
+from omninav.stages.simulator.config import Delivery, Event, MirrorCamera, OdometryNoise, Ranges, Sensor, WorldConfig
 from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.renderer import render
+from omninav.stages.simulator.robot import around, steer
 from omninav.stages.simulator.world import World
 from omninav.stages.source.closed_loop import ClosedLoop, Simulation
 from omninav.stages.source.recording import UnreadableRecording
@@ -107,6 +110,29 @@ def test_somebody_who_lifts_it_is_not_seen_by_its_wheels():
     assert after.truth.x == 9.5
     assert after.motion is not None
     assert abs(after.motion.x) < 0.05
+
+
+def test_its_pictures_are_blurred_by_its_motion_around_their_tick():
+    """What it sees is the mean over where it is about to be and has just been; at rest it is one picture."""
+    quiet = replace(EXACT, sensor=Sensor(noise=0.0, exposure_drift=0.0, shutter=0.1))
+    sharp, blurred = (
+        Loop(world=world, start=(1.5, 1.3, 0.0))
+        for world in (replace(quiet, sensor=replace(quiet.sensor, shutter=0.0)), quiet)
+    )
+    first = [loop.step() for loop in (sharp, blurred)]
+    assert all(out and out.image for out in first)
+    np.testing.assert_array_equal(first[0].image.pixels, first[1].image.pixels)
+    last = [[loop.step(Command(0.3, 0.5)) for _ in range(8)][-1] for loop in (sharp, blurred)]
+    assert np.abs(last[0].image.pixels.astype(int) - last[1].image.pixels).mean() > 0.5
+    state, source = blurred.state.robot, blurred.source
+    poses = around(state, [-0.05, 0.0, 0.05])
+    driven = np.repeat(state[None], 2, axis=0)
+    steer(driven[0], 0.3, 0.5, source._limits, 0.05, source._room)
+    np.testing.assert_allclose(poses[2], driven[0, :3], atol=1e-3)
+    np.testing.assert_array_equal(poses[1], state[:3])
+    steps = around(state, shutter_times(quiet.sensor, 0.0))
+    seen = render(source._scene, source._rays, steps, quiet.camera.height)
+    np.testing.assert_array_equal(last[1].image.pixels, seen)
 
 
 def test_lost_pictures_are_absent_and_counted():
