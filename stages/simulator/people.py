@@ -344,6 +344,8 @@ class Crowd:
                 wish = who.wish(now, track, state[there, :2])
             row = state[number]
             if row[GONE] >= 0.0 or begins:
+                if isinstance(who, Companion) and not begins:
+                    wish = _out_of_sight(track.poses[-2000:, :2], robot)
                 self._come(row, wish, now, robot, state[there, :2], 0.0 if begins else SIGHT)
             else:
                 goal = row[:2].copy() if wish is None else wish
@@ -407,6 +409,12 @@ class Crowd:
 def _lost(row: F64, goal: F64, robot: F64) -> bool:
     """Whether somebody has given up, and nobody sees it."""
     return math.dist(goal, row[:2]) > LOST and math.dist(row[:2], robot) > SIGHT
+
+
+def _out_of_sight(way: F64, robot: F64) -> F64 | None:
+    """The last point of the robot's way (N, 2) that it has left far enough behind for somebody to turn up there."""
+    far = np.flatnonzero(np.hypot(*(way - robot).T) >= SIGHT)
+    return way[far[-1]] if len(far) else None
 
 
 def _expected(track: Track, now: float) -> F64:
