@@ -3,6 +3,7 @@
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.lesson import Lesson, Lessons
+from omninav.stages.values.pose import UncertainMotion
 from omninav.stages.values.views import WholeView
 
 
@@ -17,7 +18,7 @@ class AtOnce(Stage):
 
         lessons: Lessons
 
-    def step(self, ctx: Context, view: WholeView, state: GaussianMixture) -> Out:
+    def step(self, ctx: Context, view: WholeView, state: GaussianMixture, model: UncertainMotion | None = None) -> Out:
         """Make a lesson of the view."""
         items = (Lesson(view, state, ctx.tick.index),) if len(state) else ()
         return self.Out(lessons=Lessons(items))

@@ -91,6 +91,16 @@ class ViewMixtures(Value):
         for row in range(len(weights)):
             self.add_component(owner, means[row], covariances[row], float(weights[row]), float(counts[row]))
 
+    def put_mixtures(self, owners: Ints, means: Array, covariances: Array, weights: Array, counts: Array) -> None:
+        """Replace all places of the views that `owners` (N,) names, at once: N components."""
+        self.keep_components(~np.isin(self.owner, owners))
+        fields = {"owner": owners, "means": means, "covariances": covariances, "weights": weights, "counts": counts}
+        self._put(**{name: np.concatenate([getattr(self, name), rows]) for name, rows in fields.items()})
+
+    def put_weights(self, weights: Array) -> None:
+        """Replace the weights of all components (C,)."""
+        self._put(weights=weights)
+
     def keep_components(self, kept: Mask) -> None:
         """Drop all other components (C,)."""
         if not kept.all():

@@ -1,0 +1,227 @@
+"""A map of views that follows what the robot sees: it learns places, trusts them more or less, and forgets them."""
+
+from typing import Annotated, Literal
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.problems import BadInput
+from omninav.stages.geometry.gaussians import apart, floored, merged, squared_distance
+from omninav.stages.geometry.se2 import wrap
+from omninav.stages.geometry.view_similarity import Shape, similarity
+from omninav.stages.values.belief import GaussianMixture
+from omninav.stages.values.lesson import Lesson, Lessons
+from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
+from omninav.stages.values.views import ViewLimit
+
+from .view_cap import within_cap
+from .view_events import view_event
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Forgetting = Literal["active", "passive", "none"]
+
+
+class AdaptiveViews(Stage):
+    """Learns views and the places they are seen from, with weights that grow where they fit and fade where they do not.
+
+    Gross, Koenig & Mueller 2005, section 2.3, for each lesson (a view and the state in which it was seen):
+
+    1. A view whose distance to all kept ones is at or above the limit (E_max) is kept as a new one, with no place yet.
+    2. Views alike by S >= `least_similarity` take the state in as a new component, its heading turned to theirs
+       (erratum 12), with weight 0 and count S over the sum of S of all views (equation 11, erratum 6). Components
+       nearer than `merge_below` become one (equations 12 to 14, divided by the counts' sum: erratum 7), weights added
+       and capped at 1 (erratum 8).
+    3. Weights of views nearer than the limit: w = beta S + (1 - beta S) w of components that fit the state, squared
+       distance <= `fits_below` (equation 16); w = (1 - beta S) w of the others (17), unless `forgetting` is `none`.
+       With `forgetting: active`, components of all other views within `near_m` of the state: w = (1 - b) w with b =
+       beta_forget max(1 - distance / fade_m, 0) gain_m / (sigma_x + sigma_y), in [0, 1] (18, 19, errata 10 and 11).
+    4. Components below `least_weight` go, and views without any (erratum 9: after the weights have grown; checked to be
+       below beta least_similarity, so that none dies at birth). Above `max_views` (0: no limit) the weakest views go.
+
+    `forgetting: passive` is the model of Porta & Kroese that Table 1 compares with. A state of several modes, which the
+    paper does not learn from, teaches each mode by its weight p: it is taken in where S p >= `least_similarity`, the
+    count is p times as much, and w = beta S p + (1 - beta S) w with p of all modes that fit. `least_m` and `least_deg`
+    are the least standard deviations with which a place is taken in: a view looks alike over some way.
+    """
+
+    shape: Shape = "linear"
+    forgetting: Forgetting = "active"
+    beta: Annotated[float, Bounds(gt=0, le=1)] = 0.1
+    least_similarity: Annotated[float, Bounds(gt=0, le=1)] = 0.2
+    merge_below: Annotated[float, Bounds(ge=0)] = 7.81
+    fits_below: Annotated[float, Bounds(gt=0)] = 7.81
+    beta_forget: Annotated[float, Bounds(ge=0, le=1)] = 0.1
+    near_m: Annotated[float, Bounds(gt=0)] = 0.5
+    fade_m: Annotated[float, Bounds(gt=0)] = 0.5
+    gain_m: Annotated[float, Bounds(gt=0)] = 0.2
+    least_weight: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
+    least_m: Annotated[float, Bounds(ge=0)] = 0.1
+    least_deg: Annotated[float, Bounds(ge=0)] = 2.0
+    max_views: Annotated[int, Bounds(ge=0)] = 0
+
+    class Out(Outputs):
+        """The map, and what this tick did to it."""
+
+        map: ViewMixtures
+        events: ViewEvent | None = None
+
+    def __post_init__(self) -> None:
+        """A component's first weight must outlive its first tick."""
+        if self.least_weight > (1.0 - 1e-9) * self.beta * self.least_similarity:
+            raise ValueError(
+                f"least_weight: {self.least_weight:g} is not below beta * least_similarity = "
+                f"{self.beta * self.least_similarity:g}, so that a new place could be dropped as it is learned"
+            )
+
+    def step(self, ctx: Context, lessons: Lessons | None, limit: ViewLimit | None, map: ViewMixtures) -> Out:
+        """Learn from what this tick has to teach."""
+        if lessons is None or not lessons.items:
+            return self.Out(map=map)
+        before, next_name = map.names, map.next_name
+        changed, full = [], False
+        for lesson in lessons.items:
+            changed.append(self._learn(ctx, lesson, limit, map))
+            kept = within_cap(map, self.max_views)
+            full = full or not kept.all()
+            map.keep_views(kept)
+            map.step()
+        new = np.arange(next_name, map.next_name)
+        names = np.concatenate([*changed, new])
+        return self.Out(map=map, events=view_event(map, before, names, "full" if full else "forgotten"))
+
+    def _learn(self, ctx: Context, lesson: Lesson, limit: ViewLimit | None, map: ViewMixtures) -> Ints:
+        # The names of the views whose places changed.
+        view = lesson.view
+        state = _floored(lesson.state, self.least_m, np.radians(self.least_deg))
+        if not len(state):
+            return np.empty(0, np.int64)
+        if len(map) and (map.kind != type(view).__name__ or map.views.shape[1] != len(view.values)):
+            raise BadInput(
+                f"map: its views are {map.kind} of {map.views.shape[1]} numbers, the present one is "
+                f"{type(view).__name__} of {len(view.values)}; use the features it was learned with, or learn it anew"
+            )
+        if len(map) and limit is None:
+            ctx.count("view_before_limit", detail="mapping: what a view is compared by is still being measured")
+            return np.empty(0, np.int64)
+        distances = view.distances(map.views) if len(map) else np.empty(0)
+        within = 0.0 if limit is None else limit.distance
+        matched = distances < within
+        if not matched.any():
+            map.add_view(view.values, type(view).__name__)
+            distances, matched = np.append(distances, 0.0), np.append(matched, True)
+        alike = np.where(matched, similarity(distances, within, self.shape), 0.0)
+        rows = np.flatnonzero(matched)
+        turns = np.zeros(len(map))
+        turns[rows] = view.turns(map.views[rows])
+        self._take_in(state, alike, turns, map)
+        weights = np.empty(len(map.weights))
+        _weigh(
+            state.means,
+            state.covariances,
+            state.weights,
+            map.owner,
+            map.means,
+            map.covariances,
+            map.weights,
+            matched,
+            alike,
+            turns,
+            self.beta,
+            self.fits_below,
+            self.forgetting != "none",
+            self.beta_forget if self.forgetting == "active" else 0.0,
+            self.near_m,
+            self.fade_m,
+            self.gain_m,
+            weights,
+        )
+        touched: Ints = map.names[np.unique(map.owner[weights != map.weights])]
+        map.put_weights(weights)
+        map.keep_components(map.weights >= self.least_weight)
+        map.keep_views(np.bincount(map.owner, minlength=len(map)) > 0)
+        return touched
+
+    def _take_in(self, state: GaussianMixture, alike: Array, turns: Array, map: ViewMixtures) -> None:
+        # Phase 2: the state becomes a component of each view that is alike enough.
+        total = alike.sum()
+        rows = np.flatnonzero(alike * state.weights.max() >= self.least_similarity)
+        mixtures = []
+        for row in rows.tolist():
+            kept = alike[row] * state.weights >= self.least_similarity
+            means = state.means[kept]
+            means[:, 2] = wrap(means[:, 2] - turns[row])
+            mine = map.owner == row
+            parts = merged(
+                np.concatenate([map.means[mine], means]),
+                np.concatenate([map.covariances[mine], state.covariances[kept]]),
+                np.concatenate([map.counts[mine], state.weights[kept] * (alike[row] / total)]),
+                self.merge_below,
+                shares=np.concatenate([map.weights[mine], np.zeros(len(means))]),
+            )
+            mixtures.append(parts)
+        if len(rows):
+            means, covariances, counts, weights = (np.concatenate(each) for each in zip(*mixtures, strict=True))
+            owners = np.repeat(rows, [len(parts[0]) for parts in mixtures])
+            map.put_mixtures(owners, means, covariances, np.minimum(weights, 1.0), counts)
+
+
+def _floored(state: GaussianMixture, metres: float, radians: float) -> GaussianMixture:
+    # The state with weights that sum to 1, each mode no more certain than that.
+    present = state.weights > 0.0
+    covariances = state.covariances[present]
+    if metres > 0.0 and radians > 0.0 and len(covariances):
+        covariances = floored(covariances, (metres, metres, radians))
+    weights = state.weights[present]
+    return GaussianMixture(state.means[present], covariances, weights / weights.sum() if len(weights) else weights)
+
+
+@numba.njit(cache=True, nogil=True)
+def _weigh(
+    means: Array,
+    covariances: Array,
+    shares: Array,
+    owner: Ints,
+    places: Array,
+    spreads: Array,
+    weights: Array,
+    matched: npt.NDArray[np.bool_],
+    alike: Array,
+    turns: Array,
+    beta: float,
+    fits_below: float,
+    passive: bool,
+    beta_forget: float,
+    near: float,
+    fade: float,
+    gain: float,
+    out: Array,
+) -> None:
+    # Phase 3, equations 16 to 19, for the components (C,) of all views, of a state of several modes.
+    mode = np.empty(3)
+    for c in range(len(owner)):
+        row = owner[c]
+        if matched[row]:
+            fitting = 0.0
+            for k in range(len(shares)):
+                mode[:] = means[k]
+                mode[2] -= turns[row]
+                if apart(mode, covariances[k], places[c], spreads[c], fits_below):
+                    continue
+                if squared_distance(mode, covariances[k], places[c], spreads[c]) <= fits_below:
+                    fitting += shares[k]
+            gained = beta * alike[row]
+            fading = gained if passive else gained * fitting
+            out[c] = min(gained * fitting + (1.0 - fading) * weights[c], 1.0)
+        else:
+            kept = 1.0
+            if beta_forget > 0.0:
+                for k in range(len(shares)):
+                    distance = np.hypot(places[c, 0] - means[k, 0], places[c, 1] - means[k, 1])
+                    if distance < near and distance < fade:
+                        spread = np.sqrt(covariances[k, 0, 0]) + np.sqrt(covariances[k, 1, 1])
+                        lost = beta_forget * (1.0 - distance / fade) * gain / spread
+                        kept *= 1.0 - shares[k] * min(lost, 1.0)
+            out[c] = kept * weights[c]

@@ -1,0 +1,203 @@
+"""The map of views of Gross, Koenig & Mueller 2005, section 2.3: its equations worked by hand, and what always holds."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from omninav.pipeline import Context
+from omninav.stages.geometry.spectra import packed
+from omninav.stages.mapping.adaptive_views import AdaptiveViews
+from omninav.stages.mapping.frozen import Frozen
+from omninav.stages.values.belief import GaussianMixture
+from omninav.stages.values.lesson import Lesson, Lessons
+from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.views import Coefficients, Spectrum, ViewLimit
+
+LIMIT = ViewLimit(1.0)
+FREE = {"least_m": 0.0, "least_deg": 0.0}
+
+
+def view(*values):
+    row = np.array(values, np.float32)
+    return Coefficients(row, row[None])
+
+
+def state(*means, sigma=0.1, weights=None):
+    means = np.array(means, np.float64)
+    covariances = np.stack([np.eye(3) * sigma**2] * len(means))
+    return GaussianMixture(means, covariances, np.full(len(means), 1.0) if weights is None else np.array(weights))
+
+
+def learn(map, view, state, **options):
+    stage = AdaptiveViews(**{**FREE, **options})
+    return stage.step(Context("mapping"), lessons=Lessons((Lesson(view, state, 0),)), limit=LIMIT, map=map).events
+
+
+def test_a_view_unlike_all_others_is_kept_with_its_place_and_weight_beta():
+    map = ViewMixtures.empty()
+    event = learn(map, view(0, 0), state([1, 2, 0.5]))
+    assert event.inserted.tolist() == [0]
+    # S = 1 to itself: eta = 1 / 1 (11), w = beta * 1 + (1 - beta) * 0 (16).
+    assert map.counts.tolist() == [1.0]
+    assert map.weights.tolist() == [0.1]
+    np.testing.assert_allclose(map.means, [[1, 2, 0.5]])
+    event = learn(map, view(1.0, 0), state([5, 2, 0.5]))
+    assert event.inserted.tolist() == [1], "a distance at the limit is a new view's"
+
+
+def test_counts_share_one_observation_among_the_views_it_resembles():
+    map = ViewMixtures.empty()
+    learn(map, view(0, 0), state([0, 0, 0]))
+    learn(map, view(1.1, 0), state([4, 0, 0]))
+    # S to the two: 1 - 0.4 = 0.6 and 1 - 0.7 = 0.3; eta 2 / 3 and 1 / 3 (equation 11, erratum 6).
+    learn(map, view(0.4, 0), state([9, 0, 0]))
+    assert map.counts[map.means[:, 0] == 9].tolist() == pytest.approx([2 / 3, 1 / 3])
+
+
+def test_merged_places_are_the_counts_mean_and_not_their_sum():
+    map = ViewMixtures.empty()
+    row = map.add_view(np.zeros(2, np.float32), "Coefficients")
+    map.add_component(row, np.array([10.0, 5.0, 0.0]), np.eye(3) * 4.0, 0.5, 5.0)
+    # Erratum 7: eta 5 and 0.4 must not move (10, 5) to (54, 27). Here eta 5 and 1 at (10, 5) and (13, 5).
+    learn(map, view(0, 0), state([13, 5, 0], sigma=2.0))
+    assert len(map.weights) == 1
+    np.testing.assert_allclose(map.means[0], [10 + 3 / 6, 5, 0])
+    # Equation 14: (5 (4 + 0.5^2) + 1 (4 + 2.5^2)) / 6 along x, 4 along y.
+    np.testing.assert_allclose(np.diag(map.covariances[0]), [(5 * 4.25 + 10.25) / 6, 4, 4])
+    assert map.counts.tolist() == [6.0]
+    assert map.weights.tolist() == [0.1 + 0.9 * 0.5]
+
+
+def test_headings_are_kept_as_seen_by_a_robot_that_sees_the_kept_view():
+    signal = np.random.default_rng(0).normal(size=(1, 36))
+    turn = 7 * 2 * math.pi / 36
+
+    def turned(steps):  # counter-clockwise: what was ahead is now to the right, further on in the panorama
+        spectrum = np.fft.rfft(np.roll(signal, steps, axis=1), axis=1)[:, :10] / 6.0
+        return Spectrum(packed(spectrum), 1, 36)
+
+    map = ViewMixtures.empty()
+    learn(map, turned(0), state([0, 0, 3.0]))
+    learn(map, turned(7), state([0, 0, 3.0 + turn]))
+    assert len(map.weights) == 1, "one place: seen with another heading"
+    assert map.means[0, 2] == pytest.approx(3.0, abs=0.01)
+    assert map.counts.tolist() == [2.0]
+
+
+def test_places_that_fit_grow_and_the_others_of_the_same_view_fade():
+    map = ViewMixtures.empty()
+    row = map.add_view(np.zeros(2, np.float32), "Coefficients")
+    for x in (0.0, 8.0):
+        map.add_component(row, np.array([x, 0.0, 0.0]), np.eye(3) * 0.01, 0.5, 3.0)
+    passive = {"forgetting": "passive"}
+    event = learn(map, view(0.2, 0), state([0, 0, 0]), **passive)
+    # S = 0.8: w = 0.08 + 0.92 * 0.5 (16), and 0.92 * 0.5 (17).
+    np.testing.assert_allclose(map.weights[np.argsort(map.means[:, 0])], [0.54, 0.46])
+    assert event.changed.tolist() == [0]
+    learn(map, view(0.2, 0), state([0, 0, 0]), forgetting="none")
+    np.testing.assert_allclose(map.weights[np.argsort(map.means[:, 0])], [0.08 + 0.92 * 0.54, 0.46])
+
+
+def test_an_unlike_view_that_was_seen_here_is_forgotten_as_the_distance_and_the_doubt_allow():
+    def made():
+        map = ViewMixtures.empty()
+        for name, x in enumerate((0.0, 0.3, 0.6)):
+            map.add_view(np.array([10.0 + 2 * name, 0.0], np.float32), "Coefficients")
+            map.add_component(name, np.array([x, 0.0, 2.0]), np.eye(3) * 0.01, 0.5, 3.0)
+        return map
+
+    active = {"forgetting": "active", "near_m": 0.5, "fade_m": 0.4, "beta_forget": 0.2, "gain_m": 0.1}
+    map = made()
+    learn(map, view(0, 0), state([0, 0, 0], sigma=0.1), **active)
+    # b = 0.2 (1 - d / 0.4) 0.1 / (0.1 + 0.1): 0.1 at 0 m, 0.025 at 0.3 m, nothing at 0.6 m; headings do not matter.
+    np.testing.assert_allclose(map.weights[:3], [0.5 * 0.9, 0.5 * 0.975, 0.5])
+    map = made()
+    learn(map, view(0, 0), state([0, 0, 0], sigma=0.2), **active)
+    np.testing.assert_allclose(map.weights[:3], [0.5 * 0.95, 0.5 * 0.9875, 0.5])
+    map = made()
+    learn(map, view(0, 0), state([0, 0, 0], sigma=0.2), **{**active, "forgetting": "passive"})
+    np.testing.assert_allclose(map.weights[:3], 0.5)
+
+
+def test_a_state_that_is_very_certain_takes_away_a_weight_but_not_more():
+    map = ViewMixtures.empty()
+    map.add_view(np.array([10.0, 0.0], np.float32), "Coefficients")
+    map.add_component(0, np.zeros(3), np.eye(3) * 0.01, 0.5, 3.0)
+    # b = 0.1 * 2 / 0.002 = 100: without a limit the weight would be negative (erratum 11).
+    event = learn(map, view(0, 0), state([0, 0, 0], sigma=0.001), forgetting="active", gain_m=2.0)
+    assert event.removed.tolist() == [0]
+    assert event.why == "forgotten"
+    assert map.names.tolist() == [1]
+
+
+def test_a_new_place_outlives_the_tick_in_which_it_is_learned_however_little_it_is_alike():
+    map = ViewMixtures.empty()
+    learn(map, view(0, 0), state([0, 0, 0]))
+    learn(map, view(0.79, 0), state([9, 0, 0]))
+    assert 9 in map.means[:, 0].round(9), "S = 0.21: taken in, w = 0.021"
+    learn(map, view(0.81, 0), state([20, 0, 0]))
+    assert 20 not in map.means[:, 0].round(9), "S = 0.19 is not enough"
+    with pytest.raises(ValueError, match="least_weight: 0.02 is not below"):
+        AdaptiveViews(least_weight=0.02, least_similarity=0.2, beta=0.1)
+
+
+def test_a_place_never_seen_again_loses_its_weight_and_a_view_without_places_goes():
+    map = ViewMixtures.empty()
+    learn(map, view(0, 0), state([0, 0, 0]))
+    steps = 0
+    while 0.0 in map.means[:, 0].round(9):
+        learn(map, view(0, 0), state([9, 0, 0]), forgetting="passive")
+        steps += 1
+    # 0.1 * 0.9^n < 0.01 from n = 22.
+    assert steps == 22
+
+
+def test_a_state_of_two_modes_teaches_each_by_its_weight():
+    map = ViewMixtures.empty()
+    learn(map, view(0, 0), state([0, 0, 0], [9, 0, 0], weights=[0.6, 0.2]))
+    np.testing.assert_allclose(map.weights, [0.075, 0.025])
+    np.testing.assert_allclose(map.counts, [0.75, 0.25])
+
+
+def test_views_above_the_limit_go_though_lessons_come_many_at_once():
+    map = ViewMixtures.empty()
+    lessons = Lessons(tuple(Lesson(view(2 * n, 0), state([n, 0, 0]), n) for n in range(9)))
+    stage = AdaptiveViews(max_views=4)
+    event = stage.step(Context("mapping"), lessons=lessons, limit=LIMIT, map=map).events
+    assert len(map) == event.views == 4
+    assert 8 in map.names
+    assert event.inserted.tolist() == map.names.tolist()
+
+
+def test_nothing_to_learn_leaves_the_map_alone_and_a_frozen_map_learns_nothing():
+    map = ViewMixtures.empty()
+    assert AdaptiveViews().step(Context("m"), lessons=Lessons(()), limit=LIMIT, map=map).events is None
+    lessons = Lessons((Lesson(view(0, 0), state([0, 0, 0]), 0),))
+    out = Frozen().step(Context("m"), map=map, lessons=lessons, limit=LIMIT)
+    assert out.map is map
+    assert (len(map), map.steps) == (0, 0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000), st.sampled_from(["active", "passive", "none"]))
+def test_weights_stay_in_0_to_1_and_covariances_positive_definite_over_any_updates(seed, forgetting):
+    rng = np.random.default_rng(seed)
+    map = ViewMixtures.empty()
+    stage = AdaptiveViews(forgetting=forgetting, beta=float(rng.uniform(0.1, 1.0)), gain_m=5.0, max_views=30, **FREE)
+    for _ in range(400):
+        parts = int(rng.integers(1, 4))
+        roots = rng.normal(0, 0.2, (parts, 3, 3))
+        spread = roots @ roots.transpose(0, 2, 1) + np.eye(3) * 10.0 ** rng.uniform(-6, -1)
+        where = GaussianMixture(rng.normal(0, 1, (parts, 3)), spread, rng.random(parts) + 1e-3)
+        lesson = Lesson(view(*rng.normal(0, 1.0, 2)), where, 0)
+        stage.step(Context("mapping"), lessons=Lessons((lesson,)), limit=LIMIT, map=map)
+        assert (map.weights >= 0).all()
+        assert (map.weights <= 1).all()
+        assert (map.counts > 0).all()
+        assert (np.bincount(map.owner, minlength=len(map)) > 0).all(), "no view without a place"
+    np.testing.assert_array_equal(map.covariances, map.covariances.transpose(0, 2, 1))
+    assert (np.linalg.eigvalsh(map.covariances) > 0).all()
+    assert (np.abs(map.means[:, 2]) <= math.pi).all()
+    assert len(map) <= 30
