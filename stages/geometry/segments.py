@@ -61,7 +61,14 @@ def penalties(segments: int, exponent: float) -> Floats:
 
 @numba.njit(cache=True, nogil=True)
 def _compare(
-    references: Floats, chosen: Ints, query: Floats, histograms: bool, network: Ints, factors: Floats, out: Floats
+    references: Floats,
+    chosen: Ints,
+    query: Floats,
+    histograms: bool,
+    network: Ints,
+    factors: Floats,
+    scale: np.float32,
+    out: Floats,
 ) -> None:
     # Headings are the innermost axis throughout: each loop over them is vector instructions, the sorting too.
     segments, bins, lanes = query.shape
@@ -69,7 +76,6 @@ def _compare(
     alike = np.empty((segments, lanes), np.float32)
     total = np.empty(lanes, np.float32)
     best = np.empty(lanes, np.float32)
-    largest = np.float32(np.sqrt(3.0) * 255.0)
     for n in range(len(chosen)):
         reference = references[chosen[n]]
         for j in range(segments):
@@ -88,7 +94,7 @@ def _compare(
                         row[h] += gap * gap
             if not histograms:
                 for h in range(lanes):
-                    row[h] = np.float32(1) - np.sqrt(row[h]) / largest
+                    row[h] = max(np.float32(1) - np.sqrt(row[h]) / scale, np.float32(0))
         for p in range(len(network)):
             high, low = alike[network[p, 0]], alike[network[p, 1]]
             for h in range(lanes):
@@ -116,13 +122,15 @@ def similarities(
     selective: bool,
     exponent: float = 0.5,
     chosen: Ints | None = None,
+    colour_scale: float = LARGEST_COLOUR_DISTANCE,
 ) -> Floats:
     """Similarity of a view to references at equally spaced headings: (chosen, headings) float32 in [0, 1].
 
     `references` (R, segments, bins) and `view` (segments, bins): histograms that sum to 1 per segment (compared by
-    intersection), or colours in 0..255 (s_j = 1 - |difference| / (sqrt(3) 255)). `selective`: S = max_k (sum of the k
-    largest s_j) k^-exponent n^-(1-exponent), all k tried, since S(k) is not unimodal (Gross & Koenig 2004, section 2;
-    errata 20, 21); otherwise the mean of all s_j. `chosen`: indices of the references to compare; None means all.
+    intersection), or colours in 0..255 (s_j = 1 - |difference| / colour_scale, not below 0). `selective`: S = max_k
+    (sum of the k largest s_j) k^-exponent n^-(1-exponent), all k tried, since S(k) is not unimodal (Gross & Koenig
+    2004, section 2; errata 20, 21); otherwise the mean of all s_j. `chosen`: indices of the references to compare; None
+    means all.
     Column h is a robot heading 2 pi h / headings more than the reference's own.
     """
     chosen = np.arange(len(references)) if chosen is None else chosen
@@ -136,7 +144,8 @@ def similarities(
     else:
         factors = np.zeros(segments, np.float32)
         factors[-1] = 1.0 / segments
-    _compare(np.ascontiguousarray(references, np.float32), chosen, query, histograms, network, factors, out)
+    scale = np.float32(colour_scale)
+    _compare(np.ascontiguousarray(references, np.float32), chosen, query, histograms, network, factors, scale, out)
     return np.minimum(out, np.float32(1.0))
 
 

@@ -30,4 +30,4 @@ class HistogramIntersection(NearBelief, Stage):
         check_alike(features, map)
         chosen, stands_for = self.candidates(ctx, map, near, reach)
         values = similarities(map.features, features.values, self.headings, True, False, chosen=chosen)
-        return self.Out(similarities=Similarities(values, chosen, stands_for))
+        return self.Out(similarities=Similarities(values, chosen, stands_for, exponent=0.0))

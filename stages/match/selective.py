@@ -1,9 +1,9 @@
 """Similarity from the best segments only."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from omninav.pipeline import Context, Stage
-from omninav.stages.geometry.segments import EXPONENTS, similarities
+from omninav.pipeline import Bounds, Context, Stage
+from omninav.stages.geometry.segments import EXPONENTS, LARGEST_COLOUR_DISTANCE, similarities
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures
 from omninav.stages.values.maps import ReferenceGraph
@@ -17,13 +17,16 @@ class SelectiveMatch(NearBelief, Stage):
     """Similarity from the k best segments only, so that occluded ones do not count.
 
     Gross & Koenig 2004, section 2: S = max_k (sum of the k largest s_j) sqrt(1 / (k n)); s_j is the intersection of
-    segment j's histograms, or 1 - |difference| / (sqrt(3) 255) of its colours. All k are tried (erratum 21).
+    segment j's histograms, or 1 - |difference| / `colour_scale` of its colours, not below 0. All k are tried (erratum
+    21). The paper gives s_j for histograms only; by default colours are 0 alike at the largest possible difference,
+    sqrt(3) 255, which leaves no segment out (experiment omniview_mcl/colour_scale).
     `penalty`: sqrt as in the paper; cube_root: k^-1/3 n^-2/3, which wants more segments; three_quarters: k^-3/4 n^-1/4,
     which is content with fewer; none: the mean of all.
     What is compared where: candidates.NearBelief. Raises BadInput where map and view are of other kinds.
     """
 
     penalty: Literal["sqrt", "cube_root", "three_quarters", "none"] = "sqrt"
+    colour_scale: Annotated[float, Bounds(gt=0)] = LARGEST_COLOUR_DISTANCE
 
     def step(
         self,
@@ -36,7 +39,6 @@ class SelectiveMatch(NearBelief, Stage):
         """Compare one view."""
         histograms = check_alike(features, map)
         chosen, stands_for = self.candidates(ctx, map, near, reach)
-        values = similarities(
-            map.features, features.values, self.headings, histograms, True, EXPONENTS[self.penalty], chosen
-        )
-        return self.Out(similarities=Similarities(values, chosen, stands_for))
+        exponent, scale = EXPONENTS[self.penalty], self.colour_scale
+        values = similarities(map.features, features.values, self.headings, histograms, True, exponent, chosen, scale)
+        return self.Out(similarities=Similarities(values, chosen, stands_for, exponent, scale))

@@ -1,15 +1,15 @@
 """How well each particle explains the view, from the view that is expected at its pose."""
 
 import math
-from typing import Literal
 
 import numba
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context
+from omninav.pipeline.problems import BadInput
 from omninav.stages.geometry.nearby import NearestCells
-from omninav.stages.geometry.segments import EXPONENTS, penalties, sorting_network
+from omninav.stages.geometry.segments import LARGEST_COLOUR_DISTANCE, penalties, sorting_network
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
@@ -37,11 +37,11 @@ def _likeness(
     ordinary: float,
     network: Ints,
     factors: Floats,
+    scale: np.float32,
 ) -> Array:
     segments, bins = view.shape
     expected, alike = np.empty((segments, bins), np.float32), np.empty(segments, np.float32)
     apart = np.empty(nearest.shape[1])
-    largest = np.float32(np.sqrt(3.0) * 255.0)
     out = np.empty(len(poses))
     for n in range(len(poses)):
         out[n] = ordinary
@@ -84,7 +84,7 @@ def _likeness(
             else:
                 for b in range(bins):
                     common += (mine[b] - seen[b]) ** 2
-                alike[s] = np.float32(1) - np.float32(np.sqrt(common)) / largest
+                alike[s] = max(np.float32(1) - np.float32(np.sqrt(common)) / scale, np.float32(0))
         for p in range(len(network)):
             a, c = alike[network[p, 0]], alike[network[p, 1]]
             alike[network[p, 0]] = a if a > c else c
@@ -110,6 +110,7 @@ def likeness_of_expected(
     fade: float,
     ordinary: float,
     exponent: float = 0.5,
+    colour_scale: float = LARGEST_COLOUR_DISTANCE,
 ) -> Array:
     """Selective similarity of a view (segments, bins) to the one expected at each pose: (N, 3) -> (N,).
 
@@ -119,7 +120,10 @@ def likeness_of_expected(
     """
     network, factors = sorting_network(len(view)), penalties(len(view), exponent)
     poses, view = np.ascontiguousarray(poses), np.ascontiguousarray(view, np.float32)
-    found: Array = _likeness(poses, references, features, view, histograms, *cells, fade, ordinary, network, factors)
+    scale = np.float32(colour_scale)
+    found: Array = _likeness(
+        poses, references, features, view, histograms, *cells, fade, ordinary, network, factors, scale
+    )
     return found
 
 
@@ -129,11 +133,10 @@ class ExpectedObservation(NearReferences):
     Gross & Koenig 2004, section 2: the similarity S is that "between the expected observation of the sample in its
     current pose and the actual observation". The features of the nearest references are mixed and turned to the
     particle's heading, then compared. `near_references` interpolates similarities in place of features, which costs a
-    tenth. Power, ordinary match, proposals and all other parameters are those of `near_references`, which see;
-    `penalty` as in `selective`.
+    tenth. Power, ordinary match, proposals and all parameters are those of `near_references`, which see. Penalty and
+    scale of colours are those of the `similarities`, since likelihoods are taken in proportion to the best of them.
+    Raises BadInput where those are no such comparison (`match=l2`).
     """
-
-    penalty: Literal["sqrt", "cube_root", "three_quarters", "none"] = "sqrt"
 
     def step(  # type: ignore[override]
         self,
@@ -146,7 +149,13 @@ class ExpectedObservation(NearReferences):
         reach: Reach | None = None,
     ) -> NearReferences.Out:
         """Weigh all particles."""
-        self._view = features
+        if similarities.exponent is None:
+            raise BadInput(
+                "sensor: expected_observation compares the segments as the match does, and this match compares whole "
+                "views; use match=selective or match=histogram_intersection, or sensor=near_references"
+            )
+        self._view, self._exponent = features, similarities.exponent
+        self._colour_scale = similarities.colour_scale or LARGEST_COLOUR_DISTANCE
         return super().step(ctx, similarities, particles, map, motion, reach)
 
     def _expected(
@@ -161,5 +170,6 @@ class ExpectedObservation(NearReferences):
             self._cells,
             self.fade * unit,
             floor,
-            EXPONENTS[self.penalty],
+            self._exponent,
+            self._colour_scale,
         )

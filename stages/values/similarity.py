@@ -13,8 +13,14 @@ class Similarities(Value):
     2 pi h / headings. `candidates` (references,) holds the indices of the map's references that were compared, in
     ascending order; None means all of them. `stands_for` (references,): how many references of the map each of them
     stands for, where only some were compared; None: one each. Sums with it are estimates for the whole map.
+
+    How they were compared, so that others can compare alike: S = max_k (sum of the k largest s_j) k^-exponent
+    n^-(1-exponent) over the n segments, with `exponent` None where S is something else; of colours,
+    s_j = 1 - |difference| / `colour_scale`.
     """
 
     values: npt.NDArray[np.float32]
     candidates: npt.NDArray[np.int64] | None = None
     stands_for: npt.NDArray[np.float64] | None = None
+    exponent: float | None = None
+    colour_scale: float | None = None

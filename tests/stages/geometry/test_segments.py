@@ -54,6 +54,15 @@ def test_colours_are_compared_by_their_distance() -> None:
     assert np.allclose(plain, alike.mean(axis=1), atol=1e-6)
 
 
+def test_colours_farther_apart_than_the_scale_are_not_alike_at_all() -> None:
+    references, view = np.full((1, 4, 3), 100, np.float32), np.full((4, 3), 100, np.float32)
+    view[:, 0] += [0, 15, 30, 90]
+    assert similarities(references, view, 1, False, False, colour_scale=60.0)[0, 0] == pytest.approx(2.25 / 4)
+    # s = 1, 3/4, 1/2, 0: three segments, (9/4) / sqrt(3 x 4) = .65, beat four and two.
+    found = similarities(references, view, 1, False, True, colour_scale=60.0)[0, 0]
+    assert found == pytest.approx(2.25 / np.sqrt(12), abs=1e-6)
+
+
 def with_segment_similarities(alike: list[float]) -> tuple[np.ndarray, np.ndarray]:
     """Two views whose segments' histogram intersections are the given numbers."""
     expected = np.array([[[s, 1 - s, 0] for s in alike]], np.float32)

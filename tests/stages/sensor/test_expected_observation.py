@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
+from omninav.pipeline.problems import BadInput
 from omninav.stages.geometry.nearby import nearest_cells
 from omninav.stages.geometry.segments import selective_similarity, turned_view
+from omninav.stages.match.l2 import L2Match
+from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.sensor.expected_observation import ExpectedObservation, likeness_of_expected
 from omninav.stages.values.belief import Particles
-from omninav.stages.values.features import SegmentHistograms
+from omninav.stages.values.features import SegmentColours, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 
@@ -51,7 +54,27 @@ def test_the_particle_where_the_view_was_taken_wins() -> None:
     )
     field = RNG.uniform(0.3, 0.5, (40, 12)).astype(np.float32)
     field[3, 3] = 1.0
-    out = stage.step(ctx, Similarities(field), SegmentHistograms(seen), Particles(poses, np.full(4, 0.25)), map)
+    out = stage.step(
+        ctx, Similarities(field, exponent=0.5), SegmentHistograms(seen), Particles(poses, np.full(4, 0.25)), map
+    )
     likelihood = out.likelihood.values
     assert np.argmax(likelihood) == 0
     assert likelihood[0] > 100 * likelihood[1:].max()
+
+
+@pytest.mark.parametrize("match", [SelectiveMatch(penalty="none"), SelectiveMatch(colour_scale=60.0), L2Match()])
+def test_the_view_is_compared_as_the_match_compares_it(match: SelectiveMatch | L2Match) -> None:
+    colours = (RNG.random((40, 9, 3)) * 60).astype(np.float32)
+    map, seen = ReferenceGraph(REFERENCES, colours, "colours", np.zeros((0, 2), np.int64), "truth"), colours[4] + 5
+    alike = match.step(Context("match"), SegmentColours(seen), map).similarities
+    stage, ctx = ExpectedObservation(reach_m=0.1, power=5.0), Context("sensor", np.random.default_rng(0))
+    stage.setup(ctx)
+    belief = Particles(REFERENCES, np.full(40, 1 / 40))
+    if isinstance(match, L2Match):
+        with pytest.raises(BadInput, match="use match=selective"):
+            stage.step(ctx, alike, SegmentColours(seen), belief, map)
+        return
+    likelihood = stage.step(ctx, alike, SegmentColours(seen), belief, map).likelihood.values
+    # A particle at a reference is as likely as the best of the compared ones, and no other is much likelier.
+    assert likelihood[4] == pytest.approx(1.0, abs=0.05)
+    assert likelihood.max() < 1.05
