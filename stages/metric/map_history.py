@@ -122,7 +122,7 @@ def _errors(poses: Array, truth: Array) -> dict[str, Any]:
         "position_error_m": spread(metres),
         "heading_error_deg": spread(degrees),
         "final_error_m": float(metres[-1]),
-        "final_error_deg": float(degrees[-1]),
+        "final_heading_error_deg": float(degrees[-1]),
     }
 
 

@@ -1,7 +1,7 @@
 """How far off the estimate was, frame by frame."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from omninav.stages.values.pose import Motion, Pose
 from .style import ESTIMATE, MARK, ODOMETRY, picture
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.ticker import Formatter
 
 
@@ -25,7 +26,7 @@ class ErrorOverTime(Stage):
     """
 
     class Out(Outputs):
-        """`figure`: one pair of curves per log."""
+        """`figure`: one pair of panels per log, on the same scales."""
 
         figure: Figure | None = None
 
@@ -45,8 +46,9 @@ class ErrorOverTime(Stage):
             figure=Figure(
                 name="error_over_time",
                 title="Error over time",
-                caption="Distance from the true position and size of the heading error. The line marks where "
-                "the error stays below 1 m and 20 degrees for ten frames. The scale is logarithmic.",
+                caption="Distance from the true position and size of the heading error. Odometry alone starts at each "
+                "log's first true pose and is not aligned. The green line marks where the estimate stays below 1 m and "
+                "20 degrees for ten frames. The scale is logarithmic.",
                 content=_draw(logs),
                 order=20,
             )
@@ -54,57 +56,66 @@ class ErrorOverTime(Stage):
 
 
 def _draw(logs: Sequence[Drive]) -> bytes:
-    with picture(8.0, 4.2 * len(logs)) as drawn:
+    """Logs stand side by side on the same scales, at most three in a row."""
+    columns = min(len(logs), 3)
+    bands = -(-len(logs) // columns)
+    kinds = (("position error (m)", position_errors, 1.0, None), ("heading error (°)", heading_errors_deg, 20.0, 250))
+    floors = [_floor(np.concatenate([errors(log.estimate, log.truth) for log in logs])) for _, errors, _, _ in kinds]
+    with picture(8.0 if columns == 1 else 10.0, 4.2 * bands) as drawn:
+        panels = drawn.canvas.subplots(2 * bands, columns, sharey="row", squeeze=False)
+        for panel in panels[:, len(logs) - columns * (bands - 1) :][2 * (bands - 1) :].flat:
+            panel.remove()
         for number, drive in enumerate(logs):
-            position, heading = (
-                position_errors(drive.estimate, drive.truth),
-                heading_errors_deg(drive.estimate, drive.truth),
-            )
-            odometry = drive.odometry_alone()
-            scored = np.flatnonzero(np.isfinite(position))
-            settled = first_settled(position[scored], heading[scored])
-            upper = drawn.canvas.add_subplot(2 * len(logs), 1, 2 * number + 1)
-            lower = drawn.canvas.add_subplot(2 * len(logs), 1, 2 * number + 2, sharex=upper)
-            for axes, errors, name, limit in (
-                (upper, position_errors, "position error (m)", 1.0),
-                (lower, heading_errors_deg, "heading error (°)", 20.0),
-            ):
+            band, column = divmod(number, columns)
+            odometry, settled = drive.odometry_alone(), _settled(drive)
+            upper, lower = panels[2 * band : 2 * band + 2, column]
+            for axes, (name, errors, limit, top), floor in zip((upper, lower), kinds, floors, strict=True):
                 if odometry is not None:
-                    axes.plot(
-                        drive.seconds,
-                        errors(odometry, drive.truth),
-                        color=ODOMETRY,
-                        linestyle="--",
-                        linewidth=1.2,
-                        label="odometry alone",
-                    )
-                axes.plot(
-                    drive.seconds, errors(drive.estimate, drive.truth), color=ESTIMATE, linewidth=1.2, label="estimate"
-                )
+                    wrong = errors(odometry, drive.truth)
+                    axes.plot(drive.seconds, wrong, "--", color=ODOMETRY, linewidth=1.2, label="odometry alone")
+                wrong = errors(drive.estimate, drive.truth)
+                axes.plot(drive.seconds, wrong, color=ESTIMATE, linewidth=1.2, label="estimate")
                 axes.axhline(limit, color="#999999", linewidth=0.7, linestyle=":")
                 if settled is not None:
-                    axes.axvline(
-                        drive.seconds[scored[settled]],
-                        color=MARK,
-                        linewidth=1.2,
-                        label=f"converged after {scored[settled]} frames",
-                    )
-                axes.set_ylabel(name)
+                    axes.axvline(drive.seconds[settled], color=MARK, linewidth=1.2, label="converged")
                 axes.set_yscale("log")
-            upper.set_ylim(bottom=_floor(position[scored]))
-            lower.set_ylim(bottom=_floor(heading[scored]), top=250)
-            upper.tick_params(labelbottom=False)
-            lower.set_xlabel("time since the log's first frame (s)")
-            upper.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
-            for axes in (upper, lower):
+                axes.set_ylim(bottom=floor, top=top)
                 axes.yaxis.set_major_formatter(_plain())
-            if len(logs) > 1:
-                upper.set_title(f"log {drive.log}")
+                axes.yaxis.set_minor_formatter("")
+                if not column:
+                    axes.set_ylabel(name)
+            upper.tick_params(labelbottom=False)
+            lower.set_xlim(upper.get_xlim())
+            lower.set_xlabel("time since the log's first frame (s)")
+            converged = "never converged" if settled is None else f"converged after {settled} frames"
+            ends = f"at the end {_last(drive.estimate, drive):.2f} m off"
+            beside = "" if odometry is None else f", odometry {_last(odometry, drive):.2f} m"
+            upper.set_title(f"log {drive.log}: {converged}\n{ends}{beside}", fontsize=8.5)
+        named = {label: handle for axes in drawn.canvas.axes for handle, label in zip(*_legend(axes), strict=True)}
+        drawn.canvas.legend(named.values(), named.keys(), loc="outside lower center", ncols=3)
     return drawn.content
+
+
+def _settled(drive: Drive) -> int | None:
+    position, heading = position_errors(drive.estimate, drive.truth), heading_errors_deg(drive.estimate, drive.truth)
+    scored = np.flatnonzero(np.isfinite(position))
+    settled = first_settled(position[scored], heading[scored])
+    return None if settled is None else int(scored[settled])
+
+
+def _last(poses: Array, drive: Drive) -> float:
+    errors = position_errors(poses, drive.truth)
+    there = errors[np.isfinite(errors)]
+    return float(there[-1]) if len(there) else float("nan")
+
+
+def _legend(axes: "Axes") -> tuple[list[Any], list[Any]]:
+    return axes.get_legend_handles_labels()
 
 
 def _floor(errors: Array) -> float:
     """Where a logarithmic axis begins: below nearly all errors, without following single zeros down."""
+    errors = errors[np.isfinite(errors)]
     return max(float(np.percentile(errors, 2)) / 2, 1e-4) if len(errors) else 1e-2
 
 
