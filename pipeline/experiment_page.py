@@ -250,7 +250,7 @@ def pictures_of(experiment: Experiment, results: Results) -> list[dict[str, Any]
     for index, curve in enumerate(experiment.curves):
         content = _curve(experiment, results, curve)
         caption = (
-            f"{curve.title} along {curve.along}: mean of the repetitions, and between which two a half of them lies"
+            f"{curve.title} along {curve.along}: mean of the repetitions, in a band that holds the middle half of them"
         )
         file = f"{experiment.name}_curve_{index + 1}.png"
         found.append({"file": file, "title": curve.title, "caption": f"{caption}.", "content": content})
@@ -375,8 +375,8 @@ def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
                 list(samples(experiment, results, name, labels | {experiment.page.columns: c}).values())
                 for c in columns
             ]
-            heights = [float(np.mean(v)) if v else 0.0 for v in found]
-            spreads = [float(np.std(v)) if v else 0.0 for v in found]
+            heights = [float(np.mean(v)) if v else np.nan for v in found]
+            spreads = [float(np.std(v)) if v else np.nan for v in found]
             all_heights += heights
             colour = PALETTE[index % len(PALETTE)]
             title = ", ".join(labels.values())
@@ -402,7 +402,7 @@ def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
         axes.set_ylabel(measure.title)
         _scale(axes, all_heights)
         axes.grid(axis="x", visible=False)
-        axes.legend(ncols=2)
+        axes.legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
     return drawn.content
 
 
