@@ -16,9 +16,9 @@ Array = npt.NDArray[np.float64]
 class Agreement(Stage):
     """Resamples particles by the map's density where the two agree; else tracks both.
 
-    Porta & Kroese 2004, section 3.1. The map's hypothesis is p(y|x), equation 5: a mixture whose weights, lambda w, sum
-    to 1 (`sensor.superposition`), so that it is a density over poses in 1/(m^2 rad). `agreement`, sum_i pi_i p(y|x_i),
-    is then one too; `agree_above` holds for metres and radians (the paper gives 10^-4 without units: erratum 14).
+    Porta & Kroese 2004, section 3.1. The map's hypothesis is p(y|x), equation 5: a mixture, whose weights, lambda w,
+    are made to sum to 1, so that it is a density over poses in 1/(m^2 rad). `agreement`, sum_i pi_i p(y|x_i), is then
+    one too; `agree_above` holds for metres and radians (the paper gives 10^-4 without units: erratum 14).
 
     * Above it: all particles are drawn anew by pi_i p(y|x_i) and weigh 1/N. This is what the paper describes; it is
       importance resampling (SIR), although it cites the auxiliary filter (erratum 15), which is `fusion=auxiliary`.
@@ -44,7 +44,8 @@ class Agreement(Stage):
         """Fuse prediction and hypothesis."""
         if hypothesis is None or not len(hypothesis):
             return self.Out(belief=particles)
-        likelihood = density(particles.poses, hypothesis.means, hypothesis.covariances, hypothesis.weights)
+        shares = hypothesis.weights / hypothesis.weights.sum()
+        likelihood = density(particles.poses, hypothesis.means, hypothesis.covariances, shares)
         agreement = float(particles.weights @ likelihood)
         if agreement > self.agree_above:
             ctx.count("agreed")
