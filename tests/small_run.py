@@ -6,9 +6,10 @@ import numpy as np
 
 from omninav.pipeline import Tick
 from omninav.stages.geometry.se2 import between
-from omninav.stages.values.belief import Particles, PoseEstimate
+from omninav.stages.values.belief import GaussianMixture, Particles, PoseEstimate
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 
 
 @dataclass
@@ -53,3 +54,35 @@ def reference_graph(references: int) -> ReferenceGraph:
     edges = np.stack([np.arange(max(references - 1, 0)), np.arange(1, max(references, 1))], axis=1)
     features = np.zeros((references, 10, 20), dtype=np.float32)
     return ReferenceGraph(eight(references), features, "histograms", edges, "truth")
+
+
+def mixture_run(run: SmallRun) -> tuple[ViewMixtures, list[GaussianMixture], list[ViewEvent], list[ViewMixtures]]:
+    """A map of views learned on a small run by hand, its beliefs and events, and the map after every tick.
+
+    Each frame brings a view; view 0 is seen from a second place too, which gains what the first one loses, and every
+    fifth frame takes the oldest other view away.
+    """
+    map, beliefs, events, after = ViewMixtures.empty(), [], [], []
+    for number, true in enumerate(run.truth):
+        mean, covariance = np.array([true.x, true.y, true.heading]), np.diag([0.2, 0.05, 0.01])
+        means, covariances = np.stack([mean, mean + np.array([3.0, 0.0, 0.1])]), np.stack([covariance, 4 * covariance])
+        beliefs.append(GaussianMixture(means, covariances, np.array([0.9, 0.1])))
+        row = map.add_view(np.full(6, number, np.float32), "Coefficients")
+        map.add_component(row, mean, covariance, 0.5, 1.0)
+        share = 0.5**number
+        start = np.array([[8.0, 0.0, 0.0], [-2.0, 1.0, 0.0]])
+        map.put_mixture(0, start, covariances, np.array([share, 1 - share]), np.ones(2))
+        removed = np.empty(0, np.int64)
+        if number % 5 == 4:
+            removed = map.names[1:2].copy()
+            map.keep_views(map.names != removed[0])
+        map.step()
+        inserted, changed = np.array([number]), np.array([0])
+        heaviest = int(share < 0.5)
+        why = "forgotten" if len(removed) else ""
+        weight, place = np.array([max(share, 1 - share)]), start[heaviest][None, :2]
+        counts = len(map), len(map.weights)
+        events.append(ViewEvent(*counts, inserted, removed, why, changed, weight, place, np.array([2])))
+        fields = ("views", "kind", "names", "born", "owner", "means", "covariances", "weights", "counts")
+        after.append(ViewMixtures(*(getattr(map, name) for name in fields), map.steps, map.next_name, map.pose_source))
+    return map, beliefs, events, after

@@ -24,7 +24,8 @@ class ReferenceLife(Stage):
 
     `name`: which one; None: the one whose heaviest component's place moved furthest in sum, which is where wrong
     associations show. Components of two moments are the same place where they are nearest to each other and within
-    `same_m` metres. True positions are those of the frames at which the reference changed.
+    `same_m` metres. True positions are those of the frames at which the reference changed; where lessons come with delay
+    its view was seen before.
     """
 
     name: Annotated[int, Bounds(ge=0)] | None = None
@@ -69,8 +70,9 @@ class ReferenceLife(Stage):
                 caption=f"Reference {name} came in frame {moments[0][0]} and changed in {len(moments)} frames; "
                 f"{ended}. {len(lives)} place(s) were held for it, each with its colour in both pictures"
                 f"{'; grey: those beyond the heaviest six' if len(lives) > len(COLOURS) else ''}. "
-                "Right: larger dots weigh more, circles are last places, crosses true positions at these frames.",
-                content=_draw(lives, len(ticks), path, np.array(seen), plan, gone),
+                "Right: larger dots weigh more, circles are last places, crosses the true positions at these frames "
+                "(a map that learns with delay changes a little after the view was seen).",
+                content=_draw(lives, path, np.array(seen), plan, gone),
                 order=16,
             )
         )
@@ -119,7 +121,6 @@ def lives_of(moments: Sequence[Moment], same_m: float) -> list[Array]:
 
 def _draw(
     lives: Sequence[Array],
-    frames: int,
     path: Array,
     seen: npt.NDArray[np.int64],
     plan: FloorPlan | None,
@@ -143,7 +144,6 @@ def _draw(
         if gone is not None:
             left.axvline(gone, color="#999999", linewidth=1.0, linestyle=":", label="removed")
             left.legend(loc="upper right")
-        left.set_xlim(0, max(frames - 1, 1))
         left.set_ylim(bottom=0)
         left.set_ylabel("weight")
         left.set_xlabel("frames, all logs one after the other")

@@ -1,0 +1,107 @@
+import numpy as np
+import pytest
+from small_run import mixture_run, small_run
+
+from omninav.pipeline import Context
+from omninav.stages.geometry.se2 import chain, compose
+from omninav.stages.metric.map_history import MapHistory, counted
+from omninav.stages.metric.view_map_size import ViewMapSize, stored_bytes, visited_area
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.view_mixtures import ViewMixtures
+
+CTX = Context("metric")
+
+
+@pytest.fixture(scope="module")
+def run():
+    return small_run(30, logs=2)
+
+
+@pytest.fixture(scope="module")
+def learned(run):
+    return mixture_run(run)
+
+
+@pytest.fixture(scope="module")
+def history(run, learned):
+    return MapHistory(points=7).step(CTX, *run.drive, learned[2]).metrics.values
+
+
+def test_what_came_less_what_went_is_what_is_in_the_map(history, learned):
+    over = history["map_over_steps"]
+    assert over["step"][0] == 0
+    assert over["step"][-1] == 59
+    assert len(over["step"]) == 7
+    assert np.subtract(over["inserted"], over["removed"]).tolist() == over["references"]
+    assert history["map"] == {"inserted": 60, "removed": 12, "new_after_first_lap_rate": 1.0}
+    assert over["references"][-1] == len(learned[0]) == 48
+
+
+def test_each_part_of_the_run_says_what_came_and_went_in_it(history):
+    per_lap = history["map_per_lap"]
+    assert per_lap["frames"] == [30, 30]
+    assert per_lap["inserted"] == [30, 30]
+    assert per_lap["removed"] == [6, 6]
+    assert per_lap["references"] == [24, 48]
+
+
+def test_ticks_without_an_event_change_nothing():
+    assert counted([None, None]).tolist() == [[0, 0, 0, 0], [0, 0, 0, 0]]
+
+
+def test_laps_of_the_first_log_are_parts_of_their_own():
+    run = small_run(60)
+    twice = small_run(60)
+    run.ticks += [type(tick)(60 + n, tick.stamp + 6 * 10**9, 0, 60 + n) for n, tick in enumerate(twice.ticks)]
+    run.estimates += twice.estimates
+    run.truth += twice.truth
+    run.motion += twice.motion
+    events = mixture_run(run)[2]
+    found = MapHistory(home_m=1.0).step(CTX, *run.drive, events).metrics.values
+    assert found["map_per_lap"]["frames"] == [60, 60]
+    assert found["first_map"]["part"] == "first lap"
+
+
+def test_the_drift_of_the_first_part_is_that_of_odometry_from_its_first_true_pose(history, run):
+    first = history["first_map"]
+    assert first["part"] == "first log"
+    # odometry is the true motion times 1.05 in turn and way: by hand the last pose is off by the chained difference
+    steps = np.array([[m.x, m.y, m.turn] if m else [0.0, 0.0, 0.0] for m in run.motion[:30]])
+    true = np.array([[p.x, p.y, p.heading] for p in run.truth[:30]])
+    alone = compose(true[0], chain(steps))
+    assert first["odometry_alone"]["final_error_m"] == pytest.approx(np.hypot(*(alone - true)[-1, :2]))
+    assert first["odometry_alone"]["position_error_m"]["max"] >= first["odometry_alone"]["final_error_m"]
+    assert first["estimate"]["final_error_m"] < 0.2
+
+
+def test_without_truth_there_are_counts_but_no_errors(run, learned):
+    ticks, estimates, truth, motion = run.drive
+    found = MapHistory().step(CTX, ticks, estimates, [None] * len(truth), motion, learned[2]).metrics.values
+    assert "first_map" not in found
+    assert found["map_per_lap"]["inserted"] == [30, 30]
+    assert MapHistory().step(CTX, [], [], [], [], []).metrics.values == {}
+
+
+def test_the_size_of_a_map_is_that_of_its_arrays(learned, run):
+    map = learned[0]
+    views, components = 48, len(map.weights)
+    # float32 values, names and births as 8 bytes; owner, mean, covariance, weight, count: 8 * (1 + 3 + 9 + 1 + 1)
+    assert stored_bytes(map) == views * (4 * 6 + 16) + components * 120
+    found = ViewMapSize().step(CTX, map, run.estimates, run.truth).metrics.values["map"]
+    assert found["references"] == 48
+    assert found["reference_size_bytes"] == stored_bytes(map) / 48
+    assert found["references_per_m2"] == pytest.approx(48 / found["visited_area_m2"])
+
+
+def test_the_area_along_a_line_is_a_strip_with_round_ends():
+    line = np.stack([np.linspace(0, 40, 400), np.zeros(400)], axis=1)
+    assert visited_area(line, 1.0) == pytest.approx(40 * 2 + np.pi, rel=0.06)
+    assert visited_area(np.concatenate([line, line]), 1.0) == visited_area(line, 1.0)
+    assert visited_area(np.empty((0, 2)), 1.0) == 0.0
+
+
+def test_an_empty_map_has_no_density_and_an_unseen_path_no_area():
+    found = ViewMapSize().step(CTX, ViewMixtures.empty(), [None], [Pose(0.0, 0.0, 0.0)]).metrics.values["map"]
+    assert found["references"] == 0
+    assert found["reference_size_bytes"] is None
+    assert found["references_per_m2"] == 0.0
