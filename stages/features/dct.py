@@ -9,7 +9,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.views import Coefficients
 
-from .strip import Channels, averaged_strip
+from .strip import Channels, Contrast, averaged_strip
 
 Array = npt.NDArray[np.float64]
 FloatArray = npt.NDArray[np.float32]
@@ -38,18 +38,20 @@ class CosineTransform(Stage):
     """The first coefficients of the orthonormal discrete cosine transform of the averaged panorama.
 
     Porta & Kröse 2004, section 3: a standard compression that needs no set of images to learn from. The panorama is
-    averaged to `rows` x `columns` (0..255, brightness or colour), so distances are root sums of squares of grey levels
-    over that strip. `coefficients` of each channel are kept, from the lowest frequencies; `mean` False leaves the first
+    averaged to `rows` x `columns`, of brightness or colour, in grey levels (`contrast` none, the paper's form) or in
+    standard deviations (whole, local: strip.averaged_strip); distances are root sums of squares over that strip.
+    `coefficients` of each channel are kept, from the lowest frequencies; `mean` False leaves the first
     (DC) out, which is the brightness of the whole picture (erratum 19). `headings` 1 is the paper's form, which
     compares views as they are: a transform of an unturned panorama never matches another heading. More headings, which
     must divide `columns`, compare at that many turns, and tell by which the view is turned.
     """
 
-    coefficients: Annotated[int, Bounds(ge=1)] = 64
+    coefficients: Annotated[int, Bounds(ge=1)] = 128
     mean: bool = False
     rows: Annotated[int, Bounds(ge=1)] = 16
     columns: Annotated[int, Bounds(ge=1)] = 72
     channels: Channels = "brightness"
+    contrast: Contrast = "local"
     headings: Annotated[int, Bounds(ge=1)] = 36
 
     class Out(Outputs):
@@ -77,7 +79,7 @@ class CosineTransform(Stage):
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:
         """Describe one panorama."""
-        strip = averaged_strip(panorama.pixels, self.rows, self.columns, self.channels)
+        strip = averaged_strip(panorama.pixels, self.rows, self.columns, self.channels, self.contrast)
         columns = np.tensordot(self._vertical, strip, axes=(1, 0))  # (frequencies down, columns, channels)
         waves = np.tensordot(self._turned, columns, axes=(2, 1))  # (headings, across, down, channels)
         turned: FloatArray = waves[:, self._across, self._down].reshape(self.headings, -1).astype(np.float32)

@@ -10,7 +10,7 @@ from omninav.stages.geometry.spectra import packed
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.views import Spectrum
 
-from .strip import Channels, averaged_strip
+from .strip import Channels, Contrast, averaged_strip
 
 FloatArray = npt.NDArray[np.float32]
 Complex = npt.NDArray[np.complex128]
@@ -37,14 +37,16 @@ class SegmentSpectrum(Stage):
     the coefficients do not change when the robot turns, and the turn between two views is found by circular
     cross-correlation. The panorama is averaged to `segments` around the robot in `bands` from top to bottom; each band
     and channel is a signal of its own. `frequencies`: how many coefficients of each are kept, the mean among them;
-    `mean` False leaves that out (it is 0), which is the brightness of the band.
+    `mean` False leaves that out (it is 0), which is the brightness of the band. `contrast` none: in grey levels, as the
+    paper may have had it; whole, local: in standard deviations (strip.averaged_strip).
     """
 
     segments: Annotated[int, Bounds(ge=2)] = 36
-    bands: Annotated[int, Bounds(ge=1)] = 4
-    frequencies: Annotated[int, Bounds(ge=2)] = 10
+    bands: Annotated[int, Bounds(ge=1)] = 8
+    frequencies: Annotated[int, Bounds(ge=2)] = 8
     mean: bool = True
     channels: Channels = "colour"
+    contrast: Contrast = "local"
 
     class Out(Outputs):
         """The description of the view."""
@@ -58,6 +60,6 @@ class SegmentSpectrum(Stage):
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:
         """Describe one panorama."""
-        strip = averaged_strip(panorama.pixels, self.bands, self.segments, self.channels)
+        strip = averaged_strip(panorama.pixels, self.bands, self.segments, self.channels, self.contrast)
         spectrum = spectrum_around(strip, self.frequencies, self.mean)
         return self.Out(view=Spectrum(packed(spectrum), len(spectrum), self.segments))

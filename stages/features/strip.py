@@ -10,13 +10,49 @@ from omninav.stages.values.image import Pixels
 
 FloatArray = npt.NDArray[np.float32]
 Channels = Literal["brightness", "colour"]
+Contrast = Literal["none", "whole", "local"]
+
+WINDOW = 1.0 / 18.0
+"""Standard deviation of the window of local contrast, as a share of the circle: 20 degrees."""
+
+FAINT = 5.0
+"""Grey levels: what differs by less from its surroundings is rather noise than contrast."""
 
 
-def averaged_strip(pixels: Pixels, rows: int, columns: int, channels: Channels) -> FloatArray:
-    """Means over equal parts of a panorama: (rows, columns, 1 or 3) float32 in 0..255.
+def averaged_strip(
+    pixels: Pixels, rows: int, columns: int, channels: Channels, contrast: Contrast = "none"
+) -> FloatArray:
+    """Means over equal parts of a panorama: (rows, columns, 1 or 3) float32. Columns run as the panorama's.
 
-    `brightness`: grey as OpenCV weighs it; `colour`: blue, green, red. Columns run as the panorama's.
+    `brightness`: grey as OpenCV weighs it; `colour`: blue, green, red. `contrast` none: grey levels, 0..255. whole:
+    less the channel's mean, over its standard deviation, so that neither exposure nor the lamps' brightness counts.
+    local: the same at each place with the mean and deviation of its surroundings, so that shadows and lamps that are
+    switched count as little.
     """
     seen = cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY) if channels == "brightness" else pixels
     small = cv2.resize(seen.astype(np.float32), (columns, rows), interpolation=cv2.INTER_AREA)
-    return cast(FloatArray, small.reshape(rows, columns, -1))
+    strip = cast(FloatArray, small.reshape(rows, columns, -1))
+    match contrast:
+        case "none":
+            return strip
+        case "whole":
+            deviation = np.sqrt(strip.var(axis=(0, 1)) + FAINT**2)
+            return cast(FloatArray, (strip - strip.mean(axis=(0, 1))) / deviation)
+        case "local":
+            return local_contrast(strip, WINDOW * columns, WINDOW * pixels.shape[1] * rows / pixels.shape[0])
+
+
+def local_contrast(strip: FloatArray, across: float, down: float) -> FloatArray:
+    """Each value less the mean of its surroundings, over their standard deviation: (rows, columns, channels).
+
+    The surroundings are Gaussian, of `across` columns and `down` rows (standard deviations), and go around the circle.
+    """
+    columns = strip.shape[1]
+    circle = np.concatenate([strip, strip, strip], axis=1)
+    gap = circle - _blurred(circle, across, down)
+    contrast = gap / np.sqrt(_blurred(gap**2, across, down) + FAINT**2)
+    return np.ascontiguousarray(contrast[:, columns : 2 * columns], dtype=np.float32)
+
+
+def _blurred(strip: FloatArray, across: float, down: float) -> FloatArray:
+    return cast(FloatArray, cv2.GaussianBlur(strip, (0, 0), sigmaX=across, sigmaY=down).reshape(strip.shape))

@@ -1,6 +1,7 @@
 """Whole views by cosine transform and Fourier spectrum, of turned pictures and of a turned robot."""
 
 import dataclasses
+import functools
 import math
 from typing import Any
 
@@ -11,7 +12,7 @@ from scipy import fft
 from omninav.pipeline import Context, Stage
 from omninav.stages.features.dct import CosineTransform, cosine_basis, lowest_frequencies
 from omninav.stages.features.fourier import SegmentSpectrum, spectrum_around
-from omninav.stages.features.strip import averaged_strip
+from omninav.stages.features.strip import Contrast, averaged_strip, local_contrast
 from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
@@ -20,7 +21,12 @@ from omninav.stages.unwarp.by_camera import UnwarpByCamera
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.views import WholeView
 
-STAGES = [CosineTransform(), CosineTransform(channels="colour", mean=True), SegmentSpectrum(), SegmentSpectrum(bands=1)]
+STAGES = [
+    CosineTransform(),
+    CosineTransform(channels="colour", mean=True, contrast="none"),
+    SegmentSpectrum(),
+    SegmentSpectrum(bands=4, contrast="none"),
+]
 
 
 def described(stage: Any, pixels: np.ndarray) -> WholeView:
@@ -41,6 +47,7 @@ def seen() -> Any:
     context = Context("unwarp")
     unwarp.setup(context)
 
+    @functools.cache
     def look(x: float, y: float, heading: float) -> np.ndarray:
         picture = Image(render(scene, rays, (x, y, heading), 0.9))
         panorama: Panorama = unwarp.step(context, image=picture, camera=camera).panorama
@@ -61,7 +68,7 @@ def test_coefficients_are_the_lowest_of_the_strips_transform_in_order() -> None:
     assert list(zip(down.tolist(), across.tolist(), strict=True)) == [(0, 0), (0, 1), (1, 0), (0, 2), (1, 1), (2, 0)]
     assert list(zip(*(part.tolist() for part in lowest_frequencies(4, 6, 2, False)), strict=True)) == [(0, 1), (1, 0)]
     pixels = np.random.default_rng(1).integers(0, 256, (80, 360, 3), dtype=np.uint8)
-    stage = CosineTransform(coefficients=20, mean=True)
+    stage = CosineTransform(coefficients=20, mean=True, contrast="none")
     strip = averaged_strip(pixels, stage.rows, stage.columns, "brightness")[..., 0]
     whole = fft.dctn(strip.astype(np.float64), norm="ortho")
     expected = whole[lowest_frequencies(stage.rows, stage.columns, 20, True)]
@@ -70,18 +77,19 @@ def test_coefficients_are_the_lowest_of_the_strips_transform_in_order() -> None:
 
 def test_all_coefficients_keep_the_distance_of_the_strips() -> None:
     a, b = np.random.default_rng(2).integers(0, 256, (2, 8, 12, 3), dtype=np.uint8)
-    stage = CosineTransform(coefficients=96, mean=True, rows=8, columns=12, headings=1, channels="colour")
+    stage = CosineTransform(
+        coefficients=96, contrast="none", mean=True, rows=8, columns=12, headings=1, channels="colour"
+    )
     apart = described(stage, a).distances(described(stage, b).values[None])
     assert apart == pytest.approx([np.linalg.norm(a.astype(float) - b)], rel=1e-5)
 
 
 def test_the_mean_is_what_a_brighter_picture_changes() -> None:
     pixels = np.random.default_rng(4).integers(0, 200, (80, 360, 3), dtype=np.uint8)
-    for stage in (CosineTransform(), SegmentSpectrum(mean=False)):
+    for stage in (CosineTransform(contrast="none"), SegmentSpectrum(mean=False, contrast="none")):
         assert described(stage, pixels + 40).values == pytest.approx(described(stage, pixels).values, abs=0.2)
-    with_mean = (
-        described(CosineTransform(mean=True), pixels + 40).values - described(CosineTransform(mean=True), pixels).values
-    )
+    stage = CosineTransform(mean=True, contrast="none")
+    with_mean = described(stage, pixels + 40).values - described(stage, pixels).values
     assert with_mean[0] == pytest.approx(40 * math.sqrt(16 * 72), rel=1e-3)
 
 
@@ -89,6 +97,28 @@ def test_a_strip_is_the_mean_of_its_parts() -> None:
     pixels = np.random.default_rng(5).integers(0, 256, (80, 360, 3), dtype=np.uint8)
     expected = pixels.reshape(4, 20, 36, 10, 3).mean(axis=(1, 3))
     assert averaged_strip(pixels, 4, 36, "colour") == pytest.approx(expected, abs=1e-3)
+
+
+@pytest.mark.parametrize("contrast", ["whole", "local"])
+def test_contrast_does_not_know_how_bright_the_lamps_are(contrast: Contrast) -> None:
+    pixels = np.kron(
+        np.random.default_rng(9).integers(40, 120, (8, 36, 3), dtype=np.uint8), np.ones((10, 10, 1), np.uint8)
+    )
+    dim, bright = (averaged_strip(part, 8, 36, "colour", contrast) for part in (pixels, 2 * pixels - 10))
+    assert bright == pytest.approx(dim, abs=0.1)
+    assert dim.std() == pytest.approx(1.0, abs=0.1)
+
+
+def test_local_contrast_goes_around_the_circle_and_counts_a_lit_side_as_little() -> None:
+    strip = np.random.default_rng(10).uniform(50, 100, (16, 72, 1)).astype(np.float32)
+    contrast = local_contrast(strip, 4.0, 4.0)
+    assert local_contrast(np.roll(strip, 30, axis=1), 4.0, 4.0) == pytest.approx(
+        np.roll(contrast, 30, axis=1), abs=1e-4
+    )
+    lit = strip.copy()
+    lit[:, 20:50] *= 2.0
+    inside = local_contrast(lit, 4.0, 4.0)[:, 32:38]
+    assert inside == pytest.approx(contrast[:, 32:38], abs=0.15)
 
 
 def test_a_spectrum_has_the_energy_of_its_strip() -> None:
@@ -124,7 +154,7 @@ def test_a_robot_that_turned_on_the_spot_knows_the_place_and_its_turn(seen: Any,
 
 
 def test_the_papers_form_compares_unturned() -> None:
-    stage = CosineTransform(headings=1)
+    stage = CosineTransform(headings=1, contrast="none")
     pixels = np.random.default_rng(8).integers(0, 256, (80, 360, 3), dtype=np.uint8)
     view = described(stage, pixels)
     assert view.turns(view.values[None]).tolist() == [0.0]
