@@ -29,27 +29,22 @@ def _count(
     least_value: int,
 ) -> Floats:
     segments = len(edges) - 1
-    bins = hues * values if joint else hues + values
+    bins = hues * values + values if joint else hues + values
     counts = np.zeros((segments, bins), np.float32)
     hue_counts = np.zeros(hues, np.int64)
     value_counts = np.zeros(values, np.int64)
-    joint_counts = np.zeros(hues * values, np.int64)
-    grey_counts = np.zeros(values, np.int64)
+    joint_counts = np.zeros(hues * values + values, np.int64)
     for j in range(segments):
         hue_counts[:] = 0
         value_counts[:] = 0
         joint_counts[:] = 0
-        grey_counts[:] = 0
         coloured = 0
         for row in range(hsv.shape[0]):
             for column in range(edges[j], edges[j + 1]):
                 h, s, v = hsv[row, column, 0], hsv[row, column, 1], hsv[row, column, 2]
                 defined = s >= least_saturation and v >= least_value
                 if joint:
-                    if defined:
-                        joint_counts[hue_bin[h] * values + value_bin[v]] += 1
-                    else:
-                        grey_counts[value_bin[v]] += 1
+                    joint_counts[(hue_bin[h] if defined else hues) * values + value_bin[v]] += 1
                 else:
                     value_counts[value_bin[v]] += 1
                     if defined:
@@ -57,9 +52,8 @@ def _count(
                         coloured += 1
         total = hsv.shape[0] * (edges[j + 1] - edges[j])
         if joint:
-            # A hue that is not defined is any of them: such pixels count in all hues of their value, in equal parts.
             for b in range(bins):
-                counts[j, b] = (joint_counts[b] + grey_counts[b % values] / hues) / total
+                counts[j, b] = joint_counts[b] / total
         else:
             # Pixels without a hue take no part of its histogram: their share of the segment's mass stays with V.
             for b in range(hues):
@@ -82,8 +76,9 @@ def hsv_histograms(
 
     `joint` False: `hue_bins` + `value_bins` bins, half of the mass in each part; a pixel whose hue is not defined
     (saturation below `least_saturation` or value below `least_value`, of 255; S = 0 or V = 0 never is) gives its
-    share to V. `joint` True: `hue_bins` x `value_bins` bins, hue slowest; such a pixel counts in all hues of its value
-    in equal parts. So grey segments compare by value in both: two of one value intersect by 1, white and black by 0.
+    share to V. `joint` True: `hue_bins` x `value_bins` bins, hue slowest, and behind them `value_bins` for such pixels
+    (in all hues alike, grey would resemble noise of all colours). So grey segments compare by value in both: two of
+    one value intersect by 1, white and black by 0.
     OpenCV's hue is 0..179 and circular: bins are equal arcs, of which the first starts at red (erratum 22).
     """
     hsv = cast(Pixels, cv2.cvtColor(pixels, cv2.COLOR_BGR2HSV))
@@ -106,9 +101,9 @@ class HsvHistogram(Stage):
     """Histogram of hue (16 bins) and brightness (4 bins) per segment of the panorama.
 
     Gross & Koenig 2004, section 2. `bins`: the paper's "16 bins for H and 4 bins for V" can be two histograms (20
-    bins) or a joint one (64), erratum 22; what has no hue counts by its value alone in either. Each segment sums to 1,
-    so that intersections lie in [0, 1] (erratum 20). `least_saturation` and `least_value` (of 255): below them a
-    pixel's hue is noise and does not count.
+    bins) or a joint one (64, and 4 for what has no hue), erratum 22; what has no hue counts by its value alone in
+    either. Each segment sums to 1, so that intersections lie in [0, 1] (erratum 20). `least_saturation` and
+    `least_value` (of 255): below them a pixel's hue is noise and does not count.
     """
 
     segments: Annotated[int, Bounds(ge=1)] = 36
