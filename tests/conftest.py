@@ -8,9 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT.parent / "shared" / "data"
+
+settings.register_profile("omninav", deadline=None)  # the first call of a compiled function takes what it takes
+settings.load_profile("omninav")
 
 Command = Callable[..., subprocess.CompletedProcess[str]]
 

@@ -1,0 +1,376 @@
+"""Gaussians over poses, against scipy, numpy's own inverses, plain loops and the identities of ERRATA 1 to 7 and 16."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from made_mixtures import Mixture, covariances, drawn_mixture, gap, half_a_turn_apart, mixtures
+from scipy.stats import chi2, multivariate_normal
+
+from omninav.stages.geometry.gaussians import (
+    density,
+    drawn,
+    floored,
+    intersected,
+    merged,
+    moments,
+    squared_distances,
+)
+from omninav.stages.geometry.se2 import wrap
+
+UNIT = np.eye(3)
+headings = st.floats(-math.pi, 3.14)
+
+
+def turned(mixture: Mixture, angle: float) -> Mixture:
+    """The same mixture for somebody whose zero heading lies elsewhere: places the seam anywhere."""
+    means = mixture[0].copy()
+    means[:, 2] = wrap(means[:, 2] + angle)
+    return means, mixture[1], mixture[2]
+
+
+# densities
+
+
+@given(mixtures(), st.floats(-3, 3), headings)
+def test_the_density_is_scipys_at_the_shorter_turn(mixture: Mixture, x: float, heading: float) -> None:
+    point = np.array([x, 0.3, heading])
+    assume(not half_a_turn_apart(mixture[0], point[None]))
+    wanted = sum(
+        weight * multivariate_normal(np.zeros(3), covariance).pdf(gap(mean, point))
+        for mean, covariance, weight in zip(*mixture, strict=True)
+    )
+    assert density(point[None], *mixture)[0] == pytest.approx(wanted, rel=1e-9, abs=1e-300)
+
+
+@given(mixtures(), st.floats(-3, 3), headings, st.floats(-7, 7))
+def test_the_density_does_not_see_the_seam(mixture: Mixture, x: float, heading: float, angle: float) -> None:
+    points = np.array([[x, 0.3, heading], [x, 0.3, heading + 2 * math.pi], [x, 0.3, heading - 4 * math.pi]])
+    assume(not half_a_turn_apart(mixture[0], points))
+    here = density(points, *mixture)
+    assert here[1:] == pytest.approx(here[:1].repeat(2), rel=1e-9)
+    there = density(points + np.array([0, 0, angle]), *turned(mixture, angle))
+    assert there == pytest.approx(here, rel=1e-6, abs=1e-12)
+
+
+def test_the_density_sums_to_one_over_places_and_headings() -> None:
+    mean, covariance = np.array([[0.2, -0.1, 3.0]]), np.diag([0.09, 0.04, 0.16])
+    x, y = np.linspace(-2, 2, 81), np.linspace(-2, 2, 81)
+    turns = np.linspace(-math.pi, math.pi, 120, endpoint=False)
+    grid = np.stack(np.meshgrid(x, y, turns, indexing="ij"), -1).reshape(-1, 3)
+    cell = (x[1] - x[0]) * (y[1] - y[0]) * (turns[1] - turns[0])
+    assert density(grid, mean, covariance[None], np.ones(1)).sum() * cell == pytest.approx(1.0, rel=1e-6)
+
+
+def test_the_density_is_in_one_over_square_metres_and_radians() -> None:
+    # Erratum 14: at its mean 1 / ((2 pi)^1.5 sigma_x sigma_y sigma_heading), so that a threshold on it has a unit.
+    top = density(np.zeros((1, 3)), np.zeros((1, 3)), np.diag([0.04, 0.09, 0.01])[None], np.ones(1))[0]
+    assert top == pytest.approx(1 / ((2 * math.pi) ** 1.5 * 0.2 * 0.3 * 0.1))
+
+
+def test_no_component_no_density() -> None:
+    assert density(np.zeros((2, 3)), np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0)).tolist() == [0.0, 0.0]
+
+
+# distances
+
+
+@given(mixtures(), mixtures())
+def test_squared_distances_are_those_of_a_plain_loop(a: Mixture, b: Mixture) -> None:
+    assume(not half_a_turn_apart(a[0], b[0]))
+    found, back = squared_distances(*a[:2], *b[:2]), squared_distances(*b[:2], *a[:2])
+    for i, j in itertools.product(range(len(a[0])), range(len(b[0]))):
+        apart = gap(a[0][i], b[0][j])
+        assert found[i, j] == pytest.approx(apart @ np.linalg.solve(a[1][i] + b[1][j], apart), rel=1e-6, abs=1e-12)
+    assert np.allclose(back.T, found, rtol=1e-6, atol=1e-12)
+
+
+def test_across_the_seam_a_squared_distance_takes_the_shorter_turn() -> None:
+    # Erratum 1: 0.2 rad apart on both sides of pi with variances of 0.02 each: 0.2^2 / 0.04 = 1.
+    a, b = np.array([[0, 0, math.pi - 0.1]]), np.array([[0, 0, -math.pi + 0.1]])
+    covariance = np.diag([1.0, 1.0, 0.02])[None]
+    assert squared_distances(a, covariance, b, covariance)[0, 0] == pytest.approx(1.0)
+
+
+def test_a_squared_distance_of_7_81_holds_95_percent() -> None:
+    rng = np.random.default_rng(0)
+    mixture = drawn_mixture(rng, 1)
+    points = drawn(*mixture, 20_000, rng)
+    squared = squared_distances(mixture[0], mixture[1], points, np.zeros((len(points), 3, 3)))
+    assert (squared < 7.81).mean() == pytest.approx(0.95, abs=0.005)
+    assert chi2(3).cdf(7.81) == pytest.approx(0.95, abs=1e-3)
+
+
+def test_places_without_doubt_are_at_no_distance_from_themselves_and_far_from_others() -> None:
+    means, none = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), np.zeros((2, 3, 3))
+    found = squared_distances(means, none, means, none)
+    assert found[0, 0] == 0.0
+    assert found[0, 1] > 1e200
+
+
+# moments
+
+
+def test_counts_that_are_not_normalised_do_not_move_the_mean() -> None:
+    # Erratum 7: equation 13 as printed moves (10, 5) to (54, 27) with counts of 5 and 0.4.
+    means = np.array([[10.0, 5.0, 0.3], [10.0, 5.0, 0.3]])
+    mean, covariance, total = moments(means, np.stack([UNIT, UNIT]), np.array([5.0, 0.4]))
+    assert mean == pytest.approx([10.0, 5.0, 0.3])
+    assert covariance == pytest.approx(UNIT)
+    assert total == pytest.approx(5.4)
+
+
+def test_moments_worked_by_hand() -> None:
+    # Weights 3 and 1, x at 0 and 4: mean 1, spread (3 * 1 + 1 * 9) / 4 = 3 on top of the mean covariance (3 + 5) / 4.
+    means = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0]])
+    parts = np.stack([np.diag([1.0, 1.0, 1.0]), np.diag([5.0, 1.0, 1.0])])
+    mean, covariance, _ = moments(means, parts, np.array([3.0, 1.0]))
+    assert mean == pytest.approx([1.0, 0.0, 0.0])
+    assert np.diag(covariance) == pytest.approx([5.0, 1.0, 1.0])
+    _, without, _ = moments(means, parts, np.array([3.0, 1.0]), spread=False)
+    assert np.diag(without) == pytest.approx([2.0, 1.0, 1.0])
+
+
+def test_the_spread_of_the_means_makes_the_covariance_that_of_samples() -> None:
+    # Erratum 16: without it, the merged Gaussian is more certain than what it stands for.
+    rng = np.random.default_rng(1)
+    means, parts, weights = drawn_mixture(rng, 4, extent=1.0)
+    means[:, 2] *= 0.1
+    points = drawn(means, parts, weights, 200_000, rng)
+    mean, covariance, _ = moments(means, parts, weights)
+    assert mean == pytest.approx(points.mean(axis=0), abs=0.01)
+    assert covariance == pytest.approx(np.cov(points.T), abs=0.01)
+    _, without, _ = moments(means, parts, weights, spread=False)
+    assert np.linalg.eigvalsh(covariance - without).min() > -1e-12
+    assert np.trace(without) < 0.5 * np.trace(covariance)
+
+
+@given(mixtures(), st.floats(-7, 7))
+def test_moments_do_not_see_the_seam(mixture: Mixture, angle: float) -> None:
+    means = mixture[0] * [1.0, 1.0, 0.3]  # headings within a third of a turn: a mean heading exists
+    mean, covariance, _ = moments(means, *mixture[1:])
+    other, same, _ = moments(*turned((means, *mixture[1:]), angle))
+    assert np.abs(gap(mean + np.array([0, 0, angle]), other)).max() < 1e-9
+    assert same == pytest.approx(covariance, abs=1e-9)
+
+
+def test_the_mean_heading_of_two_beside_the_seam_is_at_the_seam() -> None:
+    means = np.array([[0, 0, math.pi - 0.1], [0, 0, -math.pi + 0.1]])
+    mean, covariance, _ = moments(means, np.zeros((2, 3, 3)), np.ones(2))
+    assert abs(mean[2]) == pytest.approx(math.pi)
+    assert covariance[2, 2] == pytest.approx(0.01)
+
+
+def test_without_any_weight_all_count_alike() -> None:
+    mean, _, total = moments(np.array([[0.0, 0, 0], [2.0, 0, 0]]), np.stack([UNIT, UNIT]), np.zeros(2))
+    assert mean[0] == pytest.approx(1.0)
+    assert total == 0.0
+
+
+# merging
+
+
+def merged_plainly(mixture: Mixture, limit: float, spread: bool) -> Mixture:
+    """The closest pair first, by looking at all pairs each time."""
+    parts = list(zip(*mixture, strict=True))
+    while len(parts) > 1:
+        found = {
+            (i, j): gap(a[0], b[0]) @ np.linalg.solve(a[1] + b[1], gap(a[0], b[0]))
+            for (i, a), (j, b) in itertools.combinations(enumerate(parts), 2)
+        }
+        i, j = min(found, key=lambda pair: found[pair])
+        if found[i, j] >= limit:
+            break
+        pair = [np.stack([parts[i][k], parts[j][k]]) for k in range(3)]
+        parts = [part for k, part in enumerate(parts) if k not in (i, j)] + [moments(*pair, spread)]
+    means, parts_covariances, weights = (np.stack(each) for each in zip(*parts, strict=True))
+    return means, parts_covariances, weights
+
+
+def by_place(mixture: Mixture) -> list[np.ndarray]:
+    order = np.lexsort(mixture[0].T)
+    return [each[order] for each in mixture]
+
+
+@pytest.mark.parametrize("spread", [True, False])
+@pytest.mark.parametrize("limit", [0.5, 3.0, 20.0])
+def test_merging_takes_the_closest_pair_first_like_a_plain_loop(limit: float, spread: bool) -> None:
+    rng = np.random.default_rng(2)
+    for number in (2, 5, 12, 25):
+        mixture = drawn_mixture(rng, number, extent=0.7)
+        found, wanted = (
+            by_place(each) for each in (merged(*mixture, limit, spread), merged_plainly(mixture, limit, spread))
+        )
+        assert len(found[0]) == len(wanted[0])
+        assert all(np.allclose(a, b, atol=1e-9) for a, b in zip(found, wanted, strict=True))
+
+
+@given(mixtures(most=10, extent=0.6), st.randoms(use_true_random=False), st.sampled_from([0.3, 2.0, 8.0]))
+def test_the_order_of_the_input_changes_nothing_at_all(mixture: Mixture, random: object, limit: float) -> None:
+    order = list(range(len(mixture[2])))
+    random.shuffle(order)  # type: ignore[attr-defined]
+    here = merged(*mixture, limit, shares=mixture[2] * 0.5)
+    there = merged(*(each[order] for each in mixture), limit, shares=(mixture[2] * 0.5)[order])
+    assert all(np.array_equal(a, b) for a, b in zip(here, there, strict=True))
+
+
+@given(mixtures(most=7), st.randoms(use_true_random=False))
+def test_a_fixed_set_merges_to_the_same_moments_of_place_in_any_order(mixture: Mixture, random: object) -> None:
+    parts = [tuple(each[k : k + 1] for each in mixture) for k in range(len(mixture[2]))]
+    while len(parts) > 1:
+        random.shuffle(parts)  # type: ignore[attr-defined]
+        pair = [np.concatenate(each) for each in zip(parts.pop(), parts.pop(), strict=True)]
+        parts.append(tuple(np.asarray(each)[None] for each in moments(*pair)))
+    mean, covariance, total = moments(*mixture)
+    assert parts[0][0][0][:2] == pytest.approx(mean[:2], abs=1e-12)
+    assert parts[0][1][0][:2, :2] == pytest.approx(covariance[:2, :2], abs=1e-12)
+    assert parts[0][2][0] == pytest.approx(total)
+
+
+@given(mixtures(most=10, extent=0.6))
+def test_merging_keeps_the_weight_and_the_first_two_moments_of_place(mixture: Mixture) -> None:
+    found = merged(*mixture, 5.0, shares=np.arange(len(mixture[2])) * 1.0)
+    before, after = moments(*mixture), moments(*found[:3])
+    assert after[2] == pytest.approx(before[2])
+    assert after[0][:2] == pytest.approx(before[0][:2], abs=1e-12)
+    assert after[1][:2, :2] == pytest.approx(before[1][:2, :2], abs=1e-12)
+    assert found[3].sum() == pytest.approx(np.arange(len(mixture[2])).sum())
+    assert np.linalg.eigvalsh(found[1]).min() > 0.0
+    apart = squared_distances(found[0], found[1], found[0], found[1])
+    assert (apart[~np.eye(len(apart), dtype=bool)] >= 5.0).all()
+
+
+def test_of_three_in_a_row_the_two_closest_become_one() -> None:
+    # 0, 1.0 and 1.9 with variances of 0.5: squared distances 1 and 0.81. The first stays alone: 1.45^2 / 1.2 > 1.1.
+    means = np.array([[0.0, 0, 0], [1.0, 0, 0], [1.9, 0, 0]])
+    for order in itertools.permutations(range(3)):
+        found = merged(means[list(order)], np.stack([0.5 * UNIT] * 3), np.ones(3), 1.1)
+        assert sorted(found[0][:, 0]) == pytest.approx([0.0, 1.45])
+        assert sorted(found[2]) == [1.0, 2.0]
+
+
+def test_counts_average_and_weights_add_up() -> None:
+    # Equations 13 and 14: eta 3 and 1 average places, w 0.7 and 0.6 are summed; capping at 1 is the map's (erratum 8).
+    means = np.array([[0.0, 0, 0], [0.4, 0, 0]])
+    found = merged(means, np.stack([UNIT, UNIT]), np.array([3.0, 1.0]), 1.0, shares=np.array([0.7, 0.6]))
+    assert found[0][0] == pytest.approx([0.1, 0, 0])
+    assert found[2] == pytest.approx([4.0])
+    assert found[3] == pytest.approx([1.3])
+
+
+def test_two_on_both_sides_of_the_seam_merge_at_the_seam() -> None:
+    means = np.array([[0, 0, math.pi - 0.05], [0, 0, -math.pi + 0.05]])
+    found = merged(means, np.stack([0.01 * UNIT] * 2), np.ones(2), 1.0)
+    assert abs(found[0][0, 2]) == pytest.approx(math.pi)
+    assert found[1][0, 2, 2] == pytest.approx(0.01 + 0.05**2)
+
+
+def test_merging_writes_to_nothing_it_was_given() -> None:
+    mixture = drawn_mixture(np.random.default_rng(3), 20, 0.3)
+    before = [each.copy() for each in mixture]
+    merged(*mixture, 8.0)
+    assert all(np.array_equal(a, b) for a, b in zip(mixture, before, strict=True))
+
+
+# intersection
+
+
+@given(mixtures(most=2, least=2), st.floats(0, 1))
+def test_an_intersection_is_equations_3_and_4_with_their_inverses(mixture: Mixture, alpha: float) -> None:
+    (a, b), (cov_a, cov_b), _ = mixture
+    assume(not half_a_turn_apart(a[None], b[None]))
+    mean, covariance = intersected(a, cov_a, b, cov_b, alpha)
+    near = a + gap(a, b)
+    first, second = (1 - alpha) * np.linalg.inv(cov_a), alpha * np.linalg.inv(cov_b)
+    wanted = np.linalg.inv(first + second)
+    assert covariance == pytest.approx(wanted, rel=1e-6, abs=1e-12)
+    assert np.abs(gap(mean, wanted @ (first @ a + second @ near))).max() < 1e-7
+
+
+@given(mixtures(most=2, least=2), st.floats(0, 1), st.floats(-7, 7))
+def test_an_intersection_does_not_see_the_seam(mixture: Mixture, alpha: float, angle: float) -> None:
+    means, parts, weights = mixture
+    means = means * [1, 1, 0.45]  # the shorter turn between them stays the same one
+    mean, covariance = intersected(means[0], parts[0], means[1], parts[1], alpha)
+    there, _, _ = turned((means, parts, weights), angle)
+    other, same = intersected(there[0], parts[0], there[1], parts[1], alpha)
+    assert np.abs(gap(mean + np.array([0, 0, angle]), other)).max() < 1e-8
+    assert same == pytest.approx(covariance, rel=1e-9, abs=1e-15)
+
+
+def test_equal_covariances_stay_and_equal_means_do_not_move() -> None:
+    # Errata 2 and 4: as printed, 4 I and 4 I gave 0.25 I and another mean; Kalman's would be 2 I.
+    pose = np.array([3.0, -2.0, 1.0])
+    mean, covariance = intersected(pose, 4 * UNIT, pose, 4 * UNIT, 0.3)
+    assert covariance == pytest.approx(4 * UNIT)
+    assert mean == pytest.approx(pose)
+
+
+@given(covariances(), covariances(), st.floats(0.01, 0.99), st.integers(0, 2**32 - 1))
+@settings(max_examples=50)
+def test_an_intersection_is_never_more_certain_than_it_may_be(
+    cov_a: np.ndarray, cov_b: np.ndarray, alpha: float, seed: int
+) -> None:
+    # Whatever the correlation R of the two errors: the error (1-alpha) C A^-1 e_a + alpha C B^-1 e_b has a covariance
+    # that C bounds from above. R of norm <= 1 makes [[A, X], [X^T, B]] with X = A^(1/2) R B^(1/2)^T a covariance.
+    _, covariance = intersected(np.zeros(3), cov_a, np.zeros(3), cov_b, alpha)
+    random = np.random.default_rng(seed).normal(size=(3, 3))
+    cross = np.linalg.cholesky(cov_a) @ (random / np.linalg.norm(random, 2)) @ np.linalg.cholesky(cov_b).T
+    by_a = (1 - alpha) * covariance @ np.linalg.inv(cov_a)
+    by_b = alpha * covariance @ np.linalg.inv(cov_b)
+    mixed = by_a @ cross @ by_b.T
+    error = by_a @ cov_a @ by_a.T + by_b @ cov_b @ by_b.T + mixed + mixed.T
+    slack = np.linalg.eigvalsh(covariance - error)
+    assert slack.min() > -1e-9 * np.trace(covariance)
+
+
+def test_what_is_no_covariance_is_refused() -> None:
+    with pytest.raises(ValueError, match="not positive definite"):
+        intersected(np.zeros(3), UNIT, np.zeros(3), -UNIT, 0.5)
+    with pytest.raises(ValueError, match="not positive definite"):
+        density(np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3, 3)), np.ones(1))
+
+
+# draws and floors
+
+
+def test_draws_have_the_moments_of_the_mixture_and_wrapped_headings() -> None:
+    rng = np.random.default_rng(4)
+    means = np.array([[0.0, 0.0, 3.1], [5.0, 1.0, -3.1], [9.0, 9.0, 0.0]])
+    parts = np.stack([np.diag([0.04, 0.01, 0.02])] * 3)
+    points = drawn(means, parts, np.array([0.75, 0.25, 0.0]), 40_000, rng)
+    assert points[:, 2].min() >= -math.pi
+    assert points[:, 2].max() < math.pi
+    first = points[:, 0] < 2.5
+    assert first.mean() == pytest.approx(0.75, abs=0.01)
+    assert not (points[:, 1] > 5).any()
+    assert points[first, 0].std() == pytest.approx(0.2, rel=0.02)
+    assert wrap(points[first, 2] - 3.1).std() == pytest.approx(math.sqrt(0.02), rel=0.02)
+
+
+def test_a_mixture_without_weight_gives_no_draws() -> None:
+    with pytest.raises(ValueError, match="without weight"):
+        drawn(np.zeros((1, 3)), UNIT[None], np.zeros(1), 5, np.random.default_rng(0))
+
+
+@given(covariances(), st.floats(0.01, 1.0), st.floats(0.01, 1.0))
+def test_a_floor_holds_in_every_direction_and_changes_nothing_above_it(
+    covariance: np.ndarray, metres: float, radians: float
+) -> None:
+    least = np.diag([metres, metres, radians]) ** 2
+    found = floored(covariance, (metres, metres, radians))
+    assert np.linalg.eigvalsh(found - least).min() > -1e-12
+    assert np.linalg.eigvalsh(found - covariance).min() > -1e-12
+    assert np.array_equal(found, found.T)
+    above = floored(covariance + least, (metres, metres, radians))
+    assert np.array_equal(above, covariance + least)
+
+
+def test_a_floor_raises_none_and_less_than_none() -> None:
+    low = np.array([np.zeros((3, 3)), np.diag([1.0, -1e-12, 1.0])])
+    found = floored(low, (0.1, 0.1, 0.02))
+    assert found[0] == pytest.approx(np.diag([0.01, 0.01, 0.0004]))
+    assert found[1] == pytest.approx(np.diag([1.0, 0.01, 1.0]))
