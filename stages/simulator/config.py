@@ -197,6 +197,18 @@ class Room:
 
 
 @dataclass(frozen=True)
+class Event:
+    """Somebody lifts the robot, `at` seconds into a drive; odometry does not see it.
+
+    It is put down where it was, or at `to` (x, y, heading: a kidnapping), turned by `turn` (rad).
+    """
+
+    at: Positive
+    turn: float = 0.0
+    to: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True)
 class Route:
     """A way through a world; `tours.plan` makes it a line of points around whatever stands in between.
 
@@ -214,6 +226,10 @@ class Route:
     length: Positive | None = None
     """Metres after which it ends; all the way where null."""
     seed: int = 0
+    events: tuple[Event, ...] = ()
+    """What is done to the robot on this route, each time that it is driven."""
+    day_lasts: Positive | None = None
+    """Seconds after which lamps, curtains and goods are the next day's, while the robot drives on; null: never."""
 
 
 @dataclass(frozen=True)
@@ -387,18 +403,6 @@ class Delivery:
     dropped: Share = 0.0
     late: Share = 0.0
     late_by: Spread = 0.7
-
-
-@dataclass(frozen=True)
-class Event:
-    """Somebody lifts the robot, `at` seconds into a drive; odometry does not see it.
-
-    It is put down where it was, or at `to` (x, y, heading: a kidnapping), turned by `turn` (rad).
-    """
-
-    at: Positive
-    turn: float = 0.0
-    to: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)

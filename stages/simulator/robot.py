@@ -21,6 +21,8 @@ ARRIVED = 0.05
 """Metres from the last waypoint at which a drive ends."""
 LOOSE = 0.02
 """Metres from an obstacle at which a contact has ended and another one counts anew."""
+ABOUT = 0.5
+"""Metres by which one stretch of a route may pass further from a place than another and still be taken for as near."""
 NOBODY: F64 = np.zeros((0, 3))
 """No people in the way."""
 
@@ -134,7 +136,8 @@ def drive(
     Pure pursuit: the robot steers for the point of the route `look_ahead` metres on, slower the more it must turn, and
     turns on the spot where it would have to look back. Speed and turning change no faster than the limits allow. The
     robot starts at rest at the first waypoint, facing the second unless `start_heading` is given. Obstacles stop it
-    where `room` is given. After an event it goes on from the point of the route that is nearest to where it was put.
+    where `room` is given. After an event it goes on from the point of the route that is nearest to where it was put; of
+    several, as on laps, from the next.
     """
     points, ends = _legs(waypoints)
     length = float(ends[-1])
@@ -165,7 +168,7 @@ def drive(
         put_down(state, event)
         poses[done - 1] = state[:3]
         if event.to is not None:
-            along = _nearest_along(points, ends, state[:2])
+            along = _nearest_along(points, ends, state[:2], along)
     poses = poses[:done]
     before = poses.copy()
     for number, pose in rolled_to.items():
@@ -196,14 +199,19 @@ def _legs(waypoints: npt.ArrayLike) -> tuple[F64, F64]:
     return points, np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
 
 
-def _nearest_along(points: F64, ends: F64, at: F64) -> float:
-    """Distance along the line of the point nearest to a place."""
+def _nearest_along(points: F64, ends: F64, at: F64, along: float = 0.0) -> float:
+    """Distance along the line of the point nearest to a place; of several that are about as near, the first ahead."""
     if len(points) == 1:
         return 0.0
     legs = np.diff(points, axis=0)
     part = np.clip(((at - points[:-1]) * legs).sum(axis=1) / (legs**2).sum(axis=1), 0.0, 1.0)
-    leg = int(np.argmin(np.hypot(*(points[:-1] + part[:, None] * legs - at).T)))
-    return float(ends[leg] + part[leg] * (ends[leg + 1] - ends[leg]))
+    off = np.hypot(*(points[:-1] + part[:, None] * legs - at).T)
+    places = ends[:-1] + part * np.diff(ends)
+    near = off <= off.min() + ABOUT
+    ahead = near & (places >= along)
+    first = int(np.argmax(ahead if ahead.any() else near))
+    chosen = [leg for leg in range(first, len(legs)) if places[leg] - places[first] < 2 * ABOUT]
+    return float(places[chosen[int(np.argmin(off[chosen]))]])
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -20,7 +20,7 @@ from omninav.stages.simulator.obstacles import Obstacles, gather, nearest
 from omninav.stages.simulator.odometry import draw_bias, odometry
 from omninav.stages.simulator.people import Person, Track
 from omninav.stages.simulator.ranges import azimuths, measure, round_bodies
-from omninav.stages.simulator.renderer import render
+from omninav.stages.simulator.renderer import Scene, render
 from omninav.stages.simulator.robot import NOBODY, drive, reach
 from omninav.stages.simulator.streams import stream
 from omninav.stages.simulator.world import World
@@ -55,7 +55,9 @@ class SimulatedRecording:
                 f"world '{world.name}' has no route '{route}'; it has: {', '.join(sorted(world.routes)) or 'none'}"
             )
         self.world, self.route, self.day = world, route, day
-        self.events = tuple(sorted(events, key=lambda event: event.at))
+        self.events = tuple(sorted([*world.routes[route].events, *events], key=lambda event: event.at))
+        self._later: World | None = None
+        self._lasts = world.routes[route].day_lasts
         self.camera = camera_of(world.camera)
         self.dropped: Counter[str] = Counter()
         self.details: dict[str, str] = {}
@@ -74,6 +76,11 @@ class SimulatedRecording:
         for event in self.events:
             if event.to is not None:
                 refuse_no_room(world, self._room, event.to, "events")
+        if self._lasts is not None and any(later.furniture or later.doors < 1.0 for later in world.days[self.day :]):
+            raise UnreadableRecording(
+                f"route '{self.route}' lasts several days, and on one of world '{world.name}' furniture or doors move; "
+                "lamps, curtains and goods may change while the robot drives, but what it may run into may not"
+            )
         driven = drive(line, world.robot, world.timing.odometry, room=self._room, events=self.events)
         self._seconds, self.driven, self.collisions = driven.times, driven.poses, driven.collisions
         bias = draw_bias(world.odometry, stream(world.seed, "odometry bias", self.day))
@@ -136,6 +143,15 @@ class SimulatedRecording:
     def _world(self) -> World:
         return World(self.world, self.day)
 
+    def _scene(self, seconds: float) -> Scene:
+        """The world as it looks at a time: a long drive may see several days."""
+        if self._lasts is None or seconds < self._lasts:
+            return self._world.scene
+        number = self.day + int(seconds // self._lasts)
+        if self._later is None or self._later.day != number:
+            self._later = World(self.world, number)
+        return self._later.scene
+
     @cached_property
     def _room(self) -> Obstacles:
         return gather(self._world.obstacles, self.world.size, reach(self.world.robot))
@@ -156,7 +172,7 @@ class SimulatedRecording:
         sensor, at = self.world.sensor, self._shots[shot]
         swing = np.sin(2 * np.pi * at / sensor.exposure_period)
         return render(
-            self._world.scene,
+            self._scene(float(at)),
             self._rays,
             self._true(shutter_times(sensor, at)),
             self.world.camera.height,

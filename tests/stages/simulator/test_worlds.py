@@ -11,6 +11,7 @@ import pytest
 from omegaconf import OmegaConf
 
 from omninav.pipeline.ports import convert
+from omninav.stages.geometry.se2 import compose, wrap
 from omninav.stages.simulator import tours
 from omninav.stages.simulator.config import AisleBlock, Block, Day, Door, LampGrid, Room, Route, WorldConfig
 from omninav.stages.simulator.layout import expand
@@ -94,6 +95,9 @@ def test_a_days_line_is_beside_the_route_by_the_stated_share_of_its_spread() -> 
         ("home_store", "training", 1400, 1650),
         *(("home_store", f"tt{k}", 150, 200) for k in (1, 2, 3, 4)),
         ("campus", "tour", 440, 460),
+        ("home_store_mid", "training", 1900, 2100),
+        ("home_store_mid", "test", 295, 305),
+        ("home_store_small", "laps", 370, 400),
     ],
 )
 def test_routes_have_the_lengths_of_the_papers(name: str, route: str, least: float, most: float) -> None:
@@ -106,6 +110,26 @@ def test_the_campus_tour_has_545_images() -> None:
 
 def test_a_lap_of_the_office_loop_has_about_100_images() -> None:
     assert len(SimulatedRecording(load("office_loop"), "lap", 0).stamps) == pytest.approx(100, abs=8)
+
+
+def test_three_laps_of_four_are_slipped_on_and_one_of_ten_begins_elsewhere() -> None:
+    """Porta & Kroese: four laps with three liftings; a lap cut short by a kidnapping, then nine more."""
+    slip, kidnap = (SimulatedRecording(load("office_loop"), route, 0) for route in ("slip", "kidnap"))
+    lap = len(SimulatedRecording(load("office_loop"), "lap", 0).stamps)
+    assert len(slip.stamps) == pytest.approx(4 * lap, abs=15)
+    starts = [(moment - int(slip.times[0])) / 1e9 / (slip.times[-1] - slip.times[0]) * 4e9 for moment, _ in slip.lifted]
+    assert [int(start) for start in starts] == [1, 2, 3]
+    assert len(kidnap.stamps) == pytest.approx(9.6 * lap, abs=0.5 * lap)
+    for drive in (slip, kidnap):
+        ends = compose(drive.driven[0], drive.rolled[-1])
+        assert math.dist(ends[:2], drive.driven[-1, :2]) > 2.0
+    row = int(np.searchsorted(kidnap.times, kidnap.lifted[0][0]))
+    turned = wrap(kidnap.driven[row, 2] - kidnap.driven[row - 1, 2])
+    assert abs(turned) == pytest.approx(math.pi, abs=0.15)
+
+
+def test_the_changing_institute_has_8000_pictures_in_one_drive() -> None:
+    assert 8000 <= len(SimulatedRecording(load("institute"), "changing", 0).stamps) <= 8400
 
 
 def test_the_home_store_has_more_than_40_aisles_and_training_goes_through_each() -> None:

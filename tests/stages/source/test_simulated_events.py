@@ -1,6 +1,7 @@
 """What befalls a simulated drive: liftings, pictures lost or late, ranges; in its log as in itself."""
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,8 +11,10 @@ import pytest
 from omninav.pipeline import Context
 from omninav.pipeline.log import LogReader
 from omninav.stages.geometry.se2 import between, wrap
-from omninav.stages.simulator.config import Delivery, Event, MirrorCamera, OdometryNoise, Route
+from omninav.stages.simulator.config import Day, Delivery, Event, MirrorCamera, OdometryNoise, Route, Sensor
 from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.renderer import render
+from omninav.stages.simulator.world import World
 from omninav.stages.source.log import LogSource, Position
 from omninav.stages.source.opening import open_recording
 from omninav.stages.source.record_log import RecordLog
@@ -54,6 +57,48 @@ def test_a_lifted_robot_is_elsewhere_in_the_truth_and_nowhere_else():
     moments = drive.stamps[leaps] - drive.times[0]
     assert [round(moment / 1e9, 2) for moment in moments] == [3.02, 4.52]
     assert off[leaps[0], 2] == pytest.approx(1.0)
+
+
+def test_a_routes_own_events_come_with_it_and_others_on_top():
+    route = replace(EXACT.routes["there"], events=KIDNAPPED[:1])
+    drive = SimulatedRecording(replace(EXACT, routes={"there": route}), "there", 1, KIDNAPPED[1:])
+    whole = SimulatedRecording(EXACT, "there", 1, KIDNAPPED)
+    assert drive.events == KIDNAPPED
+    np.testing.assert_array_equal(drive.driven, whole.driven)
+
+
+def test_who_is_put_down_beside_laps_goes_on_with_the_lap_that_was_begun():
+    """A triangle of 12 m, three times: who is carried ahead on the first lap has most of it left, and two more."""
+    laps = Route(kind="laps", waypoints=((2.0, 1.5), (5.0, 1.5), (5.0, 5.5)), laps=3)
+    world = replace(EXACT, shelves=(), blocks=(), hangings=(), routes={"laps": laps})
+    plain, carried = (
+        SimulatedRecording(world, "laps", 1, events) for events in ((), (Event(at=4.0, to=(5.0, 4.5, 1.57)),))
+    )
+    way = [float(np.hypot(*np.diff(drive.rolled[:, :2], axis=0).T).sum()) for drive in (plain, carried)]
+    assert 2.0 < way[0] - way[1] < 6.0  # what it was carried over, but no lap
+
+
+def test_a_long_drive_sees_the_light_and_the_goods_of_several_days():
+    days = (Day(), Day(rearranged=0.5), Day(light=(0.5, 0.5, 0.5)))
+    still = replace(EXACT, days=days, timing=replace(EXACT.timing, pictures=1.0), sensor=Sensor(noise=0.0))
+    lasting = replace(still, routes={"there": replace(still.routes["there"], day_lasts=3.0)})
+    drive = SimulatedRecording(lasting, "there", 0)
+    for shot, day in ((0, 0), (2, 0), (4, 1), (7, 2)):
+        at = drive._shots[shot]
+        assert int(at // 3.0) == day
+        exposure = 1.0 + 0.04 * math.sin(2 * math.pi * at / still.sensor.exposure_period)
+        as_that_day = render(
+            World(still, day).scene, drive._rays, drive._true(at[None]), 0.9, exposure, key=drive._key + shot
+        )
+        np.testing.assert_array_equal(drive.picture(shot), as_that_day)
+    np.testing.assert_array_equal(drive.picture(0), SimulatedRecording(still, "there", 0).picture(0))
+
+
+def test_what_a_robot_may_run_into_does_not_change_while_it_drives():
+    lasting = replace(EXACT.routes["there"], day_lasts=3.0)
+    world = replace(EXACT, days=(Day(), Day(furniture=0.1)), routes={"there": lasting})
+    with pytest.raises(UnreadableRecording, match="route 'there' lasts several days, and on one of world"):
+        SimulatedRecording(world, "there", 0)
 
 
 def test_no_picture_is_taken_on_the_way_from_one_place_to_the_other():
