@@ -86,8 +86,9 @@ def mean_and_spread(values: Sequence[float], digits: int) -> str:
 
 
 def beside_the_mean(values: Sequence[float], ran: int, digits: int) -> list[str]:
-    """What a mean does not say: the median, and how many of those that have run have a figure at all."""
-    said = [f"median {number(float(np.median(values)), digits)}"] if len(values) > 1 else []
+    """What a mean does not say: the median where it is another, and how many of those that ran have a figure at all."""
+    mean, median = (number(float(of(values)), digits) if values else "" for of in (np.mean, np.median))
+    said = [f"median {median}"] if mean != median else []
     return [*said, f"{len(values)} of {ran}"] if len(values) < ran else said
 
 
