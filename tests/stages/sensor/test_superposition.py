@@ -1,0 +1,109 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from made_mixtures import drawn_mixture
+
+from omninav.pipeline import Context
+from omninav.stages.geometry.gaussians import density
+from omninav.stages.geometry.se2 import wrap
+from omninav.stages.sensor.superposition import Superposition
+from omninav.stages.values.belief import GaussianMixture
+from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.views import Neighbours
+
+CTX = Context("sensor")
+
+
+def learned(owners: list[int], means: list[list[float]], weights: list[float], spread: float = 0.1) -> ViewMixtures:
+    map = ViewMixtures.empty()
+    for _ in range(max(owners) + 1):
+        map.add_view(np.zeros(4, np.float32), "Coefficients")
+    for owner, mean, weight in zip(owners, means, weights, strict=True):
+        map.add_component(owner, np.array(mean), spread**2 * np.eye(3), weight, 1.0)
+    return map
+
+
+def near(rows: list[int], alike: list[float], turns: list[float] | None = None) -> Neighbours:
+    turned = np.zeros(len(rows)) if turns is None else np.array(turns)
+    return Neighbours(np.array(rows, np.int64), 1 - np.array(alike), np.array(alike), turned, 0.0)
+
+
+TWO = learned([0, 1, 1, 2], [[0, 0, 0], [1, 0, 0], [5, 5, 1], [9, 9, 2]], [0.8, 0.5, 0.2, 1.0])
+
+
+def said(stage: Superposition, neighbours: Neighbours, map: ViewMixtures = TWO) -> GaussianMixture:
+    found = stage.step(CTX, neighbours, map).hypothesis
+    assert found is not None
+    return found
+
+
+def test_weights_are_likeness_times_weight_and_are_not_normalised() -> None:
+    # Erratum 13: the weights of a view's places need not sum to 1, and stay so.
+    found = said(Superposition(), near([1, 0], [0.9, 0.5]))
+    assert found.weights == pytest.approx([0.5 * 0.8, 0.9 * 0.5, 0.9 * 0.2])
+    assert found.means[:, 0].tolist() == [0.0, 1.0, 5.0]
+
+
+def test_normalised_likeness_makes_a_density_in_metres_and_radians() -> None:
+    # Equation 5 with sum lambda = 1 (erratum 14): at the mean of one place of weight 1 it is the Gaussian's own top.
+    map = learned([0, 1], [[0, 0, 0], [40, 0, 0]], [1.0, 1.0])
+    found = said(Superposition(normalise=True), near([0, 1], [0.6, 0.2]), map)
+    assert found.weights == pytest.approx([0.75, 0.25])
+    top = density(np.zeros((1, 3)), found.means, found.covariances, found.weights)[0]
+    assert top == pytest.approx(0.75 / ((2 * math.pi) ** 1.5 * 0.1**3))
+
+
+def test_the_nearest_view_alone_is_the_crisp_mapping() -> None:
+    found = said(Superposition(views="nearest"), near([1, 0], [0.9, 0.5]))
+    assert found.means[:, 0].tolist() == [1.0, 5.0]
+    assert said(Superposition(views="nearest", normalise=True), near([1, 0], [0.9, 0.5])).weights.sum() == 0.7
+
+
+@given(st.floats(-math.pi, 3.14), st.floats(-math.pi, 3.14))
+def test_headings_turn_by_what_was_taken_off_when_they_were_learned(heading: float, turn: float) -> None:
+    # Erratum 12: stored as heading minus turn, used as stored plus turn; covariances as they are. Seam included.
+    map = learned([0], [[1.0, 2.0, float(wrap(heading - turn))]], [1.0])
+    found = said(Superposition(), near([0], [1.0], [turn]), map)
+    assert abs(np.angle(np.exp(1j * (found.means[0, 2] - heading)))) < 1e-9
+    assert -math.pi <= found.means[0, 2] < math.pi
+    assert found.means[0, :2].tolist() == [1.0, 2.0]
+    assert np.array_equal(found.covariances, map.covariances)
+
+
+def test_places_without_weight_yet_say_nothing() -> None:
+    map = learned([0, 0], [[1, 0, 0], [2, 0, 0]], [0.0, 0.3])
+    assert said(Superposition(), near([0], [1.0]), map).means[:, 0].tolist() == [2.0]
+    assert Superposition().step(CTX, near([0], [1.0]), learned([0], [[1, 0, 0]], [0.0])).hypothesis is None
+
+
+def test_where_nothing_is_near_there_is_no_hypothesis() -> None:
+    assert Superposition().step(CTX, None, TWO).hypothesis is None
+    assert Superposition().step(CTX, near([], []), TWO).hypothesis is None
+    assert Superposition().step(CTX, near([], []), ViewMixtures.empty()).hypothesis is None
+
+
+def test_the_map_is_not_written_to() -> None:
+    before = TWO.means.copy()
+    said(Superposition(), near([0, 1, 2], [1.0, 1.0, 1.0], [1.0, 2.0, 3.0]))
+    assert np.array_equal(TWO.means, before)
+
+
+def test_it_is_the_sum_over_views_and_components_written_as_two_loops() -> None:
+    rng = np.random.default_rng(0)
+    means, covariances, weights = drawn_mixture(rng, 40)
+    owners = rng.integers(0, 12, 40)
+    map = learned([11], [[0, 0, 0]], [0.0])
+    for k in range(40):
+        map.add_component(int(owners[k]), means[k], covariances[k], float(weights[k]), 1.0)
+    rows, alike, turns = rng.permutation(12)[:7], np.sort(rng.random(7))[::-1], rng.uniform(-3, 3, 7)
+    found = said(Superposition(), Neighbours(rows, 1 - alike, alike, turns, 0.0), map)
+    points = drawn_mixture(rng, 50)[0]
+    wanted = np.zeros(50)
+    for j in range(7):
+        for k in np.flatnonzero(owners == rows[j]):
+            turned = means[k : k + 1] + np.array([0, 0, turns[j]])
+            wanted += alike[j] * density(points, turned, covariances[k : k + 1], weights[k : k + 1])
+    assert density(points, found.means, found.covariances, found.weights) == pytest.approx(wanted, rel=1e-9)
