@@ -296,6 +296,7 @@ def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
                 axes.plot(x, y, color="#555555", linestyle=("--", ":", "-.")[index % 3], linewidth=1.3, label=label)
             axes.set_title(box)
             axes.set_xlabel(curve.along)
+            axes.locator_params(axis="x", integer=not curve.at)  # there is no lap 1.5
         if not heights:
             return b""
         _scale(grid[0], heights)
@@ -403,7 +404,8 @@ def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
         axes.set_ylabel(measure.title)
         _scale(axes, all_heights)
         axes.grid(axis="x", visible=False)
-        axes.legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
+        if axes.get_legend_handles_labels()[1]:
+            axes.legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
     return drawn.content
 
 
