@@ -204,7 +204,7 @@ def _tiles(run: "ExperimentRun", verdicts: Sequence[Verdict]) -> list[dict[str, 
     ]
     return [
         *(claims if verdicts else []),
-        {"value": str(len(run.cells)), "of": "", "name": "conditions"},
+        {"value": str(len(run.experiment.conditions())), "of": "", "name": "conditions"},
         {"value": str(done), "of": f"of {wanted}", "name": "repetitions done"},
         {"value": run.profile, "of": "", "name": "profile"},
     ]
