@@ -1,5 +1,6 @@
 """The map's views that look like the present one."""
 
+import math
 from typing import Annotated
 
 import numpy as np
@@ -40,7 +41,7 @@ class ViewNeighbours(Stage):
         if self.count:
             order = np.argsort(distances, kind="stable")
             rows = order[: self.count]
-            within = float(distances[order[min(self.count, len(order) - 1)]])
+            within = float(distances[order[min(self.count, len(order) - 1)]]) if len(order) > 1 else math.inf
         else:
             within = 0.0 if limit is None else limit.distance
             rows = np.flatnonzero(distances < within)

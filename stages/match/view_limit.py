@@ -31,25 +31,31 @@ class FixedLimit(Stage):
 
 
 class FirstViews(State):
-    """The first views of a drive (n, D), how far each is from the one `apart` before, and metres since the last."""
+    """The first views of a drive (n, D), all distances between two of them, and metres since the last was taken.
+
+    Both are let go of once the limit is `settled`.
+    """
 
     views: FloatArray = field(default_factory=lambda: np.zeros((0, 0), np.float32))
     distances: Array = field(default_factory=lambda: np.zeros(0))
     since: float = 0.0
+    limit: float = 0.0
     settled: bool = False
 
 
 class FirstViewsLimit(Stage):
-    """The median distance between views that are `apart` views from each other, over the drive's first ones.
+    """A share of the median distance between any two of the drive's first views.
 
-    A threshold in the views' unit that follows from the drive itself: delta_y of Porta & Kröse 2004, E_max of Gross,
-    Koenig & Müller 2005, who do not say how they set theirs. The first `views` views between which the robot moved by
-    `least_m` count; until then the limit is the median so far, not settled, and absent for the first view. It is
-    settled in the first log and holds for all that follow. Manifest fact `view_limit`.
+    The threshold of Porta & Kröse 2004 (delta_y) and Gross, Koenig & Müller 2005 (E_max), who do not say how they set
+    it, in the views' own unit. Most of those pairs are strangers, and strangers are about equally far from each other
+    in all recordings: one share does for all of them (docs/experiments/cml_view_limit.md). The first `views` views
+    count between which the robot moved by `least_m`. Until then the limit is that of the views so far, and not
+    settled; the very first has none. It is settled in the first log and holds for all that follow. Manifest fact
+    `view_limit`.
     """
 
-    views: Annotated[int, Bounds(ge=2)] = 30
-    apart: Annotated[int, Bounds(ge=1)] = 3
+    share: Annotated[float, Bounds(gt=0, le=1)] = 0.65
+    views: Annotated[int, Bounds(ge=2)] = 100
     least_m: Annotated[float, Bounds(ge=0)] = 0.01
 
     class Out(Outputs):
@@ -59,21 +65,22 @@ class FirstViewsLimit(Stage):
 
     def step(self, ctx: Context, view: WholeView, motion: Motion | None, first: FirstViews) -> Out:
         """Take one view in."""
-        if not first.settled:
-            self._measure(view, motion, first)
-        if not len(first.distances):
-            return self.Out()
-        distance = float(np.median(first.distances))
-        ctx.fact("view_limit", round(distance, 4))
-        return self.Out(limit=ViewLimit(distance, first.settled))
+        if not first.settled and self._has_moved(motion, first):
+            self._take(view, first)
+            ctx.fact("view_limit", round(first.limit, 4))
+        return self.Out(limit=ViewLimit(first.limit, first.settled) if first.limit > 0.0 else None)
 
-    def _measure(self, view: WholeView, motion: Motion | None, first: FirstViews) -> None:
-        first.since += 0.0 if motion is None else math.hypot(motion.x, motion.y)
-        if len(first.views) and first.since < self.least_m:
-            return
-        first.since = 0.0
+    def _has_moved(self, motion: Motion | None, first: FirstViews) -> bool:
+        first.since += math.inf if motion is None else math.hypot(motion.x, motion.y)
+        moved = first.since >= self.least_m
+        if moved:
+            first.since = 0.0
+        return moved
+
+    def _take(self, view: WholeView, first: FirstViews) -> None:
         if len(first.views):
-            before = first.views[-min(self.apart, len(first.views))]
-            first.distances = np.append(first.distances, view.distances(before[None])[0])
+            first.distances = np.append(first.distances, view.distances(first.views))
+            first.limit = self.share * float(np.median(first.distances))
         first.views = np.concatenate([first.views.reshape(-1, len(view.values)), view.values[None]])
-        first.settled = len(first.views) >= self.views
+        if len(first.views) >= self.views:
+            first.settled, first.views, first.distances = True, first.views[:0], first.distances[:0]
