@@ -1,0 +1,287 @@
+"""Fusion of mixtures: equations 2 to 8 of Gross, Koenig & Mueller 2005 with ERRATA 1 to 5, against plain loops."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_mixtures import Mixture, covariances, drawn_mixture, gap, mixtures
+from scipy.optimize import minimize_scalar
+
+from omninav.pipeline import Context
+from omninav.stages.fusion.covariance_intersection import (
+    CovarianceIntersection,
+    alpha_by_ratio,
+    alpha_of_least_determinant,
+    fused,
+)
+from omninav.stages.geometry.gaussians import squared_distances
+from omninav.stages.geometry.se2 import wrap
+from omninav.stages.motion.gaussian import GaussianMotion
+from omninav.stages.values.belief import GaussianMixture
+from omninav.stages.values.pose import Motion
+
+UNIT = np.eye(3)
+CTX = Context("fusion")
+rules = st.sampled_from(["det_ratio", "det_min"])
+
+
+def mixture(*components: tuple[float, float], spread: float = 0.1) -> GaussianMixture:
+    """Components (x, weight) on the x axis."""
+    means = np.array([[x, 0.0, 0.0] for x, _ in components])
+    return GaussianMixture(means, np.stack([spread**2 * UNIT] * len(means)), np.array([w for _, w in components]))
+
+
+def parts(mixture: GaussianMixture) -> Mixture:
+    return mixture.means, mixture.covariances, mixture.weights
+
+
+def fused_plainly(a: Mixture, b: Mixture, gamma: float, weighted: bool) -> list[tuple[np.ndarray, np.ndarray, float]]:
+    """Equations 2 to 8 word by word, with numpy's inverses."""
+    match = squared_distances(a[0], a[1], b[0], b[1]) < gamma
+    out = []
+    for i, (mean_a, cov_a, w_a) in enumerate(zip(*a, strict=True)):
+        if not match[i].any():
+            out.append((mean_a, cov_a, w_a))
+        for j, (mean_b, cov_b, w_b) in enumerate(zip(*b, strict=True)):
+            if match[i, j]:
+                s_a, s_b = (w_a, w_b) if weighted else (1.0, 1.0)
+                det_a, det_b = np.linalg.det(cov_a), np.linalg.det(cov_b)
+                alpha = s_b * det_a / (s_b * det_a + s_a * det_b)
+                first, second = (1 - alpha) * np.linalg.inv(cov_a), alpha * np.linalg.inv(cov_b)
+                covariance = np.linalg.inv(first + second)
+                mean = covariance @ (first @ mean_a + second @ (mean_a + gap(mean_a, mean_b)))
+                weight = w_a * w_b / b[2][match[i]].sum() + w_b * w_a / a[2][match[:, j]].sum()
+                out.append((mean, covariance, weight))
+    alone = np.flatnonzero(~match.any(axis=0))
+    return out + [(b[0][j], b[1][j], b[2][j]) for j in alone]
+
+
+@pytest.mark.parametrize("weighted", [True, False])
+def test_fusion_is_the_papers_equations_written_as_loops(weighted: bool) -> None:
+    rng = np.random.default_rng(0)
+    for sizes in ((1, 1), (3, 5), (12, 7), (20, 20)):
+        a, b = (drawn_mixture(rng, size, extent=0.8) for size in sizes)
+        found = list(zip(*fused(a, b, 7.81, weighted=weighted), strict=True))
+        wanted = fused_plainly(a, b, 7.81, weighted)
+        assert len(found) == len(wanted)
+        for (mean, covariance, weight), (mean_w, covariance_w, weight_w) in zip(found, wanted, strict=True):
+            assert np.abs(gap(mean, mean_w)).max() < 1e-8
+            assert covariance == pytest.approx(covariance_w, rel=1e-6, abs=1e-10)
+            assert weight == pytest.approx(weight_w, rel=1e-12)
+
+
+@given(mixtures(), mixtures(), rules, st.booleans(), st.floats(0.05, 20.0))
+def test_fusion_conserves_the_sum_of_all_weights(
+    a: Mixture, b: Mixture, rule: str, weighted: bool, mass: float
+) -> None:
+    # Erratum 5: matched pairs and unmatched copies together weigh what both mixtures weigh.
+    means, covariance, weights = fused(a, (b[0], b[1], mass * b[2]), 7.81, rule, weighted)  # type: ignore[arg-type]
+    assert weights.sum() == pytest.approx(1.0 + mass, rel=1e-12)
+    assert weights.min() > 0.0
+    assert np.linalg.eigvalsh(covariance).min() > 0.0
+    assert np.abs(means[:, 2]).max() <= math.pi
+
+
+@given(mixtures(), mixtures(), rules)
+def test_the_sum_of_weights_is_conserved_match_by_match_too(a: Mixture, b: Mixture, rule: str) -> None:
+    # Equations 6 to 8: what a matched component gives away adds up to its own weight, from either side.
+    match = squared_distances(a[0], a[1], b[0], b[1]) < 7.81
+    found = fused(a, b, 7.81, rule)[2]  # type: ignore[arg-type]
+    alone = a[2][~match.any(axis=1)].sum() + b[2][~match.any(axis=0)].sum()
+    assert len(found) == match.sum() + (~match.any(axis=1)).sum() + (~match.any(axis=0)).sum()
+    assert found.sum() - alone == pytest.approx(
+        a[2][match.any(axis=1)].sum() + b[2][match.any(axis=0)].sum(), abs=1e-12
+    )
+
+
+def test_weights_of_a_pair_and_of_two_on_one_worked_by_hand() -> None:
+    # a = 0.6 at 0 and 0.4 at 9; b = 0.5 at 0, 0.3 at 0.01, 0.2 at 20. Of a at 0 the sum of matches is 0.8:
+    # 0.6 0.5/0.8 + 0.5 0.6/0.6 = 0.875, 0.6 0.3/0.8 + 0.3 = 0.525; the rest are copies: in all 2.
+    a, b = mixture((0.0, 0.6), (9.0, 0.4)), mixture((0.0, 0.5), (0.01, 0.3), (20.0, 0.2))
+    weights = fused(parts(a), parts(b), 7.81)[2]
+    assert weights == pytest.approx([0.875, 0.525, 0.4, 0.2])
+
+
+def test_what_no_source_supports_is_halved_by_one_normalisation() -> None:
+    # Erratum 5, and figure 2: prediction and hypothesis weigh 1 each.
+    out = CovarianceIntersection().step(CTX, mixture((0.0, 0.5), (9.0, 0.5)), mixture((0.0, 1.0))).belief
+    assert sorted(out.weights) == pytest.approx([0.25, 0.75])
+
+
+def test_normalisation_waits_for_the_last_source() -> None:
+    # Three sources of weight 1 that do not correspond end with a third each; normalised in between, the last had half.
+    out = CovarianceIntersection().step(CTX, mixture((0.0, 1.0)), mixture((5.0, 1.0)), mixture((9.0, 1.0))).belief
+    assert out.weights == pytest.approx([1 / 3] * 3)
+    four = CovarianceIntersection().step(
+        CTX, mixture((0.0, 1.0)), mixture((5.0, 1.0)), mixture((9.0, 1.0)), mixture((9.0, 1.0))
+    )
+    assert sorted(four.belief.weights) == pytest.approx([0.25, 0.25, 0.5])
+
+
+def test_a_source_counts_by_what_its_weights_sum_to() -> None:
+    # Erratum 13: hypotheses are not normalised.
+    out = CovarianceIntersection().step(CTX, mixture((0.0, 1.0)), mixture((5.0, 2.0), (9.0, 1.0))).belief
+    assert sorted(out.weights) == pytest.approx([0.25, 0.25, 0.5])
+
+
+def test_components_across_the_seam_correspond() -> None:
+    # Errata 1 and 2: 0.1 rad apart over pi; equal covariances and weights meet in the middle.
+    covariance = 0.01 * UNIT[None]
+    a = GaussianMixture(np.array([[0, 0, math.pi - 0.05]]), covariance, np.ones(1))
+    b = GaussianMixture(np.array([[0, 0, -math.pi + 0.05]]), covariance, np.ones(1))
+    out = CovarianceIntersection().step(CTX, a, b).belief
+    assert len(out) == 1
+    assert abs(out.means[0, 2]) == pytest.approx(math.pi)
+    assert out.covariances[0] == pytest.approx(covariance[0])
+
+
+@given(mixtures(), mixtures(), st.floats(-7, 7))
+def test_fusion_does_not_see_the_seam(a: Mixture, b: Mixture, angle: float) -> None:
+    turned = []
+    sides = [(side[0] * [1, 1, 0.45], *side[1:]) for side in (a, b)]  # the shorter turn of any two stays the same one
+    for means, covariance, weights in sides:
+        turned.append((np.column_stack([means[:, :2], wrap(means[:, 2] + angle)]), covariance, weights))
+    edge = squared_distances(*sides[0][:2], *sides[1][:2])
+    if np.abs(edge - 7.81).min() < 1e-6:
+        return
+    here, there = fused(*sides, 7.81), fused(*turned, 7.81)
+    assert there[2] == pytest.approx(here[2], rel=1e-9)
+    for mean, other in zip(here[0], there[0], strict=True):
+        assert np.abs(gap(mean + np.array([0, 0, angle]), other)).max() < 1e-7
+
+
+def test_agreement_does_not_make_it_more_certain() -> None:
+    # Erratum 4: covariance intersection is no Kalman filter; fifty equal hypotheses leave the covariance as it is.
+    belief = mixture((0.0, 1.0))
+    for _ in range(50):
+        belief = CovarianceIntersection().step(CTX, belief, mixture((0.0, 1.0))).belief
+    assert belief.covariances[0] == pytest.approx(0.01 * UNIT)
+
+
+# alpha
+
+
+def test_the_ratio_saturates() -> None:
+    # Erratum 3: C_b = 4 C_a in three dimensions has 64 times the determinant: alpha = 1 / 65.
+    assert alpha_by_ratio(UNIT, 4 * UNIT) == pytest.approx(1 / 65)
+    assert alpha_by_ratio(4 * UNIT, UNIT) == pytest.approx(64 / 65)
+    assert alpha_by_ratio(UNIT, UNIT, 0.2, 0.6) == pytest.approx(0.75)
+
+
+@given(covariances(), covariances())
+@settings(max_examples=50)
+def test_the_least_determinant_is_found(cov_a: np.ndarray, cov_b: np.ndarray) -> None:
+    first, second = np.linalg.inv(cov_a), np.linalg.inv(cov_b)
+
+    def size(alpha: float) -> float:
+        return -float(np.linalg.slogdet((1 - alpha) * first + alpha * second)[1])
+
+    found = size(alpha_of_least_determinant(cov_a, cov_b))
+    best = minimize_scalar(size, bounds=(0, 1), method="bounded", options={"xatol": 1e-10}).fun
+    assert found <= min(best, size(0.0), size(1.0)) + 1e-7
+
+
+def test_complementary_doubts_are_both_reduced_by_the_least_determinant() -> None:
+    # One knows x well, the other y: by symmetry alpha is a half, and each of x, y gets twice the smaller variance / ~1.
+    a, b = np.diag([0.01, 1.0, 0.1]), np.diag([1.0, 0.01, 0.1])
+    assert alpha_of_least_determinant(a, b) == pytest.approx(0.5)
+    assert alpha_of_least_determinant(UNIT, UNIT) == 0.5
+    out = CovarianceIntersection(alpha="det_min").step(
+        CTX,
+        GaussianMixture(np.zeros((1, 3)), a[None], np.ones(1)),
+        GaussianMixture(np.zeros((1, 3)), b[None], np.ones(1)),
+    )
+    assert np.diag(out.belief.covariances[0]) == pytest.approx([2 / 101, 2 / 101, 0.1])
+
+
+def test_the_paper_weighs_by_weight_and_porta_and_kroese_do_not() -> None:
+    a, b = mixture((0.0, 0.9)), mixture((0.1, 0.1))
+    weighted = CovarianceIntersection().step(CTX, a, b).belief
+    plain = CovarianceIntersection(weighted=False).step(CTX, a, b).belief
+    assert weighted.means[0, 0] == pytest.approx(0.01)
+    assert plain.means[0, 0] == pytest.approx(0.05)
+
+
+# the stage
+
+
+def test_near_components_become_one_and_light_ones_go() -> None:
+    out = CovarianceIntersection(drop_below=0.05).step(CTX, mixture((0.0, 0.5), (0.12, 0.48), (5.0, 0.02)), None).belief
+    assert len(out) == 1
+    assert out.weights.tolist() == [1.0]
+    assert out.means[0, 0] == pytest.approx(0.12 * 0.48 / 0.98)
+    kept = CovarianceIntersection(drop_below=0.0, merge=0.0)
+    assert len(kept.step(CTX, mixture((0.0, 0.5), (0.12, 0.48), (5.0, 0.02)), None).belief) == 3
+
+
+def test_two_equal_gaussians_merge_where_they_have_one_peak() -> None:
+    # Two normal densities of one sigma have one peak up to two sigma apart: a squared distance of 2 with C_a + C_b.
+    x = np.linspace(-0.2, 0.5, 7001)
+    for apart, peaks in ((0.195, 1), (0.205, 2)):
+        curve = np.exp(-(x**2) / 0.02) + np.exp(-((x - apart) ** 2) / 0.02)
+        assert ((curve[1:-1] > curve[:-2]) & (curve[1:-1] >= curve[2:])).sum() == peaks
+        assert len(CovarianceIntersection().step(CTX, mixture((0.0, 0.5), (apart, 0.5)), None).belief) == peaks
+
+
+def test_where_many_places_are_as_likely_the_heaviest_stay() -> None:
+    wide = mixture(*((3.0 * k, 1.0 + 0.001 * k) for k in range(50)))
+    out = CovarianceIntersection(most=20).step(CTX, wide, None).belief
+    assert len(out) == 20
+    assert out.means[:, 0].min() == pytest.approx(90.0)
+    assert out.weights.sum() == pytest.approx(1.0)
+    assert len(CovarianceIntersection(most=0).step(CTX, wide, None).belief) == 50
+
+
+def test_a_prediction_of_nothing_takes_the_hypothesis_and_no_weight_changes_nothing() -> None:
+    nothing = GaussianMixture(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0))
+    out = CovarianceIntersection().step(CTX, nothing, mixture((1.0, 0.3))).belief
+    assert (out.means[0, 0], out.weights[0]) == (1.0, 1.0)
+    assert CovarianceIntersection().step(CTX, nothing, None).belief is nothing
+    same = CovarianceIntersection().step(CTX, mixture((1.0, 1.0)), mixture((5.0, 0.0))).belief
+    assert same.means[:, 0].tolist() == [1.0]
+
+
+def test_what_is_no_covariance_is_refused() -> None:
+    flat = GaussianMixture(np.zeros((1, 3)), np.diag([1.0, -1.0, 1.0])[None], np.ones(1))
+    with pytest.raises(ValueError, match="not positive definite"):
+        CovarianceIntersection().step(CTX, mixture((0.0, 1.0)), flat)
+
+
+@given(mixtures(), mixtures(), rules, st.randoms(use_true_random=False))
+def test_the_order_of_components_changes_nothing_but_rounding(
+    a: Mixture, b: Mixture, rule: str, random: object
+) -> None:
+    stage = CovarianceIntersection(alpha=rule, merge=0.0, drop_below=0.0)  # type: ignore[arg-type]
+    order = list(range(len(b[2])))
+    random.shuffle(order)  # type: ignore[attr-defined]
+    here = stage.step(CTX, GaussianMixture(*a), GaussianMixture(*b)).belief
+    there = stage.step(CTX, GaussianMixture(*a), GaussianMixture(*(each[order] for each in b))).belief
+    rows = [np.lexsort(np.round(each.means, 6).T) for each in (here, there)]
+    assert there.weights[rows[1]].sum() == pytest.approx(here.weights[rows[0]].sum())
+    assert sorted(there.weights) == pytest.approx(sorted(here.weights), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("stage", "updates"),
+    [(CovarianceIntersection(), 10_000), (CovarianceIntersection(alpha="det_min", merge=0.5), 2_000)],
+)
+def test_over_thousands_of_random_updates_covariances_stay_positive_definite_and_weights_in_0_to_1(
+    stage: CovarianceIntersection, updates: int
+) -> None:
+    rng, motion = np.random.default_rng(5), GaussianMotion()
+    belief = GaussianMixture(np.zeros((1, 3)), np.diag([0.01, 0.01, 0.001])[None], np.ones(1))
+    most = 0
+    for turn in range(updates):
+        x, y, angle = rng.normal(0, [0.2, 0.02, 0.2]).tolist()
+        predicted = motion.step(CTX, belief, Motion(x, y, angle)).belief
+        hypothesis = GaussianMixture(*drawn_mixture(rng, int(rng.integers(1, 5)))) if turn % 3 else None
+        belief = stage.step(CTX, predicted, hypothesis).belief
+        np.linalg.cholesky(belief.covariances)
+        assert belief.weights.min() > 0.0
+        assert belief.weights.max() <= 1.0
+        assert abs(belief.weights.sum() - 1.0) < 1e-12
+        most = max(most, len(belief))
+    assert np.array_equal(belief.covariances, np.swapaxes(belief.covariances, 1, 2))
+    assert 1 < most <= stage.most
