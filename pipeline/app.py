@@ -344,7 +344,7 @@ def complete(config: Any) -> dict[str, Any]:
 
     from .problems import Problem, ProblemsFound
 
-    graph_keys = {"variant", "nodes", "wires", "artifacts", "saves", "log", "tour", "map", "route", "day"}
+    graph_keys = {"variant", "nodes", "wires", "artifacts", "saves", "log", "tour", "map", "route", "day", "events"}
     try:
         plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
         for name, spec in (plain.get("artifacts") or {}).items():
@@ -367,6 +367,7 @@ def complete(config: Any) -> dict[str, Any]:
                 if str(key) not in graph_keys:
                     other[key] = config._get_node(key)
             other.update({"tour": None, "map": None} | {key: spec.get(key) for key in ("log", "route", "day")})
+            other.events = spec.get("events") or []  # who lifts the robot on its drive does not lift it on its tour
             for node in spec.get("share") or ():
                 if config.nodes.get(node) is not None:
                     other.nodes[node] = OmegaConf.to_container(config.nodes[node], resolve=False)

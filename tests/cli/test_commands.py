@@ -280,3 +280,12 @@ def test_the_trajectory_is_in_tum_format_with_ascending_header_stamps(demo: Path
     assert rows.shape[1] == 8
     assert np.all(np.diff(rows[:, 0]) > 0)
     assert np.allclose(np.linalg.norm(rows[:, 4:], axis=1), 1.0)
+
+
+def test_who_lifts_the_robot_on_its_drive_does_not_lift_it_on_its_tour():
+    from omninav.pipeline.app import _composed, complete
+
+    with _composed(["events=[{at: 30.0, turn: 1.5}]"]) as config:
+        plain = complete(config)
+    assert plain["nodes"]["source"]["events"] == [{"at": 30.0, "turn": 1.5}]
+    assert plain["artifacts"]["map"]["graph"]["nodes"]["source"]["events"] == []
