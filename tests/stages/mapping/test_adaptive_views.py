@@ -1,4 +1,4 @@
-"""The map of views of Gross, Koenig & Mueller 2005, section 2.3: its equations worked by hand, and what always holds."""
+"""The map of views of Gross, Koenig & Mueller 2005, section 2.3: its equations by hand, and what always holds."""
 
 import math
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from omninav.pipeline import Context
 from omninav.stages.geometry.spectra import packed
 from omninav.stages.mapping.adaptive_views import AdaptiveViews
@@ -139,7 +140,7 @@ def test_a_new_place_outlives_the_tick_in_which_it_is_learned_however_little_it_
     assert 9 in map.means[:, 0].round(9), "S = 0.21: taken in, w = 0.021"
     learn(map, view(0.81, 0), state([20, 0, 0]))
     assert 20 not in map.means[:, 0].round(9), "S = 0.19 is not enough"
-    with pytest.raises(ValueError, match="least_weight: 0.02 is not below"):
+    with pytest.raises(ValueError, match=r"least_weight: 0\.02 is not below"):
         AdaptiveViews(least_weight=0.02, least_similarity=0.2, beta=0.1)
 
 
