@@ -65,8 +65,13 @@ class FusedMixtures(Stage):
             row = map.add_view(view.values, type(view).__name__)
             map.put_mixture(row, *self._fused([parts(state, 0.0)]))
         else:
-            for row, turn in zip(rows.tolist(), view.turns(map.views[rows]).tolist(), strict=True):
-                map.put_mixture(row, *self._fused([stored(map, row), parts(state, turn)]))
+            turns = view.turns(map.views[rows]).tolist()
+            mixtures = [
+                self._fused([stored(map, row), parts(state, turn)])
+                for row, turn in zip(rows.tolist(), turns, strict=True)
+            ]
+            owners = np.repeat(rows, [len(weights) for _, _, weights, _ in mixtures])
+            map.put_mixtures(owners, *(np.concatenate(fields) for fields in zip(*mixtures, strict=True)))
         map.step()
         return [int(map.names[row])] if not len(rows) else [int(name) for name in map.names[rows]]
 
