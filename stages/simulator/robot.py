@@ -247,9 +247,11 @@ def _pursue(
     """Follow a line until `poses` (N, 3) is full or the robot is there: rows filled, metres along, whether it is."""
     length = ends[-1]
     goal_x, goal_y = points[-1, 0], points[-1, 1]
+    patience = math.ceil((2 * math.pi / robot[2] + robot[2] / robot[4]) / STEP)  # as long as it takes to turn once
+    waited = 0
     for row in range(len(poses)):
         for _ in range(every):
-            best = np.inf
+            best, before = np.inf, along
             ahead = along
             for step in range(16):  # on the next stretch of the line, never back
                 at = min(ahead + 0.02 * step, length)
@@ -257,9 +259,14 @@ def _pursue(
                 off = math.hypot(x - state[X], y - state[Y])
                 if off < best:
                     best, along = off, at
+            waited = waited + 1 if along == before else 0
+            if waited > patience:  # it circles round the point that it steers for, and so has been there
+                along, waited = min(along + look_ahead, length), 0
             remaining = math.hypot(goal_x - state[X], goal_y - state[Y])
-            if along >= length - look_ahead and remaining < ARRIVED and state[SPEED] < 0.05:
-                return row, along, True
+            if along >= length - look_ahead:
+                halts = along >= length - 0.6 * ARRIVED or (remaining < 2 * ARRIVED and state[TURNING] == 0.0)
+                if (remaining < ARRIVED and state[SPEED] < 0.05) or (halts and state[SPEED] == 0.0):
+                    return row, along, True
             x, y = _point(points, ends, min(along + look_ahead, length))
             off = math.atan2(y - state[Y], x - state[X]) - state[HEADING]
             off -= 2 * math.pi * math.floor((off + math.pi) / (2 * math.pi))

@@ -49,6 +49,28 @@ def test_sharp_turns_and_repeated_waypoints_are_driven(behind: tuple[tuple[float
     assert math.hypot(poses[-1, 0] - behind[-1][0], poses[-1, 1] - behind[-1][1]) < 0.2
 
 
+def test_every_drive_ends_where_its_way_does_however_sharp_its_turns() -> None:
+    """Zigzags that a joystick would not drive: without a rule for it, some circle round their next point for ever."""
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        line = np.cumsum(rng.uniform(-2.0, 2.0, (8, 2)), axis=0)
+        way = float(np.hypot(*np.diff(line, axis=0).T).sum())
+        driven = drive(line, Robot(), rate=20.0)
+        assert driven.times[-1] < 2.0 * way / 0.45 + 20.0
+        assert math.dist(driven.poses[-1, :2], line[-1]) < 0.15
+
+
+def test_a_line_that_was_cut_in_a_bend_ends_where_it_was_cut() -> None:
+    """The robot is beside the line there, a hand's breadth from its end: it has arrived, and does not wait for ever."""
+    for radius in (0.15, 0.3, 0.5):
+        for angle in (0.5, 1.0, 1.5, 2.0, 2.5, 3.0):
+            turned = np.linspace(0.0, angle, 30)
+            bend = np.stack([2.0 + radius * np.sin(turned), radius - radius * np.cos(turned)], axis=1)
+            driven = drive(np.concatenate([[(0.0, 0.0)], bend]), Robot(), rate=20.0)
+            assert driven.times[-1] < (2.0 + radius * angle) / 0.45 + 10.0
+            assert math.dist(driven.poses[-1, :2], bend[-1]) < 0.15
+
+
 def test_odometry_without_noise_is_the_drive_itself() -> None:
     poses = drive(CORNER, Robot(), rate=20.0).poses
     seen = odometry(poses, EXACT, NO_BIAS, np.random.default_rng(0))
