@@ -1,9 +1,10 @@
 # make demo: the built-in world, a map, a drive, a report.   make test: everything that must hold.   make bench: speed.
+# make soak: 100,000 steps of a map that forgets, where nothing may keep growing.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test bench lint clean
+.PHONY: demo test bench soak lint clean
 
 demo: $(VENV)/.installed
 	$(BIN)/omninav
@@ -17,6 +18,9 @@ test: $(VENV)/.installed
 
 bench: $(VENV)/.benchmarks
 	$(BIN)/python benchmarks/run.py
+
+soak: $(VENV)/.installed
+	$(BIN)/python benchmarks/soak.py
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "omninav needs Python 3.11: make PYTHON=python3.11 …"'
