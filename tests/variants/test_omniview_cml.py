@@ -1,0 +1,131 @@
+"""Concurrent map building with mixtures of Gaussians: stopped anywhere, killed, and as a user runs it."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import DATA
+
+from omninav.pipeline.artifact import read_artifact
+from omninav.pipeline.codec import encode
+from omninav.pipeline.engine import Engine, StageFailed
+from omninav.pipeline.graph import build
+
+STAGES = "omninav.stages"
+NODES = {
+    "source": {"_target_": "round_drive.Rounds"},
+    "knows": {"_target_": "round_drive.Knows"},
+    "empty": {"_target_": f"{STAGES}.mapping.empty_view_mixtures.FirstViewMixtures"},
+    "lessons": {"_target_": f"{STAGES}.lessons.unimodal_queue.UnimodalQueue", "length": 12},
+    "mapping": {"_target_": f"{STAGES}.mapping.adaptive_views.AdaptiveViews", "max_views": 20},
+}
+WIRES = {
+    "knows": {"view": "source.view"},
+    "lessons": {"view": "source.view", "state": "knows.belief", "model": "source.model"},
+    "mapping": {
+        "lessons": "lessons.lessons",
+        "limit": "source.limit",
+        "map": {"from": "mapping.map", "delay": 1, "initial": "empty.map"},
+    },
+}
+
+
+def learned(place: Path, breaks_at: int = -1) -> bytes:
+    graph = build({"nodes": {**NODES, "knows": {**NODES["knows"], "breaks_at": breaks_at}}, "wires": WIRES})
+    engine = Engine(graph, {}, 0, place, place / "memory", ["mapping.map"], identity="same", every_s=0.0)
+    return encode(engine.run()["mapping.map"])
+
+
+@pytest.mark.parametrize(
+    ("at", "what"),
+    [(5, "the queue fills"), (18, "it is full"), (28, "a way is open"), (35, "the way is worked out"), (45, "flushed")],
+)
+def test_a_run_stopped_while_lessons_wait_goes_on_to_the_same_map(tmp_path: Path, at: int, what: str):
+    unbroken = learned(tmp_path / "unbroken")
+    with pytest.raises(StageFailed):
+        learned(tmp_path / "broken", at)
+    assert learned(tmp_path / "broken") == unbroken, what
+
+
+HOUSE = DATA / "photoreal-house"
+needs_house = pytest.mark.skipif(not DATA.exists(), reason=f"no recordings: {DATA} does not exist")
+WORDS = (
+    "variant=omniview_cml",
+    f"log=[{HOUSE / 'tour.mcap'},{HOUSE / 'drive.mcap'}]",
+    "nodes.source.stop=45",
+    "checkpoint_s=0.05",
+    "cache=null",
+)
+
+
+def start(place: Path, *words: str) -> subprocess.Popen[bytes]:
+    place.mkdir(exist_ok=True)
+    command = [sys.executable, "-m", "omninav.pipeline", *words]
+    return subprocess.Popen(
+        command, cwd=place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    )
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("omniview_cml")
+    assert start(place, *WORDS).wait(timeout=300) == 0
+    return place / "runs" / "latest"
+
+
+@needs_house
+def test_two_logs_of_a_house_grow_one_map_and_the_second_finds_itself_in_it(whole: Path):
+    metrics = json.loads((whole / "metrics.json").read_text())
+    assert [log["frames"] for log in metrics["logs"]] == [45, 45]
+    assert metrics["position_error_m"]["median"] < 1.0
+    assert metrics["heading_error_deg"]["median"] < 8.0
+    assert (whole / "trajectory_0.tum").exists()
+    assert (whole / "trajectory.tum").read_bytes() == (whole / "trajectory_1.tum").read_bytes()
+
+
+@needs_house
+def test_a_killed_run_resumes_to_the_same_map_and_trajectory(whole: Path, tmp_path: Path):
+    moments = random.Random(3)
+    process, kills = start(tmp_path, *WORDS), 0
+    while process.poll() is None and kills < 3:
+        if next(tmp_path.glob("runs/*/checkpoints/checkpoint"), None) is None:
+            time.sleep(0.02)
+            continue
+        time.sleep(moments.uniform(0.0, 1.0))
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+            kills += 1
+            process = start(tmp_path, "resume", "runs/latest")
+    assert kills > 0
+    assert process.wait(timeout=300) == 0
+    for name in ("map.omap", "trajectory.tum", "trajectory_0.tum", "metrics.json"):
+        assert (tmp_path / "runs" / "latest" / name).read_bytes() == (whole / name).read_bytes(), name
+
+
+@needs_house
+def test_a_saved_map_is_read_only_or_grows_on_and_forgetting_is_a_word(whole: Path, tmp_path: Path):
+    def drive(name: str, *words: str) -> Path:
+        log = f"log={HOUSE / 'drive.mcap'}"
+        where = tmp_path / name
+        assert start(where, WORDS[0], log, *WORDS[2:], f"map={whole / 'map.omap'}", *words).wait(timeout=300) == 0
+        return where / "runs" / "latest"
+
+    def content(run: Path):
+        return read_artifact(run / "map.omap")
+
+    before = content(whole)
+    frozen = content(drive("frozen", "mapping=frozen"))
+    assert encode(frozen) == encode(before)
+    grown = content(drive("grown", "forgetting=passive"))
+    assert grown.steps > before.steps
+    assert np.isin(before.names, grown.names).mean() > 0.9
+    config = (tmp_path / "grown" / "runs" / "latest" / "config.yaml").read_text()
+    assert "forgetting: passive" in config
