@@ -30,7 +30,7 @@ class ViewNeighbours(Stage):
 
         neighbours: Neighbours
 
-    def step(self, ctx: Context, view: WholeView, map: ViewMixtures, limit: ViewLimit | None) -> Out:
+    def step(self, ctx: Context, view: WholeView, map: ViewMixtures, limit: ViewLimit | None = None) -> Out:
         """Look through the map."""
         check_kind(view, map)
         if not len(map):
