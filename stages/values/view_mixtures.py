@@ -158,3 +158,11 @@ class ViewEvent(Value):
     weights: Array
     places: Array
     parts: Ints
+
+
+class MixturesNow(Value):
+    """Components of some views after a tick: `names` (C,) of their views, `means` (C, 3) m and rad, `weights` (C,)."""
+
+    names: npt.NDArray[np.int64]
+    means: npt.NDArray[np.float32]
+    weights: npt.NDArray[np.float32]

@@ -1,18 +1,9 @@
 """The mixtures of the views that a tick changed: small enough to be kept, so that a reference's life can be told."""
 
 import numpy as np
-import numpy.typing as npt
 
-from omninav.pipeline import Context, Outputs, Stage, Value
-from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
-
-
-class MixturesNow(Value):
-    """Components of some views after a tick: `names` (C,) of their views, `means` (C, 3) m and rad, `weights` (C,)."""
-
-    names: npt.NDArray[np.int64]
-    means: npt.NDArray[np.float32]
-    weights: npt.NDArray[np.float32]
+from omninav.pipeline import Context, Outputs, Stage
+from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent, ViewMixtures
 
 
 class ChangedMixtures(Stage):

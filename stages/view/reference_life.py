@@ -10,9 +10,8 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.results import Figure
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.pose import Pose
-from omninav.stages.values.view_mixtures import ViewEvent
+from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 
-from .changed_mixtures import MixturesNow
 from .style import EDGE, REFERENCE, TRUTH, draw_plan, extent_of, fitting_height, picture, plan_axes
 
 Array = npt.NDArray[np.float64]
@@ -24,7 +23,7 @@ class ReferenceLife(Stage):
 
     `name`: which one; None: the one whose heaviest component's place moved furthest in sum, which is where wrong
     associations show. Components of two moments are the same place where they are nearest to each other and within
-    `same_m` metres. True positions are those of the frames at which the reference changed; where lessons come with delay
+    `same_m` metres. True positions are those of the frames at which the reference changed; where lessons come late
     its view was seen before.
     """
 

@@ -1,0 +1,44 @@
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.stages.metric.view_spacing import ViewSpacing, spaced
+from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.views import Coefficients
+
+CTX = Context("spacing")
+
+
+def a_map(views, places):
+    known = ViewMixtures.empty()
+    for view, (x, y) in zip(views, places, strict=True):
+        row = known.add_view(np.array(view, np.float32), "Coefficients")
+        known.add_component(row, np.array([50.0, 50.0, 0.0]), np.eye(3), 0.1, 1.0)  # lighter: it does not count
+        known.add_component(row, np.array([x, y, 0.0]), np.eye(3), 0.9, 1.0)
+    return known
+
+
+def spacing(known, **parameters):
+    view = Coefficients(np.zeros(2, np.float32), np.zeros((36, 2), np.float32))
+    return ViewSpacing(**parameters).step(CTX, known, view).metrics.values
+
+
+def test_each_view_is_as_far_as_its_nearest_other_one_in_views_and_in_metres():
+    found = spacing(a_map([(0, 0), (3, 4), (3, 5), (10, 5)], [(0, 0), (0, 2), (0, 4), (0, 6)]))["spacing"]
+    assert found["between_views"]["mean"] == pytest.approx((5 + 1 + 1 + 7) / 4)
+    assert found["between_places_m"]["mean"] == pytest.approx(2.0)
+    assert found["between_places_m"]["unevenness"] == 0.0
+    assert found["between_views"]["unevenness"] == pytest.approx(np.std([5, 1, 1, 7]) / 3.5)
+
+
+def test_of_many_views_only_some_are_asked_but_all_are_neighbours():
+    found = spacing(a_map([(k * k, 0) for k in range(9)], [(k, 0) for k in range(9)]), most=3)["spacing"]
+    assert found["between_views"]["mean"] == pytest.approx((1 + 7 + 15) / 3)  # of views 0, 4 and 8
+
+
+def test_two_views_have_no_spacing():
+    assert spacing(a_map([(0, 0), (1, 1)], [(0, 0), (1, 0)])) == {}
+
+
+def test_views_that_are_all_alike_have_no_unevenness():
+    assert spaced(np.zeros(4))["unevenness"] is None

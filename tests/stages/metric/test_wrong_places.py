@@ -1,0 +1,63 @@
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.stages.metric.wrong_places import WrongPlaces
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
+
+CTX = Context("wrong places")
+NONE = np.empty(0, np.int64)
+
+
+def event(inserted=(), removed=()):
+    came, went = np.array(inserted, np.int64), np.array(removed, np.int64)
+    return ViewEvent(1, 1, came, went, "", came, np.zeros(len(came)), np.zeros((len(came), 2)), came * 0)
+
+
+def mixture(*parts):
+    names, xs, weights = zip(*parts, strict=True)
+    means = np.array([(x, 0.0, 0.0) for x in xs], np.float32)
+    return MixturesNow(np.array(names, np.int64), means, np.array(weights, np.float32))
+
+
+@pytest.fixture
+def life():
+    # The robot goes from x = 0 by 1 m a frame. Reference 0 comes where it is; 1 and 2 come 10 m off.
+    events = [event([0]), event([1]), event([2]), event(), event(), event()]
+    mixtures = [
+        mixture((0, 0.0, 1.0)),
+        mixture((1, 11.0, 1.0)),
+        mixture((2, 12.0, 1.0)),
+        mixture((1, 11.0, 0.5), (1, 1.0, 0.5)),
+        mixture((1, 1.0, 1.0)),
+        mixture((2, 12.0, 0.2), (2, 2.0, 0.6)),
+    ]
+    return events, mixtures, [Pose(float(x), 0.0, 0.0) for x in range(6)]
+
+
+def test_the_share_of_the_weight_at_a_wrong_place_is_followed_until_it_is_gone(life):
+    found = WrongPlaces(points=6).step(CTX, *life).metrics.values["wrong_places"]
+    assert found["references"] == 2
+    assert found["kept"] == 1
+    assert found["along_m"] == [0.0, 1.0]
+    assert found["gone_after_steps"] == [3, None]
+    assert found["last_step"] == [4, None]
+    assert found["step"] == [0, 1, 2, 3, 4, 5]
+    assert found["weight"] == [None, 1.0, 1.0, 0.75, 0.5, pytest.approx(0.125)]
+    assert found["example"]["weight"] == [0.0, 1.0, 1.0, 0.5, 0.0, 0.0]
+
+
+def test_a_reference_that_is_removed_holds_no_place(life):
+    events, mixtures, truth = life
+    events[3] = event(removed=[1, 2])
+    mixtures[3:] = [None, None, None]
+    found = WrongPlaces(points=6).step(CTX, events, mixtures, truth).metrics.values["wrong_places"]
+    assert found["kept"] == 0
+    assert found["gone_after_steps"] == [2, 1]
+
+
+def test_a_map_without_wrong_places_says_only_that(life):
+    events, mixtures, truth = life
+    found = WrongPlaces().step(CTX, events[:1], mixtures[:1], truth[:1]).metrics.values
+    assert found == {"wrong_places": {"references": 0}}
