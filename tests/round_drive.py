@@ -3,6 +3,7 @@
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Source, Stage, State, Tick
+from omninav.stages.geometry.odometry_motion import turn_go_turn
 from omninav.stages.geometry.se2 import between
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import UncertainMotion
@@ -19,6 +20,10 @@ def place(tick: int) -> np.ndarray:
 
 def look(tick: int) -> np.ndarray:
     return np.cos(place(tick)[:2] @ FREQUENCIES + 0.01 * tick).astype(np.float32)
+
+
+def way(tick: int) -> UncertainMotion:
+    return UncertainMotion(turn_go_turn(*map(float, between(place(tick - 1), place(tick)))), (0.02, 0.02, 0.02))
 
 
 class At(State):
@@ -42,8 +47,7 @@ class Rounds(Source):
             return None
         at.tick += 1
         half = self.ticks // 2
-        step = between(place(n - 1), place(n))
-        model = UncertainMotion((0.0, float(np.hypot(*step[:2])), float(step[2])), (0.02, 0.02, 0.02))
+        model = way(n)
         first = n % half == 0
         view = Coefficients(look(n), look(n)[None])
         tick = Tick(n, n * 10**9, n // half, n % half, first)
