@@ -56,3 +56,13 @@ def local_contrast(strip: FloatArray, across: float, down: float) -> FloatArray:
 
 def _blurred(strip: FloatArray, across: float, down: float) -> FloatArray:
     return cast(FloatArray, cv2.GaussianBlur(strip, (0, 0), sigmaX=across, sigmaY=down).reshape(strip.shape))
+
+
+def turned_copies(rows: FloatArray, headings: int) -> FloatArray:
+    """Rows (D, P) that run column by column, turned: (headings, D, P).
+
+    A picture projected on turn h of the rows is what a robot turned counter-clockwise by 2 pi h / headings would see,
+    projected on the rows themselves: its columns move right, which is the same as rows moved to the left.
+    """
+    step = rows.shape[1] // headings
+    return np.stack([np.roll(rows, -step * heading, axis=1) for heading in range(headings)])

@@ -1,0 +1,60 @@
+"""Whole views by a projection that was learned from a tour."""
+
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.problems import BadInput
+from omninav.stages.values.image import Panorama
+from omninav.stages.values.projection import Projection
+from omninav.stages.values.views import Coefficients
+
+from .strip import Channels, Contrast, averaged_strip, turned_copies
+
+
+class PrincipalComponents(Stage):
+    """The averaged panorama projected on the principal components of a supervised tour's: y = W z.
+
+    Porta & Kröse 2004, section 2, equation 3. `rows`, `columns`, `channels` and `contrast` must be those of the strips
+    that W was learned from (stage AveragedView). `headings`, which must divide `columns`: at how many turns views are
+    compared; 1 is the paper's form. Raises BadInput where W is for strips of another size.
+    """
+
+    rows: Annotated[int, Bounds(ge=1)] = 16
+    columns: Annotated[int, Bounds(ge=1)] = 72
+    channels: Channels = "brightness"
+    contrast: Contrast = "local"
+    headings: Annotated[int, Bounds(ge=1)] = 36
+
+    class Out(Outputs):
+        """The description of the view."""
+
+        view: Coefficients
+
+    def __post_init__(self) -> None:
+        """Headings are whole columns apart."""
+        if self.columns % self.headings:
+            raise ValueError(f"headings: {self.headings} do not divide {self.columns} columns; write columns: 72")
+
+    def setup(self, ctx: Context) -> None:
+        """No projection seen yet."""
+        self._projection: Projection | None = None
+
+    def step(self, ctx: Context, panorama: Panorama, projection: Projection) -> Out:
+        """Describe one panorama."""
+        strip = averaged_strip(panorama.pixels, self.rows, self.columns, self.channels, self.contrast)
+        if projection is not self._projection:
+            self._learned(projection, strip.size)
+        values = np.moveaxis(strip, 1, 0).ravel()
+        turned = (self._turned @ values).reshape(self.headings, -1)
+        return self.Out(view=Coefficients(turned[0].copy(), turned))
+
+    def _learned(self, projection: Projection, size: int) -> None:
+        if projection.components.shape[1] != size:
+            raise BadInput(
+                f"projection: learned from strips of {projection.components.shape[1]} numbers, the present ones have "
+                f"{size}; give features the rows, columns and channels it was learned with, or learn it anew"
+            )
+        self._projection = projection
+        self._turned = turned_copies(projection.components, self.headings).reshape(-1, size)

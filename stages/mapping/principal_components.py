@@ -1,0 +1,65 @@
+"""The projection that keeps most of a tour's pictures."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.values.projection import Projection
+from omninav.stages.values.views import Coefficients
+
+Array = npt.NDArray[np.float64]
+FloatArray = npt.NDArray[np.float32]
+
+
+def principal_components(pictures: FloatArray, number: int, headings: int = 1) -> tuple[Array, Array]:
+    """Directions of greatest variance of pictures (N, P), and their shares of it: (D, P) orthonormal, (D,).
+
+    With `headings` H > 1 over all H turned copies of each: a picture runs column by column around the robot, a turn
+    moves it by P / H. From the eigenvectors of the scatter matrix, which are the right singular vectors of the centred
+    pictures. A direction's largest number is positive. D is `number`, or less where there is less to tell apart.
+    """
+    centred = pictures.astype(np.float64) - pictures.mean(axis=0, dtype=np.float64)
+    if headings > 1:
+        centred = pictures.astype(np.float64)
+        ring = centred.reshape(len(pictures), headings, -1).mean(axis=(0, 1))  # the mean of all turned copies
+        centred = centred - np.tile(ring, headings)
+    scatter = centred.T @ centred
+    step = pictures.shape[1] // headings
+    scatter = sum(
+        (np.roll(scatter, (step * h, step * h), axis=(0, 1)) for h in range(headings)), np.zeros_like(scatter)
+    )
+    variances, vectors = np.linalg.eigh(scatter)
+    strongest = np.argsort(-variances, kind="stable")[:number]
+    strongest = strongest[variances[strongest] > 1e-9 * variances.max()]
+    rows = vectors[:, strongest].T
+    largest = np.take_along_axis(rows, np.abs(rows).argmax(axis=1)[:, None], axis=1)
+    return rows * np.sign(largest), variances[strongest] / variances.sum()
+
+
+class LearnPrincipalComponents(Stage):
+    """Principal components of a tour's averaged panoramas.
+
+    Porta & Kröse 2004, section 2: the eigenvectors with the largest eigenvalues become the rows of the projection
+    matrix W. `components`: how many (the paper does not say). `headings` 1 learns from the pictures as they are, as the
+    paper; more, from each picture at so many turns, so that the projection serves a robot that comes from elsewhere. It
+    must divide the pictures' columns.
+    """
+
+    components: Annotated[int, Bounds(ge=1)] = 128
+    headings: Annotated[int, Bounds(ge=1)] = 36
+
+    class Out(Outputs):
+        """The projection."""
+
+        projection: Projection
+
+    def step(self, ctx: Context, views: Sequence[Coefficients]) -> Out:
+        """Learn from the whole tour."""
+        rows, explained = principal_components(
+            np.stack([view.values for view in views]), self.components, self.headings
+        )
+        ctx.fact("explained_variance", round(float(explained.sum()), 4))
+        return self.Out(projection=Projection(rows.astype(np.float32), explained))

@@ -1,0 +1,55 @@
+"""A map of views made in one go from a tour whose poses are known."""
+
+import math
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.problems import BadInput
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.projection import Projection
+from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.views import WholeView
+
+
+class SupervisedViews(Stage):
+    """Each of the tour's views with one Gaussian at its true pose: the training set of appearance-based localisation.
+
+    Porta & Kröse 2004, section 2: T = {(x_i, z_i)} and the Gaussians phi(x|x_j) of equation 4, whose spread (here
+    `sigma_m`, `sigma_deg`) is not given. With `projection` wired, views are projected by it first, so that projection
+    and map come from one tour. Views without a true pose are left out. Raises BadInput where none has one.
+    """
+
+    sigma_m: Annotated[float, Bounds(gt=0)] = 0.25
+    sigma_deg: Annotated[float, Bounds(gt=0)] = 10.0
+
+    class Out(Outputs):
+        """The map."""
+
+        map: ViewMixtures
+
+    def step(
+        self,
+        ctx: Context,
+        views: Sequence[WholeView | None],
+        truth: Sequence[Pose | None],
+        projection: Projection | None = None,
+    ) -> Out:
+        """Make the map of a whole tour."""
+        map = ViewMixtures.empty()
+        map.take_poses_from("truth")
+        covariance = np.diag([self.sigma_m**2, self.sigma_m**2, math.radians(self.sigma_deg) ** 2])
+        for view, pose in zip(views, truth, strict=True):
+            if view is None or pose is None:
+                ctx.count("view_without_pose", detail="mapping: pictures without truth are not mapped")
+                continue
+            values = view.values if projection is None else projection.components @ view.values
+            row = map.add_view(values, type(view).__name__)
+            map.add_component(row, np.array([pose.x, pose.y, pose.heading]), covariance, 1.0, 1.0)
+            map.step()
+        if not len(map):
+            raise BadInput("mapping: the tour has no ground truth; use a tour with /ground_truth/pose")
+        ctx.fact("map_poses", "truth")
+        return self.Out(map=map)
