@@ -1,6 +1,6 @@
 """Keeps particles where belief and map agree; where they do not, follows both."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -9,6 +9,9 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.gaussians import density, drawn
 from omninav.stages.geometry.particles import systematic
 from omninav.stages.values.belief import GaussianMixture, Particles
+from omninav.stages.values.pose import UncertainMotion
+
+from .auxiliary import auxiliary
 
 Array = npt.NDArray[np.float64]
 
@@ -21,7 +24,8 @@ class Agreement(Stage):
     one too; `agree_above` holds for metres and radians (the paper gives 10^-4 without units: erratum 14).
 
     * Above it: all particles are drawn anew by pi_i p(y|x_i) and weigh 1/N. This is what the paper describes; it is
-      importance resampling (SIR), although it cites the auxiliary filter (erratum 15), which is `fusion=auxiliary`.
+      importance resampling (SIR, `sampling: importance`), although it cites the auxiliary filter (erratum 15).
+      `sampling: auxiliary` is that filter (`fusion/auxiliary.py`); it needs the belief before the motion, and `model`.
     * Below it: the share `keep` of the particles, chosen at random and not by weight (erratum 17a), stays and weighs
       `keep`; the others are drawn from the hypothesis, by lambda w, and weigh the rest, each alike (erratum 17).
     * Without hypothesis the belief stays as it is.
@@ -31,6 +35,7 @@ class Agreement(Stage):
     one look-alike has spoken against is not lost at once. 0 is the paper's filter.
     """
 
+    sampling: Literal["importance", "auxiliary"] = "importance"
     agree_above: Annotated[float, Bounds(ge=0)] = 1e-4
     keep: Annotated[float, Bounds(ge=0, le=1)] = 0.8
     stray: Annotated[float, Bounds(ge=0, le=1)] = 0.0
@@ -40,7 +45,14 @@ class Agreement(Stage):
 
         belief: Particles
 
-    def step(self, ctx: Context, particles: Particles, hypothesis: GaussianMixture | None) -> Out:
+    def step(
+        self,
+        ctx: Context,
+        particles: Particles,
+        hypothesis: GaussianMixture | None,
+        before: Particles | None = None,
+        model: UncertainMotion | None = None,
+    ) -> Out:
         """Fuse prediction and hypothesis."""
         if hypothesis is None or not len(hypothesis):
             return self.Out(belief=particles)
@@ -49,6 +61,10 @@ class Agreement(Stage):
         agreement = float(particles.weights @ likelihood)
         if agreement > self.agree_above:
             ctx.count("agreed")
+            if self.sampling == "auxiliary" and before is not None and model is not None:
+                chosen = auxiliary(before, model, hypothesis, self.stray * agreement, ctx.rng)
+                if chosen is not None:
+                    return self.Out(belief=chosen)
             likelihood = (1.0 - self.stray) * likelihood + self.stray * agreement
             rows = systematic(particles.weights * likelihood, len(particles.poses), float(ctx.rng.random()))
             return self.Out(belief=equally(particles.poses[rows]))
