@@ -11,9 +11,10 @@ from omninav.stages.values.pose import Pose
 
 
 class Stated(State):
-    """The way (m) since a pose was last stated, and where the robot was at the picture before (x, y)."""
+    """The way (m) since a pose was last stated and since the log began, and where the robot was just before (x, y)."""
 
     way: float = math.inf
+    gone: float = 0.0
     at: tuple[float, float] | None = None
 
 
@@ -26,14 +27,16 @@ class Calibration(Stage):
 
     A pose is stated at a log's first picture and then each time when at least `every_m` metres have been gone since (0:
     at each picture). `places`: only within `near_m` metres of one of these (x, y in m; none: anywhere). `logs`: only in
-    these logs, counted from 0 (none: in all). `sigma_m`, `sigma_rad`: how exact it is said to be. `weight`: how much it
-    counts beside the others, whose weights sum to about 1. Absent, and counted, where the log says no true pose.
+    these logs, counted from 0 (none: in all). `first_m`: only on so many metres of a log's way (0: on all). `sigma_m`,
+    `sigma_rad`: how exact it is said to be. `weight`: how much it counts beside the others, whose weights sum to about
+    1. Absent, and counted, where the log says no true pose.
     """
 
     every_m: Annotated[float, Bounds(ge=0)] = 0.0
     places: tuple[tuple[float, float], ...] = ()
     near_m: Annotated[float, Bounds(gt=0)] = 0.5
     logs: tuple[int, ...] = ()
+    first_m: Annotated[float, Bounds(ge=0)] = 0.0
     sigma_m: Annotated[float, Bounds(gt=0)] = 0.05
     sigma_rad: Annotated[float, Bounds(gt=0)] = 0.02
     weight: Annotated[float, Bounds(gt=0)] = 1.0
@@ -46,16 +49,18 @@ class Calibration(Stage):
     def step(self, ctx: Context, truth: Pose | None, stated: Stated) -> Out:
         """State the pose, where it is time."""
         if ctx.tick.first_of_log:
-            stated.way, stated.at = math.inf, None
+            stated.way, stated.gone, stated.at = math.inf, 0.0, None
         if self.logs and ctx.tick.log not in self.logs:
             return self.Out()
         if truth is None:
             ctx.count("no_pose_to_state", detail="calibration: this picture has no true pose; none is stated")
             return self.Out()
         if stated.at is not None:
-            stated.way += math.hypot(truth.x - stated.at[0], truth.y - stated.at[1])
+            moved = math.hypot(truth.x - stated.at[0], truth.y - stated.at[1])
+            stated.way, stated.gone = stated.way + moved, stated.gone + moved
         stated.at = (truth.x, truth.y)
-        if stated.way < self.every_m or not self._in_place(truth):
+        over = self.first_m > 0.0 and stated.gone > self.first_m
+        if over or stated.way < self.every_m or not self._in_place(truth):
             return self.Out()
         stated.way = 0.0
         sigmas = np.array([self.sigma_m, self.sigma_m, self.sigma_rad])

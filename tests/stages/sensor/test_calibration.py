@@ -45,6 +45,12 @@ def test_only_in_the_logs_that_are_named_and_anew_in_each() -> None:
     assert [stated(stage, log=log, memory=memory) for log in range(3)] == [[0.0, 2.0], [], [0.0, 2.0]]
 
 
+def test_only_on_the_first_metres_of_each_log() -> None:
+    memory = Stated()
+    stage = Calibration(first_m=1.0, every_m=0.5)
+    assert [stated(stage, log=log, memory=memory) for log in range(2)] == [[0.0, 0.5, 1.0]] * 2
+
+
 def test_without_truth_nothing_is_stated_and_it_is_counted() -> None:
     ctx = Context("calibration")
     assert Calibration().step(ctx, None, Stated()).hypothesis is None
