@@ -223,6 +223,8 @@ class Route:
     through: tuple[str, ...] = ()
     laps: Annotated[int, Bounds(ge=1)] = 1
     """Of `laps`: times around; of `aisles`: times through each, there and back by turns."""
+    first: tuple[Point, ...] = ()
+    """Of `laps`: points that it goes through before."""
     length: Positive | None = None
     """Metres after which it ends; all the way where null."""
     seed: int = 0

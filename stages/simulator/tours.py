@@ -94,6 +94,7 @@ def _goals(world: World, ways: "_Ways", route: Route) -> Iterator[Point]:
         yield from route.waypoints
         return
     if route.kind == "laps":
+        yield from route.first
         for _ in range(route.laps):
             yield from route.waypoints
         yield from route.waypoints[:1]

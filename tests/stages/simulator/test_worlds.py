@@ -97,11 +97,32 @@ def test_a_days_line_is_beside_the_route_by_the_stated_share_of_its_spread() -> 
         ("campus", "tour", 440, 460),
         ("home_store_mid", "training", 1900, 2100),
         ("home_store_mid", "test", 295, 305),
-        ("home_store_small", "laps", 370, 400),
+        ("home_store_small", "laps", 420, 450),
+        ("home_store_mid", "part", 420, 460),
+        ("hall", "area", 340, 380),
     ],
 )
 def test_routes_have_the_lengths_of_the_papers(name: str, route: str, least: float, most: float) -> None:
     assert least <= length(tours.plan(built(name), load(name).routes[route])) <= most
+
+
+def test_laps_begin_where_what_comes_first_has_led() -> None:
+    open_hall = World(WorldConfig(size=(20.0, 20.0)))
+    square = ((5.0, 5.0), (15.0, 5.0), (15.0, 15.0), (5.0, 15.0))
+    plain = tours.plan(open_hall, Route(square, "laps", laps=2))
+    line = tours.plan(open_hall, Route(square, "laps", laps=2, first=((2.0, 2.0), (2.0, 5.0))))
+    np.testing.assert_array_equal(line[0], (2.0, 2.0))
+    assert length(line) == pytest.approx(length(plain) + 6.0, abs=1.0)
+
+
+@pytest.mark.parametrize(("name", "route", "farthest"), [("hall", "area", 30.0), ("home_store_mid", "part", 30.0)])
+def test_who_builds_a_map_soon_comes_back_to_where_he_has_been(name: str, route: str, farthest: float) -> None:
+    """No stretch of new floor, farther than 0.6 m from any place left 6 m of way before, is longer than 30 m."""
+    truth = SimulatedRecording(load(name), route, 0).truth[:, :2]
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth, axis=0).T))])
+    known = np.array([(np.hypot(*(truth[way < way[k] - 6.0] - at).T) < 0.6).any() for k, at in enumerate(truth)])
+    returns = way[np.concatenate([np.flatnonzero(known), [len(way) - 1]])]
+    assert np.diff(returns).max() < farthest
 
 
 def test_the_campus_tour_has_545_images() -> None:
