@@ -84,8 +84,14 @@ class MapHistory(Stage):
 
 
 def counted(events: Sequence[ViewEvent | None]) -> Ints:
-    """References and components after each tick, and how many references had come and gone by then: (N, 4)."""
-    rows, views, components, came, went = [], 0, 0, 0, 0
+    """References and components after each tick, and how many references had come and gone by then: (N, 4).
+
+    What a known map held is taken from the first event.
+    """
+    first = next((event for event in events if event is not None), None)
+    views = 0 if first is None else first.views - len(first.inserted) + len(first.removed)
+    components = first.components if first is not None and views else 0
+    rows, came, went = [], 0, 0
     for event in events:
         if event is not None:
             views, components = event.views, event.components

@@ -23,6 +23,7 @@ class ViewMapSize(Stage):
     some kilobytes of text, is not counted), `reference_size_bytes` (a view's share of them), `pose_source`,
     `visited_area_m2` and `references_per_m2`. The visited area is what lies within `near_m` of the path: cells of half
     that size which the true path, or the estimates where there is no truth, comes so near to.
+    A known map may hold more than what this run visited: its density then says too much.
     """
 
     near_m: Annotated[float, Bounds(gt=0)] = 1.0

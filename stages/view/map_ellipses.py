@@ -55,7 +55,7 @@ class MapEllipses(Stage):
             figure=Figure(
                 name="map_ellipses",
                 title="The map",
-                caption=f"{said} Each place is an ellipse of {self.sigmas:g} standard deviations, yellow where it "
+                caption=f"{said} Each place is an ellipse of {self.sigmas:g} sigma, yellow where it "
                 f"weighs little and blue where it weighs much. The line is the {'true path' if true else 'estimate'}. "
                 f"The first pose came from {map.pose_source}.",
                 content=_draw(map, paths, plan if true else None, self.sigmas, self.headings, true),
@@ -70,7 +70,9 @@ def _draw(
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    extent = extent_of(*paths, map.means, margin=0.08)
+    reach = sigmas * np.sqrt(np.diagonal(map.covariances, axis1=1, axis2=2)[:, :2])
+    corners = map.means[:, None, :2] + np.stack([-reach, reach], axis=1)
+    extent = extent_of(*paths, corners.reshape(-1, 2), margin=0.02)
     with picture(8.0, fitting_height(extent, 8.0, 3.0, 9.0)) as drawn:
         axes = drawn.canvas.add_subplot()
         draw_plan(axes, plan)
@@ -78,7 +80,7 @@ def _draw(
             colour, name = (TRUTH, "true path") if true else (ESTIMATE, "estimate")
             x, y = path[known(path)][:, :2].T
             axes.plot(x, y, color=colour, linewidth=0.8, alpha=0.5, zorder=2, label=None if number else name)
-        scale = ScalarMappable(Normalize(0.0, 1.0), "viridis_r")
+        scale = ScalarMappable(Normalize(0.0, float(map.weights.max()) or 1.0), "viridis_r")
         order = np.argsort(map.weights, kind="stable")  # what weighs most lies on top
         means, weights = map.means[order], map.weights[order]
         colours = np.asarray(scale.to_rgba(weights))

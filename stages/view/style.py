@@ -53,7 +53,8 @@ def draw_map(axes: "Axes", map: AnyMap | None, label: bool = True) -> None:
         size = float(np.clip(3000 / max(len(map.weights), 1), 1.5, 9))
         name = f"views ({len(map)}) at {len(map.weights)} places" if label else None
         x, y = map.means[:, :2].T
-        colours = faded(REFERENCE, np.clip(map.weights, 0.15, 1))
+        heaviest = float(map.weights.max(initial=0.0)) or 1.0
+        colours = faded(REFERENCE, np.clip(map.weights / heaviest, 0.3, 1.0))
         axes.scatter(x, y, s=size, c=colours, linewidths=0, zorder=1.5, label=name)
         return
     if len(map.edges):
@@ -68,7 +69,7 @@ def draw_gaussians(
 ) -> None:
     """Gaussians over the pose, (K, 3) and (K, 3, 3), as ellipses of `sigmas` standard deviations in the plane.
 
-    `colours` (K, 4) are those of the lines; the inside is a third as opaque.
+    `colours` (K, 4) are those of the lines; the inside is a third as opaque, and less where there are many.
     """
     if not len(means):
         return
@@ -84,7 +85,7 @@ def draw_gaussians(
             units="xy",
             offsets=means[:, :2],
             offset_transform=axes.transData,
-            facecolors=colours * (1, 1, 1, 0.33),
+            facecolors=colours * (1, 1, 1, min(0.33, 15 / len(means))),
             edgecolors=colours,
             linewidths=0.7,
             zorder=zorder,

@@ -49,6 +49,13 @@ def test_ticks_without_an_event_change_nothing():
     assert counted([None, None]).tolist() == [[0, 0, 0, 0], [0, 0, 0, 0]]
 
 
+def test_a_map_that_was_known_is_there_before_the_first_event(learned):
+    later = learned[2][40:]
+    counts = counted([None, *later])
+    assert counts[0].tolist() == [learned[2][39].views, later[0].components, 0, 0]
+    assert counts[1, 0] == later[0].views
+
+
 def test_laps_of_the_first_log_are_parts_of_their_own():
     run = small_run(60)
     twice = small_run(60)
