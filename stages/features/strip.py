@@ -13,7 +13,8 @@ Channels = Literal["brightness", "colour"]
 Contrast = Literal["none", "whole", "local"]
 
 WINDOW = 1.0 / 18.0
-"""Standard deviation of the window of local contrast, as a share of the circle: 20 degrees."""
+"""Standard deviation of the window of local contrast, as a share of the circle: 20 degrees
+(docs/experiments/cml_view_limit.md)."""
 
 FAINT = 5.0
 """Grey levels: what differs by less from its surroundings is rather noise than contrast."""

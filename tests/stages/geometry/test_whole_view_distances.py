@@ -14,13 +14,33 @@ RNG = np.random.default_rng(3)
 
 
 def test_distance_at_the_best_heading_is_the_least_of_all_written_out() -> None:
-    turned = RNG.normal(0, 100, (36, 64)).astype(np.float32)
-    kept = np.concatenate([RNG.normal(0, 100, (50, 64)), turned[[7]] + 1e-3, turned[[20]]]).astype(np.float32)
+    turned = RNG.normal(0, 100, (2, 64)).astype(np.float32)
+    kept = np.concatenate([RNG.normal(0, 100, (50, 64)), turned[[1]] + 1e-3, turned[[0]]]).astype(np.float32)
     written = np.array([[math.dist(here, there) for here in turned.tolist()] for there in kept.tolist()])
     assert all_distances(turned, kept) == pytest.approx(written, rel=1e-6, abs=1e-2)
     found = turned_distances(turned, kept)
     assert found == pytest.approx(written.min(axis=1), rel=1e-5)
     assert found[-1] == 0.0
+
+
+def test_between_headings_the_distance_follows_the_parabola_of_squares() -> None:
+    turned = RNG.normal(0, 100, (36, 64)).astype(np.float32)
+    kept = np.concatenate([RNG.normal(0, 100, (50, 64)), turned[[20]]]).astype(np.float32)
+    found = turned_distances(turned, kept)
+    for there, distance in zip(kept.tolist(), found.tolist(), strict=True):
+        squares = [math.dist(here, there) ** 2 for here in turned.tolist()]
+        best = int(np.argmin(squares))
+        around = [squares[(best + step) % 36] for step in (-1, 0, 1)]
+        bend, slope, level = np.polyfit([-1, 0, 1], around, 2)
+        assert distance == pytest.approx(math.sqrt(max(0.0, level - slope**2 / (4 * bend))), rel=1e-4, abs=1e-3)
+    assert found[-1] == 0.0
+
+
+def test_a_robot_turned_by_half_a_step_is_nearer_than_to_either_heading() -> None:
+    angles = 2 * math.pi * (np.arange(36) + 0.5) / 36
+    turned = np.stack([np.cos(angles), np.sin(angles)], axis=1).astype(np.float32)
+    kept = np.array([[1.0, 0.0]], np.float32)
+    assert turned_distances(turned, kept)[0] < 0.1 * all_distances(turned, kept).min()
 
 
 @pytest.mark.parametrize("headings", [12, 36, 72])
