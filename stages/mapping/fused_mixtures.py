@@ -34,7 +34,7 @@ class FusedMixtures(Stage):
     """
 
     merge_below: Annotated[float, Bounds(ge=0)] = 7.81
-    spread: bool = False
+    spread: bool = True
     least_weight: Annotated[float, Bounds(ge=0, lt=0.5)] = 0.01
     max_views: Annotated[int, Bounds(ge=0)] = 0
 

@@ -32,7 +32,7 @@ def learn(
     stage: FusedMixtures | None = None,
     limit: float = 1.0,
 ) -> ViewEvent:
-    stage = FusedMixtures() if stage is None else stage
+    stage = FusedMixtures(spread=False) if stage is None else stage
     out = stage.step(Context("mapping"), Lessons((Lesson(view, state, 0),)), ViewLimit(limit), map)
     assert out.events is not None
     return out.events
