@@ -18,6 +18,8 @@ Ints = npt.NDArray[np.int64]
 
 ColourSpace = Literal["rgb", "lab", "ycrcb", "hsv"]
 BinCount = Annotated[int, Bounds(ge=0, le=256)]
+Level = Annotated[int, Bounds(ge=0, le=255)]
+Ranges = tuple[tuple[Level, Level], tuple[Level, Level], tuple[Level, Level]]
 
 CONVERSIONS = {"lab": cv2.COLOR_BGR2Lab, "ycrcb": cv2.COLOR_BGR2YCrCb, "hsv": cv2.COLOR_BGR2HSV}
 LEVELS = {"rgb": (256, 256, 256), "lab": (256, 256, 256), "ycrcb": (256, 256, 256), "hsv": (180, 256, 256)}
@@ -49,18 +51,28 @@ def _count(pixels: Pixels, edges: Ints, bins: Ints, sizes: Ints, offsets: Ints, 
 
 
 def colour_histograms(
-    pixels: Pixels, segments: int, space: ColourSpace, bins: tuple[int, int, int], joint: bool = False
+    pixels: Pixels,
+    segments: int,
+    space: ColourSpace,
+    bins: tuple[int, int, int],
+    joint: bool = False,
+    ranges: Ranges | None = None,
 ) -> Floats:
     """Histograms of a colour space's channels per segment, each segment's summing to 1: (segments, bins) float32.
 
-    `bins` per channel in the space's order (rgb: red, green, blue), equal steps of its range; 0 leaves a channel out.
+    `bins` per channel in the space's order (rgb: red, green, blue), 0 leaves one out: equal steps of all its levels, or
+    of those from the lowest to the highest in `ranges`; what lies beyond counts in the first and the last bin.
     `joint` False: one histogram per channel behind each other, with equal shares of the mass; True: one over all
     channels, the first slowest. `pixels` are blue-green-red.
     """
     converted = pixels[..., ::-1] if space == "rgb" else cv2.cvtColor(pixels, CONVERSIONS[space])
     sizes = np.array(bins, dtype=np.int64)
+    spans = ranges or tuple((0, levels - 1) for levels in LEVELS[space])
     table = np.stack(
-        [np.minimum(np.arange(256) * n // levels, max(n - 1, 0)) for n, levels in zip(bins, LEVELS[space], strict=True)]
+        [
+            np.clip((np.arange(256) - low) * n // (high - low + 1), 0, max(n - 1, 0))
+            for n, (low, high) in zip(bins, spans, strict=True)
+        ]
     )
     offsets = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
     length = int(np.prod(sizes[sizes > 0])) if joint else int(sizes.sum())
@@ -74,14 +86,17 @@ class ColourHistogram(Stage):
 
     Gross & Koenig 2004, section 2, "experimentally studied several color spaces" before they settled on HSV (stage
     HsvHistogram, which also leaves out hues that are noise). `space`: rgb, lab, ycrcb or hsv, as OpenCV converts 8-bit
-    pictures; `bins` per channel, 0 leaves one out; `joint`: one histogram over all channels instead of one for each.
-    Each segment sums to 1, so that intersections lie in [0, 1].
+    pictures; `bins` per channel, 0 leaves one out; `joint`: one histogram over all channels instead of one for each;
+    `ranges`: the lowest and the highest level that the bins of each channel share, where pictures hold only some of all
+    levels (Lab's a and b: of seven simulated worlds 96 % lie from 80 to 183). Each segment sums to 1, so that
+    intersections lie in [0, 1].
     """
 
     segments: Annotated[int, Bounds(ge=1)] = 36
     space: ColourSpace = "rgb"
     bins: tuple[BinCount, BinCount, BinCount] = (8, 8, 8)
     joint: bool = False
+    ranges: Ranges | None = None
 
     class Out(Outputs):
         """The description of the view."""
@@ -89,11 +104,15 @@ class ColourHistogram(Stage):
         features: SegmentHistograms
 
     def __post_init__(self) -> None:
-        """At least one channel must be left."""
+        """At least one channel must be left, and each range go upwards."""
         if not any(self.bins):
             raise ValueError("bins: at least one channel needs bins; write bins: [8, 8, 8]")
+        if any(low >= high for low, high in self.ranges or ()):
+            raise ValueError(
+                "ranges: each is [lowest, highest]; write ranges: [[0, 255], [80, 183], [80, 183]], or null"
+            )
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:
         """Describe one panorama."""
-        histograms = colour_histograms(panorama.pixels, self.segments, self.space, self.bins, self.joint)
+        histograms = colour_histograms(panorama.pixels, self.segments, self.space, self.bins, self.joint, self.ranges)
         return self.Out(features=SegmentHistograms(histograms))

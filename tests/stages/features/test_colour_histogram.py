@@ -39,3 +39,27 @@ def test_a_channel_can_be_left_out():
     assert both.shape == (6, 16)
     with pytest.raises(ValueError, match="at least one channel"):
         ColourHistogram(bins=(0, 0, 0))
+
+
+def test_bins_within_ranges_are_those_of_opencv_and_what_lies_beyond_is_in_the_outer_ones():
+    ranges = ((0, 255), (80, 183), (64, 191))
+    counted = colour_histograms(PIXELS, 6, "lab", (4, 8, 4), ranges=ranges)
+    lab = cv2.cvtColor(PIXELS, cv2.COLOR_BGR2Lab)
+    for segment in range(6):
+        part = lab[:, 12 * segment : 12 * segment + 12]
+        peers = [
+            cv2.calcHist([np.clip(part, low, high)], [channel], None, [n], [low, high + 1]).ravel()
+            for channel, (n, (low, high)) in enumerate(zip((4, 8, 4), ranges, strict=True))
+        ]
+        assert counted[segment] == pytest.approx(np.concatenate(peers) / (3 * 480), abs=1e-6)
+
+
+@pytest.mark.parametrize(("space", "whole"), [("lab", ((0, 255),) * 3), ("hsv", ((0, 179), (0, 255), (0, 255)))])
+def test_ranges_of_all_levels_change_nothing(space, whole):
+    plain = colour_histograms(PIXELS, 6, space, (5, 8, 0), joint=True)
+    np.testing.assert_array_equal(colour_histograms(PIXELS, 6, space, (5, 8, 0), joint=True, ranges=whole), plain)
+
+
+def test_a_range_that_does_not_go_upwards_is_refused():
+    with pytest.raises(ValueError, match=r"ranges: each is \[lowest, highest\]"):
+        ColourHistogram(space="lab", ranges=((0, 255), (183, 80), (80, 183)))
