@@ -302,11 +302,10 @@ def _execute(run: Run, planned: Plan, progress: Any) -> dict[str, Any]:
     for name, origin in planned.saves.items():
         value = last[origin]
         if isinstance(value, Value):
-            write_artifact(
-                run.folder / f"{name}.omap",
-                value,
-                _provenance(planned.graph.leading_to([origin]), engine, planned.variant),
-            )
+            file = run.folder / f"{name}.omap"
+            write_artifact(file, value, _provenance(planned.graph.leading_to([origin]), engine, planned.variant))
+            saved = {"file": file.name, "bytes": file.stat().st_size, "sha256": digest_file(file)}
+            run.manifest.setdefault("saved", {})[name] = saved
     return _finish(run, planned, engine, front)
 
 
