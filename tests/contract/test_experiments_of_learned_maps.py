@@ -1,0 +1,65 @@
+"""What the pages of maps that are learned on the way promise, and that their conditions can be built."""
+
+from pathlib import Path
+
+import pytest
+from hydra import compose, initialize_config_module
+from omegaconf import OmegaConf
+
+from omninav.pipeline.app import complete
+from omninav.pipeline.experiment import read_experiment, words_of
+from omninav.pipeline.run import plan
+
+CONF = Path(__file__).resolve().parents[2] / "conf" / "experiment"
+NAMES = [
+    f"{folder}/{path.stem}"
+    for folder in ("particle_cml", "omniview_cml", "cml")
+    for path in sorted((CONF / folder).glob("*.yaml"))
+]
+each = pytest.mark.parametrize("name", NAMES)
+
+
+@pytest.fixture(autouse=True)
+def hydra():
+    with initialize_config_module("omninav.conf", version_base="1.3"):
+        yield
+
+
+def experiment(name: str, profile: str):
+    config = OmegaConf.to_container(compose("config", overrides=[f"+experiment={name}"]), resolve=True)
+    return read_experiment(config["experiment"], profile)
+
+
+def typed(found, condition):
+    drive = next(iter(found.drives.values()), "")
+    own = [word for part in (found.common, found.set, condition.words, drive) for word in words_of(part)]
+    return own if any(word.startswith("variant=") for word in own) else [f"variant={found.variant}", *own]
+
+
+@each
+def test_the_page_shows_how_far_odometry_alone_would_have_gone_wrong(name):
+    found = experiment(name, "paper")
+    paths = [path for measure in found.measures.values() for path in measure.of]
+    assert any(path.endswith("odometry_alone.final_error_m") for path in paths)
+
+
+@pytest.mark.parametrize("name", ["particle_cml/slip", "particle_cml/kidnap", "omniview_cml/figure_6"])
+def test_it_is_a_claim_that_odometry_alone_ends_two_metres_off(name):
+    claims = [claim for claim in experiment(name, "paper").claims if claim.measure == "odometry_end"]
+    assert [claim.at_least for claim in claims] == [2.0]
+
+
+@each
+@pytest.mark.parametrize("profile", ["paper", "quick"])
+def test_its_last_condition_can_be_built(name, profile):
+    found = experiment(name, profile)
+    planned = plan(complete(compose("config", overrides=typed(found, found.conditions()[-1]))))
+    assert {"errors", "curves", "history"} <= set(planned.graph.nodes)
+
+
+def test_an_interval_is_asked_for_only_where_there_are_repetitions_for_one():
+    for name in NAMES:
+        found = experiment(name, "paper")
+        sides = ("below", "above", "not_above", "no_worse")
+        if any(getattr(claim, side) is not None for claim in found.claims for side in sides):
+            assert found.runs_of_a_condition >= 6, name
