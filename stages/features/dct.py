@@ -82,5 +82,6 @@ class CosineTransform(Stage):
         strip = averaged_strip(panorama.pixels, self.rows, self.columns, self.channels, self.contrast)
         columns = np.tensordot(self._vertical, strip, axes=(1, 0))  # (frequencies down, columns, channels)
         waves = np.tensordot(self._turned, columns, axes=(2, 1))  # (headings, across, down, channels)
-        turned: FloatArray = waves[:, self._across, self._down].reshape(self.headings, -1).astype(np.float32)
+        # In C order, as a cache gives it back: in another, products with it would differ in their last bit.
+        turned: FloatArray = waves[:, self._across, self._down].reshape(self.headings, -1).astype(np.float32, order="C")
         return self.Out(view=Coefficients(turned[0].copy(), turned))
