@@ -41,8 +41,8 @@ class ChangingField(Source):
     steps: Annotated[int, Bounds(ge=1)] = 100_000
     every: Annotated[int, Bounds(ge=0)] = 500
     stride: Annotated[float, Bounds(gt=0)] = 0.15
-    width: Annotated[float, Bounds(gt=0)] = 6.0
-    depth: Annotated[float, Bounds(gt=0)] = 5.0
+    width: Annotated[float, Bounds(gt=0)] = 4.0
+    depth: Annotated[float, Bounds(gt=0)] = 3.5
     kind: Kind = "spectrum"
 
     class Out(Outputs):
