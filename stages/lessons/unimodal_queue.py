@@ -32,9 +32,10 @@ class UnimodalQueue(Stage):
     queue gives out what is left in it when the next log begins; what waits at the end of the last log is not learned.
 
     The test for a unimodal state is not given (erratum 12a). `unimodal: share`: the components nearer to the heaviest
-    than `near_below` (squared Mahalanobis distance) hold at least `least_share` of the weight; the lesson's state has
-    their moments. `single`: there is one component. Either way its heading's standard deviation is at most `most_deg`
-    (one that nothing is known of has 104 degrees), and that of the position at most `most_m` (0: any).
+    than `near_below` (squared Mahalanobis distance) hold more than `least_share` of the weight; the lesson's state has
+    their moments. Where no view is known there is no evidence against a wrong part either, so that a high share would
+    learn nothing there. `single`: there is one component. Either way its heading's standard deviation is at most
+    `most_deg` (one that nothing is known of has 104 degrees), and that of the position at most `most_m` (0: any).
 
     Views in between wait until the next unimodal state, and then get the most likely states along the odometry between
     the two (`reconstruct`; geometry/path_reconstruction.py). They are dropped where odometry misses that state by more
@@ -44,7 +45,7 @@ class UnimodalQueue(Stage):
 
     length: Annotated[int, Bounds(ge=0)] = 20
     unimodal: Literal["share", "single"] = "share"
-    least_share: Annotated[float, Bounds(gt=0, le=1)] = 0.9
+    least_share: Annotated[float, Bounds(ge=0, lt=1)] = 0.5
     near_below: Annotated[float, Bounds(ge=0)] = 7.81
     most_m: Annotated[float, Bounds(ge=0)] = 0.0
     most_deg: Annotated[float, Bounds(gt=0)] = 45.0
@@ -90,7 +91,7 @@ class UnimodalQueue(Stage):
         top = int(np.argmax(state.weights))
         centre = (state.means[top : top + 1], state.covariances[top : top + 1])
         near = squared_distances(*centre, state.means, state.covariances)[0] <= self.near_below
-        if state.weights[near].sum() < self.least_share * state.weights.sum():
+        if state.weights[near].sum() <= self.least_share * state.weights.sum():
             return None
         mean, covariance, _ = moments(state.means[near], state.covariances[near], state.weights[near])
         sigmas = np.sqrt(np.diag(covariance))

@@ -21,6 +21,7 @@ from .view_events import view_event
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+UNMEASURED_M = 0.3
 Forgetting = Literal["active", "passive", "none"]
 
 
@@ -44,7 +45,8 @@ class AdaptiveViews(Stage):
     `forgetting: passive` is the model of Porta & Kroese that Table 1 compares with. A state of several modes, which the
     paper does not learn from, teaches each mode by its weight p: it is taken in where S p >= `least_similarity`, the
     count is p times as much, and w = beta S p + (1 - beta S) w with p of all modes that fit. `least_m` and `least_deg`
-    are the least standard deviations with which a place is taken in: a view looks alike over some way.
+    are the least standard deviations with which a place is taken in: a view looks alike over some way. `near_m` and
+    `fade_m`: none is the way over which the limit says that views look alike (0.3 m where it does not say).
     """
 
     shape: Shape = "linear"
@@ -54,8 +56,8 @@ class AdaptiveViews(Stage):
     merge_below: Annotated[float, Bounds(ge=0)] = 7.81
     fits_below: Annotated[float, Bounds(gt=0)] = 7.81
     beta_forget: Annotated[float, Bounds(ge=0, le=1)] = 0.1
-    near_m: Annotated[float, Bounds(gt=0)] = 0.5
-    fade_m: Annotated[float, Bounds(gt=0)] = 0.5
+    near_m: Annotated[float, Bounds(gt=0)] | None = None
+    fade_m: Annotated[float, Bounds(gt=0)] | None = None
     gain_m: Annotated[float, Bounds(gt=0)] = 0.2
     least_weight: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
     least_m: Annotated[float, Bounds(ge=0)] = 0.1
@@ -118,6 +120,7 @@ class AdaptiveViews(Stage):
         turns[rows] = view.turns(map.views[rows])
         self._take_in(state, alike, turns, map)
         weights = np.empty(len(map.weights))
+        alike_m = 0.0 if limit is None else limit.metres
         _weigh(
             state.means,
             state.covariances,
@@ -133,8 +136,8 @@ class AdaptiveViews(Stage):
             self.fits_below,
             self.forgetting != "none",
             self.beta_forget if self.forgetting == "active" else 0.0,
-            self.near_m,
-            self.fade_m,
+            self.near_m or alike_m or UNMEASURED_M,
+            self.fade_m or alike_m or UNMEASURED_M,
             self.gain_m,
             weights,
         )

@@ -92,7 +92,7 @@ def certain(stage, state):
 
 
 def test_a_state_is_certain_by_the_share_of_what_is_near_its_heaviest_part():
-    stage = UnimodalQueue(length=0)
+    stage = UnimodalQueue(length=0, least_share=0.9)
     assert certain(stage, belief(0, (0.91, 0.09)))
     assert not certain(stage, belief(0, (0.89, 0.11)))
     near = belief(0, (0.6, 0.4))

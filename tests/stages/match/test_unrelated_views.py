@@ -26,6 +26,8 @@ def test_the_limit_is_half_the_median_distance_of_views_far_enough_apart():
     assert [None if one is None else one.distance for one in out] == [None, None, 1.5, 3.0, 3.25, 3.25, 3.25]
     assert [one.settled for one in out if one is not None] == [False, False, True, True, True]
     assert ctx.facts["view_limit"] == 3.25
+    # From 0 the first view at 3.25 or more is 7, three steps of 0.1 m on; from 1 and from 3 it is 7 too: 0.3, 0.2, 0.1.
+    assert out[-1].metres == pytest.approx(0.2)
 
 
 def test_a_robot_that_stands_measures_nothing():
