@@ -175,7 +175,7 @@ def test_parameters_that_do_not_fit_each_other_are_refused(stage: Stage, changed
 
 
 def test_views_lie_in_memory_as_a_cache_gives_them_back() -> None:
-    # In another order products with them differ in their last bit, and a run with a warm cache from one with a cold one.
+    # In another order products with them differ in their last bit: a run with a warm cache from one with a cold one.
     stage = CosineTransform()
     stage.setup(Context("features"))
     pixels = np.random.default_rng(0).integers(0, 256, (80, 360, 3), np.uint8)
