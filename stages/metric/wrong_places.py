@@ -18,7 +18,7 @@ class WrongPlaces(Stage):
     """How long references keep a place at which they were learned and never were: after a kidnapping, mostly.
 
     A reference counts whose heaviest component lies further than `wrong_m` from the true position of the frame in which
-    it came (so this is for maps that learn at once). Of its weight, the share at places that far off is followed to the
+    it was seen, at its coming. Of its weight, the share at places that far off is followed to the
     end. Under `wrong_places`: `references`, how many there are; `kept`, of how many some of that weight is left at the
     end; lists with an entry for each of them in the order of their coming: `along_m`, the true way (m) since the first
     of them came, `gone_after_steps`, how many frames after it came that share had become 0 (None: never),
@@ -78,12 +78,11 @@ def wrong_shares(
     rows: list[dict[int, float]] = []
     for frame, (event, parts) in enumerate(zip(events, mixtures, strict=True)):
         if event is not None:
-            for name in event.inserted.tolist():
-                seen[name] = path[frame]
             for name in event.removed.tolist():
                 now.pop(name, None)
                 seen.pop(name, None)
         if parts is not None:
+            seen |= {int(name): path[row] for name, row in zip(parts.new, parts.seen, strict=True)}
             for name in np.unique(parts.names).tolist():
                 if name not in seen or not np.isfinite(seen[name]).all():
                     continue

@@ -15,10 +15,16 @@ def event(inserted=(), removed=()):
     return ViewEvent(1, 1, came, went, "", came, np.zeros(len(came)), np.zeros((len(came), 2)), came * 0)
 
 
-def mixture(*parts):
+def mixture(*parts, new=(), seen=()):
     names, xs, weights = zip(*parts, strict=True)
     means = np.array([(x, 0.0, 0.0) for x in xs], np.float32)
-    return MixturesNow(np.array(names, np.int64), means, np.array(weights, np.float32))
+    return MixturesNow(
+        np.array(names, np.int64),
+        means,
+        np.array(weights, np.float32),
+        np.array(new, np.int64),
+        np.array(seen, np.int64),
+    )
 
 
 @pytest.fixture
@@ -26,9 +32,9 @@ def life():
     # The robot goes from x = 0 by 1 m a frame. Reference 0 comes where it is; 1 and 2 come 10 m off.
     events = [event([0]), event([1]), event([2]), event(), event(), event()]
     mixtures = [
-        mixture((0, 0.0, 1.0)),
-        mixture((1, 11.0, 1.0)),
-        mixture((2, 12.0, 1.0)),
+        mixture((0, 0.0, 1.0), new=[0], seen=[0]),
+        mixture((1, 11.0, 1.0), new=[1], seen=[1]),
+        mixture((2, 12.0, 1.0), new=[2], seen=[2]),
         mixture((1, 11.0, 0.5), (1, 1.0, 0.5)),
         mixture((1, 1.0, 1.0)),
         mixture((2, 12.0, 0.2), (2, 2.0, 0.6)),
@@ -61,3 +67,11 @@ def test_a_map_without_wrong_places_says_only_that(life):
     events, mixtures, truth = life
     found = WrongPlaces().step(CTX, events[:1], mixtures[:1], truth[:1]).metrics.values
     assert found == {"wrong_places": {"references": 0}}
+
+
+def test_what_is_learned_late_is_held_against_where_it_was_seen(life):
+    truth = life[2]
+    late = [event()] * 4 + [event([0]), event()]
+    parts = [None] * 4 + [mixture((0, 1.0, 1.0), new=[0], seen=[1]), None]
+    near = WrongPlaces(wrong_m=2.0).step(CTX, late, parts, truth).metrics.values["wrong_places"]
+    assert near["references"] == 0
