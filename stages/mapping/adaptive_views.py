@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry.gaussians import apart, floored, merged, squared_distance
+from omninav.stages.geometry.gaussians import apart, floored, merged, moments, squared_distance, squared_distances
 from omninav.stages.geometry.se2 import wrap
 from omninav.stages.geometry.view_similarity import Shape, similarity
 from omninav.stages.values.belief import GaussianMixture
@@ -23,6 +23,8 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 UNMEASURED_M = 0.3
 Forgetting = Literal["active", "passive", "none"]
+Doubt = Literal["once", "again"]
+Components = tuple[Array, Array, Array, Array]
 
 
 class AdaptiveViews(Stage):
@@ -34,7 +36,7 @@ class AdaptiveViews(Stage):
     2. Views alike by S >= `least_similarity` take the state in as a new component, its heading turned to theirs
        (erratum 12), with weight 0 and count S over the sum of S of all views (equation 11, erratum 6). Components
        nearer than `merge_below` become one (equations 12 to 14, divided by the counts' sum: erratum 7), weights added
-       and capped at 1 (erratum 8).
+       and capped at 1 (erratum 8). `doubt` says what the state's own covariance does to a component it merges with.
     3. Weights of views nearer than the limit: w = beta S + (1 - beta S) w of components that fit the state, squared
        distance <= `fits_below` (equation 16); w = (1 - beta S) w of the others (17), unless `forgetting` is `none`.
        With `forgetting: active`, components of all other views within `near_m` of the state: w = (1 - b) w with b =
@@ -46,7 +48,15 @@ class AdaptiveViews(Stage):
     paper does not learn from, teaches each mode by its weight p: it is taken in where S p >= `least_similarity`, the
     count is p times as much, and w = beta S p + (1 - beta S) w with p of all modes that fit. `least_m` and `least_deg`
     are the least standard deviations with which a place is taken in: a view looks alike over some way. `near_m` and
-    `fade_m`: none is the way over which the limit says that views look alike (0.3 m where it does not say).
+    `fade_m`: none is the way over which the limit says that views look alike (0.3 m where it does not say). `gain_m`:
+    none is twice that way, so that a state as uncertain as views look alike forgets at `beta_forget`.
+
+    `doubt: again` is equation 14 to the letter: each state adds its covariance to that of the component, which holds
+    the spread of the means already. But the state has most of its covariance from the same map, so that the map teaches
+    itself its own doubt, again and again: covariances grow without end, covariance intersection never takes any back,
+    and forgetting, which equation 19 divides by them, dies down. With `once` a place has the covariance of the first
+    state it was seen in, which fades as states confirm it: they add the spread of their means, and no more doubt of
+    their own than `least_m` and `least_deg` ("coding a stable and reliable estimation", section 2.2).
     """
 
     shape: Shape = "linear"
@@ -55,10 +65,11 @@ class AdaptiveViews(Stage):
     least_similarity: Annotated[float, Bounds(gt=0, le=1)] = 0.2
     merge_below: Annotated[float, Bounds(ge=0)] = 7.81
     fits_below: Annotated[float, Bounds(gt=0)] = 7.81
-    beta_forget: Annotated[float, Bounds(ge=0, le=1)] = 0.1
+    doubt: Doubt = "once"
+    beta_forget: Annotated[float, Bounds(ge=0, le=1)] = 0.2
     near_m: Annotated[float, Bounds(gt=0)] | None = None
     fade_m: Annotated[float, Bounds(gt=0)] | None = None
-    gain_m: Annotated[float, Bounds(gt=0)] = 0.2
+    gain_m: Annotated[float, Bounds(gt=0)] | None = None
     least_weight: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
     least_m: Annotated[float, Bounds(ge=0)] = 0.1
     least_deg: Annotated[float, Bounds(ge=0)] = 2.0
@@ -120,7 +131,7 @@ class AdaptiveViews(Stage):
         turns[rows] = view.turns(map.views[rows])
         self._take_in(state, alike, turns, map)
         weights = np.empty(len(map.weights))
-        alike_m = 0.0 if limit is None else limit.metres
+        alike_m = (0.0 if limit is None else limit.metres) or UNMEASURED_M
         _weigh(
             state.means,
             state.covariances,
@@ -136,9 +147,9 @@ class AdaptiveViews(Stage):
             self.fits_below,
             self.forgetting != "none",
             self.beta_forget if self.forgetting == "active" else 0.0,
-            self.near_m or alike_m or UNMEASURED_M,
-            self.fade_m or alike_m or UNMEASURED_M,
-            self.gain_m,
+            self.near_m or alike_m,
+            self.fade_m or alike_m,
+            self.gain_m or 2.0 * alike_m,
             weights,
         )
         touched: Ints = map.names[np.unique(map.owner[weights != map.weights])]
@@ -151,24 +162,42 @@ class AdaptiveViews(Stage):
         # Phase 2: the state becomes a component of each view that is alike enough.
         total = alike.sum()
         rows = np.flatnonzero(alike * state.weights.max() >= self.least_similarity)
+        least = np.diag([self.least_m, self.least_m, np.radians(self.least_deg)]) ** 2
         mixtures = []
         for row in rows.tolist():
             kept = alike[row] * state.weights >= self.least_similarity
             means = state.means[kept]
             means[:, 2] = wrap(means[:, 2] - turns[row])
             mine = map.owner == row
-            parts = merged(
-                np.concatenate([map.means[mine], means]),
-                np.concatenate([map.covariances[mine], state.covariances[kept]]),
-                np.concatenate([map.counts[mine], state.weights[kept] * (alike[row] / total)]),
-                self.merge_below,
-                shares=np.concatenate([map.weights[mine], np.zeros(len(means))]),
-            )
-            mixtures.append(parts)
+            known = (map.means[mine], map.covariances[mine], map.counts[mine], map.weights[mine])
+            counts = state.weights[kept] * (alike[row] / total)
+            new = (means, state.covariances[kept], counts, np.zeros(len(means)))
+            if self.doubt == "once":
+                known, new = _confirmed(known, new, self.merge_below, least)
+            *components, weights = (np.concatenate(both) for both in zip(known, new, strict=True))
+            mixtures.append(merged(*components, self.merge_below, shares=weights))
         if len(rows):
             means, covariances, counts, weights = (np.concatenate(each) for each in zip(*mixtures, strict=True))
             owners = np.repeat(rows, [len(parts[0]) for parts in mixtures])
             map.put_mixtures(owners, means, covariances, np.minimum(weights, 1.0), counts)
+
+
+def _confirmed(known: Components, new: Components, below: float, least: Array) -> tuple[Components, Components]:
+    # The known components, each having taken in the means of those new ones that it is the nearest to, with the least
+    # doubt instead of their own; and the new ones that are not near any.
+    means, covariances, counts, weights = (each.copy() for each in known)
+    left = np.ones(len(new[0]), np.bool_)
+    if len(means):
+        for k in range(len(left)):
+            squared = squared_distances(new[0][k : k + 1], new[1][k : k + 1], means, covariances)[0]
+            j = int(squared.argmin())
+            if squared[j] >= below:
+                continue
+            left[k] = False
+            means[j], covariances[j], counts[j] = moments(
+                np.stack([means[j], new[0][k]]), np.stack([covariances[j], least]), np.array([counts[j], new[2][k]])
+            )
+    return (means, covariances, counts, weights), (new[0][left], new[1][left], new[2][left], new[3][left])
 
 
 def _floored(state: GaussianMixture, metres: float, radians: float) -> GaussianMixture:

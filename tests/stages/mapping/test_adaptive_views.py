@@ -62,13 +62,44 @@ def test_merged_places_are_the_counts_mean_and_not_their_sum():
     row = map.add_view(np.zeros(2, np.float32), "Coefficients")
     map.add_component(row, np.array([10.0, 5.0, 0.0]), np.eye(3) * 4.0, 0.5, 5.0)
     # Erratum 7: eta 5 and 0.4 must not move (10, 5) to (54, 27). Here eta 5 and 1 at (10, 5) and (13, 5).
-    learn(map, view(0, 0), state([13, 5, 0], sigma=2.0))
+    learn(map, view(0, 0), state([13, 5, 0], sigma=2.0), doubt="again")
     assert len(map.weights) == 1
     np.testing.assert_allclose(map.means[0], [10 + 3 / 6, 5, 0])
     # Equation 14: (5 (4 + 0.5^2) + 1 (4 + 2.5^2)) / 6 along x, 4 along y.
     np.testing.assert_allclose(np.diag(map.covariances[0]), [(5 * 4.25 + 10.25) / 6, 4, 4])
     assert map.counts.tolist() == [6.0]
     assert map.weights.tolist() == [0.1 + 0.9 * 0.5]
+
+
+def test_a_place_that_is_confirmed_learns_how_far_the_means_are_apart_and_not_the_doubt_again():
+    map = ViewMixtures.empty()
+    row = map.add_view(np.zeros(2, np.float32), "Coefficients")
+    map.add_component(row, np.array([10.0, 5.0, 0.0]), np.eye(3) * 4.0, 0.5, 5.0)
+    learn(map, view(0, 0), state([13, 5, 0], sigma=2.0), least_m=0.1)
+    # As above, but what comes has 0.1 m instead of 2 m: (5 (4 + 0.5^2) + 1 (0.1^2 + 2.5^2)) / 6 along x.
+    np.testing.assert_allclose(np.diag(map.covariances[0]), [(5 * 4.25 + 6.26) / 6, 20.01 / 6, 20 / 6])
+    learn(map, view(0, 0), state([30, 5, 0], sigma=2.0), least_m=0.1)
+    new = map.means[:, 0] == 30
+    np.testing.assert_allclose(np.diag(map.covariances[new][0]), 4.0, err_msg="elsewhere it is a place of its own")
+
+
+@pytest.mark.parametrize(("doubt", "grows"), [("once", False), ("again", True)])
+def test_a_map_that_teaches_itself_grows_ever_more_doubtful_only_where_doubt_counts_each_time(doubt, grows):
+    # The state is the map's own place and one picture's motion noise; the view is seen from within 0.2 m of it.
+    rng = np.random.default_rng(0)
+    map, spreads = ViewMixtures.empty(), []
+    for step in range(2000):
+        covariance = map.covariances[0] if len(map) else np.eye(3) * 0.01
+        noisy = GaussianMixture(rng.uniform(-0.2, 0.2, (1, 3)), (covariance + np.eye(3) * 0.003)[None], np.ones(1))
+        learn(map, view(0, 0), noisy, doubt=doubt, least_m=0.1)
+        if step in (999, 1999):
+            spreads.append(np.sqrt(map.covariances[0][0, 0]))
+    assert len(map.weights) == 1
+    if grows:
+        assert spreads[1] > 1.03 * spreads[0] > 0.3
+    else:
+        # A uniform spread over +-0.2 m, and the floor of 0.1 m.
+        assert spreads == pytest.approx([math.sqrt(0.4**2 / 12 + 0.01)] * 2, rel=0.05)
 
 
 def test_headings_are_kept_as_seen_by_a_robot_that_sees_the_kept_view():
@@ -126,7 +157,7 @@ def test_a_state_that_is_very_certain_takes_away_a_weight_but_not_more():
     map = ViewMixtures.empty()
     map.add_view(np.array([10.0, 0.0], np.float32), "Coefficients")
     map.add_component(0, np.zeros(3), np.eye(3) * 0.01, 0.5, 3.0)
-    # b = 0.1 * 2 / 0.002 = 100: without a limit the weight would be negative (erratum 11).
+    # b = 0.2 * 2 / 0.002 = 200: without a limit the weight would be negative (erratum 11).
     event = learn(map, view(0, 0), state([0, 0, 0], sigma=0.001), forgetting="active", gain_m=2.0)
     assert event.removed.tolist() == [0]
     assert event.why == "forgotten"
