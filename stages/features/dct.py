@@ -5,11 +5,11 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Stage
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.views import Coefficients
 
-from .strip import Channels, Contrast, averaged_strip
+from .strip import AveragedStrip
 
 Array = npt.NDArray[np.float64]
 FloatArray = npt.NDArray[np.float32]
@@ -34,7 +34,7 @@ def lowest_frequencies(rows: int, columns: int, number: int, mean: bool) -> tupl
     return down[order], across[order]
 
 
-class CosineTransform(Stage):
+class CosineTransform(AveragedStrip, Stage):
     """The first coefficients of the orthonormal discrete cosine transform of the averaged panorama.
 
     Porta & Kröse 2004, section 3: a standard compression that needs no set of images to learn from. The panorama is
@@ -48,21 +48,10 @@ class CosineTransform(Stage):
 
     coefficients: Annotated[int, Bounds(ge=1)] = 128
     mean: bool = False
-    rows: Annotated[int, Bounds(ge=1)] = 16
-    columns: Annotated[int, Bounds(ge=1)] = 72
-    channels: Channels = "brightness"
-    contrast: Contrast = "local"
-    headings: Annotated[int, Bounds(ge=1)] = 36
-
-    class Out(Outputs):
-        """The description of the view."""
-
-        view: Coefficients
 
     def __post_init__(self) -> None:
         """Headings are whole columns apart, and there are as many coefficients as asked for."""
-        if self.columns % self.headings:
-            raise ValueError(f"headings: {self.headings} do not divide {self.columns} columns; write columns: 72")
+        super().__post_init__()
         if self.coefficients > self.rows * self.columns - (not self.mean):
             raise ValueError(
                 f"coefficients: a strip of {self.rows} x {self.columns} has fewer than {self.coefficients}"
@@ -77,9 +66,9 @@ class CosineTransform(Stage):
         step = self.columns // self.headings
         self._turned = np.stack([np.roll(waves, -step * heading, axis=1) for heading in range(self.headings)])
 
-    def step(self, ctx: Context, panorama: Panorama) -> Out:
+    def step(self, ctx: Context, panorama: Panorama) -> AveragedStrip.Out:
         """Describe one panorama."""
-        strip = averaged_strip(panorama.pixels, self.rows, self.columns, self.channels, self.contrast)
+        strip = self.strip(panorama)
         columns = np.tensordot(self._vertical, strip, axes=(1, 0))  # (frequencies down, columns, channels)
         waves = np.tensordot(self._turned, columns, axes=(2, 1))  # (headings, across, down, channels)
         # In C order, as a cache gives it back: in another, products with it would differ in their last bit.

@@ -1,19 +1,17 @@
 """Whole views by a projection that was learned from a tour."""
 
-from typing import Annotated
-
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Stage
 from omninav.pipeline.problems import BadInput
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.projection import Projection
 from omninav.stages.values.views import Coefficients
 
-from .strip import Channels, Contrast, averaged_strip, turned_copies
+from .strip import AveragedStrip, turned_copies
 
 
-class PrincipalComponents(Stage):
+class PrincipalComponents(AveragedStrip, Stage):
     """The averaged panorama projected on the principal components of a supervised tour's: y = W z.
 
     Porta & Kröse 2004, section 2, equation 3. `rows`, `columns`, `channels` and `contrast` must be those of the strips
@@ -21,29 +19,13 @@ class PrincipalComponents(Stage):
     compared; 1 is the paper's form. Raises BadInput where W is for strips of another size.
     """
 
-    rows: Annotated[int, Bounds(ge=1)] = 16
-    columns: Annotated[int, Bounds(ge=1)] = 72
-    channels: Channels = "brightness"
-    contrast: Contrast = "local"
-    headings: Annotated[int, Bounds(ge=1)] = 36
-
-    class Out(Outputs):
-        """The description of the view."""
-
-        view: Coefficients
-
-    def __post_init__(self) -> None:
-        """Headings are whole columns apart."""
-        if self.columns % self.headings:
-            raise ValueError(f"headings: {self.headings} do not divide {self.columns} columns; write columns: 72")
-
     def setup(self, ctx: Context) -> None:
         """No projection seen yet."""
         self._projection: Projection | None = None
 
-    def step(self, ctx: Context, panorama: Panorama, projection: Projection) -> Out:
+    def step(self, ctx: Context, panorama: Panorama, projection: Projection) -> AveragedStrip.Out:
         """Describe one panorama."""
-        strip = averaged_strip(panorama.pixels, self.rows, self.columns, self.channels, self.contrast)
+        strip = self.strip(panorama)
         if projection is not self._projection:
             self._learned(projection, strip.size)
         values = np.moveaxis(strip, 1, 0).ravel()

@@ -1,12 +1,15 @@
 """A panorama averaged to a small strip: what transforms of whole views begin with."""
 
-from typing import Literal, cast
+from dataclasses import dataclass
+from typing import Annotated, Literal, cast
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.values.image import Pixels
+from omninav.pipeline import Bounds, Outputs
+from omninav.stages.values.image import Panorama, Pixels
+from omninav.stages.values.views import Coefficients
 
 FloatArray = npt.NDArray[np.float32]
 Channels = Literal["brightness", "colour"]
@@ -18,6 +21,36 @@ WINDOW = 1.0 / 18.0
 
 FAINT = 5.0
 """Grey levels: what differs by less from its surroundings is rather noise than contrast."""
+
+
+@dataclass(kw_only=True, eq=False)
+class AveragedStrip:
+    """What stages that describe a view by its averaged panorama have in common: a mixin, beside `Stage`.
+
+    The panorama is averaged to `rows` x `columns` of brightness or colour (`channels`), in grey levels (`contrast`
+    none) or in standard deviations (whole, local: see `averaged_strip`). `headings`, which must divide `columns`: at
+    how many turns views are compared; 1 compares them as they are.
+    """
+
+    rows: Annotated[int, Bounds(ge=1)] = 16
+    columns: Annotated[int, Bounds(ge=1)] = 72
+    channels: Channels = "brightness"
+    contrast: Contrast = "local"
+    headings: Annotated[int, Bounds(ge=1)] = 36
+
+    class Out(Outputs):
+        """The description of the view."""
+
+        view: Coefficients
+
+    def __post_init__(self) -> None:
+        """Headings are whole columns apart."""
+        if self.columns % self.headings:
+            raise ValueError(f"headings: {self.headings} do not divide {self.columns} columns; write columns: 72")
+
+    def strip(self, panorama: Panorama) -> FloatArray:
+        """One panorama averaged: (rows, columns, channels)."""
+        return averaged_strip(panorama.pixels, self.rows, self.columns, self.channels, self.contrast)
 
 
 def averaged_strip(

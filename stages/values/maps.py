@@ -1,18 +1,19 @@
 """Maps."""
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
 
+from .growing import GrowingArrays
 from .pose import Pose, PoseSource
 
 FeatureKind = Literal["histograms", "colours"]
 
 
-class ReferenceGraph(Value):
+class ReferenceGraph(GrowingArrays, Value):
     """Reference views at known poses, joined by edges along the drive (Gross & Koenig 2004, section 2).
 
     `poses`: (R, 3) x, y (m), heading (rad) of the robot when the view was taken. `features`: (R, segments, bins) in
@@ -40,13 +41,13 @@ class ReferenceGraph(Value):
     def insert(self, pose: Pose, features: npt.NDArray[np.float32], kind: FeatureKind) -> int:
         """Add a reference and give its index. Raises ValueError where the features are not of the map's shape."""
         if not len(self):
-            self._put(kind=kind, features=np.empty((0, *features.shape), np.float32))
+            self.put(kind=kind, features=np.empty((0, *features.shape), np.float32))
         if kind != self.kind or features.shape != self.features.shape[1:]:
             raise ValueError(
                 f"a {kind} view of shape {features.shape} in a map of {self.kind} {self.features.shape[1:]}"
             )
-        self._append("poses", np.array([pose.x, pose.y, pose.heading]))
-        self._append("features", features)
+        self.append("poses", np.array([pose.x, pose.y, pose.heading]))
+        self.append("features", features)
         return len(self) - 1
 
     def join(self, one: int, other: int) -> bool:
@@ -54,27 +55,12 @@ class ReferenceGraph(Value):
         pair = np.array(sorted((one, other)), np.int64)
         if one == other or bool((self.edges == pair).all(axis=1).any()):
             return False
-        self._append("edges", pair)
+        self.append("edges", pair)
         return True
 
     def take_poses_from(self, source: PoseSource) -> None:
         """Say where the poses to come are from."""
-        self._put(pose_source=source)
-
-    def _put(self, **fields: object) -> None:
-        for name, value in fields.items():
-            setattr(self, name, value)
-
-    def _append(self, name: str, row: npt.NDArray[Any]) -> None:
-        # The field is a view of an array with room to grow, which doubles when it is full: R insertions copy O(R).
-        rows: npt.NDArray[Any] = getattr(self, name)
-        rooms: dict[str, npt.NDArray[Any]] = self.__dict__.setdefault("_rooms", {})
-        room = rooms.get(name)
-        if room is None or rows.base is not room or len(rows) == len(room):
-            room = rooms[name] = np.empty((max(64, 2 * len(rows)), *rows.shape[1:]), rows.dtype)
-            room[: len(rows)] = rows
-        room[len(rows)] = row
-        self._put(**{name: room[: len(rows) + 1]})
+        self.put(pose_source=source)
 
 
 class ReferenceEvent(Value):

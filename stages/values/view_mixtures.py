@@ -1,12 +1,13 @@
 """Maps that are learned while they are used: views, and for each the places where it may be seen."""
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
 
+from .growing import GrowingArrays
 from .pose import PoseSource
 
 Array = npt.NDArray[np.float64]
@@ -14,7 +15,7 @@ Ints = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 
 
-class ViewMixtures(Value):
+class ViewMixtures(GrowingArrays, Value):
     """Views and for each a mixture of Gaussians over the poses from which it is seen (Porta & Kroese 2004, section 3;
     Gross, Koenig & Mueller 2005, equations 9 and 10). Changed in place by the stage that learns it.
 
@@ -67,22 +68,22 @@ class ViewMixtures(Value):
     def add_view(self, values: npt.NDArray[np.float32], kind: str) -> int:
         """Keep a view, with no place yet; gives its row. Raises ValueError where it is not of the map's kind."""
         if not len(self) and not self.next_name:
-            self._put(views=np.empty((0, len(values)), np.float32), kind=kind)
+            self.put(views=np.empty((0, len(values)), np.float32), kind=kind)
         if kind != self.kind or len(values) != self.views.shape[1]:
             raise ValueError(f"{kind} of {len(values)} numbers in a map of {self.kind} of {self.views.shape[1]}")
-        self._append("views", values)
-        self._append("names", np.int64(self.next_name))
-        self._append("born", np.int64(self.steps))
-        self._put(next_name=self.next_name + 1)
+        self.append("views", values)
+        self.append("names", np.int64(self.next_name))
+        self.append("born", np.int64(self.steps))
+        self.put(next_name=self.next_name + 1)
         return len(self) - 1
 
     def add_component(self, owner: int, mean: Array, covariance: Array, weight: float, count: float) -> int:
         """Give a view one more place; gives the component's row."""
-        self._append("owner", np.int64(owner))
-        self._append("means", mean)
-        self._append("covariances", covariance)
-        self._append("weights", np.float64(weight))
-        self._append("counts", np.float64(count))
+        self.append("owner", np.int64(owner))
+        self.append("means", mean)
+        self.append("covariances", covariance)
+        self.append("weights", np.float64(weight))
+        self.append("counts", np.float64(count))
         return len(self.weights) - 1
 
     def put_mixture(self, owner: int, means: Array, covariances: Array, weights: Array, counts: Array) -> None:
@@ -95,17 +96,17 @@ class ViewMixtures(Value):
         """Replace all places of the views that `owners` (N,) names, at once: N components."""
         self.keep_components(~np.isin(self.owner, owners))
         fields = {"owner": owners, "means": means, "covariances": covariances, "weights": weights, "counts": counts}
-        self._put(**{name: np.concatenate([getattr(self, name), rows]) for name, rows in fields.items()})
+        self.put(**{name: np.concatenate([getattr(self, name), rows]) for name, rows in fields.items()})
 
     def put_weights(self, weights: Array) -> None:
         """Replace the weights of all components (C,)."""
-        self._put(weights=weights)
+        self.put(weights=weights)
 
     def keep_components(self, kept: Mask) -> None:
         """Drop all other components (C,)."""
         if not kept.all():
             for name in ("owner", "means", "covariances", "weights", "counts"):
-                self._put(**{name: getattr(self, name)[kept]})
+                self.put(**{name: getattr(self, name)[kept]})
 
     def keep_views(self, kept: Mask) -> None:
         """Drop all other views (R,) and their components. The order of the rest stays."""
@@ -113,32 +114,17 @@ class ViewMixtures(Value):
             return
         self.keep_components(kept[self.owner])
         row = np.cumsum(kept) - 1
-        self._put(owner=row[self.owner])
+        self.put(owner=row[self.owner])
         for name in ("views", "names", "born"):
-            self._put(**{name: getattr(self, name)[kept]})
+            self.put(**{name: getattr(self, name)[kept]})
 
     def step(self) -> None:
         """Count one more view learned from."""
-        self._put(steps=self.steps + 1)
+        self.put(steps=self.steps + 1)
 
     def take_poses_from(self, source: PoseSource) -> None:
         """Say where the first pose came from."""
-        self._put(pose_source=source)
-
-    def _put(self, **fields: object) -> None:
-        for name, value in fields.items():
-            setattr(self, name, value)
-
-    def _append(self, name: str, row: Any) -> None:
-        # The field is a view of an array with room to grow, which doubles when it is full: N appends copy O(N).
-        rows: npt.NDArray[Any] = getattr(self, name)
-        rooms: dict[str, npt.NDArray[Any]] = self.__dict__.setdefault("_rooms", {})
-        room = rooms.get(name)
-        if room is None or rows.base is not room or len(rows) == len(room):
-            room = rooms[name] = np.empty((max(64, 2 * len(rows)), *rows.shape[1:]), rows.dtype)
-            room[: len(rows)] = rows
-        room[len(rows)] = row
-        self._put(**{name: room[: len(rows) + 1]})
+        self.put(pose_source=source)
 
 
 class ViewEvent(Value):
