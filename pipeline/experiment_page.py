@@ -74,8 +74,11 @@ def write_page(run: "ExperimentRun") -> Path:
 
 
 def number(value: float | None, digits: int) -> str:
-    """A figure with a measure's digits; a dash where there is none."""
-    return "–" if value is None or not math.isfinite(value) else f"{value:.{digits}f}"
+    """A figure with a measure's digits, more where it would look like 0 and is not; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    text = f"{value:.{digits}f}"
+    return f"{value:.1g}" if value and not float(text) else text
 
 
 def mean_and_spread(values: Sequence[float], digits: int) -> str:
