@@ -1,5 +1,6 @@
 """The first belief of a log where the map is learned on the way."""
 
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -17,8 +18,9 @@ Array = npt.NDArray[np.float64]
 Where = Literal["uniform", "truth", "origin"] | tuple[float, float, float, float, float]
 
 
-class GrowingStart(Stage):
-    """Where a log begins: at a known pose while the map is empty, anywhere in the map later.
+@dataclass(kw_only=True, eq=False)
+class GrowingStart:
+    """Where a log begins, at a known pose while the map is empty, anywhere in the map later: a mixin, beside `Stage`.
 
     All localisation is with respect to the pose at which a map is begun (Porta & Kroese 2004, section 3): with an empty
     map, `uniform` means the log's first true pose where it has one, else the origin, and that pose is certain to
@@ -48,7 +50,7 @@ class GrowingStart(Stage):
         return np.array(at[:3]), np.array([at[3], at[3], at[4]])
 
 
-class ParticlesInMap(GrowingStart):
+class ParticlesInMap(GrowingStart, Stage):
     """The first particles of a log: around a known pose, or drawn from the map so far with any heading.
 
     With an empty map `start=uniform` begins at the log's first true pose, else at the origin (Porta & Kroese 2004,
@@ -76,7 +78,7 @@ class ParticlesInMap(GrowingStart):
         return self.Out(belief=Particles(poses, np.full(self.number, 1.0 / self.number)))
 
 
-class MixtureInMap(GrowingStart):
+class MixtureInMap(GrowingStart, Stage):
     """The first Gaussian of a log: a known pose, or one as wide as the map so far, with any heading.
 
     With an empty map `start=uniform` begins at the log's first true pose, else at the origin (Porta & Kroese 2004,
