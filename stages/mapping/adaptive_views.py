@@ -174,8 +174,8 @@ class AdaptiveViews(Stage):
             new = (means, state.covariances[kept], counts, np.zeros(len(means)))
             if self.doubt == "once":
                 known, new = _confirmed(known, new, self.merge_below, least)
-            *components, weights = (np.concatenate(both) for both in zip(known, new, strict=True))
-            mixtures.append(merged(*components, self.merge_below, shares=weights))
+            means, covariances, counts, weights = (np.concatenate(both) for both in zip(known, new, strict=True))
+            mixtures.append(merged(means, covariances, counts, self.merge_below, shares=weights))
         if len(rows):
             means, covariances, counts, weights = (np.concatenate(each) for each in zip(*mixtures, strict=True))
             owners = np.repeat(rows, [len(parts[0]) for parts in mixtures])
