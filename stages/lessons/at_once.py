@@ -4,7 +4,8 @@ from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.lesson import Lesson, Lessons
 from omninav.stages.values.pose import UncertainMotion
-from omninav.stages.values.views import WholeView
+from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.views import Neighbours, WholeView
 
 
 class AtOnce(Stage):
@@ -18,7 +19,15 @@ class AtOnce(Stage):
 
         lessons: Lessons
 
-    def step(self, ctx: Context, view: WholeView, state: GaussianMixture, model: UncertainMotion | None = None) -> Out:
+    def step(
+        self,
+        ctx: Context,
+        view: WholeView,
+        state: GaussianMixture,
+        model: UncertainMotion | None = None,
+        neighbours: Neighbours | None = None,
+        map: ViewMixtures | None = None,
+    ) -> Out:
         """Make a lesson of the view."""
         items = (Lesson(view, state, ctx.tick.index),) if len(state) else ()
         return self.Out(lessons=Lessons(items))

@@ -7,13 +7,15 @@ from typing import Annotated, Literal
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.stages.geometry.gaussians import moments, squared_distances
 from omninav.stages.geometry.odometry_motion import increment
 from omninav.stages.geometry.path_reconstruction import reconstructed
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.lesson import Lesson, Lessons
 from omninav.stages.values.pose import UncertainMotion
-from omninav.stages.values.views import WholeView
+from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.views import Neighbours, WholeView
+
+from .certain_state import certain_state
 
 
 class Waiting(State):
@@ -59,7 +61,14 @@ class UnimodalQueue(Stage):
         lessons: Lessons
 
     def step(
-        self, ctx: Context, view: WholeView, state: GaussianMixture, model: UncertainMotion | None, waiting: Waiting
+        self,
+        ctx: Context,
+        view: WholeView,
+        state: GaussianMixture,
+        model: UncertainMotion | None,
+        waiting: Waiting,
+        neighbours: Neighbours | None = None,
+        map: ViewMixtures | None = None,
     ) -> Out:
         """Take one view in, and give out what has waited long enough."""
         now = ctx.tick.index
@@ -86,14 +95,12 @@ class UnimodalQueue(Stage):
 
     def _single(self, state: GaussianMixture) -> GaussianMixture | None:
         # The state as one Gaussian, where it is certain.
-        if not len(state) or (self.unimodal == "single" and len(state) > 1):
+        if self.unimodal == "single" and len(state) > 1:
             return None
-        top = int(np.argmax(state.weights))
-        centre = (state.means[top : top + 1], state.covariances[top : top + 1])
-        near = squared_distances(*centre, state.means, state.covariances)[0] <= self.near_below
-        if state.weights[near].sum() <= self.least_share * state.weights.sum():
+        certain = certain_state(state, self.least_share, self.near_below)
+        if certain is None:
             return None
-        mean, covariance, _ = moments(state.means[near], state.covariances[near], state.weights[near])
+        mean, covariance = certain
         sigmas = np.sqrt(np.diag(covariance))
         if sigmas[2] > math.radians(self.most_deg) or (self.most_m and max(sigmas[:2]) > self.most_m):
             return None

@@ -1,11 +1,12 @@
 """A map of views whose places are fused with the state that was believed each time they were seen."""
 
+from dataclasses import field
 from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.gaussians import merged
 from omninav.stages.geometry.se2 import wrap
 from omninav.stages.values.belief import GaussianMixture
@@ -21,6 +22,12 @@ Ints = npt.NDArray[np.int64]
 Parts = tuple[Array, Array, Array, Array]
 
 
+class Unjudged(State):
+    """Lessons that came before there was a limit that says which views are new."""
+
+    lessons: list[Lesson] = field(default_factory=list)
+
+
 class FusedMixtures(Stage):
     """A view that is new becomes a map point; one that is known adds its state to those it resembles, half and half.
 
@@ -29,8 +36,9 @@ class FusedMixtures(Stage):
     stored view's: the two mixtures side by side, the closest pairs merged while their squared Mahalanobis distance is
     below `merge_below` (7.81: places that are the same at 95 %), weights made to sum to 1, and components below
     `least_weight` dropped. So a place that is not confirmed loses half of its weight each time, and is gone after the
-    seventh at 0.01. `spread`: whether a merged covariance holds how far apart the two means were; the paper's does not
-    and is over-confident (erratum 16). `max_views` 0: no limit; else the weakest views go first.
+    seventh at 0.01. Lessons wait until there is a limit, all but the first view of a map. `spread`: whether a merged
+    covariance holds how far apart the two means were; the paper's does not and is over-confident (erratum 16).
+    `max_views` 0: no limit; else the weakest views go first.
     """
 
     merge_below: Annotated[float, Bounds(ge=0)] = 7.81
@@ -44,12 +52,17 @@ class FusedMixtures(Stage):
         map: ViewMixtures
         events: ViewEvent | None = None
 
-    def step(self, ctx: Context, lessons: Lessons | None, limit: ViewLimit | None, map: ViewMixtures) -> Out:
+    def step(
+        self, ctx: Context, lessons: Lessons | None, limit: ViewLimit | None, map: ViewMixtures, unjudged: Unjudged
+    ) -> Out:
         """Learn from what this tick has to teach."""
-        if lessons is None or not lessons.items:
+        unjudged.lessons += () if lessons is None else lessons.items
+        if not unjudged.lessons or (limit is None and len(map)):
             return self.Out(map=map)
         before = map.names.copy()
-        changed = [name for lesson in lessons.items for name in self._learn(lesson, limit, map)]
+        now = len(unjudged.lessons) if limit is not None else 1
+        changed = [name for lesson in unjudged.lessons[:now] for name in self._learn(lesson, limit, map)]
+        unjudged.lessons = unjudged.lessons[now:]
         over = within_cap(map, self.max_views)
         map.keep_views(over)
         why = "" if over.all() else "full"
@@ -58,8 +71,6 @@ class FusedMixtures(Stage):
     def _learn(self, lesson: Lesson, limit: ViewLimit | None, map: ViewMixtures) -> list[int]:
         # The names of the views that took the lesson in.
         view, state = lesson.view, lesson.state
-        if len(map) and limit is None:
-            return []
         rows = np.flatnonzero(view.distances(map.views) < limit.distance) if len(map) and limit else np.empty(0, int)
         if not len(rows):
             row = map.add_view(view.values, type(view).__name__)

@@ -10,14 +10,13 @@ class Lesson(Value):
     """A view and where the robot was believed to be when it saw it: one Gaussian, or a mixture of them.
 
     `index`: the tick at which the view was seen. `reconstructed`: whether the state was worked out afterwards, between
-    two states that were certain. `correction`: of what the same view taught before.
+    two states that were certain.
     """
 
     view: WholeView
     state: GaussianMixture
     index: int
     reconstructed: bool = False
-    correction: bool = False
 
 
 class Lessons(Value):

@@ -12,7 +12,7 @@ from omninav.stages.fusion.agreement import Agreement
 from omninav.stages.fusion.growing_start import ParticlesInMap
 from omninav.stages.geometry.se2 import between, wrap
 from omninav.stages.lessons.left_behind import Behind, LeftBehind
-from omninav.stages.mapping.fused_mixtures import FusedMixtures
+from omninav.stages.mapping.fused_mixtures import FusedMixtures, Unjudged
 from omninav.stages.match.neighbours import ViewNeighbours
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.sensor.superposition import Superposition
@@ -58,28 +58,35 @@ def drive() -> tuple[list[Array], list[Motion | None]]:
     return poses, motions
 
 
-def run(**filter_options: float) -> tuple[Array, list[float], Array]:
+def run(retrace: bool = True, **filter_options: float) -> tuple[Array, list[float], Array]:
     """Errors per picture (m), the wrong weight of the view at B after each, and the lap each belongs to."""
     poses, motions = drive()
     ctx = {
         name: Context(name, np.random.default_rng(n)) for n, name in enumerate(("first", "motion", "fusion", "rest"))
     }
-    known, limit, behind = ViewMixtures.empty(), ViewLimit(LIMIT), Behind()
+    known, limit, behind, unjudged = ViewMixtures.empty(), ViewLimit(LIMIT), Behind(), Unjudged()
     start, move, fuse = ParticlesInMap(number=500), RotationTranslationRotation(), Agreement(**filter_options)  # type: ignore[arg-type]
-    match, sensor, gather, teach, learn = ViewNeighbours(), Superposition(), Clusters(), LeftBehind(), FusedMixtures()
+    match, sensor, gather, teach, learn = (
+        ViewNeighbours(),
+        Superposition(),
+        Clusters(),
+        LeftBehind(retrace=retrace),
+        FusedMixtures(),
+    )
     errors, wrong, belief = [], [], None
     for n, (pose, motion) in enumerate(zip(poses, motions, strict=True)):
         for each in ctx.values():
             each.tick = Tick(n, n, 0, n, n == 0)
         view = seen_from(pose)
-        hypothesis = sensor.step(ctx["rest"], match.step(ctx["rest"], view, known, limit).neighbours, known).hypothesis
+        neighbours = match.step(ctx["rest"], view, known, limit).neighbours
+        hypothesis = sensor.step(ctx["rest"], neighbours, known).hypothesis
         belief = start.step(ctx["first"], known, Pose(*map(float, pose))).belief or belief
         assert belief is not None
         moved = move.step(ctx["motion"], belief, motion)
         belief = fuse.step(ctx["fusion"], moved.belief, hypothesis).belief
         state = gather.step(ctx["rest"], belief).state
-        lessons = teach.step(ctx["rest"], view, state, moved.model, behind).lessons
-        known = learn.step(ctx["rest"], lessons, limit, known).map
+        lessons = teach.step(ctx["rest"], view, state, moved.model, behind, neighbours, known).lessons
+        known = learn.step(ctx["rest"], lessons, limit, known, unjudged).map
         at = belief.estimate().pose
         errors.append(math.hypot(at.x - pose[0], at.y - pose[1]))
         wrong.append(wrong_weight(known))
@@ -117,11 +124,19 @@ def test_a_wrong_place_is_forgotten_lap_by_lap_and_removed() -> None:
     assert max(after[4:]) == 0.0
 
 
-def test_views_near_a_are_put_right_first_and_those_towards_c_later() -> None:
+def test_once_back_at_the_start_the_way_from_b_is_put_right_and_the_error_falls() -> None:
     errors, _, laps = run()
+    lap = [float(errors[laps == n].mean()) for n in range(LAPS)]
+    assert lap[0] > lap[1] > lap[2] > lap[3]
+    assert max(lap[3:]) < 0.3
+
+
+def test_without_retracing_the_wrong_stretch_travels_round() -> None:
+    errors, _, laps = run(retrace=False)
     place = np.arange(STEPS)
     right_up_to = []
     for lap in (1, 3, 6):
         wrong = (errors[laps == lap] > 1.0) & (place >= 3 * STEPS // 4)
         right_up_to.append(int(place[wrong].min(initial=STEPS)))
     assert right_up_to[0] < right_up_to[1] < right_up_to[2]
+    assert errors[laps == LAPS - 1].mean() > 1.0

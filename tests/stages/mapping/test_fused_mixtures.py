@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.mapping.fused_mixtures import FusedMixtures
+from omninav.stages.mapping.fused_mixtures import FusedMixtures, Unjudged
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.lesson import Lesson, Lessons
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
@@ -33,7 +33,7 @@ def learn(
     limit: float = 1.0,
 ) -> ViewEvent:
     stage = FusedMixtures(spread=False) if stage is None else stage
-    out = stage.step(Context("mapping"), Lessons((Lesson(view, state, 0),)), ViewLimit(limit), map)
+    out = stage.step(Context("mapping"), Lessons((Lesson(view, state, 0),)), ViewLimit(limit), map, Unjudged())
     assert out.events is not None
     return out.events
 
@@ -102,17 +102,20 @@ def test_headings_are_kept_as_those_of_a_robot_that_sees_the_view_unturned() -> 
     assert map.means[:, 2] == pytest.approx([0.3])
 
 
-def test_before_there_is_a_limit_only_the_first_view_is_kept() -> None:
-    map, stage = ViewMixtures.empty(), FusedMixtures()
+def test_before_there_is_a_limit_only_the_first_view_is_kept_and_the_others_wait() -> None:
+    map, stage, unjudged = ViewMixtures.empty(), FusedMixtures(), Unjudged()
     for value in (0.0, 9.0):
-        stage.step(Context("mapping"), Lessons((Lesson(view(value), state(0.0), 0),)), None, map)
+        stage.step(Context("mapping"), Lessons((Lesson(view(value), state(0.0), 0),)), None, map, unjudged)
     assert len(map) == 1
+    stage.step(Context("mapping"), None, ViewLimit(1.0), map, unjudged)
+    assert map.views[:, 0].tolist() == [0.0, 9.0]
+    assert not unjudged.lessons
 
 
 def test_nothing_to_learn_changes_nothing() -> None:
     map = ViewMixtures.empty()
-    assert FusedMixtures().step(Context("mapping"), Lessons(()), None, map).events is None
-    assert FusedMixtures().step(Context("mapping"), None, None, map).map is map
+    assert FusedMixtures().step(Context("mapping"), Lessons(()), None, map, Unjudged()).events is None
+    assert FusedMixtures().step(Context("mapping"), None, None, map, Unjudged()).map is map
 
 
 def test_a_map_never_holds_more_views_than_it_may() -> None:
