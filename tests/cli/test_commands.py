@@ -52,6 +52,7 @@ def test_check_says_who_reads_the_truth(omninav):
     assert set(readers) <= {
         "first_belief",
         "errors",
+        "curves",
         "relative",
         "error_view",
         "path_view",
