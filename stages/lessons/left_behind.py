@@ -82,9 +82,8 @@ class LeftBehind(Stage):
         again: list[Lesson] = []
         if self.retrace:
             remember(lesson, model, behind, self.longest)
-            seen_before = neighbours is not None and map is not None and len(neighbours.rows)
-            if seen_before and len(behind.past) > 1:
-                again = self._corrected(ctx, int(map.born[neighbours.rows].min()), behind)  # type: ignore[union-attr]
+            if neighbours is not None and map is not None and len(neighbours.rows) and len(behind.past) > 1:
+                again = self._corrected(ctx, int(map.born[neighbours.rows].min()), behind)
         if len(state):
             behind.lessons.append(lesson)
             behind.seen_at.append(behind.driven)
