@@ -71,7 +71,7 @@ def mixture_run(run: SmallRun) -> tuple[ViewMixtures, list[GaussianMixture], lis
         map.add_component(row, mean, covariance, 0.5, 1.0)
         share = 0.5**number
         start = np.array([[8.0, 0.0, 0.0], [-2.0, 1.0, 0.0]])
-        map.put_mixture(0, start, covariances, np.array([share, 1 - share]), np.ones(2))
+        map.put_mixtures(np.array([0, 0]), start, covariances, np.array([share, 1 - share]), np.ones(2))
         removed = np.empty(0, np.int64)
         if number % 5 == 4:
             removed = map.names[1:2].copy()

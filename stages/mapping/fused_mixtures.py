@@ -1,7 +1,7 @@
 """A map of views whose places are fused with the state that was believed each time they were seen."""
 
 from dataclasses import field
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -65,26 +65,26 @@ class FusedMixtures(Stage):
         unjudged.lessons = unjudged.lessons[now:]
         over = within_cap(map, self.max_views)
         map.keep_views(over)
-        why = "" if over.all() else "full"
-        return self.Out(map=map, events=view_event(map, before, np.array(changed, np.int64), why))  # type: ignore[arg-type]
+        why: Literal["", "full"] = "" if over.all() else "full"
+        return self.Out(map=map, events=view_event(map, before, np.array(changed, np.int64), why))
 
     def _learn(self, lesson: Lesson, limit: ViewLimit | None, map: ViewMixtures) -> list[int]:
         # The names of the views that took the lesson in.
         view, state = lesson.view, lesson.state
         rows = np.flatnonzero(view.distances(map.views) < limit.distance) if len(map) and limit else np.empty(0, int)
-        if not len(rows):
-            row = map.add_view(view.values, type(view).__name__)
-            map.put_mixture(row, *self._fused([parts(state, 0.0)]))
-        else:
+        if len(rows):
             turns = view.turns(map.views[rows]).tolist()
             mixtures = [
                 self._fused([stored(map, row), parts(state, turn)])
                 for row, turn in zip(rows.tolist(), turns, strict=True)
             ]
-            owners = np.repeat(rows, [len(weights) for _, _, weights, _ in mixtures])
-            map.put_mixtures(owners, *(np.concatenate(fields) for fields in zip(*mixtures, strict=True)))
+        else:
+            rows = np.array([map.add_view(view.values, type(view).__name__)])
+            mixtures = [self._fused([parts(state, 0.0)])]
+        owners = np.repeat(rows, [len(weights) for _, _, weights, _ in mixtures])
+        map.put_mixtures(owners, *(np.concatenate(fields) for fields in zip(*mixtures, strict=True)))
         map.step()
-        return [int(map.names[row])] if not len(rows) else [int(name) for name in map.names[rows]]
+        return [int(name) for name in map.names[rows]]
 
     def _fused(self, mixtures: list[Parts]) -> Parts:
         return fused(mixtures, self.merge_below, self.spread, self.least_weight)

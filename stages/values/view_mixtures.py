@@ -86,12 +86,6 @@ class ViewMixtures(GrowingArrays, Value):
         self.append("counts", np.float64(count))
         return len(self.weights) - 1
 
-    def put_mixture(self, owner: int, means: Array, covariances: Array, weights: Array, counts: Array) -> None:
-        """Replace all places of a view."""
-        self.keep_components(self.owner != owner)
-        for row in range(len(weights)):
-            self.add_component(owner, means[row], covariances[row], float(weights[row]), float(counts[row]))
-
     def put_mixtures(self, owners: Ints, means: Array, covariances: Array, weights: Array, counts: Array) -> None:
         """Replace all places of the views that `owners` (N,) names, at once: N components."""
         self.keep_components(~np.isin(self.owner, owners))
