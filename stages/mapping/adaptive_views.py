@@ -7,7 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.problems import BadInput
 from omninav.stages.geometry.gaussians import apart, floored, merged, moments, squared_distance, squared_distances
 from omninav.stages.geometry.se2 import wrap
 from omninav.stages.geometry.view_similarity import Shape, similarity
@@ -111,11 +110,7 @@ class AdaptiveViews(Stage):
         state = _floored(lesson.state, self.least_m, np.radians(self.least_deg))
         if not len(state):
             return np.empty(0, np.int64)
-        if len(map) and (map.kind != type(view).__name__ or map.views.shape[1] != len(view.values)):
-            raise BadInput(
-                f"map: its views are {map.kind} of {map.views.shape[1]} numbers, the present one is "
-                f"{type(view).__name__} of {len(view.values)}; use the features it was learned with, or learn it anew"
-            )
+        map.check_kind(view)
         if len(map) and limit is None:
             ctx.count("view_before_limit", detail="mapping: what a view is compared by is still being measured")
             return np.empty(0, np.int64)

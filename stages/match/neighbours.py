@@ -6,7 +6,6 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.problems import BadInput
 from omninav.stages.geometry.view_similarity import Shape, similarity
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Neighbours, ViewLimit, WholeView
@@ -32,7 +31,7 @@ class ViewNeighbours(Stage):
 
     def step(self, ctx: Context, view: WholeView, map: ViewMixtures, limit: ViewLimit | None = None) -> Out:
         """Look through the map."""
-        check_kind(view, map)
+        map.check_kind(view)
         if not len(map):
             none = np.zeros(0)
             return self.Out(neighbours=Neighbours(np.zeros(0, np.int64), none, none, none, np.inf))
@@ -49,13 +48,3 @@ class ViewNeighbours(Stage):
         near = distances[rows]
         turns = view.turns(map.views[rows]) if len(rows) else np.zeros(0)
         return self.Out(neighbours=Neighbours(rows, near, similarity(near, within, self.shape), turns, nearest))
-
-
-def check_kind(view: WholeView, map: ViewMixtures) -> None:
-    """Raises BadInput where view and map do not describe views alike."""
-    kind, size = type(view).__name__, len(view.values)
-    if len(map) and (map.kind != kind or map.views.shape[1] != size):
-        raise BadInput(
-            f"map: its views are {map.kind} of {map.views.shape[1]} numbers, the present one is {kind} of {size}; "
-            "use the features it was learned with, or learn it anew"
-        )

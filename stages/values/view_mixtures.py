@@ -6,9 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
+from omninav.pipeline.problems import BadInput
 
 from .growing import GrowingArrays
 from .pose import PoseSource
+from .views import WholeView
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -64,6 +66,15 @@ class ViewMixtures(GrowingArrays, Value):
 
     def __len__(self) -> int:
         return len(self.views)
+
+    def check_kind(self, view: WholeView) -> None:
+        """Raises BadInput where this view is not of the map's kind."""
+        kind, size = type(view).__name__, len(view.values)
+        if len(self) and (self.kind != kind or self.views.shape[1] != size):
+            raise BadInput(
+                f"map: its views are {self.kind} of {self.views.shape[1]} numbers, the present one is {kind} of "
+                f"{size}; use the features it was learned with, or learn it anew"
+            )
 
     def add_view(self, values: npt.NDArray[np.float32], kind: str) -> int:
         """Keep a view, with no place yet; gives its row. Raises ValueError where it is not of the map's kind."""
