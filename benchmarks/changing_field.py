@@ -132,7 +132,7 @@ def graph_on_field(variant: str, source: dict[str, Any], limit: float | None = N
     nodes, wires = config["nodes"], config["wires"]
     nodes["source"] = {"_target_": "benchmarks.changing_field.ChangingField", **source}
     if limit is not None:
-        nodes["limit"], wires["limit"] = {"_target_": "omninav.stages.match.view_limit.FixedLimit"}, {}
+        nodes["limit"], wires["limit"] = {"_target_": "omninav.stages.limit.fixed.FixedLimit"}, {}
         nodes["limit"]["distance"] = limit
     kept = {"source", "limit", "match", "sensor", "first_belief", "motion", "fusion", "state", "lessons", "mapping"}
     kept = {name for name in kept | {"empty_map", "estimate"} if nodes.get(name)}

@@ -1,0 +1,1 @@
+"""How far apart two views of one place may be."""
