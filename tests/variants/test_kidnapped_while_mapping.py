@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -58,14 +59,14 @@ def drive() -> tuple[list[Array], list[Motion | None]]:
     return poses, motions
 
 
-def run(retrace: bool = True, **filter_options: float) -> tuple[Array, list[float], Array]:
+def run(retrace: bool = True, **filter_options: Any) -> tuple[Array, list[float], Array]:
     """Errors per picture (m), the wrong weight of the view at B after each, and the lap each belongs to."""
     poses, motions = drive()
     ctx = {
         name: Context(name, np.random.default_rng(n)) for n, name in enumerate(("first", "motion", "fusion", "rest"))
     }
     known, limit, behind, unjudged = ViewMixtures.empty(), ViewLimit(LIMIT), Behind(), Unjudged()
-    start, move, fuse = ParticlesInMap(number=500), RotationTranslationRotation(), Agreement(**filter_options)  # type: ignore[arg-type]
+    start, move, fuse = ParticlesInMap(number=500), RotationTranslationRotation(), Agreement(**filter_options)
     match, sensor, gather, teach, learn = (
         ViewNeighbours(),
         Superposition(),

@@ -1,4 +1,5 @@
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,9 +20,9 @@ def at(*places: float, weights: tuple[float, ...] | None = None, sigma: float = 
     return GaussianMixture(means, np.repeat(np.eye(3)[None] * sigma**2, len(places), axis=0), shares)
 
 
-def fuse(particles: Particles, hypothesis: GaussianMixture | None, seed: int = 1, **options: float) -> Particles:
+def fuse(particles: Particles, hypothesis: GaussianMixture | None, seed: int = 1, **options: Any) -> Particles:
     ctx = Context("fusion", np.random.default_rng(seed))
-    return Agreement(**options).step(ctx, particles, hypothesis).belief  # type: ignore[arg-type]
+    return Agreement(**options).step(ctx, particles, hypothesis).belief
 
 
 def test_where_map_and_belief_agree_the_belief_becomes_their_product() -> None:
@@ -72,9 +73,9 @@ def test_without_anything_near_in_the_map_the_belief_stays_as_it_is() -> None:
     assert fuse(particles, none) is particles
 
 
-def kidnapped(**options: float) -> list[float]:
+def kidnapped(**options: Any) -> list[float]:
     """Share of the weight at B, tick by tick, when the robot is carried there from A and the map knows both."""
-    ctx, stage, belief = Context("fusion", np.random.default_rng(3)), Agreement(**options), around(0.0)  # type: ignore[arg-type]
+    ctx, stage, belief = Context("fusion", np.random.default_rng(3)), Agreement(**options), around(0.0)
     shares = []
     for _ in range(10):
         belief = stage.step(ctx, belief, at(9.0)).belief

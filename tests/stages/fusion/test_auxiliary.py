@@ -52,7 +52,7 @@ def test_as_an_option_it_gives_the_belief_of_importance_sampling_up_to_chance() 
         moved(before.poses, AHEAD.way, AHEAD.sigmas, rng.standard_normal((3, 50_000))), before.weights
     )
     beliefs = [
-        Agreement(sampling=sampling).step(Context("fusion"), particles, at(1.4, 0.3), before, AHEAD).belief  # type: ignore[arg-type]
+        Agreement(sampling=sampling).step(Context("fusion"), particles, at(1.4, 0.3), before, AHEAD).belief
         for sampling in ("importance", "auxiliary")
     ]
     means = [float(belief.weights @ belief.poses[:, 0]) for belief in beliefs]

@@ -1,6 +1,7 @@
 """Fusion of mixtures: equations 2 to 8 of Gross, Koenig & Mueller 2005 with ERRATA 1 to 5, against plain loops."""
 
 import math
+from random import Random
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scipy.optimize import minimize_scalar
 from omninav.pipeline import Context
 from omninav.stages.fusion.covariance_intersection import (
     CovarianceIntersection,
+    Rule,
     alpha_by_ratio,
     alpha_of_least_determinant,
     fused,
@@ -24,7 +26,7 @@ from omninav.stages.values.pose import Motion
 
 UNIT = np.eye(3)
 CTX = Context("fusion")
-rules = st.sampled_from(["det_ratio", "det_min"])
+rules: st.SearchStrategy[Rule] = st.sampled_from(["det_ratio", "det_min"])
 
 
 def mixture(*components: tuple[float, float], spread: float = 0.1) -> GaussianMixture:
@@ -74,10 +76,10 @@ def test_fusion_is_the_papers_equations_written_as_loops(weighted: bool) -> None
 
 @given(mixtures(), mixtures(), rules, st.booleans(), st.floats(0.05, 20.0))
 def test_fusion_conserves_the_sum_of_all_weights(
-    a: Mixture, b: Mixture, rule: str, weighted: bool, mass: float
+    a: Mixture, b: Mixture, rule: Rule, weighted: bool, mass: float
 ) -> None:
     # Erratum 5: matched pairs and unmatched copies together weigh what both mixtures weigh.
-    means, covariance, weights = fused(a, (b[0], b[1], mass * b[2]), 7.81, rule, weighted)  # type: ignore[arg-type]
+    means, covariance, weights = fused(a, (b[0], b[1], mass * b[2]), 7.81, rule, weighted)
     assert weights.sum() == pytest.approx(1.0 + mass, rel=1e-12)
     assert weights.min() > 0.0
     assert np.linalg.eigvalsh(covariance).min() > 0.0
@@ -85,10 +87,10 @@ def test_fusion_conserves_the_sum_of_all_weights(
 
 
 @given(mixtures(), mixtures(), rules)
-def test_the_sum_of_weights_is_conserved_match_by_match_too(a: Mixture, b: Mixture, rule: str) -> None:
+def test_the_sum_of_weights_is_conserved_match_by_match_too(a: Mixture, b: Mixture, rule: Rule) -> None:
     # Equations 6 to 8: what a matched component gives away adds up to its own weight, from either side.
     match = squared_distances(a[0], a[1], b[0], b[1]) < 7.81
-    found = fused(a, b, 7.81, rule)[2]  # type: ignore[arg-type]
+    found = fused(a, b, 7.81, rule)[2]
     alone = a[2][~match.any(axis=1)].sum() + b[2][~match.any(axis=0)].sum()
     assert len(found) == match.sum() + (~match.any(axis=1)).sum() + (~match.any(axis=0)).sum()
     assert found.sum() - alone == pytest.approx(
@@ -251,11 +253,11 @@ def test_what_is_no_covariance_is_refused() -> None:
 
 @given(mixtures(), mixtures(), rules, st.randoms(use_true_random=False))
 def test_the_order_of_components_changes_nothing_but_rounding(
-    a: Mixture, b: Mixture, rule: str, random: object
+    a: Mixture, b: Mixture, rule: Rule, random: Random
 ) -> None:
-    stage = CovarianceIntersection(alpha=rule, merge=0.0, drop_below=0.0)  # type: ignore[arg-type]
+    stage = CovarianceIntersection(alpha=rule, merge=0.0, drop_below=0.0)
     order = list(range(len(b[2])))
-    random.shuffle(order)  # type: ignore[attr-defined]
+    random.shuffle(order)
     here = stage.step(CTX, GaussianMixture(*a), GaussianMixture(*b)).belief
     there = stage.step(CTX, GaussianMixture(*a), GaussianMixture(*(each[order] for each in b))).belief
     rows = [np.lexsort(np.round(each.means, 6).T) for each in (here, there)]

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from random import Random
 
 import numpy as np
 import pytest
@@ -209,19 +210,19 @@ def test_merging_takes_the_closest_pair_first_like_a_plain_loop(limit: float, sp
 
 
 @given(mixtures(most=10, extent=0.6), st.randoms(use_true_random=False), st.sampled_from([0.3, 2.0, 8.0]))
-def test_the_order_of_the_input_changes_nothing_at_all(mixture: Mixture, random: object, limit: float) -> None:
+def test_the_order_of_the_input_changes_nothing_at_all(mixture: Mixture, random: Random, limit: float) -> None:
     order = list(range(len(mixture[2])))
-    random.shuffle(order)  # type: ignore[attr-defined]
+    random.shuffle(order)
     here = merged(*mixture, limit, shares=mixture[2] * 0.5)
     there = merged(*(each[order] for each in mixture), limit, shares=(mixture[2] * 0.5)[order])
     assert all(np.array_equal(a, b) for a, b in zip(here, there, strict=True))
 
 
 @given(mixtures(most=7), st.randoms(use_true_random=False))
-def test_a_fixed_set_merges_to_the_same_moments_of_place_in_any_order(mixture: Mixture, random: object) -> None:
+def test_a_fixed_set_merges_to_the_same_moments_of_place_in_any_order(mixture: Mixture, random: Random) -> None:
     parts = [tuple(each[k : k + 1] for each in mixture) for k in range(len(mixture[2]))]
     while len(parts) > 1:
-        random.shuffle(parts)  # type: ignore[attr-defined]
+        random.shuffle(parts)
         pair = [np.concatenate(each) for each in zip(parts.pop(), parts.pop(), strict=True)]
         parts.append(tuple(np.asarray(each)[None] for each in moments(*pair)))
     mean, covariance, total = moments(*mixture)

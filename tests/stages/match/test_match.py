@@ -39,10 +39,11 @@ def test_the_place_and_the_turn_are_found(match: SelectiveMatch) -> None:
     seen = SegmentHistograms(np.roll(map.features[7], turn, axis=0))
     similarities = match.step(Context("match"), seen, map).similarities
     assert np.unravel_index(int(np.argmax(similarities.values)), similarities.values.shape) == (7, turn)
-    pose = BestMatch().step(Context("fusion"), similarities, map).belief.pose  # type: ignore[union-attr]
+    best = BestMatch().step(Context("fusion"), similarities, map).belief
+    assert best is not None
     expected = map.poses[7, 2] + 2 * np.pi * turn / SEGMENTS
-    assert pose.x == map.poses[7, 0]
-    assert np.exp(1j * pose.heading) == pytest.approx(np.exp(1j * expected))
+    assert best.pose.x == map.poses[7, 0]
+    assert np.exp(1j * best.pose.heading) == pytest.approx(np.exp(1j * expected))
 
 
 @pytest.mark.parametrize("match", MATCHES)
@@ -85,7 +86,10 @@ def test_around_particles_set_aside_only_the_next_references_are_compared() -> N
     assert set(chosen) <= set(np.flatnonzero(farther))
     assert (stands_for == 1).all()
     alone, _ = near_belief(map.poses, belief, 3.0, 0.0, 0, 0, 0)
-    assert set(alone) == set(near_belief(map.poses, tracked, 3.0, 0.5, 0, 0, 0).chosen)  # type: ignore[arg-type]
+    without, _ = near_belief(map.poses, tracked, 3.0, 0.5, 0, 0, 0)
+    assert alone is not None
+    assert without is not None
+    assert set(alone) == set(without)
 
 
 def test_strangers_stand_for_the_whole_map_and_all_have_their_turn() -> None:
@@ -101,7 +105,8 @@ def test_strangers_stand_for_the_whole_map_and_all_have_their_turn() -> None:
     # A sum over the map, estimated turn by turn, is right on average.
     value = np.random.default_rng(0).random(400)
     turns = [near_belief(map.poses, belief, 1.0, 0.0, 0, 20, turn) for turn in range(200)]
-    assert np.mean([(value[c] * w).sum() for c, w in turns]) == pytest.approx(value.sum(), rel=0.005)  # type: ignore[index]
+    sums = [(value[c] * w).sum() for c, w in turns if c is not None and w is not None]
+    assert np.mean(sums) == pytest.approx(value.sum(), rel=0.005)
 
 
 def test_what_is_compared_near_the_belief_is_what_it_is_everywhere() -> None:
@@ -146,6 +151,7 @@ def test_a_map_of_other_features_is_refused_in_one_line() -> None:
 def test_the_best_match_counts_in_the_map_s_own_indices() -> None:
     map = a_map()
     similarities = Similarities(np.array([[0.1, 0.2], [0.9, 0.3]], np.float32), np.array([4, 11]))
-    pose = BestMatch().step(Context("fusion"), similarities, map).belief.pose  # type: ignore[union-attr]
-    assert pose.x == map.poses[11, 0]
+    best = BestMatch().step(Context("fusion"), similarities, map).belief
+    assert best is not None
+    assert best.pose.x == map.poses[11, 0]
     assert BestMatch().step(Context("f"), Similarities(np.zeros((0, 36), np.float32)), map).belief is None

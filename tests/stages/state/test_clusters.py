@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,9 +15,9 @@ def cloud(centre: tuple[float, float, float], sigma: float, number: int, seed: i
     return np.random.default_rng(seed).normal(centre, sigma, (number, 3))
 
 
-def gather(poses: np.ndarray, weights: np.ndarray | None = None, **options: float) -> GaussianMixture:
+def gather(poses: np.ndarray, weights: np.ndarray | None = None, **options: Any) -> GaussianMixture:
     weights = np.full(len(poses), 1 / len(poses)) if weights is None else weights
-    return Clusters(**options).step(Context("state"), Particles(poses, weights)).state  # type: ignore[arg-type]
+    return Clusters(**options).step(Context("state"), Particles(poses, weights)).state
 
 
 def test_two_clouds_become_two_gaussians_with_their_weights() -> None:
