@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Canvas
 
-PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#111111", "#8a8f98")
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#111111", "#8a8f98", "#E69F00", "#56B4E9")
 """Okabe & Ito's colours (2008), which colour-blind readers tell apart, dark enough on white."""
 
 RC: dict[Any, Any] = {
