@@ -78,12 +78,12 @@ def drive(path: list[np.ndarray], match: SelectiveMatch, seed: int = 0) -> Filte
             ctx.tick = Tick(index=k, stamp=k, first_of_log=k == 0)
         moved = STEP if k else None
         if k == 0:
-            belief = start.step(contexts["start"], MAP, None, REACH).belief  # type: ignore[attr-defined]
-        belief = motion.step(contexts["motion"], belief, moved).belief  # type: ignore[attr-defined]
+            belief = start.step(contexts["start"], MAP, None, REACH).belief
+        belief = motion.step(contexts["motion"], belief, moved).belief
         view = SegmentHistograms(LAND.seen_from(pose, noise.normal(0, 0.5, (SEGMENTS, BINS))))
         alike = match.step(contexts["match"], view, MAP, belief, REACH).similarities
-        out = sensor.step(contexts["sensor"], alike, belief, MAP, moved, REACH)  # type: ignore[attr-defined]
-        belief = fusion.step(contexts["fusion"], belief, out.likelihood, out.proposals).belief  # type: ignore[attr-defined]
+        out = sensor.step(contexts["sensor"], alike, belief, MAP, moved, REACH)
+        belief = fusion.step(contexts["fusion"], belief, out.likelihood, out.proposals).belief
         estimate = belief.estimate().pose
         errors.append(np.hypot(estimate.x - pose[0], estimate.y - pose[1]))
         said.append(out.likelihood)

@@ -42,7 +42,7 @@ class Loop:
 
 
 def flat(out: ClosedLoop.Out) -> bytes:
-    return encode({field.name: getattr(out, field.name) for field in dataclasses.fields(out)})  # type: ignore[arg-type]
+    return encode({field.name: getattr(out, field.name) for field in dataclasses.fields(out)})
 
 
 def test_it_starts_where_the_route_starts_and_ends_when_the_time_is_over():
