@@ -1,9 +1,10 @@
 """`make soak`: 100,000 steps of a map that forgets, in a field whose look keeps changing. Nothing may keep growing.
 
 The graph is that of `variant=omniview_cml`, run by the engine with its checkpoints; only the source is made up, and
-what is collected for the report is left out. Printed every tenth of the way: references and components, the map's
+what is collected for the report is left out. Printed every twentieth of the way: references and components, the map's
 bytes, the process's memory, milliseconds a step, and how far off the estimate was. Exit status 1 where the map or the
-memory still grows in the last half.
+memory still grows in the last half. Some ten minutes on a free core. `benchmarks/soak.py STEPS` takes fewer, but the
+bounds are for quarters of 25,000: references swing by a fifth over some thousand steps.
 """
 
 import sys
