@@ -219,14 +219,16 @@ class Run:
 
 
 def start(planned: Plan, argv: Sequence[str], folder: Path | None = None) -> Run:
-    """Make the run's folder with config, graph and manifest. `folder` is given by a sweep, else made from the date."""
+    """Make the run's folder with config, graph and manifest. `folder` is given by a sweep, else made from the date.
+
+    The latter appears under its name when all that a resume needs is in it: a run that can be seen can be gone on with.
+    """
     config = planned.config
     inputs = input_digests(planned)
-    if folder is None:
-        root = Path(str(config.get("runs", "runs")))
-        folder = _fresh(root, f"{datetime.now():%Y-%m-%d_%H-%M-%S}_{planned.variant}")
-    folder.mkdir(parents=True, exist_ok=True)
-    run = Run(folder)
+    root, named = Path(str(config.get("runs", "runs"))), f"{datetime.now():%Y-%m-%d_%H-%M-%S}_{planned.variant}"
+    beginning = root / f".{named}.{os.getpid()}.part" if folder is None else folder
+    beginning.mkdir(parents=True, exist_ok=True)
+    run = Run(beginning)
     run.manifest = {
         "omninav": version("omninav"),
         "status": "running",
@@ -241,14 +243,15 @@ def start(planned: Plan, argv: Sequence[str], folder: Path | None = None) -> Run
         "python": platform.python_version(),
         "libraries": {name: version(name) for name in LIBRARIES},
     }
-    write_whole(folder / "config.yaml", yaml.safe_dump(dict(config), sort_keys=False, allow_unicode=True, width=120))
+    write_whole(beginning / "config.yaml", yaml.safe_dump(dict(config), sort_keys=False, allow_unicode=True, width=120))
     from .draw import mermaid, svg  # drawing is not needed to start the command line
 
-    write_whole(folder / "graph.svg", svg(planned.graph))
-    write_whole(folder / "graph.mmd", mermaid(planned.graph))
+    write_whole(beginning / "graph.svg", svg(planned.graph))
+    write_whole(beginning / "graph.mmd", mermaid(planned.graph))
     run.save()
-    if not folder.name.isdigit():  # a sweep's jobs have numbers, and no latest among them
-        _point_latest(folder)
+    if folder is None:
+        run.folder = _named(beginning, root, named)
+        _point_latest(run.folder)
     return run
 
 
@@ -593,15 +596,15 @@ def _logged(run: Run) -> Iterator[None]:
         handler.close()
 
 
-def _fresh(root: Path, name: str) -> Path:
-    """A folder of that name that did not exist, made now (two runs may start in the same second)."""
+def _named(folder: Path, root: Path, name: str) -> Path:
+    """The folder under a name that no other has (two runs may start in the same second)."""
     for number in range(1, 1000):
-        folder = root / (name if number == 1 else f"{name}_{number}")
+        target = root / (name if number == 1 else f"{name}_{number}")
         try:
-            folder.mkdir(parents=True)
-            return folder
-        except FileExistsError:
-            continue
+            return folder.rename(target)
+        except OSError as taken:  # by a folder with something in it
+            if not target.exists():
+                raise BadInput(f"{target}: {taken.strerror}; give another folder: runs=FOLDER") from None
     raise BadInput(f"{root}: more than 1000 runs named {name}")
 
 
