@@ -54,12 +54,21 @@ class LeftBehind(Stage):
     lifted in between; its states there are worked out along odometry (ten Hagen & Kroese 2002), and views whose state
     cannot be what was believed are learned with it: once more, where they had been learned. It
     looks back over `longest` views.
+
+    `back_propagate`: for robots that nobody lifts (Porta & Kroese 2004, section 3.2, last sentence). Where the map
+    makes the state at least `improved` times as certain (the root of the determinants' ratio) as it was one picture
+    before, and odometry leads there, the states since it was last known as well are worked out from both ends (ten
+    Hagen & Kroese 2002), and those that are known better by it take the place of what was learned; so do those that
+    `retrace` puts right. A jump, which odometry does not explain, ends it. `mapping=fused_mixtures` takes lessons back,
+    other maps learn them once more.
     """
 
     metres: Annotated[float, Bounds(ge=0)] = 4.0
     longest: Annotated[int, Bounds(ge=0)] = 500
     retrace: bool = True
     missed_below: Annotated[float, Bounds(ge=0)] = 16.3
+    back_propagate: bool = False
+    improved: Annotated[float, Bounds(gt=1)] = 2.0
 
     class Out(Outputs):
         """What has been left behind, in the order in which it was seen."""
@@ -80,7 +89,7 @@ class LeftBehind(Stage):
         behind.driven += 0.0 if model is None else math.fabs(model.way[1])
         lesson = Lesson(view, state, ctx.tick.index)
         again: list[Lesson] = []
-        if self.retrace:
+        if self.retrace or self.back_propagate:
             remember(lesson, model, behind, self.longest)
             if neighbours is not None and map is not None and len(neighbours.rows) and len(behind.past) > 1:
                 again = self._corrected(ctx, int(map.born[neighbours.rows].min()), behind)
@@ -92,7 +101,8 @@ class LeftBehind(Stage):
         if ctx.tick.first_of_log:
             due = max(due, sum(1 for lesson in behind.lessons if lesson.index < ctx.tick.index))
         ready, behind.lessons, behind.seen_at = behind.lessons[:due], behind.lessons[due:], behind.seen_at[due:]
-        return self.Out(lessons=Lessons((*again, *ready)))
+        open_from = behind.past[0].index if self.back_propagate else None
+        return self.Out(lessons=Lessons((*again, *ready), open_from))
 
     def _corrected(self, ctx: Context, oldest: int, behind: Behind) -> list[Lesson]:
         # What is to be learned again, now that a view of the map, the oldest of this age, spoke for the present state.
@@ -102,17 +112,39 @@ class LeftBehind(Stage):
         if end is None or before is None:
             return []
         if led(behind, before, end)[2] <= self.missed_below:
-            return []
+            return self._propagated(ctx, behind, end, len(behind.past) - 2)
         ctx.count("belief_jumped")
         places = {lesson.index: row for row, lesson in enumerate(behind.past)}
-        for place, (index, age) in reversed(list(enumerate(behind.jumps))):
+        for place, (index, age) in reversed(list(enumerate(behind.jumps))) if self.retrace else ():
             if oldest < age:
                 means, covariances, missed = led(behind, places[index], end)
                 if missed <= self.missed_below:
                     behind.jumps = behind.jumps[:place]
-                    return self._retraced(ctx, behind, places[index], means, covariances)
+                    again = self._retraced(ctx, behind, places[index], means, covariances)
+                    return [*again, *self._propagated(ctx, behind, end, places[index])]
         behind.jumps.append((behind.past[before].index, oldest))
         return []
+
+    def _propagated(self, ctx: Context, behind: Behind, end: tuple[Array, Array], latest: int) -> list[Lesson]:
+        # The states since one, up to row `latest`, that was known about as well as the present one, `end`.
+        if not self.back_propagate:
+            return []
+        enough = self.improved**2 * doubt(end)
+        after = behind.jumps[-1][0] if behind.jumps else -1
+        known = (row for row in range(latest, -1, -1) if doubt(certain_state(behind.past[row].state)) <= enough)
+        first = next(known, latest)
+        if first == latest or behind.past[first].index <= after:
+            return []
+        means, covariances, missed = led(behind, first, end)
+        if missed > self.missed_below:
+            return []
+        put = {}
+        for k in range(first + 1, len(behind.past) - 1):
+            mean, covariance = means[k - first], covariances[k - first]
+            if doubt((mean, covariance)) < doubt(certain_state(behind.past[k].state)):
+                put[k] = GaussianMixture(mean[None], covariance[None], np.ones(1))
+        ctx.count("view_propagated", len(put))
+        return put_right(behind, put)
 
     def _retraced(self, ctx: Context, behind: Behind, row: int, means: Array, covariances: Array) -> list[Lesson]:
         put = {}
@@ -126,6 +158,11 @@ class LeftBehind(Stage):
             put[k] = GaussianMixture(mean, covariance, np.ones(1))
         ctx.count("view_retraced", len(put))
         return put_right(behind, put)
+
+
+def doubt(state: tuple[Array, Array] | None) -> float:
+    """How much room a Gaussian leaves: the determinant of its covariance; without one, all there is."""
+    return math.inf if state is None else float(np.linalg.det(state[1]))
 
 
 def remember(lesson: Lesson, model: UncertainMotion | None, behind: Behind, longest: int) -> None:

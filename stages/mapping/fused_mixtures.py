@@ -1,5 +1,6 @@
 """A map of views whose places are fused with the state that was believed each time they were seen."""
 
+import math
 from dataclasses import field
 from typing import Annotated, Literal
 
@@ -9,23 +10,27 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.gaussians import merged
 from omninav.stages.geometry.se2 import wrap
+from omninav.stages.geometry.view_similarity import similarity
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.lesson import Lesson, Lessons
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import ViewLimit
 
+from .taught import Taught, taught_by
 from .view_cap import within_cap
 from .view_events import view_event
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Parts = tuple[Array, Array, Array, Array]
+Average = Literal["visits", "halves"]
 
 
-class Unjudged(State):
-    """Lessons that came before there was a limit that says which views are new."""
+class Learned(State):
+    """Lessons that came before there was a limit that says which views are new, and those that can be taken back."""
 
-    lessons: list[Lesson] = field(default_factory=list)
+    waiting: list[Lesson] = field(default_factory=list)
+    open: list[Taught] = field(default_factory=list)
 
 
 class FusedMixtures(Stage):
@@ -39,10 +44,20 @@ class FusedMixtures(Stage):
     seventh at 0.01. Lessons wait until there is a limit, all but the first view of a map. `spread`: whether a merged
     covariance holds how far apart the two means were; the paper's does not and is over-confident (erratum 16).
     `max_views` 0: no limit; else the weakest views go first.
+
+    `average`: how much each counts where components become one. `halves`: by their weights, as in the paper: the last
+    state counts as much as all before, so that a place follows the last one or two, which had come from the map
+    itself, and the map drifts (docs/experiments/cml_defaults.md). `visits`: each state alike, but for how alike the
+    two views are (S from 1 to 0 at the limit): eta of Gross, Koenig & Mueller 2005, equations 11 to 14. How much a
+    place weighs against the others of its view is the paper's either way.
+
+    Lessons that may be given again (`Lessons.open_from`) are taken back when they are: all since the first of them is
+    undone, and learned again with the states as they are known now. No view comes or goes by it.
     """
 
     merge_below: Annotated[float, Bounds(ge=0)] = 7.81
     spread: bool = True
+    average: Average = "visits"
     least_weight: Annotated[float, Bounds(ge=0, lt=0.5)] = 0.01
     max_views: Annotated[int, Bounds(ge=0)] = 0
 
@@ -53,60 +68,92 @@ class FusedMixtures(Stage):
         events: ViewEvent | None = None
 
     def step(
-        self, ctx: Context, lessons: Lessons | None, limit: ViewLimit | None, map: ViewMixtures, unjudged: Unjudged
+        self, ctx: Context, lessons: Lessons | None, limit: ViewLimit | None, map: ViewMixtures, learned: Learned
     ) -> Out:
         """Learn from what this tick has to teach."""
-        unjudged.lessons += () if lessons is None else lessons.items
-        if not unjudged.lessons or (limit is None and len(map)):
-            return self.Out(map=map)
+        lessons = Lessons(()) if lessons is None else lessons
+        open_from = math.inf if lessons.open_from is None else lessons.open_from
+        learned.open = [taught for taught in learned.open if taught.index >= open_from]
         before = map.names.copy()
-        now = len(unjudged.lessons) if limit is not None else 1
-        changed = [name for lesson in unjudged.lessons[:now] for name in self._learn(lesson, limit, map)]
-        unjudged.lessons = unjudged.lessons[now:]
+        new, changed = (
+            self._put_right(ctx, lessons.items, learned, map) if open_from < math.inf else (lessons.items, [])
+        )
+        learned.waiting += new
+        now = len(learned.waiting) if limit is not None else 0 if len(map) else 1
+        due, learned.waiting = learned.waiting[:now], learned.waiting[now:]
+        for lesson in due:
+            taught = self._learn(lesson, limit, map)
+            changed.append(taught.names)
+            if lesson.index >= open_from:
+                learned.open.append(taught)
+        if not changed:
+            return self.Out(map=map)
         over = within_cap(map, self.max_views)
-        map.keep_views(over)
-        why: Literal["", "full"] = "" if over.all() else "full"
-        return self.Out(map=map, events=view_event(map, before, np.array(changed, np.int64), why))
+        if not over.all():
+            map.keep_views(over)
+            learned.open = [taught.within(map) for taught in learned.open]
+        why = "" if over.all() else "full"
+        return self.Out(map=map, events=view_event(map, before, np.concatenate(changed), why))  # type: ignore[arg-type]
 
-    def _learn(self, lesson: Lesson, limit: ViewLimit | None, map: ViewMixtures) -> list[int]:
-        # The names of the views that took the lesson in.
-        view, state = lesson.view, lesson.state
-        rows = np.flatnonzero(view.distances(map.views) < limit.distance) if len(map) and limit else np.empty(0, int)
-        if len(rows):
-            turns = view.turns(map.views[rows]).tolist()
-            mixtures = [
-                self._fused([stored(map, row), parts(state, turn)])
-                for row, turn in zip(rows.tolist(), turns, strict=True)
-            ]
+    def _put_right(
+        self, ctx: Context, lessons: tuple[Lesson, ...], learned: Learned, map: ViewMixtures
+    ) -> tuple[tuple[Lesson, ...], list[Ints]]:
+        # Those of the lessons that are new, and the names of the views that changed because of the others.
+        fresh = {lesson.index: lesson for lesson in lessons}
+        learned.waiting = [fresh.pop(lesson.index, lesson) for lesson in learned.waiting]
+        first = next((row for row, taught in enumerate(learned.open) if taught.index in fresh), len(learned.open))
+        again, learned.open = learned.open[first:], learned.open[:first]
+        for taught in reversed(again):
+            taught.undo(map)
+        for taught in again:
+            state = fresh.pop(taught.index).state if taught.index in fresh else taught.state
+            learned.open.append(self._take_in(state, taught.index, taught.names, taught.turns, taught.alike, map))
+        if again:
+            ctx.count("lesson_taken_back", len(lessons) - len(fresh))
+        return tuple(fresh.values()), [taught.names for taught in again]
+
+    def _learn(self, lesson: Lesson, limit: ViewLimit | None, map: ViewMixtures) -> Taught:
+        view = lesson.view
+        distances = view.distances(map.views) if len(map) and limit else np.empty(0)
+        rows = np.flatnonzero(distances < limit.distance) if limit else np.empty(0, np.int64)
+        if limit and len(rows):
+            alike, turns = similarity(distances[rows], limit.distance, "linear"), view.turns(map.views[rows])
         else:
             rows = np.array([map.add_view(view.values, type(view).__name__)])
-            mixtures = [self._fused([parts(state, 0.0)])]
-        owners = np.repeat(rows, [len(weights) for _, _, weights, _ in mixtures])
-        map.put_mixtures(owners, *(np.concatenate(fields) for fields in zip(*mixtures, strict=True)))
+            alike, turns = np.ones(1), np.zeros(1)
         map.step()
-        return [int(name) for name in map.names[rows]]
+        return self._take_in(lesson.state, lesson.index, map.names[rows], turns, alike, map)
 
-    def _fused(self, mixtures: list[Parts]) -> Parts:
-        return fused(mixtures, self.merge_below, self.spread, self.least_weight)
+    def _take_in(
+        self, state: GaussianMixture, index: int, names: Ints, turns: Array, alike: Array, map: ViewMixtures
+    ) -> Taught:
+        taught = taught_by(state, index, names, turns, alike, map)
+        mixtures = [
+            fused([places, parts(state, turn, s)], self.merge_below, self.spread, self.least_weight, self.average)
+            for places, turn, s in zip(taught.places(), turns.tolist(), alike.tolist(), strict=True)
+        ]
+        owners = np.repeat(taught.rows(map), [len(weights) for _, _, weights, _ in mixtures])
+        if mixtures:
+            map.put_mixtures(owners, *(np.concatenate(fields) for fields in zip(*mixtures, strict=True)))
+        return taught
 
 
-def stored(map: ViewMixtures, row: int) -> Parts:
-    """A view's places: means, covariances, weights, counts."""
-    mine = map.owner == row
-    return map.means[mine], map.covariances[mine], map.weights[mine], map.counts[mine]
-
-
-def parts(state: GaussianMixture, turn: float) -> Parts:
-    """A state as places of a view from which the robot stood turned by `turn`, counter-clockwise."""
+def parts(state: GaussianMixture, turn: float, alike: float) -> Parts:
+    """A state as places of a view from which the robot stood turned by `turn`, counter-clockwise: means, covariances,
+    weights, and counts, `alike` (S) in all.
+    """
     means = state.means.copy()
     means[:, 2] = wrap(means[:, 2] - turn)
-    return means, state.covariances, state.weights, state.weights
+    return means, state.covariances, state.weights, state.weights * alike
 
 
-def fused(mixtures: list[Parts], merge_below: float, spread: bool, least_weight: float) -> Parts:
+def fused(mixtures: list[Parts], merge_below: float, spread: bool, least_weight: float, average: Average) -> Parts:
     """Mixtures of equal say as one: close components merged, weights made to sum to 1, weak ones dropped."""
     means, covariances, weights, counts = (np.concatenate(rows) for rows in zip(*mixtures, strict=True))
-    means, covariances, weights, counts = merged(means, covariances, weights, merge_below, spread, counts)
+    if average == "visits":
+        means, covariances, counts, weights = merged(means, covariances, counts, merge_below, spread, weights)
+    else:
+        means, covariances, weights, counts = merged(means, covariances, weights, merge_below, spread, counts)
     weights = weights / weights.sum()
     kept = weights >= least_weight
     weights = weights[kept] / weights[kept].sum()

@@ -20,6 +20,11 @@ class Lesson(Value):
 
 
 class Lessons(Value):
-    """What a tick has to teach, in the order in which it was seen; often nothing."""
+    """What a tick has to teach, in the order in which it was seen; often nothing.
+
+    `open_from`: lessons seen in this tick or later may be given once more, their states better known by then, and take
+    the place of what was learned. None: a lesson that is given again is one more.
+    """
 
     items: tuple[Lesson, ...]
+    open_from: int | None = None

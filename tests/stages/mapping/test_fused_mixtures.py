@@ -1,14 +1,17 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from omninav.pipeline import Context
-from omninav.stages.mapping.fused_mixtures import FusedMixtures, Unjudged
+from omninav.stages.mapping.fused_mixtures import Average, FusedMixtures, Learned
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.lesson import Lesson, Lessons
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import Coefficients, ViewLimit
 
 SIGMA = 0.1
+HELD = ("means", "covariances", "weights", "counts")
 
 
 def view(value: float, headings: int = 1) -> Coefficients:
@@ -33,7 +36,7 @@ def learn(
     limit: float = 1.0,
 ) -> ViewEvent:
     stage = FusedMixtures(spread=False) if stage is None else stage
-    out = stage.step(Context("mapping"), Lessons((Lesson(view, state, 0),)), ViewLimit(limit), map, Unjudged())
+    out = stage.step(Context("mapping"), Lessons((Lesson(view, state, 0),)), ViewLimit(limit), map, Learned())
     assert out.events is not None
     return out.events
 
@@ -48,16 +51,71 @@ def test_a_view_that_resembles_none_becomes_a_map_point_with_the_state_it_was_se
     assert map.weights[map.owner == 0].tolist() == [0.7, 0.3]
 
 
-def test_a_known_view_seen_at_the_same_place_is_averaged() -> None:
-    map = ViewMixtures.empty()
-    learn(map, view(0.0), state(0.0))
-    event = learn(map, view(0.5), state(0.2))
-    assert not len(event.inserted)
-    assert event.changed.tolist() == [0]
-    assert map.means[:, 0] == pytest.approx([0.1])
+@pytest.mark.parametrize(("average", "place"), [("halves", 0.15), ("visits", 0.1)])
+def test_a_known_view_seen_at_the_same_place_is_averaged(average: Average, place: float) -> None:
+    # 0, 0.2 at half the likeness (0.5 of the limit 1.0), 0.2 again: of 1 + 0.5 + 0.5 visits half are at 0.2.
+    map, stage = ViewMixtures.empty(), FusedMixtures(spread=False, average=average)
+    learn(map, view(0.0), state(0.0), stage)
+    for _ in range(2):
+        event = learn(map, view(0.5), state(0.2), stage)
+        assert not len(event.inserted)
+        assert event.changed.tolist() == [0]
+    assert map.means[:, 0] == pytest.approx([place])
     assert map.weights == pytest.approx([1.0])
     assert map.counts == pytest.approx([2.0])
     assert map.covariances[0, 0, 0] == pytest.approx(SIGMA**2)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=12))
+def test_a_place_is_the_mean_of_all_visits_with_their_variance(places: list[float]) -> None:
+    map, stage = ViewMixtures.empty(), FusedMixtures(merge_below=1e9)
+    for place in places:
+        learn(map, view(0.0), state(place), stage)
+    assert map.means[:, 0] == pytest.approx([np.mean(places)])
+    assert map.covariances[0, 0, 0] == pytest.approx(SIGMA**2 + np.var(places))
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10_000), st.sampled_from(["visits", "halves"]))
+def test_a_lesson_given_again_leaves_the_map_as_if_it_had_been_known_in_the_first_place(
+    seed: int, average: Average
+) -> None:
+    rng = np.random.default_rng(seed)
+    views = rng.uniform(0.0, 4.0, 12)
+    first, then = rng.uniform(0.0, 2.0, (2, 12))
+    again = np.flatnonzero(rng.random(12) < 0.4)
+    known = np.where(np.isin(np.arange(12), again), then, first)
+    maps = []
+    for taught, corrected in ((first, again), (known, [])):
+        map, stage, learned = ViewMixtures.empty(), FusedMixtures(average=average), Learned()
+        for lessons in (
+            *([Lesson(view(views[n]), state(taught[n]), n)] for n in range(12)),
+            [Lesson(view(views[n]), state(then[n]), int(n)) for n in corrected],
+        ):
+            stage.step(Context("mapping"), Lessons(tuple(lessons), open_from=0), ViewLimit(1.0), map, learned)
+        maps.append(map)
+    assert maps[0].names.tolist() == maps[1].names.tolist()
+    for row in range(len(maps[0])):
+        for mine, expected in zip(*([getattr(m, f)[m.owner == row] for f in HELD] for m in maps), strict=True):
+            np.testing.assert_array_equal(mine, expected)
+
+
+def test_a_lesson_from_before_the_open_ones_stays_and_is_learned_once_more() -> None:
+    map, stage, learned = ViewMixtures.empty(), FusedMixtures(), Learned()
+    for index, place, open_from in ((0, 0.0, 0), (1, 9.0, 1), (0, 5.0, 1)):
+        lessons = Lessons((Lesson(view(0.0), state(place), index),), open_from)
+        stage.step(Context("mapping"), lessons, ViewLimit(1.0), map, learned)
+    assert sorted(map.means[:, 0].tolist()) == [0.0, 5.0, 9.0]
+
+
+def test_what_a_full_map_has_dropped_does_not_come_back_with_a_lesson_given_again() -> None:
+    map, stage, learned = ViewMixtures.empty(), FusedMixtures(max_views=2), Learned()
+    for index, place in ((0, 0.0), (1, 3.0), (2, 6.0), (1, 4.0)):
+        lessons = Lessons((Lesson(view(3.0 * index), state(place), index),), 0)
+        stage.step(Context("mapping"), lessons, ViewLimit(1.0), map, learned)
+    assert map.views[:, 0].tolist() == [3.0, 6.0]
+    assert sorted(map.means[:, 0].tolist()) == [4.0, 6.0]
 
 
 def test_with_the_spread_of_the_means_a_merged_place_is_as_wide_as_what_it_holds() -> None:
@@ -103,19 +161,19 @@ def test_headings_are_kept_as_those_of_a_robot_that_sees_the_view_unturned() -> 
 
 
 def test_before_there_is_a_limit_only_the_first_view_is_kept_and_the_others_wait() -> None:
-    map, stage, unjudged = ViewMixtures.empty(), FusedMixtures(), Unjudged()
+    map, stage, learned = ViewMixtures.empty(), FusedMixtures(), Learned()
     for value in (0.0, 9.0):
-        stage.step(Context("mapping"), Lessons((Lesson(view(value), state(0.0), 0),)), None, map, unjudged)
+        stage.step(Context("mapping"), Lessons((Lesson(view(value), state(0.0), 0),)), None, map, learned)
     assert len(map) == 1
-    stage.step(Context("mapping"), None, ViewLimit(1.0), map, unjudged)
+    stage.step(Context("mapping"), None, ViewLimit(1.0), map, learned)
     assert map.views[:, 0].tolist() == [0.0, 9.0]
-    assert not unjudged.lessons
+    assert not learned.waiting
 
 
 def test_nothing_to_learn_changes_nothing() -> None:
     map = ViewMixtures.empty()
-    assert FusedMixtures().step(Context("mapping"), Lessons(()), None, map, Unjudged()).events is None
-    assert FusedMixtures().step(Context("mapping"), None, None, map, Unjudged()).map is map
+    assert FusedMixtures().step(Context("mapping"), Lessons(()), None, map, Learned()).events is None
+    assert FusedMixtures().step(Context("mapping"), None, None, map, Learned()).map is map
 
 
 def test_a_map_never_holds_more_views_than_it_may() -> None:
