@@ -304,7 +304,7 @@ def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
             return b""
         _scale(grid[0], heights)
         grid[0].set_ylabel(curve.title)
-        grid[0].legend()
+        _legend_above(drawn.canvas, grid)
     return drawn.content
 
 
@@ -362,7 +362,7 @@ def _lines(experiment: Experiment, results: Results, name: str, along: str, pane
             axes.set_xlabel(along)
         _scale(grid[0], heights)
         grid[0].set_ylabel(measure.title)
-        grid[0].legend()
+        _legend_above(drawn.canvas, grid)
     return drawn.content
 
 
@@ -410,6 +410,16 @@ def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
         if axes.get_legend_handles_labels()[1]:
             axes.legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
     return drawn.content
+
+
+def _legend_above(canvas: Any, grid: Any) -> None:
+    """One legend for all boxes, where it hides none of the lines."""
+    lines = {}
+    for axes in grid:
+        handles, labels = axes.get_legend_handles_labels()
+        lines |= dict(zip(labels, handles, strict=True))
+    if lines:
+        canvas.legend(lines.values(), lines.keys(), loc="outside upper left", ncols=min(3, len(lines)))
 
 
 def _scale(axes: Any, heights: Sequence[float]) -> None:
