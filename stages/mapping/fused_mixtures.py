@@ -92,8 +92,8 @@ class FusedMixtures(Stage):
         if not over.all():
             map.keep_views(over)
             learned.open = [taught.within(map) for taught in learned.open]
-        why = "" if over.all() else "full"
-        return self.Out(map=map, events=view_event(map, before, np.concatenate(changed), why))  # type: ignore[arg-type]
+        why: Literal["", "full"] = "" if over.all() else "full"
+        return self.Out(map=map, events=view_event(map, before, np.concatenate(changed), why))
 
     def _put_right(
         self, ctx: Context, lessons: tuple[Lesson, ...], learned: Learned, map: ViewMixtures
