@@ -15,9 +15,10 @@ class AtOnce(Stage):
     """
 
     class Out(Outputs):
-        """What this tick has to teach: one lesson, or none."""
+        """What this tick has to teach: one lesson, or none. Nothing waits."""
 
         lessons: Lessons
+        waiting: Lessons | None = None
 
     def step(
         self,

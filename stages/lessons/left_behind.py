@@ -45,7 +45,8 @@ class LeftBehind(Stage):
     confirm the belief, and holds the robot back at where it was (docs/experiments/cml_defaults.md). Gross, Koenig &
     Mueller 2005, section 2.1, delay by a short queue for the same reason; how far its length in pictures takes the
     robot depends on the camera's rate. States of any number of modes are learned. `longest`: no more views than these
-    wait, however long the robot stands. What waits when a log ends is learned as the next one begins.
+    wait, however long the robot stands. What waits when a log ends is learned as the next one begins, and after the
+    last one by `waiting` (LeftOver).
 
     `retrace`: wrong places in the map lead the belief away from where odometry, rightly, had it; where the map is right
     again, the belief comes back. That shows: it jumps to where odometry leads from the state before it was led away
@@ -71,9 +72,10 @@ class LeftBehind(Stage):
     improved: Annotated[float, Bounds(gt=1)] = 2.0
 
     class Out(Outputs):
-        """What has been left behind, in the order in which it was seen."""
+        """What has been left behind, in the order in which it was seen, and what would be as the next log begins."""
 
         lessons: Lessons
+        waiting: Lessons
 
     def step(
         self,
@@ -102,7 +104,7 @@ class LeftBehind(Stage):
             due = max(due, sum(1 for lesson in behind.lessons if lesson.index < ctx.tick.index))
         ready, behind.lessons, behind.seen_at = behind.lessons[:due], behind.lessons[due:], behind.seen_at[due:]
         open_from = behind.past[0].index if self.back_propagate else None
-        return self.Out(lessons=Lessons((*again, *ready), open_from))
+        return self.Out(lessons=Lessons((*again, *ready), open_from), waiting=Lessons(tuple(behind.lessons)))
 
     def _corrected(self, ctx: Context, oldest: int, behind: Behind) -> list[Lesson]:
         # What is to be learned again, now that a view of the map, the oldest of this age, spoke for the present state.

@@ -31,7 +31,7 @@ class UnimodalQueue(Stage):
     """Lessons from unimodal states only, `length` ticks late; states between two unimodal ones are reconstructed.
 
     Gross, Koenig & Mueller 2005, section 2.1: updating at once would feed the map's own errors back into the state. The
-    queue gives out what is left in it when the next log begins; what waits at the end of the last log is not learned.
+    queue gives out what is left in it when the next log begins, and after the last log by `waiting` (LeftOver).
 
     The test for a unimodal state is not given (erratum 12a). `unimodal: share`: the components nearer to the heaviest
     than `near_below` (squared Mahalanobis distance) hold more than `least_share` of the weight; the lesson's state has
@@ -56,9 +56,10 @@ class UnimodalQueue(Stage):
     longest: Annotated[int, Bounds(ge=0)] = 500
 
     class Out(Outputs):
-        """What is due in this tick, in the order in which it was seen."""
+        """What is due in this tick, in the order in which it was seen, and what would be due as the next log begins."""
 
         lessons: Lessons
+        waiting: Lessons
 
     def step(
         self,
@@ -91,7 +92,7 @@ class UnimodalQueue(Stage):
             waiting.seen.append(Lesson(view, state, now, reconstructed=True))
         ready = sum(1 for lesson in waiting.queue if lesson.index <= now - self.length)
         due, waiting.queue = due + waiting.queue[:ready], waiting.queue[ready:]
-        return self.Out(lessons=Lessons(tuple(due)))
+        return self.Out(lessons=Lessons(tuple(due)), waiting=Lessons(tuple(waiting.queue)))
 
     def _single(self, state: GaussianMixture) -> GaussianMixture | None:
         # The state as one Gaussian, where it is certain.

@@ -14,7 +14,7 @@ import pytest
 from conftest import DATA
 
 from omninav.pipeline.artifact import read_artifact
-from omninav.pipeline.codec import encode
+from omninav.pipeline.codec import decode, encode
 from omninav.pipeline.engine import Engine, StageFailed
 from omninav.pipeline.graph import build
 
@@ -52,6 +52,25 @@ def test_a_run_stopped_while_lessons_wait_goes_on_to_the_same_map(tmp_path: Path
     with pytest.raises(StageFailed):
         learned(tmp_path / "broken", at)
     assert learned(tmp_path / "broken") == unbroken, what
+
+
+LEFT_OVER = {"ticks": {"from": "source.tick", "collect": True}, "waiting": "lessons.waiting"}
+LAST_MAP = {"lessons": "left_over.lessons", "limit": "source.limit", "map": "mapping.map"}
+
+
+def test_what_waits_as_the_last_log_ends_is_learned_after_it(tmp_path: Path):
+    left_over = {"_target_": f"{STAGES}.lessons.left_over.LeftOver"}
+    graph = build(
+        {
+            "nodes": {**NODES, "left_over": left_over, "last_map": NODES["mapping"]},
+            "wires": {**WIRES, "left_over": LEFT_OVER, "last_map": LAST_MAP},
+        }
+    )
+    place = tmp_path / "after"
+    engine = Engine(graph, {}, 0, place, place / "memory", ["last_map.map"], identity="same", every_s=0.0)
+    last = engine.run()["last_map.map"]
+    in_the_loop = decode(learned(tmp_path / "loop"))
+    assert last.steps == in_the_loop.steps + 12
 
 
 HOUSE = DATA / "photoreal-house"
