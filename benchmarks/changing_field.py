@@ -142,4 +142,5 @@ def graph_on_field(variant: str, source: dict[str, Any], limit: float | None = N
         for name, ports in wires.items()
         if name in kept
     }
+    config["saves"] = {}  # the map that is saved is made after the last tick, by nodes that are not kept
     return plan(config).graph

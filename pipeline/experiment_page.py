@@ -85,7 +85,9 @@ def mean_and_spread(values: Sequence[float], digits: int) -> str:
     """Mean ± standard deviation; the one value where it is alone, a dash where there is nothing."""
     if len(values) < 2:
         return number(values[0], digits) if values else "–"
-    return f"{number(float(np.mean(values)), digits)} ± {number(float(np.std(values)), digits)}"
+    mean, spread = float(np.mean(values)), float(np.std(values))
+    spread = spread if spread > 1e-9 * abs(mean) else 0.0  # equal figures, but for rounding
+    return f"{number(mean, digits)} ± {number(spread, digits)}"
 
 
 def beside_the_mean(values: Sequence[float], ran: int, digits: int) -> list[str]:
