@@ -416,7 +416,7 @@ def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
 
 def _legend_above(canvas: Any, grid: Any) -> None:
     """One legend for all boxes, where it hides none of the lines."""
-    lines = {}
+    lines: dict[str, Any] = {}
     for axes in grid:
         handles, labels = axes.get_legend_handles_labels()
         lines |= dict(zip(labels, handles, strict=True))
