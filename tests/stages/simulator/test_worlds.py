@@ -98,7 +98,7 @@ def test_a_days_line_is_beside_the_route_by_the_stated_share_of_its_spread() -> 
         ("home_store_mid", "training", 1900, 2100),
         ("home_store_mid", "test", 295, 305),
         ("home_store_small", "laps", 420, 450),
-        ("home_store_mid", "part", 420, 460),
+        ("home_store_mid", "part", 770, 820),
         ("hall", "area", 340, 380),
     ],
 )
