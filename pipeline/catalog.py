@@ -157,23 +157,3 @@ def built_in() -> Iterator[Entry]:
         for cls in vars(module).values():
             if _is_stage(cls) and cls.__module__ == module.__name__ and not inspect.isabstract(cls):
                 yield Entry(f"{role}.{name}", f"{module.__name__}.{cls.__qualname__}", "built in", first_line(cls))
-
-
-_CODE: dict[str, str] = {}
-
-
-def code_version(cls: type[Stage]) -> str:
-    """A hash over the source of the package a stage belongs to: whatever it may call is in it.
-
-    A change anywhere in that package makes its cached results stale. That is more often than needed and never too
-    seldom, which a number in each stage, raised by hand, would be.
-    """
-    module = sys.modules[cls.__module__]
-    file = Path(inspect.getfile(module)).resolve()
-    root = file
-    while (root.parent / "__init__.py").exists():
-        root = root.parent
-    if str(root) not in _CODE:
-        files = sorted(root.rglob("*.py")) if root.is_dir() else [root]
-        _CODE[str(root)] = digest_text(*(text for f in files for text in (str(f.relative_to(root)), f.read_text())))
-    return _CODE[str(root)]

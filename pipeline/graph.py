@@ -8,8 +8,9 @@ from typing import Any, Literal
 
 import networkx as nx
 
-from .catalog import UnknownStage, code_version, entries, resolve
+from .catalog import UnknownStage, entries, resolve
 from .closed_loop import truth_in_the_loop
+from .code_version import code_version
 from .files import digest_text
 from .ports import compatible, convert_fields, type_name
 from .problems import Problem, ProblemsFound, nearest, suggest

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import toys
-from omninav.pipeline.catalog import UnknownStage, code_version, entries, plugins, resolve
+from omninav.pipeline.catalog import UnknownStage, entries, plugins, resolve
 
 STAGE = """
 from omninav.pipeline import Context, Outputs, Stage
@@ -85,26 +85,3 @@ def test_an_environment_entry_that_is_not_understood_says_what_to_write(monkeypa
 def test_a_missing_file_is_named(tmp_path: Path):
     with pytest.raises(UnknownStage, match=r"there is no file .*nothing\.py"):
         resolve(f"{tmp_path}/nothing.py:Twice")
-
-
-def test_the_code_version_changes_with_any_file_of_the_package(tmp_path: Path):
-    (tmp_path / "pack").mkdir()
-    (tmp_path / "pack" / "__init__.py").write_text("")
-    (tmp_path / "pack" / "other.py").write_text("x = 1\n")
-    one = _version_in_new_process(tmp_path)
-    (tmp_path / "pack" / "other.py").write_text("x = 2\n")
-    assert _version_in_new_process(tmp_path) != one
-    assert code_version(toys.Scale) == code_version(toys.Add)
-
-
-def _version_in_new_process(tmp_path: Path) -> str:
-    import subprocess
-    import sys
-
-    (tmp_path / "pack" / "stage.py").write_text(STAGE)
-    code = "import pack.stage; from omninav.pipeline.catalog import code_version; print(code_version(pack.stage.Twice))"
-    tests = str(Path(toys.__file__).parent)
-    environment = {"PYTHONPATH": f"{tmp_path}:{tests}", "PATH": "/usr/bin:/bin"}
-    return subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
-    ).stdout
