@@ -11,6 +11,7 @@ from .files import digest_text
 from .stage import Stage
 
 
+@functools.cache
 def code_version(cls: type[Stage]) -> str:
     """A hash over the source of a stage's module and of all that it imports of its own package, directly or not.
 

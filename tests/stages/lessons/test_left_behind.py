@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -58,10 +60,10 @@ def test_a_state_that_says_nothing_teaches_nothing() -> None:
     assert not behind.lessons
 
 
-def around_a_square(end: tuple[float, float, float], **options: object) -> list[Lessons]:
+def around_a_square(end: tuple[float, float, float], **options: Any) -> list[Lessons]:
     """What is taught on a square of four metres, five pictures a side, by odometry alone up to the last picture; there
     a view of the map says that the robot is at `end`."""
-    stage, behind, ctx = LeftBehind(metres=1.0, **options), Behind(), Context("lessons")  # type: ignore[arg-type]
+    stage, behind, ctx = LeftBehind(metres=1.0, **options), Behind(), Context("lessons")
     map = ViewMixtures.empty()
     map.add_view(VIEW.values, "Coefficients")
     none = Neighbours(np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0), np.inf)
