@@ -11,22 +11,26 @@ from .files import digest_text
 from .stage import Stage
 
 
-@functools.cache
 def code_version(cls: type[Stage]) -> str:
     """A hash over the source of a stage's module and of all that it imports of its own package, directly or not.
 
     A change there makes its cached results stale, one elsewhere in the package does not. Imports are read off the
     source, so that those count as well which run at need only. What other packages hold does not count.
     """
-    file = Path(inspect.getfile(sys.modules[cls.__module__])).resolve()
+    return _of_module(cls.__module__)
+
+
+@functools.cache
+def _of_module(module: str) -> str:
+    file = Path(inspect.getfile(sys.modules[module])).resolve()
     root = file.parent
     while (root / "__init__.py").exists():
         root = root.parent
     inside = file.relative_to(root).with_suffix("").parts
-    names = cls.__module__.split(".")
+    names = module.split(".")
     outer = ".".join([*names[: -len(inside)], inside[0]])  # the package's full name; or the module's, without one
     found: dict[str, str] = {}
-    to_read = [cls.__module__] if ".".join(names[-len(inside) :]) == ".".join(inside) else []
+    to_read = [module] if ".".join(names[-len(inside) :]) == ".".join(inside) else []
     while to_read:
         name = to_read.pop()
         if name in found or not f"{name}.".startswith(f"{outer}."):
