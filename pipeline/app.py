@@ -1,5 +1,7 @@
 """The command line. Only the parser is loaded at the start; what is heavy is imported by the command that needs it."""
 
+import copy
+import functools
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -263,10 +265,11 @@ def _planned_experiment(
 
     plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
     folders = _words(arguments)[1]
+    variants = _configured_variants(place)
 
     def composed(words: Sequence[str]) -> dict[str, Any]:
         try:
-            return complete(compose("config", overrides=[*place, *words]))
+            return complete(compose("config", overrides=[*place, *words]), variants)
         except HydraException as error:
             raise ProblemsFound(misfits(words, folders, str(error))) from None
 
@@ -332,18 +335,29 @@ def _sweep_rows(folder: Path) -> Iterator[dict[str, Any]]:
 # configurations
 
 
-def complete(config: Any) -> dict[str, Any]:
+def _configured_variants(place: Sequence[str] = ()) -> Callable[[str], Any]:
+    """Gives the configuration of a variant as its file has it, composed once. `place` as in `_planned_experiment`."""
+    from hydra import compose
+
+    @functools.cache
+    def of(variant: str) -> Any:
+        return compose("config", overrides=[*place, f"variant={variant}"])
+
+    return lambda variant: copy.deepcopy(of(variant))
+
+
+def complete(config: Any, variants: Callable[[str], Any] | None = None) -> dict[str, Any]:
     """A composed configuration, resolved, with the graphs of its artifacts composed too: plain dicts, all said.
 
     An artifact's graph is its variant's, with the nodes that it shares taken from this configuration, and all top-level
-    settings too; its log is the artifact's.
+    settings too; its log is the artifact's. `variants` gives variants where Hydra was not started with `--config-dir`.
     """
-    from hydra import compose
     from omegaconf import OmegaConf
     from omegaconf.errors import OmegaConfBaseException
 
     from .problems import Problem, ProblemsFound
 
+    of_variant = variants or _configured_variants()
     graph_keys = {"variant", "nodes", "wires", "artifacts", "saves", "log", "tour", "map", "route", "day", "events"}
     try:
         plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
@@ -361,7 +375,7 @@ def complete(config: Any) -> dict[str, Any]:
                 raise ProblemsFound([Problem("log", "a tour is given, but no log to localise", "type log=LOG")])
             if spec.get("log") is None and plain.get("log") is not None:
                 continue  # a log of one's own, but nothing to make the artifact from: `plan` says what is missing
-            other = compose("config", overrides=[f"variant={spec['variant']}"])
+            other = of_variant(str(spec["variant"]))
             OmegaConf.set_struct(other, False)
             for key in config:
                 if str(key) not in graph_keys:
@@ -429,7 +443,7 @@ def _check(arguments: list[str]) -> int:
     with _composed([word for word in arguments if word not in of_conditions]) as config:
         if config.get("experiment") is not None:
             return _check_experiment(_planned_experiment(config, arguments, of_conditions, search(folders)))
-        planned = plan(complete(config))
+        planned = plan(complete(config, _configured_variants(search(folders))))
     input_digests(planned)  # opens every log and map
     graph = planned.graph
     before, tick, after = (len(graph.of_lifetime(kind)) for kind in LIFETIMES)
@@ -463,11 +477,12 @@ def _check_experiment(run: "ExperimentRun") -> int:
 def _graph(arguments: list[str]) -> int:
     from .draw import mermaid, svg
     from .files import write_whole
+    from .overrides import search
     from .run import plan
 
     out = next((Path(word.partition("=")[2]) for word in arguments if word.startswith("out=")), Path("."))
     with _composed([word for word in arguments if not word.startswith("out=")]) as config:
-        planned = plan(complete(config))
+        planned = plan(complete(config, _configured_variants(search(_words(arguments)[1]))))
     drawn = {planned.variant: planned.graph} | {
         f"{planned.variant}.{a.name}": a.graph for a in planned.artifacts if a.graph
     }
@@ -548,7 +563,7 @@ def _simulate(arguments: list[str]) -> int:
         from .run import plan
 
         with _composed(["variant=simulate", *arguments]) as config:
-            planned = plan(complete(config))
+            planned = plan(complete(config))  # of no artifacts
 
         def step(done: int, total: int | None) -> None:
             progress.update("simulate", done, total)

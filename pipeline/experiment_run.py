@@ -198,14 +198,18 @@ class ExperimentRun:
         """Compose and check every condition. Raises `ProblemsFound` before anything has run."""
         problems: list[Problem] = []
         composed: dict[tuple[str, ...], dict[str, Any]] = {}
-        for cell in self.all_cells:
-            try:
-                if cell.words not in composed:
-                    composed[cell.words] = self.compose(cell.words)
-                cell.config = json.loads(json.dumps(composed[cell.words], default=str))
-                cell.planned = plan(cell.config)
-            except ProblemsFound as found:
-                problems += [Problem(f"{cell.name}: {p.where}", p.what, p.hint) for p in found.problems]
+        cells, name = self.all_cells, f"{self.experiment.name}: checking"
+        with Progress(unit="conditions") as progress:
+            progress.begin(name, 0, len(cells))
+            for number, cell in enumerate(cells, 1):
+                try:
+                    if cell.words not in composed:
+                        composed[cell.words] = self.compose(cell.words)
+                    cell.config = json.loads(json.dumps(composed[cell.words], default=str))
+                    cell.planned = plan(cell.config)
+                except ProblemsFound as found:
+                    problems += [Problem(f"{cell.name}: {p.where}", p.what, p.hint) for p in found.problems]
+                progress.update(name, number, len(cells))
         problems += self._unknown_stages()
         if problems:
             raise ProblemsFound(dict.fromkeys(problems))

@@ -45,6 +45,14 @@ def test_a_run_with_a_wrong_configuration_says_the_same_and_makes_nothing(omnina
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("command", ["check", "graph"])
+def test_a_map_may_be_made_by_a_variant_of_ones_own(omninav, tmp_path: Path, command):
+    (tmp_path / "mine" / "variant").mkdir(parents=True)
+    own = (ROOT / "conf" / "variant" / "omniview_mcl_map.yaml").read_text().replace("omniview_mcl_map", "own_map")
+    (tmp_path / "mine" / "variant" / "own_map.yaml").write_text(own)
+    omninav(command, "--config-dir=mine", "variant=omniview_mcl", "artifacts.map.variant=own_map", check=True)
+
+
 def test_check_says_who_reads_the_truth(omninav):
     said = omninav("check", "variant=omniview_mcl", check=True).stdout
     assert "nothing wrong" in said
