@@ -39,8 +39,7 @@ def _expected(
     fade: float,
     ordinary: float,
 ) -> Array:
-    # `similarity` has its first heading once more at the end, so that a turn needs no modulo.
-    headings = similarity.shape[1] - 1
+    headings = similarity.shape[1]
     per_radian, per_cell = headings / (2 * np.pi), 1.0 / cell
     least, decay = 1e-4 * fade * fade, -0.5 / (fade * fade)
     neighbours = nearest.shape[1]
@@ -75,8 +74,8 @@ def _expected(
             weight = 1.0 / (apart[k] + nearly)
             turn = turned[k] - headings * np.floor(turned[k] / headings)
             h = min(int(turn), headings - 1)
-            before = similarity[row[k], h]
-            total += weight * (before + (similarity[row[k], h + 1] - before) * (turn - h))
+            before, after = similarity[row[k], h], similarity[row[k], h + 1 if h + 1 < headings else 0]
+            total += weight * (before + (after - before) * (turn - h))
             mass += weight
         known = math.exp(decay * closest)
         out[n] = max(ordinary, known * total / mass + (1.0 - known) * ordinary)
@@ -93,9 +92,8 @@ def expected_similarity(
     exp(-d_min^2 / (2 fade^2)), and it is never below it. `rows` (R,): each reference's row in `similarity`, -1
     where it was not compared.
     """
-    poses = np.ascontiguousarray(poses)
-    around = np.concatenate([similarity, similarity[:, :1]], axis=1)
-    return _expected(poses, references, rows, around, *cells, fade, ordinary)
+    poses, similarity = np.ascontiguousarray(poses), np.ascontiguousarray(similarity)
+    return _expected(poses, references, rows, similarity, *cells, fade, ordinary)
 
 
 @numba.njit(cache=True, nogil=True)
