@@ -1,10 +1,15 @@
 """Where the robot was between two places that are certain: the way along the odometry, worked out from both ends."""
 
+from collections.abc import Callable
+
 import numba
 import numpy as np
 import numpy.typing as npt
 
+from .se2 import wrap
+
 Array = npt.NDArray[np.float64]
+Backwards = Callable[[Array, Array, Array, Array, Array, Array, Array], tuple[Array, Array]]
 
 
 def reconstructed(
@@ -29,16 +34,49 @@ def reconstructed(
     The third value is the squared Mahalanobis distance by which odometry misses the last end (3 degrees of freedom): a
     large one says that the robot was lifted, or that an end is wrong.
     """
-    means, covariances, missed = _reconstructed(
-        np.ascontiguousarray(first, np.float64),
-        np.ascontiguousarray(first_covariance, np.float64),
-        np.ascontiguousarray(motions, np.float64).reshape(-1, 3),
-        np.ascontiguousarray(noise, np.float64).reshape(-1, 3, 3),
-        np.ascontiguousarray(last, np.float64),
-        np.ascontiguousarray(last_covariance, np.float64),
-        rounds,
-    )
-    return means, covariances, float(missed)
+    return _between(first, first_covariance, motions, noise, last, last_covariance, rounds, _both_ways)
+
+
+def smoothed(
+    first: Array,
+    first_covariance: Array,
+    motions: Array,
+    noise: Array,
+    last: Array,
+    last_covariance: Array,
+    rounds: int = 5,
+) -> tuple[Array, Array, float]:
+    """The same for a filter's states: the last end is what the filter knows by then, the first end and all motions
+    included. Only what it has learned beyond them goes back along the way (Rauch, Tung & Striebel 1965), and row N is
+    the last end as it is; `reconstructed` would count the first end and the motions twice.
+    """
+    return _between(first, first_covariance, motions, noise, last, last_covariance, rounds, _back_from_the_filter)
+
+
+def _between(
+    first: Array,
+    first_covariance: Array,
+    motions: Array,
+    noise: Array,
+    last: Array,
+    last_covariance: Array,
+    rounds: int,
+    backwards: Backwards,
+) -> tuple[Array, Array, float]:
+    first, last = np.ascontiguousarray(first, np.float64), np.ascontiguousarray(last, np.float64)
+    first_covariance = np.ascontiguousarray(first_covariance, np.float64)
+    last_covariance = np.ascontiguousarray(last_covariance, np.float64)
+    motions = np.ascontiguousarray(motions, np.float64).reshape(-1, 3)
+    noise = np.ascontiguousarray(noise, np.float64).reshape(-1, 3, 3)
+    at = _led(first, motions, noise)  # the way around which motions are linearised: at first where odometry leads
+    covariances, missed = np.empty((len(at), 3, 3)), 0.0
+    for turn in range(rounds):
+        ahead, ahead_covariance = _ahead(first, first_covariance, motions, noise, at)
+        if turn == 0:
+            gap = _wrapped(last - ahead[-1])
+            missed = float(gap @ np.linalg.solve(ahead_covariance[-1] + last_covariance, gap))
+        at, covariances = backwards(motions, noise, at, ahead, ahead_covariance, last, last_covariance)
+    return np.column_stack([at[:, :2], wrap(at[:, 2])]), covariances, missed
 
 
 @numba.njit(cache=True, nogil=True)
@@ -59,45 +97,58 @@ def _linearised(pose: Array, motion: Array, noise: Array) -> tuple[Array, Array,
 
 
 @numba.njit(cache=True, nogil=True)
-def _reconstructed(
-    first: Array,
-    first_covariance: Array,
-    motions: Array,
-    noise: Array,
-    last: Array,
-    last_covariance: Array,
-    rounds: int,
-) -> tuple[Array, Array, float]:
-    number = len(motions) + 1
-    at = np.empty((number, 3))  # the way around which motions are linearised: at first where odometry leads
+def _led(first: Array, motions: Array, noise: Array) -> Array:
+    at = np.empty((len(motions) + 1, 3))
     at[0] = first
-    for k in range(1, number):
-        at[k] = _linearised(at[k - 1], motions[k - 1], noise[k - 1])[0]
-    covariances = np.empty((number, 3, 3))
-    ahead, ahead_covariance = np.empty((number, 3)), np.empty((number, 3, 3))
-    missed = 0.0
-    for turn in range(rounds):
-        ahead[0], ahead_covariance[0] = first, first_covariance
-        for k in range(1, number):
+    for k in range(len(motions)):
+        at[k + 1] = _linearised(at[k], motions[k], noise[k])[0]
+    return at
+
+
+@numba.njit(cache=True, nogil=True)
+def _ahead(first: Array, first_covariance: Array, motions: Array, noise: Array, at: Array) -> tuple[Array, Array]:
+    # What the first end and the motions say of each pose.
+    ahead, covariance = np.empty((len(at), 3)), np.empty((len(at), 3, 3))
+    ahead[0], covariance[0] = first, first_covariance
+    for k in range(len(motions)):
+        end, slope, spread = _linearised(at[k], motions[k], noise[k])
+        ahead[k + 1] = end + slope @ _wrapped(ahead[k] - at[k])
+        covariance[k + 1] = slope @ covariance[k] @ slope.T + spread
+    return ahead, covariance
+
+
+@numba.njit(cache=True, nogil=True)
+def _both_ways(
+    motions: Array, noise: Array, at: Array, ahead: Array, ahead_covariance: Array, last: Array, last_covariance: Array
+) -> tuple[Array, Array]:
+    fresh, covariances = np.empty(ahead.shape), np.empty(ahead_covariance.shape)
+    back, back_covariance = last.copy(), last_covariance.copy()
+    for k in range(len(at) - 1, -1, -1):
+        share = ahead_covariance[k] @ np.linalg.inv(ahead_covariance[k] + back_covariance)
+        fresh[k] = ahead[k] + share @ _wrapped(back - ahead[k])
+        both = share @ back_covariance
+        covariances[k] = 0.5 * (both + both.T)
+        if k > 0:
             end, slope, spread = _linearised(at[k - 1], motions[k - 1], noise[k - 1])
-            ahead[k] = end + slope @ _wrapped(ahead[k - 1] - at[k - 1])
-            ahead_covariance[k] = slope @ ahead_covariance[k - 1] @ slope.T + spread
-        back, back_covariance = last.copy(), last_covariance.copy()
-        if turn == 0:
-            gap = _wrapped(back - ahead[number - 1])
-            missed = float(gap @ np.linalg.solve(ahead_covariance[number - 1] + back_covariance, gap))
-        fresh = np.empty((number, 3))
-        for k in range(number - 1, -1, -1):
-            share = ahead_covariance[k] @ np.linalg.inv(ahead_covariance[k] + back_covariance)
-            fresh[k] = ahead[k] + share @ _wrapped(back - ahead[k])
-            both = share @ back_covariance
-            covariances[k] = 0.5 * (both + both.T)
-            if k > 0:
-                end, slope, spread = _linearised(at[k - 1], motions[k - 1], noise[k - 1])
-                undo = np.linalg.inv(slope)
-                back = at[k - 1] + undo @ _wrapped(back - end)
-                back_covariance = undo @ (back_covariance + spread) @ undo.T
-        at = fresh
-    for k in range(number):
-        at[k] = _wrapped(at[k])
-    return at, covariances, missed
+            undo = np.linalg.inv(slope)
+            back = at[k - 1] + undo @ _wrapped(back - end)
+            back_covariance = undo @ (back_covariance + spread) @ undo.T
+    return fresh, covariances
+
+
+@numba.njit(cache=True, nogil=True)
+def _back_from_the_filter(
+    motions: Array, noise: Array, at: Array, ahead: Array, ahead_covariance: Array, last: Array, last_covariance: Array
+) -> tuple[Array, Array]:
+    fresh, covariances = np.empty(ahead.shape), np.empty(ahead_covariance.shape)
+    n = len(at) - 1
+    fresh[n], covariances[n] = ahead[n] + _wrapped(last - ahead[n]), last_covariance
+    for k in range(n - 1, -1, -1):
+        slope = _linearised(at[k], motions[k], noise[k])[1]
+        gain = ahead_covariance[k] @ slope.T @ np.linalg.inv(ahead_covariance[k + 1])
+        fresh[k] = ahead[k] + gain @ _wrapped(fresh[k + 1] - ahead[k + 1])
+        # As a sum of what stays uncertain whatever the end is, and of the end's share: both are positive.
+        kept = ahead_covariance[k] - gain @ slope @ ahead_covariance[k]
+        both = kept + gain @ covariances[k + 1] @ gain.T
+        covariances[k] = 0.5 * (both + both.T)
+    return fresh, covariances

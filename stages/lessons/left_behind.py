@@ -10,7 +10,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.gaussians import squared_distances
 from omninav.stages.geometry.odometry_motion import increment
-from omninav.stages.geometry.path_reconstruction import reconstructed
+from omninav.stages.geometry.path_reconstruction import reconstructed, smoothed
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.lesson import Lesson, Lessons
 from omninav.stages.values.pose import UncertainMotion
@@ -137,7 +137,7 @@ class LeftBehind(Stage):
         first = next(known, latest)
         if first == latest or behind.past[first].index <= after:
             return []
-        means, covariances, missed = led(behind, first, end)
+        means, covariances, missed = led(behind, first, end, jumped=False)
         if missed > self.missed_below:
             return []
         put = {}
@@ -176,12 +176,16 @@ def remember(lesson: Lesson, model: UncertainMotion | None, behind: Behind, long
     behind.jumps = [jump for jump in behind.jumps if jump[0] >= behind.past[0].index]
 
 
-def led(behind: Behind, row: int, end: tuple[Array, Array]) -> tuple[Array, Array, float]:
-    """The way from a certain state in the past to the present one, `end`, along odometry: see `reconstructed`."""
+def led(behind: Behind, row: int, end: tuple[Array, Array], jumped: bool = True) -> tuple[Array, Array, float]:
+    """The way from a certain state in the past to the present one, `end`, along odometry: see `path_reconstruction`.
+
+    `jumped`: what is known of `end` came from the map alone, not from that state by odometry.
+    """
     start = certain_state(behind.past[row].state)
     assert start is not None
     steps = [increment(way.way, way.sigmas) for way in behind.ways[row:]]
-    return reconstructed(*start, np.stack([s[0] for s in steps]), np.stack([s[1] for s in steps]), *end)
+    between = reconstructed if jumped else smoothed
+    return between(*start, np.stack([s[0] for s in steps]), np.stack([s[1] for s in steps]), *end)
 
 
 def put_right(behind: Behind, states: dict[int, GaussianMixture]) -> list[Lesson]:
