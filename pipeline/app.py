@@ -356,6 +356,7 @@ def complete(config: Any, variants: Callable[[str], Any] | None = None) -> dict[
     from omegaconf.errors import OmegaConfBaseException
 
     from .problems import Problem, ProblemsFound
+    from .run import without_absent
 
     of_variant = variants or _configured_variants()
     graph_keys = {"variant", "nodes", "wires", "artifacts", "saves", "log", "tour", "map", "route", "day", "events"}
@@ -388,6 +389,7 @@ def complete(config: Any, variants: Callable[[str], Any] | None = None) -> dict[
             for node, changes in (spec.get("nodes") or {}).items():
                 other.nodes[node] = OmegaConf.merge(other.nodes.get(node) or {}, changes)
             made: dict[str, Any] = OmegaConf.to_container(other, resolve=True)  # type: ignore[assignment]
+            made = dict(without_absent(made))  # what makes an artifact begins without those that it can do without
             plain["artifacts"][name]["graph"] = {key: made.get(key) for key in ("nodes", "wires", "saves")}
     except OmegaConfBaseException as error:
         where = getattr(error, "full_key", None) or "config"
