@@ -12,6 +12,7 @@ from omninav.stages.values.pose import Pose
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 
 Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 
 
 class WrongPlaces(Stage):
@@ -20,11 +21,11 @@ class WrongPlaces(Stage):
     A reference counts whose heaviest component lies further than `wrong_m` from the true position of the frame in which
     it was seen, at its coming. Of its weight, the share at places that far off is followed to the
     end. Under `wrong_places`: `references`, how many there are; `kept`, of how many some of that weight is left at the
-    end; lists with an entry for each of them in the order of their coming: `along_m`, the true way (m) since the first
-    of them came, `gone_after_steps`, how many frames after it came that share had become 0 (None: never),
-    `last_step`, the frame at which it did; lists of `points` entries over the frames: `step`, and `weight`, the mean
-    share of all that had come by then (None before the first). `example`: `step` and `weight` of the first of them.
-    Only `references` where there are none.
+    end; lists with an entry for each of them in the order in which they were seen: `along_m`, the true way (m) from
+    where the first of them was seen to where it was, and `gone_after_steps`, how many frames after it came that share
+    had become 0 (None: never), which is as many for all where all are put right in as many laps; lists of `points`
+    entries over the frames: `step`, and `weight`, the mean share of all that had come by then (None before the first).
+    `example`: `step` and `weight` of the first of them. Only `references` where there are none.
     """
 
     wrong_m: Annotated[float, Bounds(gt=0)] = 2.0
@@ -44,20 +45,19 @@ class WrongPlaces(Stage):
     ) -> Out:
         """The whole run at once."""
         path = np.array([(np.nan, np.nan) if pose is None else (pose.x, pose.y) for pose in truth]).reshape(-1, 2)
-        names, came, shares = wrong_shares(events, mixtures, path, self.wrong_m)
-        values: dict[str, Any] = {"references": len(names)}
-        if len(names):
+        seen, came, shares = wrong_shares(events, mixtures, path, self.wrong_m)
+        values: dict[str, Any] = {"references": len(seen)}
+        if len(seen):
             ways = np.hypot(*np.diff(path, axis=0).T)
             ways = np.concatenate([[0.0], np.cumsum(np.nan_to_num(ways))])
-            last = [int(np.flatnonzero(share > 0.0)[-1]) for share in shares]
-            gone = [None if row == len(path) - 1 else row + 1 for row in last]
-            after = [None if row is None else int(row - first) for row, first in zip(gone, came, strict=True)]
+            gone = np.array([np.flatnonzero(share > 0.0)[-1] + 1 for share in shares])
             steps = np.unique(np.linspace(0, len(path) - 1, min(self.points, len(path))).round().astype(np.int64))
             values |= {
-                "kept": sum(row is None for row in gone),
-                "along_m": [float(ways[first] - ways[came[0]]) for first in came],
-                "last_step": gone,
-                "gone_after_steps": after,
+                "kept": int((gone == len(path)).sum()),
+                "along_m": (ways[seen] - ways[seen[0]]).tolist(),
+                "gone_after_steps": [
+                    int(end - first) if end < len(path) else None for first, end in zip(came, gone, strict=True)
+                ],
                 "step": steps.tolist(),
                 "weight": [_mean_of_those(shares[:, step], came <= step) for step in steps],
                 "example": {"step": steps.tolist(), "weight": shares[0, steps].tolist()},
@@ -67,12 +67,12 @@ class WrongPlaces(Stage):
 
 def wrong_shares(
     events: Sequence[ViewEvent | None], mixtures: Sequence[MixturesNow | None], path: Array, wrong_m: float
-) -> tuple[list[int], npt.NDArray[np.int64], Array]:
-    """Names of the references that came at a wrong place, in which frame each came, and the shares (R, N) over frames.
+) -> tuple[Ints, Ints, Array]:
+    """Of the references that came at a wrong place: in which frame each was seen and came, and its share in each frame.
 
-    `path`: true positions (N, 2), NaN where there is none.
+    (R,), (R,) and (R, N), in the order in which they were seen. `path`: true positions (N, 2), NaN where there is none.
     """
-    seen: dict[int, Array] = {}
+    seen: dict[int, int] = {}
     came: dict[int, int] = {}
     now: dict[int, float] = {}
     rows: list[dict[int, float]] = []
@@ -80,24 +80,24 @@ def wrong_shares(
         if event is not None:
             for name in event.removed.tolist():
                 now.pop(name, None)
-                seen.pop(name, None)
         if parts is not None:
-            seen |= {int(name): path[row] for name, row in zip(parts.new, parts.seen, strict=True)}
+            seen |= zip(parts.new.tolist(), parts.seen.tolist(), strict=True)
             for name in np.unique(parts.names).tolist():
-                if name not in seen or not np.isfinite(seen[name]).all():
+                if name not in seen or not np.isfinite(path[seen[name]]).all():
                     continue
                 mine = parts.names == name
                 weights = parts.weights[mine].astype(np.float64)
-                off = np.hypot(*(parts.means[mine, :2] - seen[name]).T) > wrong_m
+                off = np.hypot(*(parts.means[mine, :2] - path[seen[name]]).T) > wrong_m
                 begins = event is not None and name in event.inserted and off[np.argmax(weights)]
                 if begins:
                     came[name] = frame
                 if name in came:
                     now[name] = float(weights[off].sum() / weights.sum()) if weights.sum() else 0.0
         rows.append(dict(now))
-    names = sorted(came, key=lambda name: (came[name], name))
+    names = sorted(came, key=lambda name: (seen[name], name))
     shares = np.array([[row.get(name, 0.0) for row in rows] for name in names]).reshape(len(names), len(rows))
-    return names, np.array([came[name] for name in names], np.int64), shares
+    frames = np.array([(seen[name], came[name]) for name in names], np.int64).reshape(-1, 2)
+    return frames[:, 0], frames[:, 1], shares
 
 
 def _mean_of_those(shares: Array, there: npt.NDArray[np.bool_]) -> float | None:

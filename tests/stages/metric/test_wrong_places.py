@@ -1,11 +1,16 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
+import yaml
 
 from omninav.pipeline import Context
+from omninav.pipeline.series import figure_at
 from omninav.stages.metric.wrong_places import WrongPlaces
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 
+KIDNAP = Path(__file__).resolve().parents[3] / "conf" / "experiment" / "particle_cml" / "kidnap.yaml"
 CTX = Context("wrong places")
 NONE = np.empty(0, np.int64)
 
@@ -48,7 +53,6 @@ def test_the_share_of_the_weight_at_a_wrong_place_is_followed_until_it_is_gone(l
     assert found["kept"] == 1
     assert found["along_m"] == [0.0, 1.0]
     assert found["gone_after_steps"] == [3, None]
-    assert found["last_step"] == [4, None]
     assert found["step"] == [0, 1, 2, 3, 4, 5]
     assert found["weight"] == [None, 1.0, 1.0, 0.75, 0.5, pytest.approx(0.125)]
     assert found["example"]["weight"] == [0.0, 1.0, 1.0, 0.5, 0.0, 0.0]
@@ -75,3 +79,34 @@ def test_what_is_learned_late_is_held_against_where_it_was_seen(life):
     parts = [None] * 4 + [mixture((0, 1.0, 1.0), new=[0], seen=[1]), None]
     near = WrongPlaces(wrong_m=2.0).step(CTX, late, parts, truth).metrics.values["wrong_places"]
     assert near["references"] == 0
+
+
+def test_points_lie_along_the_way_where_they_were_seen_however_late_they_came(life):
+    late = [event()] * 4 + [event([0, 1]), event()]
+    parts = [None] * 4 + [mixture((0, 20.0, 1.0), (1, 20.0, 1.0), new=[0, 1], seen=[3, 1]), None]
+    found = WrongPlaces().step(CTX, late, parts, life[2]).metrics.values["wrong_places"]
+    assert found["along_m"] == [0.0, 2.0]
+
+
+def corrected(later_by_a_lap_each: int, points: int = 12, laps: int = 9):
+    """A lap of 40 frames, points seen in every second one: wrong for 3 laps, a lap longer after each so many points."""
+    events, mixtures = [event()] * (40 * laps), [None] * (40 * laps)
+    for point in range(points):
+        for lap in range(laps):
+            frame = 40 * lap + 10 + 2 * point
+            wrong = lap < 3 + point // later_by_a_lap_each
+            events[frame] = event([point] if lap == 0 else [])
+            new = {"new": [point], "seen": [frame]} if lap == 0 else {}
+            mixtures[frame] = mixture((point, 50.0 if wrong else 2.0 * point, 1.0), **new)
+    truth = [Pose(float(frame % 40 - 10), 0.0, 0.0) for frame in range(40 * laps)]
+    return WrongPlaces().step(CTX, events, mixtures, truth).metrics.values
+
+
+def test_the_measure_of_the_order_of_correction_is_0_where_all_are_corrected_alike_and_positive_where_it_travels():
+    entries = yaml.safe_load(KIDNAP.read_text())["measures"]
+    order, kept = ((entries[name]["of"][0], entries[name].get("take", "mean")) for name in ("order", "kept"))
+    assert figure_at(corrected(99), *order) == pytest.approx(0.0, abs=1e-9)
+    assert figure_at(corrected(4), *order) == pytest.approx(40 / 4, rel=0.15)
+    some_stay = corrected(2, laps=7)
+    assert figure_at(some_stay, *kept) == 4
+    assert figure_at(some_stay, *order) == pytest.approx(40 / 2, rel=0.15)
