@@ -92,17 +92,19 @@ class AdaptiveViews(Stage):
         """Learn from what this tick has to teach."""
         if lessons is None or not lessons.items:
             return self.Out(map=map)
-        before, next_name = map.names, map.next_name
-        changed, full = [], False
+        before = map.names
+        changed: list[Ints] = []
+        seen: dict[int, int] = {}
+        full = False
         for lesson in lessons.items:
+            seen[map.next_name] = lesson.index  # if it is a new one
             changed.append(self._learn(ctx, lesson, limit, map))
             kept = within_cap(map, self.max_views)
             full = full or not kept.all()
             map.keep_views(kept)
             map.step()
-        new = np.arange(next_name, map.next_name)
-        names = np.concatenate([*changed, new])
-        return self.Out(map=map, events=view_event(map, before, names, "full" if full else "forgotten"))
+        names = np.concatenate([*changed, np.array(list(seen))])
+        return self.Out(map=map, events=view_event(map, before, names, seen, "full" if full else "forgotten"))
 
     def _learn(self, ctx: Context, lesson: Lesson, limit: ViewLimit | None, map: ViewMixtures) -> Ints:
         # The names of the views whose places changed.

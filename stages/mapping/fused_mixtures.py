@@ -81,7 +81,9 @@ class FusedMixtures(Stage):
         learned.waiting += new
         now = len(learned.waiting) if limit is not None else 0 if len(map) else 1
         due, learned.waiting = learned.waiting[:now], learned.waiting[now:]
+        seen: dict[int, int] = {}
         for lesson in due:
+            seen[map.next_name] = lesson.index  # if it is a new one
             taught = self._learn(lesson, limit, map)
             changed.append(taught.names)
             if lesson.index >= open_from:
@@ -93,7 +95,7 @@ class FusedMixtures(Stage):
             map.keep_views(over)
             learned.open = [taught.within(map) for taught in learned.open]
         why: Literal["", "full"] = "" if over.all() else "full"
-        return self.Out(map=map, events=view_event(map, before, np.concatenate(changed), why))
+        return self.Out(map=map, events=view_event(map, before, np.concatenate(changed), seen, why))
 
     def _put_right(
         self, ctx: Context, lessons: tuple[Lesson, ...], learned: Learned, map: ViewMixtures

@@ -1,5 +1,6 @@
 """What a tick did to a map of views."""
 
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
@@ -11,14 +12,20 @@ Ints = npt.NDArray[np.int64]
 
 
 def view_event(
-    map: ViewMixtures, names_before: Ints, changed: Ints, why: Literal["", "forgotten", "merged", "full"] = ""
+    map: ViewMixtures,
+    names_before: Ints,
+    changed: Ints,
+    seen: Mapping[int, int],
+    why: Literal["", "forgotten", "merged", "full"] = "",
 ) -> ViewEvent:
     """The event of a tick: what came and went since the map held `names_before` (R0,), and how the changed ones stand.
 
     `changed`: names (any order, also several times) of views whose mixtures were changed; those that are gone are left
-    out. `why`: of the removals, where there are any.
+    out. `seen`: of each name given since then, the tick in which the view was seen. `why`: of the removals, where there
+    are any.
     """
     removed = np.setdiff1d(names_before, map.names, assume_unique=True)
+    inserted = np.setdiff1d(map.names, names_before, assume_unique=True)
     names, rows, _ = np.intersect1d(map.names, changed, return_indices=True)
     weights, places, parts = np.zeros(len(rows)), np.zeros((len(rows), 2)), np.zeros(len(rows), np.int64)
     if len(rows) and len(map.owner):
@@ -31,7 +38,8 @@ def view_event(
     return ViewEvent(
         views=len(map),
         components=len(map.weights),
-        inserted=np.setdiff1d(map.names, names_before, assume_unique=True),
+        inserted=inserted,
+        seen=np.array([seen[name] for name in inserted.tolist()], np.int64),
         removed=removed,
         why=why if len(removed) else "",
         changed=names,

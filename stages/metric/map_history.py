@@ -23,6 +23,10 @@ Ints = npt.NDArray[np.int64]
 class MapHistory(Stage):
     """How many references came and went, and how far odometry had drifted while the first of them were learned.
 
+    A reference comes in the frame in which it was seen, however much later it is learned, and goes in the frame in
+    which it is removed; `references` and `components` are those the map has after a frame. What is learned once the
+    last log has ended, `after_last`, counts to the last frame.
+
     Under `map`: `inserted`, `removed`; `new_after_first_lap_rate`, what came after the first lap over what had come by
     its end. `map_over_steps`: lists of `points` entries over the frames of all logs: `step`, and `references`,
     `components`, `inserted`, `removed` so far. `map_per_lap`: lists with an entry for each lap of the first log and for
@@ -48,10 +52,11 @@ class MapHistory(Stage):
         truth: Sequence[Pose | None],
         motion: Sequence[Motion | None],
         events: Sequence[ViewEvent | None],
+        after_last: ViewEvent | None = None,
     ) -> Out:
         """The whole run at once."""
         logs = drives(ticks, estimates, truth, motion)
-        counts = counted(events)
+        counts = counted(events, after_last)
         if not len(counts):
             return self.Out(metrics=Metrics({}))
         parts = parts_of(logs, self.home_m)
@@ -83,21 +88,24 @@ class MapHistory(Stage):
         return self.Out(metrics=Metrics(values))
 
 
-def counted(events: Sequence[ViewEvent | None]) -> Ints:
-    """References and components after each tick, and how many references had come and gone by then: (N, 4).
+def counted(events: Sequence[ViewEvent | None], after_last: ViewEvent | None = None) -> Ints:
+    """References and components after each tick, and how many references had been seen and had gone by then: (N, 4).
 
-    What a known map held is taken from the first event.
+    What a known map held is taken from the first event. `after_last`: what was learned after the last tick.
     """
-    first = next((event for event in events if event is not None), None)
-    views = 0 if first is None else first.views - len(first.inserted) + len(first.removed)
-    components = first.components if first is not None and views else 0
-    rows, came, went = [], 0, 0
-    for event in events:
-        if event is not None:
-            views, components = event.views, event.components
-            came, went = came + len(event.inserted), went + len(event.removed)
-        rows.append((views, components, came, went))
-    return np.array(rows, np.int64).reshape(-1, 4)
+    told = [(row, event) for row, event in enumerate(events) if event is not None]
+    if after_last is not None and events:
+        told.append((len(events) - 1, after_last))
+    if not told:
+        return np.zeros((len(events), 4), np.int64)
+    rows = np.array([row for row, _ in told])
+    first = told[0][1]
+    known = first.views - len(first.inserted) + len(first.removed)
+    held = np.array([(known, first.components if known else 0), *((e.views, e.components) for _, e in told)])
+    came = np.bincount(np.concatenate([event.seen for _, event in told]), minlength=len(events))
+    went = np.bincount(rows, [len(event.removed) for _, event in told], len(events))
+    latest = np.searchsorted(rows, np.arange(len(events)), side="right")
+    return np.column_stack([held[latest], came.cumsum(), went.cumsum()]).astype(np.int64)
 
 
 def parts_of(logs: Sequence[Drive], home_m: float) -> Ints:

@@ -135,14 +135,16 @@ class ViewMixtures(GrowingArrays, Value):
 class ViewEvent(Value):
     """What a tick did to a map of views: small, so that its life can be told when the drive has ended.
 
-    `views` and `components`: how many there are after the tick. `inserted`, `removed`: names of views. `why`: of the
-    removal. `changed`: (n,) names of views whose mixtures were changed, with, of each, `weights` (n,) of its heaviest
-    component, `places` (n, 2) its x, y (m), and `parts` (n,) how many components it has.
+    `views` and `components`: how many there are after the tick. `inserted`: (m,) names of the views that came, and
+    `seen` (m,) the ticks in which they had been seen, which may be long before. `removed`: names of those that went;
+    `why`: of the removal. `changed`: (n,) names of views whose mixtures were changed, with, of each, `weights` (n,) of
+    its heaviest component, `places` (n, 2) its x, y (m), and `parts` (n,) how many components it has.
     """
 
     views: int
     components: int
     inserted: Ints
+    seen: Ints
     removed: Ints
     why: Literal["", "forgotten", "merged", "full"]
     changed: Ints

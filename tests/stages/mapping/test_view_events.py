@@ -23,9 +23,10 @@ def test_an_event_names_what_came_and_what_went():
     before = map.names
     map.keep_views(np.array([True, False, True]))
     map.add_view(np.array([7.0, 0.0], np.float32), "Coefficients")
-    event = view_event(map, before, np.array([2, 2, 1]), "forgotten")
+    event = view_event(map, before, np.array([2, 2, 1]), {3: 17}, "forgotten")
     assert (event.views, event.components) == (3, 2)
     assert event.inserted.tolist() == [3]
+    assert event.seen.tolist() == [17]
     assert event.removed.tolist() == [1]
     assert event.why == "forgotten"
     assert event.changed.tolist() == [2], "each once, and none that is gone"
@@ -33,7 +34,7 @@ def test_an_event_names_what_came_and_what_went():
 
 def test_an_event_has_the_heaviest_part_of_each_changed_view():
     map = made_map([[0.1, 0.6, 0.3], [0.2], []])
-    event = view_event(map, map.names, np.array([2, 0, 1]))
+    event = view_event(map, map.names, np.array([2, 0, 1]), {})
     assert event.changed.tolist() == [0, 1, 2]
     assert event.weights.tolist() == [0.6, 0.2, 0.0]
     assert event.places.tolist() == [[0.0, 1.0], [1.0, 0.0], [0.0, 0.0]]

@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 from small_run import mixture_run, small_run
@@ -7,7 +9,7 @@ from omninav.stages.geometry.se2 import chain, compose
 from omninav.stages.metric.map_history import MapHistory, counted
 from omninav.stages.metric.view_map_size import ViewMapSize, stored_bytes, visited_area
 from omninav.stages.values.pose import Pose
-from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 
 CTX = Context("metric")
 
@@ -45,12 +47,26 @@ def test_each_part_of_the_run_says_what_came_and_went_in_it(history):
     assert per_lap["references"] == [24, 48]
 
 
+def event(views, inserted=(), seen=(), removed=()):
+    came, at, went = (np.array(each, np.int64) for each in (inserted, seen, removed))
+    return ViewEvent(views, views, came, at, went, "", came, np.zeros(len(came)), np.zeros((len(came), 2)), came)
+
+
+def test_a_reference_comes_when_it_is_seen_and_goes_when_it_is_removed():
+    events = [None, None, event(3, [0, 1, 2], [0, 0, 1]), None, event(3, [3], [2], [1])]
+    # References and components as the map has them; of four that came two were seen in frame 0, one in 1, one in 2.
+    assert counted(events).tolist() == [[0, 0, 2, 0], [0, 0, 3, 0], [3, 3, 4, 0], [3, 3, 4, 0], [3, 3, 4, 1]]
+    left_over = event(4, [4], [3])
+    assert counted(events, left_over)[2:].tolist() == [[3, 3, 4, 0], [3, 3, 5, 0], [4, 4, 5, 1]]
+    assert counted([None, None], event(1, [0], [1])).tolist() == [[0, 0, 0, 0], [1, 1, 1, 0]]
+
+
 def test_ticks_without_an_event_change_nothing():
     assert counted([None, None]).tolist() == [[0, 0, 0, 0], [0, 0, 0, 0]]
 
 
 def test_a_map_that_was_known_is_there_before_the_first_event(learned):
-    later = learned[2][40:]
+    later = [dataclasses.replace(event, seen=event.seen - 39) for event in learned[2][40:]]
     counts = counted([None, *later])
     assert counts[0].tolist() == [learned[2][39].views, later[0].components, 0, 0]
     assert counts[1, 0] == later[0].views

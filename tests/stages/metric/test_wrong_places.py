@@ -17,7 +17,7 @@ NONE = np.empty(0, np.int64)
 
 def event(inserted=(), removed=()):
     came, went = np.array(inserted, np.int64), np.array(removed, np.int64)
-    return ViewEvent(1, 1, came, went, "", came, np.zeros(len(came)), np.zeros((len(came), 2)), came * 0)
+    return ViewEvent(1, 1, came, came, went, "", came, np.zeros(len(came)), np.zeros((len(came), 2)), came * 0)
 
 
 def mixture(*parts, new=(), seen=()):

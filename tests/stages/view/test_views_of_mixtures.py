@@ -74,7 +74,7 @@ def test_the_life_that_is_told_is_that_of_the_reference_whose_place_moved_most()
     def event(name, x):
         one = np.array([name])
         none = np.empty(0, np.int64)
-        return ViewEvent(1, 1, none, none, "", one, np.ones(1), np.array([[x, 0.0]]), np.ones(1, np.int64))
+        return ViewEvent(1, 1, none, none, none, "", one, np.ones(1), np.array([[x, 0.0]]), np.ones(1, np.int64))
 
     moves = [event(3, 0.0), None, event(5, 0.0), event(5, 1.0), event(3, 1.5), event(5, 0.5)]
     assert most_moved(moves) == 5  # 1.0 m and half of it back, as far as 3 in one go, but in more frames

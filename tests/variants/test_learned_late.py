@@ -1,0 +1,76 @@
+"""Views are learned long after they were seen: what is told of the map goes by when they were seen."""
+
+import math
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.geometry.se2 import wrap
+from omninav.stages.lessons.left_behind import Behind, LeftBehind
+from omninav.stages.limit.first_views import FirstViews, FirstViewsLimit
+from omninav.stages.mapping.fused_mixtures import FusedMixtures, Learned
+from omninav.stages.metric.map_history import MapHistory
+from omninav.stages.metric.wrong_places import WrongPlaces
+from omninav.stages.values.belief import GaussianMixture, PoseEstimate
+from omninav.stages.values.pose import Motion, Pose, UncertainMotion
+from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.views import Coefficients
+from omninav.stages.view.changed_mixtures import ChangedMixtures
+
+LAP, LAPS, ROUND_M = 95, 3, 42.0
+"""0.44 m a picture: there is a limit after 20 of them, settled after 100, and views wait for nine more."""
+SIGMAS = np.diag([0.05, 0.05, 0.02])
+
+
+@pytest.fixture(scope="module")
+def told():
+    # The limit is measured, views wait to be left behind, and the state is the true pose: laps are alike in all.
+    rng = np.random.default_rng(0)
+    waves, phases = rng.normal(0.0, 1.0, (2, 60)), rng.uniform(0.0, 2 * math.pi, 60)
+    step, radius = 2 * math.pi / LAP, ROUND_M / (2 * math.pi)
+    limit, first, lessons, behind = FirstViewsLimit(), FirstViews(), LeftBehind(), Behind()
+    mapping, learned, changes, map = FusedMixtures(), Learned(), ChangedMixtures(), ViewMixtures.empty()
+    ctx = Context("late")
+    ticks, truth, motions, events, mixtures = [], [], [], [], []
+    for n in range(LAP * LAPS + 1):
+        ctx.tick = Tick(n, n * 10**9, 0, n, n == 0)
+        angle = (n % LAP) * step
+        pose = np.array([radius * math.cos(angle), radius * math.sin(angle), float(wrap(angle + math.pi / 2))])
+        values = np.cos(pose[:2] @ waves + phases).astype(np.float32)
+        view, state = Coefficients(values, values[None]), GaussianMixture(pose[None], SIGMAS[None] ** 2, np.ones(1))
+        motion = Motion(radius * step, 0.0, step) if n else None
+        model = UncertainMotion((step / 2, radius * step, step / 2), (0.01, 0.03, 0.01)) if n else None
+        due = lessons.step(ctx, view, state, model, behind).lessons
+        event = mapping.step(ctx, due, limit.step(ctx, view, motion, first).limit, map, learned).events
+        ticks.append(ctx.tick)
+        truth.append(Pose(*pose))
+        motions.append(motion)
+        events.append(event)
+        mixtures.append(changes.step(ctx, map, event).mixtures)
+    return ticks, truth, motions, events, mixtures
+
+
+def test_no_reference_is_new_after_the_first_lap_where_all_laps_are_alike(told):
+    ticks, truth, motions, events, _ = told
+    estimates = [PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in truth]
+    found = MapHistory().step(Context("history"), ticks, estimates, truth, motions, events).metrics.values
+    assert found["map_per_lap"]["frames"][0] < LAP + 5
+    assert found["map"]["inserted"] > 20
+    assert found["map"]["new_after_first_lap_rate"] == 0.0
+
+
+def test_no_place_is_wrong_where_every_state_was_right_however_many_are_learned_in_one_tick(told):
+    _, truth, _, events, mixtures = told
+    assert max(len(event.inserted) for event in events if event is not None) > 3
+    found = WrongPlaces(wrong_m=2.0).step(Context("wrong"), events, mixtures, truth).metrics.values
+    assert found["wrong_places"] == {"references": 0}
+
+
+def test_an_event_says_in_which_tick_each_reference_was_seen(told):
+    _, truth, _, events, _ = told
+    for event in events:
+        if event is not None:
+            came = np.isin(event.changed, event.inserted)
+            true = np.array([(truth[n].x, truth[n].y) for n in event.seen]).reshape(-1, 2)
+            np.testing.assert_allclose(event.places[came], true, atol=0.5)
