@@ -1,7 +1,5 @@
 """Where the robot was between two places that are certain: the way along the odometry, worked out from both ends."""
 
-from collections.abc import Callable
-
 import numba
 import numpy as np
 import numpy.typing as npt
@@ -9,7 +7,6 @@ import numpy.typing as npt
 from .se2 import wrap
 
 Array = npt.NDArray[np.float64]
-Backwards = Callable[[Array, Array, Array, Array, Array, Array, Array], tuple[Array, Array]]
 
 
 def reconstructed(
@@ -19,55 +16,31 @@ def reconstructed(
     noise: Array,
     last: Array,
     last_covariance: Array,
+    independent: bool = True,
     rounds: int = 5,
 ) -> tuple[Array, Array, float]:
     """Poses along a way whose two ends are known, each as a Gaussian: means (N + 1, 3), covariances (N + 1, 3, 3).
 
-    `first`, `last`: (3,) x, y (m), heading (rad), with covariances (3, 3), independent of each other. `motions`: (N, 3)
-    increments along the way, each in the frame of where it began; `noise`: (N, 3, 3) their covariances in that frame.
-    Row 0 is the first end, row N the last.
+    `first`, `last`: (3,) x, y (m), heading (rad), with covariances (3, 3). `motions`: (N, 3) increments along the way,
+    each in the frame of where it began; `noise`: (N, 3, 3) their covariances in that frame. Row 0 is the first end, row
+    N the last.
 
-    Each pose is what the way from the first end says of it, times what the way back from the last end says of it
-    (ten Hagen & Kroese 2002, forwards and backwards): the two share no motion. Motions are linearised around the
-    result of the round before, so that the result is the most likely way, also where the headings had to turn a lot.
+    `independent`: what is known of the last end does not come from the first one. Then each pose is what the way from
+    the first end says of it, times what the way back from the last end says of it (ten Hagen & Kroese 2002, forwards
+    and backwards): the two share no motion. Otherwise the last end is a filter's state, which knows the first end and
+    the motions already and would count them twice; only what it has learned beyond them goes back along the way (Rauch,
+    Tung & Striebel 1965), and row N is the last end as it is. Motions are linearised around the result of the round
+    before, so that the result is the most likely way, also where the headings had to turn a lot.
 
     The third value is the squared Mahalanobis distance by which odometry misses the last end (3 degrees of freedom): a
     large one says that the robot was lifted, or that an end is wrong.
     """
-    return _between(first, first_covariance, motions, noise, last, last_covariance, rounds, _both_ways)
-
-
-def smoothed(
-    first: Array,
-    first_covariance: Array,
-    motions: Array,
-    noise: Array,
-    last: Array,
-    last_covariance: Array,
-    rounds: int = 5,
-) -> tuple[Array, Array, float]:
-    """The same for a filter's states: the last end is what the filter knows by then, the first end and all motions
-    included. Only what it has learned beyond them goes back along the way (Rauch, Tung & Striebel 1965), and row N is
-    the last end as it is; `reconstructed` would count the first end and the motions twice.
-    """
-    return _between(first, first_covariance, motions, noise, last, last_covariance, rounds, _back_from_the_filter)
-
-
-def _between(
-    first: Array,
-    first_covariance: Array,
-    motions: Array,
-    noise: Array,
-    last: Array,
-    last_covariance: Array,
-    rounds: int,
-    backwards: Backwards,
-) -> tuple[Array, Array, float]:
     first, last = np.ascontiguousarray(first, np.float64), np.ascontiguousarray(last, np.float64)
     first_covariance = np.ascontiguousarray(first_covariance, np.float64)
     last_covariance = np.ascontiguousarray(last_covariance, np.float64)
     motions = np.ascontiguousarray(motions, np.float64).reshape(-1, 3)
     noise = np.ascontiguousarray(noise, np.float64).reshape(-1, 3, 3)
+    backwards = _both_ways if independent else _back_from_the_filter
     at = _led(first, motions, noise)  # the way around which motions are linearised: at first where odometry leads
     covariances, missed = np.empty((len(at), 3, 3)), 0.0
     for turn in range(rounds):

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.gaussians import squared_distances
 from omninav.stages.geometry.odometry_motion import increment
-from omninav.stages.geometry.path_reconstruction import reconstructed, smoothed
+from omninav.stages.geometry.path_reconstruction import reconstructed
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.lesson import Lesson, Lessons
 from omninav.stages.values.pose import UncertainMotion
@@ -177,15 +177,15 @@ def remember(lesson: Lesson, model: UncertainMotion | None, behind: Behind, long
 
 
 def led(behind: Behind, row: int, end: tuple[Array, Array], jumped: bool = True) -> tuple[Array, Array, float]:
-    """The way from a certain state in the past to the present one, `end`, along odometry: see `path_reconstruction`.
+    """The way from a certain state in the past to the present one, `end`, along odometry: see `reconstructed`.
 
     `jumped`: what is known of `end` came from the map alone, not from that state by odometry.
     """
     start = certain_state(behind.past[row].state)
     assert start is not None
     steps = [increment(way.way, way.sigmas) for way in behind.ways[row:]]
-    between = reconstructed if jumped else smoothed
-    return between(*start, np.stack([s[0] for s in steps]), np.stack([s[1] for s in steps]), *end)
+    motions, noise = (np.stack(each) for each in zip(*steps, strict=True))
+    return reconstructed(*start, motions, noise, *end, independent=jumped)
 
 
 def put_right(behind: Behind, states: dict[int, GaussianMixture]) -> list[Lesson]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.odometry_motion import increment
-from omninav.stages.geometry.path_reconstruction import smoothed
+from omninav.stages.geometry.path_reconstruction import reconstructed
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.lesson import Lesson, Lessons
 from omninav.stages.values.pose import UncertainMotion
@@ -113,13 +113,14 @@ class UnimodalQueue(Stage):
         if start is None or not seen:
             return []
         steps = [increment(way.way, way.sigmas) for way in waiting.ways]
-        means, covariances, missed = smoothed(
+        means, covariances, missed = reconstructed(
             start.means[0],
             start.covariances[0],
             np.stack([step[0] for step in steps]),
             np.stack([step[1] for step in steps]),
             end.means[0],
             end.covariances[0],
+            independent=False,
         )
         if self.missed_below and missed > self.missed_below:
             self._forget_the_way(ctx, waiting)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from omninav.stages.geometry.path_reconstruction import reconstructed, smoothed
+from omninav.stages.geometry.path_reconstruction import reconstructed
 from omninav.stages.geometry.se2 import chain, compose, wrap
 
 
@@ -101,7 +101,7 @@ def test_a_filters_end_that_knows_no_more_than_odometry_says_nothing_of_the_way(
     first, certain, motions, noise, *_ = way
     nothing = np.eye(3) * 1e12
     forwards, covariances, _ = reconstructed(first, certain, motions, noise, first, nothing, rounds=1)
-    means, after, _ = smoothed(first, certain, motions, noise, forwards[-1], covariances[-1])
+    means, after, _ = reconstructed(first, certain, motions, noise, forwards[-1], covariances[-1], independent=False)
     np.testing.assert_allclose(means, forwards, atol=1e-6)
     np.testing.assert_allclose(after, covariances, rtol=1e-6, atol=1e-12)
 
@@ -110,7 +110,9 @@ def test_what_a_filter_learned_by_its_end_goes_back_along_the_way_as_in_the_whol
     # The whole problem has the measurement; the smoother only the filter's state after it.
     first, certain, motions, noise, measured, _ = way
     expected, expected_covariances = solved_as_a_whole(first, certain, motions, noise, measured, certain * 2.0)
-    means, covariances, _ = smoothed(first, certain, motions, noise, expected[-1], expected_covariances[-1], rounds=20)
+    means, covariances, _ = reconstructed(
+        first, certain, motions, noise, expected[-1], expected_covariances[-1], independent=False, rounds=20
+    )
     np.testing.assert_allclose(means[:, :2], expected[:, :2], atol=5e-3)
     np.testing.assert_allclose(wrap(means[:, 2] - expected[:, 2]), 0.0, atol=5e-3)
     for mine, theirs in zip(covariances, expected_covariances, strict=True):
@@ -124,9 +126,8 @@ def test_smoothed_covariances_are_positive_definite_whatever_the_end(seed, numbe
     motions = rng.normal(0, [0.3, 0.05, 0.4], (number, 3))
     noise = np.stack([np.diag(rng.uniform(1e-6, 0.1, 3)) for _ in range(number)])
     first, last = rng.normal(0, 1, 3), rng.normal(0, 1, 3) * gap
-    means, covariances, _ = smoothed(
-        first, np.diag(rng.uniform(1e-4, 0.5, 3)), motions, noise, last, np.diag(rng.uniform(1e-4, 5.0, 3))
-    )
+    ends = np.diag(rng.uniform(1e-4, 0.5, 3)), np.diag(rng.uniform(1e-4, 5.0, 3))
+    means, covariances, _ = reconstructed(first, ends[0], motions, noise, last, ends[1], independent=False)
     assert np.isfinite(means).all()
     assert (np.linalg.eigvalsh(covariances) > 0).all()
 
