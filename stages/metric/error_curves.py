@@ -20,8 +20,9 @@ class ErrorCurves(Stage):
     """How the error of the estimate and of odometry alone goes on, in parts of the last log that has ground truth.
 
     `laps`: a list with an entry for each lap: `frames`, the mean, median and largest position error and the mean
-    heading error, and the mean of `odometry_error_m`. A lap ends where the true path comes nearest to its start again,
-    within `home_m`, after it has left that circle by as much again; what comes behind the last visit is an entry too.
+    heading error, and the mean of `odometry_error_m`. A lap ends where the robot is nearest to its start again, within
+    `home_m` and headed as it was there, after it has left that circle by as much again; who leaves by one side, comes
+    back and leaves by the other has not ended a lap. What comes behind the last visit is an entry too.
     `over_steps`: lists of `points` entries, each the mean over a share of the frames: `step` (its middle),
     `position_error_m`, `odometry_error_m`. `over_distance`: the same over the true distance from the first true
     position, in steps of `distance_m`, with the odometry error of the first lap alone beside it
@@ -62,10 +63,10 @@ def error_curves(drive: Drive, home_m: float, points: int, distance_m: float) ->
     metres, degrees = position_errors(drive.estimate[scored], truth), heading_errors_deg(drive.estimate[scored], truth)
     path = drive.odometry_alone()
     odometry = np.full(len(metres), np.nan) if path is None else position_errors(path[scored], truth)
-    start = drive.truth[np.argmax(known(drive.truth)), :2]
-    laps = np.split(np.arange(len(truth)), lap_ends(truth[:, :2], start, home_m))
+    start = drive.truth[np.argmax(known(drive.truth))]
+    laps = np.split(np.arange(len(truth)), lap_ends(truth, start, home_m))
     shares = [share for share in np.array_split(np.arange(len(truth)), min(points, len(truth))) if len(share)]
-    away = np.hypot(*(truth[:, :2] - start).T)
+    away = np.hypot(*(truth[:, :2] - start[:2]).T)
     rings = (away // distance_m).astype(np.int64)
     by_ring = [np.flatnonzero(rings == ring) for ring in range(int(rings.max()) + 1)]
     return {
@@ -95,22 +96,22 @@ def error_curves(drive: Drive, home_m: float, points: int, distance_m: float) ->
     }
 
 
-def lap_ends(path: Array, start: Array, home_m: float) -> list[int]:
-    """The rows of a path (N, 2) at which a lap after the first begins: where it was nearest to its start, each time.
+def lap_ends(poses: Array, start: Array, home_m: float) -> list[int]:
+    """The rows of a drive (N, 3) at which a lap after the first begins: where it is nearest to its start, each time.
 
-    A visit begins within `home_m` of the start, and ends beyond twice that; only what lies between two visits is a lap.
+    A visit begins within `home_m` of the start pose (3,), headed as there (within a right angle), and ends beyond
+    twice that; only what lies between two visits is a lap.
     """
-    away = np.hypot(*(path - start).T)
+    away = np.hypot(*(poses[:, :2] - start[:2]).T)
+    home = (away <= home_m) & (np.cos(poses[:, 2] - start[2]) > 0.0)
     ends: list[int] = []
     nearest: int | None = 0  # of the visit that is on; None between visits
     for row, distance in enumerate(away):
-        if nearest is None:
-            if distance <= home_m:
-                nearest = row
-        elif distance > 2.0 * home_m:
-            ends.append(nearest)
+        if distance > 2.0 * home_m:
+            if nearest is not None:
+                ends.append(nearest)
             nearest = None
-        elif distance < away[nearest]:
+        elif home[row] and (nearest is None or distance < away[nearest]):
             nearest = row
     return ends[1:]  # the first visit is the start itself; the last is not left again
 

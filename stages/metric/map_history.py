@@ -30,10 +30,11 @@ class MapHistory(Stage):
     Under `map`: `inserted`, `removed`; `new_after_first_lap_rate`, what came after the first lap over what had come by
     its end. `map_over_steps`: lists of `points` entries over the frames of all logs: `step`, and `references`,
     `components`, `inserted`, `removed` so far. `map_per_lap`: lists with an entry for each lap of the first log and for
-    each later log: the same counts, of that part alone. `first_map`: what went into the map before the robot came back
-    to anything it knew: `part` (the first lap, or the whole first log where it has no second), `driven_m`, and of
-    `odometry_alone` (from the first true pose, unaligned) and of the `estimate` the errors over it and how far off each
-    ended. Laps are those of `ErrorCurves`. Without ground truth there are no laps and no errors.
+    each later log: the same counts, of that part alone. `first_map`: the drift that odometry
+    put into it up to the last new ground of the first log (the robot has not been within `home_m` of it before):
+    `frames`, `driven_m`, and of `odometry_alone` (from the first true pose, unaligned) and of the `estimate` the errors
+    over it and how far off each ended. Laps are those of `ErrorCurves`. Without ground truth there are no laps and no
+    errors.
     """
 
     home_m: Annotated[float, Bounds(gt=0)] = 2.0
@@ -80,11 +81,7 @@ class MapHistory(Stage):
             },
         }
         if logs[0].has_truth:
-            one_log = int(parts[0]) == len(logs[0])
-            values["first_map"] = {
-                "part": "first log" if one_log else "first lap",
-                **first_part(logs[0], int(parts[0])),
-            }
+            values["first_map"] = first_map(logs[0], self.home_m)
         return self.Out(metrics=Metrics(values))
 
 
@@ -112,18 +109,34 @@ def parts_of(logs: Sequence[Drive], home_m: float) -> Ints:
     """How many frames each lap of the first log has, and each later log."""
     first = logs[0]
     rows = np.flatnonzero(known(first.truth))
-    ends = lap_ends(first.truth[rows, :2], first.truth[rows[0], :2], home_m) if len(rows) else []
+    ends = lap_ends(first.truth[rows], first.truth[rows[0]], home_m) if len(rows) else []
     laps = np.diff([0, *rows[ends].tolist(), len(first)])
     return np.concatenate([laps, [len(log) for log in logs[1:]]]).astype(np.int64)
 
 
-def first_part(drive: Drive, frames: int) -> dict[str, Any]:
-    """Errors of odometry alone and of the estimate over a drive's first frames, and how far off each ended."""
+def last_new_ground(path: Array, near_m: float) -> int:
+    """The last row of a path (N, 2) at a place that it had not been to: within `near_m`, and left beyond twice that."""
+
+    def is_new(row: int) -> bool:
+        away = np.hypot(*(path[: row + 1] - path[row]).T)
+        left = np.flatnonzero(away > 2.0 * near_m)
+        return not len(left) or bool((away[: left[-1]] > near_m).all())
+
+    return next(row for row in range(len(path) - 1, -1, -1) if is_new(row))
+
+
+def first_map(drive: Drive, home_m: float) -> dict[str, Any]:
+    """Errors of odometry alone and of the estimate up to the last new ground of a drive that has ground truth."""
+    rows = np.flatnonzero(known(drive.truth))
+    frames = int(rows[last_new_ground(drive.truth[rows, :2], home_m)]) + 1
     scored = (known(drive.truth) & known(drive.estimate))[:frames]
     truth = drive.truth[:frames][scored]
     if not len(truth):
         return {}
-    found: dict[str, Any] = {"driven_m": float(np.hypot(*np.diff(truth[:, :2], axis=0).T).sum())}
+    found: dict[str, Any] = {
+        "frames": frames,
+        "driven_m": float(np.hypot(*np.diff(truth[:, :2], axis=0).T).sum()),
+    }
     for name, poses in (("odometry_alone", drive.odometry_alone()), ("estimate", drive.estimate)):
         if poses is not None:
             found[name] = _errors(poses[:frames][scored], truth)

@@ -1,11 +1,19 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
+from omegaconf import OmegaConf
 
 from omninav.pipeline import Context, Tick
+from omninav.pipeline.ports import convert
 from omninav.stages.geometry.se2 import between
 from omninav.stages.metric.error_curves import ErrorCurves, lap_ends
+from omninav.stages.simulator.config import WorldConfig
+from omninav.stages.source.simulated import SimulatedRecording
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.pose import Motion, Pose
+
+WORLDS = Path(__file__).resolve().parents[3] / "conf" / "world"
 
 
 def circle(laps: float, per_lap: int = 40, radius: float = 5.0) -> np.ndarray:
@@ -27,11 +35,28 @@ def curves(truth: np.ndarray, errors: np.ndarray, stretched: float = 1.0, logs: 
 
 
 def test_a_lap_ends_where_the_path_is_nearest_to_its_start_again():
-    path = circle(3)[:, :2]
-    assert lap_ends(path, path[0], 2.0) == [40, 80]
-    assert lap_ends(circle(3.5)[:, :2], path[0], 2.0) == [40, 80, 120]
-    assert lap_ends(circle(0.5)[:, :2], path[0], 2.0) == []
-    assert lap_ends(np.zeros((9, 2)), np.zeros(2), 2.0) == []
+    start = np.zeros(3)
+    assert lap_ends(circle(3), start, 2.0) == [40, 80]
+    assert lap_ends(circle(3.5), start, 2.0) == [40, 80, 120]
+    assert lap_ends(circle(0.5), start, 2.0) == []
+    assert lap_ends(np.zeros((9, 3)), start, 2.0) == []
+
+
+def test_who_comes_back_past_the_start_to_leave_by_the_other_side_has_not_ended_a_lap():
+    along = np.concatenate([np.arange(20), np.arange(20, -20, -1), np.arange(-20, 20)]).astype(float)
+    there_and_back = np.stack([along, 0 * along, np.where(np.gradient(along) < 0, np.pi, 0.0)], axis=1)
+    assert lap_ends(there_and_back, there_and_back[0], 2.0) == [80]
+
+
+def test_the_seven_laps_around_the_shelves_are_seven_though_the_first_is_driven_by_either_side():
+    described = [OmegaConf.load(WORLDS / f"{name}.yaml") for name in ("empty", "home_store_small")]
+    entries = OmegaConf.to_container(OmegaConf.merge(*described), resolve=True)
+    entries.pop("defaults")
+    world, problems = convert(entries, WorldConfig, "world")
+    assert not problems
+    truth = SimulatedRecording(world, "laps", 0).truth
+    ends = lap_ends(truth, truth[0], 2.0)
+    assert np.diff([0, *ends, len(truth)]) / len(truth) == pytest.approx([0.255, *[0.124] * 6], abs=0.002)
 
 
 def test_each_lap_has_its_own_errors():

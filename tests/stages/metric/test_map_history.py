@@ -1,4 +1,5 @@
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -6,7 +7,7 @@ from small_run import mixture_run, small_run
 
 from omninav.pipeline import Context
 from omninav.stages.geometry.se2 import chain, compose
-from omninav.stages.metric.map_history import MapHistory, counted
+from omninav.stages.metric.map_history import MapHistory, counted, last_new_ground
 from omninav.stages.metric.view_map_size import ViewMapSize, stored_bytes, visited_area
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
@@ -82,15 +83,33 @@ def test_laps_of_the_first_log_are_parts_of_their_own():
     events = mixture_run(run)[2]
     found = MapHistory(home_m=1.0).step(CTX, *run.drive, events).metrics.values
     assert found["map_per_lap"]["frames"] == [60, 60]
-    assert found["first_map"]["part"] == "first lap"
+    assert found["first_map"]["frames"] == 59  # the last of the first lap is within a metre of the start
+
+
+def turned(angles: list[float], radius: float = 5.0) -> np.ndarray:
+    """Places on a circle (N, 2), a frame a degree, from each angle (degrees) to the next."""
+    way = np.concatenate([np.arange(a, b, np.sign(b - a)) for a, b in itertools.pairwise(angles)])
+    return radius * np.stack([np.cos(np.radians(way)), np.sin(np.radians(way))], axis=1)
+
+
+def test_new_ground_ends_where_the_robot_comes_to_what_it_has_left_however_often_it_was_back_before():
+    near = np.degrees(2 * np.arcsin(0.5 / 2 / 5.0))  # on the circle, half a metre from a place
+    assert last_new_ground(turned([0, 360]), 0.5) == int(360 - near)
+    assert last_new_ground(turned([0, 3 * 360]), 0.5) == int(360 - near)
+    by_either_side = turned([0, 90, 0, -180, 0, -180])
+    not_yet_left = np.degrees(2 * np.arcsin(1.0 / 2 / 5.0))  # turning where new ground ends: a metre back
+    assert last_new_ground(by_either_side, 0.5) == int(180 + 180 + not_yet_left)
+    assert last_new_ground(turned([0, 90]), 0.5) == 89
+    standing = np.concatenate([turned([0, 90]), np.tile(turned([0, 1]), (9, 1))])
+    assert last_new_ground(standing, 0.5) == 89
 
 
 def test_the_drift_of_the_first_part_is_that_of_odometry_from_its_first_true_pose(history, run):
     first = history["first_map"]
-    assert first["part"] == "first log"
+    assert first["frames"] == 29  # the last of 30 is within 2 m of the first
     # odometry is the true motion times 1.05 in turn and way: by hand the last pose is off by the chained difference
-    steps = np.array([[m.x, m.y, m.turn] if m else [0.0, 0.0, 0.0] for m in run.motion[:30]])
-    true = np.array([[p.x, p.y, p.heading] for p in run.truth[:30]])
+    steps = np.array([[m.x, m.y, m.turn] if m else [0.0, 0.0, 0.0] for m in run.motion[:29]])
+    true = np.array([[p.x, p.y, p.heading] for p in run.truth[:29]])
     alone = compose(true[0], chain(steps))
     assert first["odometry_alone"]["final_error_m"] == pytest.approx(np.hypot(*(alone - true)[-1, :2]))
     assert first["odometry_alone"]["position_error_m"]["max"] >= first["odometry_alone"]["final_error_m"]
