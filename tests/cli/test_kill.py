@@ -1,5 +1,6 @@
 """`kill -9` at any moment, then `omninav resume`: the same bytes as the unbroken run."""
 
+import json
 import os
 import random
 import signal
@@ -9,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+from conftest import DATA
 
 FILES = ("trajectory.tum", "metrics.json", "map.omap")
 
@@ -50,3 +52,40 @@ def test_a_killed_run_resumes_to_the_same_bytes(tmp_path: Path, demo: Path, shar
         assert (runs / "latest" / name).read_bytes() == (demo / name).read_bytes(), name
     assert not (runs / "latest" / "checkpoints").exists()
     assert not list((runs / "latest").glob("*.part"))
+
+
+def written(checkpoint: Path) -> int:
+    """When it was written (ns), 0 where it is not there."""
+    try:
+        return checkpoint.stat().st_mtime_ns
+    except FileNotFoundError:
+        return 0
+
+
+@pytest.mark.skipif(not DATA.exists(), reason=f"no recordings: {DATA} does not exist")
+def test_a_run_killed_while_views_wait_to_be_learned_or_may_be_taken_back_resumes_to_the_same_bytes(tmp_path: Path):
+    """Each view waits for 4 m, some 18 pictures, and what it taught is put right later: at any moment some wait."""
+    logs = f"log=[{DATA / 'photoreal-house' / 'tour.mcap'},{DATA / 'photoreal-house' / 'drive.mcap'}]"
+    words = ("variant=particle_cml", logs, "nodes.source.stop=45", "nodes.lessons.back_propagate=true", "cache=null")
+    for place in (tmp_path / "whole", tmp_path / "killed"):
+        place.mkdir()
+    assert start(tmp_path / "whole", *words).wait(timeout=300) == 0
+    whole, killed = (tmp_path / name / "runs" / "latest" for name in ("whole", "killed"))
+    counted = json.loads((whole / "manifest.json").read_text())["dropped"]
+    assert {"lessons.view_propagated", "mapping.lesson_taken_back"} <= set(counted)
+
+    moments, kills, last = random.Random(7), 0, 0
+    process = start(tmp_path / "killed", *words, "checkpoint_s=0.05")
+    while process.poll() is None and kills < 3:
+        if written(killed / "checkpoints" / "checkpoint") in (0, last):  # it has not come further yet
+            time.sleep(0.02)
+            continue
+        time.sleep(moments.uniform(0.0, 1.0))
+        if process.poll() is None:
+            stop(process)
+            kills, last = kills + 1, written(killed / "checkpoints" / "checkpoint")
+            process = start(tmp_path / "killed", "resume", "runs/latest")
+    assert kills > 0
+    assert process.wait(timeout=300) == 0
+    for name in (*FILES, "trajectory_0.tum"):
+        assert (killed / name).read_bytes() == (whole / name).read_bytes(), name
