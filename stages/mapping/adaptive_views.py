@@ -15,6 +15,7 @@ from omninav.stages.values.lesson import Lesson, Lessons
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import ViewLimit
 
+from .before_limit import BeforeLimit, due
 from .view_cap import within_cap
 from .view_events import view_event
 
@@ -42,6 +43,8 @@ class AdaptiveViews(Stage):
        beta_forget max(1 - distance / fade_m, 0) gain_m / (sigma_x + sigma_y), in [0, 1] (18, 19, errata 10 and 11).
     4. Components below `least_weight` go, and views without any (erratum 9: after the weights have grown; checked to be
        below beta least_similarity, so that none dies at birth). Above `max_views` (0: no limit) the weakest views go.
+
+    Lessons wait until there is a limit, all but the first of a map.
 
     `forgetting: passive` is the model of Porta & Kroese that Table 1 compares with. A state of several modes, which the
     paper does not learn from, teaches each mode by its weight p: it is taken in where S p >= `least_similarity`, the
@@ -88,17 +91,20 @@ class AdaptiveViews(Stage):
                 f"{self.beta * self.least_similarity:g}, so that a new place could be dropped as it is learned"
             )
 
-    def step(self, ctx: Context, lessons: Lessons | None, limit: ViewLimit | None, map: ViewMixtures) -> Out:
+    def step(
+        self, ctx: Context, lessons: Lessons | None, limit: ViewLimit | None, map: ViewMixtures, waiting: BeforeLimit
+    ) -> Out:
         """Learn from what this tick has to teach."""
-        if lessons is None or not lessons.items:
+        ready = due(() if lessons is None else lessons.items, limit, map, waiting)
+        if not ready:
             return self.Out(map=map)
         before = map.names
         changed: list[Ints] = []
         seen: dict[int, int] = {}
         full = False
-        for lesson in lessons.items:
+        for lesson in ready:
             seen[map.next_name] = lesson.index  # if it is a new one
-            changed.append(self._learn(ctx, lesson, limit, map))
+            changed.append(self._learn(lesson, limit, map))
             kept = within_cap(map, self.max_views)
             full = full or not kept.all()
             map.keep_views(kept)
@@ -106,16 +112,13 @@ class AdaptiveViews(Stage):
         names = np.concatenate([*changed, np.array(list(seen))])
         return self.Out(map=map, events=view_event(map, before, names, seen, "full" if full else "forgotten"))
 
-    def _learn(self, ctx: Context, lesson: Lesson, limit: ViewLimit | None, map: ViewMixtures) -> Ints:
+    def _learn(self, lesson: Lesson, limit: ViewLimit | None, map: ViewMixtures) -> Ints:
         # The names of the views whose places changed.
         view = lesson.view
         state = _floored(lesson.state, self.least_m, np.radians(self.least_deg))
         if not len(state):
             return np.empty(0, np.int64)
         map.check_kind(view)
-        if len(map) and limit is None:
-            ctx.count("view_before_limit", detail="mapping: what a view is compared by is still being measured")
-            return np.empty(0, np.int64)
         distances = view.distances(map.views) if len(map) else np.empty(0)
         within = 0.0 if limit is None else limit.distance
         matched = distances < within

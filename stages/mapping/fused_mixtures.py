@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.gaussians import merged
 from omninav.stages.geometry.se2 import wrap
 from omninav.stages.geometry.view_similarity import similarity
@@ -16,6 +16,7 @@ from omninav.stages.values.lesson import Lesson, Lessons
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import ViewLimit
 
+from .before_limit import BeforeLimit, due
 from .taught import Taught, taught_by
 from .view_cap import within_cap
 from .view_events import view_event
@@ -26,10 +27,9 @@ Parts = tuple[Array, Array, Array, Array]
 Average = Literal["visits", "halves"]
 
 
-class Learned(State):
-    """Lessons that came before there was a limit that says which views are new, and those that can be taken back."""
+class Learned(BeforeLimit):
+    """Lessons that wait for a limit, and those that can be taken back."""
 
-    waiting: list[Lesson] = field(default_factory=list)
     open: list[Taught] = field(default_factory=list)
 
 
@@ -78,11 +78,8 @@ class FusedMixtures(Stage):
         new, changed = (
             self._put_right(ctx, lessons.items, learned, map) if open_from < math.inf else (lessons.items, [])
         )
-        learned.waiting += new
-        now = len(learned.waiting) if limit is not None else 0 if len(map) else 1
-        due, learned.waiting = learned.waiting[:now], learned.waiting[now:]
         seen: dict[int, int] = {}
-        for lesson in due:
+        for lesson in due(new, limit, map, learned):
             seen[map.next_name] = lesson.index  # if it is a new one
             taught = self._learn(lesson, limit, map)
             changed.append(taught.names)

@@ -8,7 +8,10 @@ import pytest
 from omninav.pipeline import Context, Tick
 from omninav.stages.geometry.se2 import wrap
 from omninav.stages.lessons.left_behind import Behind, LeftBehind
+from omninav.stages.lessons.unimodal_queue import UnimodalQueue, Waiting
 from omninav.stages.limit.first_views import FirstViews, FirstViewsLimit
+from omninav.stages.mapping.adaptive_views import AdaptiveViews
+from omninav.stages.mapping.before_limit import BeforeLimit
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, Learned
 from omninav.stages.metric.map_history import MapHistory
 from omninav.stages.metric.wrong_places import WrongPlaces
@@ -23,14 +26,20 @@ LAP, LAPS, ROUND_M = 95, 3, 42.0
 SIGMAS = np.diag([0.05, 0.05, 0.02])
 
 
-@pytest.fixture(scope="module")
-def told():
+WAYS = {
+    "left_behind": lambda: (LeftBehind(), Behind(), FusedMixtures(), Learned()),
+    "at_once": lambda: (UnimodalQueue(length=0), Waiting(), AdaptiveViews(), BeforeLimit()),
+}
+
+
+@pytest.fixture(scope="module", params=WAYS)
+def told(request):
     # The limit is measured, views wait to be left behind, and the state is the true pose: laps are alike in all.
     rng = np.random.default_rng(0)
     waves, phases = rng.normal(0.0, 1.0, (2, 60)), rng.uniform(0.0, 2 * math.pi, 60)
     step, radius = 2 * math.pi / LAP, ROUND_M / (2 * math.pi)
-    limit, first, lessons, behind = FirstViewsLimit(), FirstViews(), LeftBehind(), Behind()
-    mapping, learned, changes, map = FusedMixtures(), Learned(), ChangedMixtures(), ViewMixtures.empty()
+    limit, first, changes, map = FirstViewsLimit(), FirstViews(), ChangedMixtures(), ViewMixtures.empty()
+    lessons, waiting, mapping, learned = WAYS[request.param]()
     ctx = Context("late")
     ticks, truth, motions, events, mixtures = [], [], [], [], []
     for n in range(LAP * LAPS + 1):
@@ -41,7 +50,7 @@ def told():
         view, state = Coefficients(values, values[None]), GaussianMixture(pose[None], SIGMAS[None] ** 2, np.ones(1))
         motion = Motion(radius * step, 0.0, step) if n else None
         model = UncertainMotion((step / 2, radius * step, step / 2), (0.01, 0.03, 0.01)) if n else None
-        due = lessons.step(ctx, view, state, model, behind).lessons
+        due = lessons.step(ctx, view, state, model, waiting).lessons
         event = mapping.step(ctx, due, limit.step(ctx, view, motion, first).limit, map, learned).events
         ticks.append(ctx.tick)
         truth.append(Pose(*pose))
@@ -65,6 +74,14 @@ def test_no_place_is_wrong_where_every_state_was_right_however_many_are_learned_
     assert max(len(event.inserted) for event in events if event is not None) > 3
     found = WrongPlaces(wrong_m=2.0).step(Context("wrong"), events, mixtures, truth).metrics.values
     assert found["wrong_places"] == {"references": 0}
+
+
+def test_the_beginning_of_the_way_is_in_the_map_though_it_was_driven_before_there_was_a_limit(told):
+    _, truth, _, events, _ = told
+    seen = np.sort(np.concatenate([event.seen for event in events if event is not None]))
+    apart = np.diff([truth[n].x + 1j * truth[n].y for n in seen[seen < LAP]])
+    assert seen[0] == 0
+    assert np.abs(apart).max() < 2.0
 
 
 def test_an_event_says_in_which_tick_each_reference_was_seen(told):

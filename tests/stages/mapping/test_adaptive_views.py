@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from omninav.pipeline import Context
 from omninav.stages.geometry.spectra import packed
 from omninav.stages.mapping.adaptive_views import AdaptiveViews
+from omninav.stages.mapping.before_limit import BeforeLimit
 from omninav.stages.mapping.frozen import Frozen
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.lesson import Lesson, Lessons
@@ -33,7 +34,8 @@ def state(*means, sigma=0.1, weights=None):
 
 def learn(map, view, state, **options):
     stage = AdaptiveViews(**{**FREE, **options})
-    return stage.step(Context("mapping"), lessons=Lessons((Lesson(view, state, 0),)), limit=LIMIT, map=map).events
+    lessons = Lessons((Lesson(view, state, 0),))
+    return stage.step(Context("mapping"), lessons, LIMIT, map, BeforeLimit()).events
 
 
 def test_a_view_unlike_all_others_is_kept_with_its_place_and_weight_beta():
@@ -197,15 +199,27 @@ def test_views_above_the_limit_go_though_lessons_come_many_at_once():
     map = ViewMixtures.empty()
     lessons = Lessons(tuple(Lesson(view(2 * n, 0), state([n, 0, 0]), n) for n in range(9)))
     stage = AdaptiveViews(max_views=4)
-    event = stage.step(Context("mapping"), lessons=lessons, limit=LIMIT, map=map).events
+    event = stage.step(Context("mapping"), lessons, LIMIT, map, BeforeLimit()).events
     assert len(map) == event.views == 4
     assert 8 in map.names
     assert event.inserted.tolist() == map.names.tolist()
 
 
+def test_before_there_is_a_limit_only_the_first_view_is_kept_and_the_others_wait():
+    map, stage, waiting = ViewMixtures.empty(), AdaptiveViews(**FREE), BeforeLimit()
+    for n in range(3):
+        lessons = Lessons((Lesson(view(2 * n, 0), state([n, 0, 0]), n),))
+        stage.step(Context("mapping"), lessons, None, map, waiting)
+        assert len(map) == 1
+    event = stage.step(Context("mapping"), None, LIMIT, map, waiting).events
+    assert map.means[:, 0].tolist() == [0.0, 1.0, 2.0]
+    assert (event.inserted.tolist(), event.seen.tolist()) == ([1, 2], [1, 2])
+    assert not waiting.waiting
+
+
 def test_nothing_to_learn_leaves_the_map_alone_and_a_frozen_map_learns_nothing():
     map = ViewMixtures.empty()
-    assert AdaptiveViews().step(Context("m"), lessons=Lessons(()), limit=LIMIT, map=map).events is None
+    assert AdaptiveViews().step(Context("m"), Lessons(()), LIMIT, map, BeforeLimit()).events is None
     lessons = Lessons((Lesson(view(0, 0), state([0, 0, 0]), 0),))
     out = Frozen().step(Context("m"), map=map, lessons=lessons, limit=LIMIT)
     assert out.map is map
