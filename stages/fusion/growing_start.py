@@ -54,7 +54,8 @@ class ParticlesInMap(GrowingStart, Stage):
     """The first particles of a log: around a known pose, or drawn from the map so far with any heading.
 
     With an empty map `start=uniform` begins at the log's first true pose, else at the origin (Porta & Kroese 2004,
-    section 3). With views in it, particles are drawn from the places of all views alike, and their headings evenly.
+    section 3). With views in it, particles are drawn from the places of all views by their weights, and their
+    headings evenly. So in a fused map all views count alike, and in one that adapts those more that it trusts more.
     """
 
     number: Annotated[int, Bounds(ge=1)] = 1000

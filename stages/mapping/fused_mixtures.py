@@ -147,13 +147,15 @@ def parts(state: GaussianMixture, turn: float, alike: float) -> Parts:
 
 
 def fused(mixtures: list[Parts], merge_below: float, spread: bool, least_weight: float, average: Average) -> Parts:
-    """Mixtures of equal say as one: close components merged, weights made to sum to 1, weak ones dropped."""
+    """Mixtures of equal say as one: close components merged, weights made to sum to 1, weak ones dropped; where all are
+    weak the heaviest stays.
+    """
     means, covariances, weights, counts = (np.concatenate(rows) for rows in zip(*mixtures, strict=True))
     if average == "visits":
         means, covariances, counts, weights = merged(means, covariances, counts, merge_below, spread, weights)
     else:
         means, covariances, weights, counts = merged(means, covariances, weights, merge_below, spread, counts)
     weights = weights / weights.sum()
-    kept = weights >= least_weight
+    kept = weights >= min(least_weight, weights.max())
     weights = weights[kept] / weights[kept].sum()
     return means[kept], covariances[kept], weights, counts[kept]

@@ -183,3 +183,47 @@ def test_a_map_never_holds_more_views_than_it_may() -> None:
     assert events[-1].why == "full"
     assert len(events[-1].removed) == 1
     assert map.names.tolist()[-1] == 5
+
+
+@pytest.mark.parametrize("average", ["visits", "halves"])
+def test_of_parts_that_are_all_weak_the_heaviest_stays(average: Average) -> None:
+    map, stage = ViewMixtures.empty(), FusedMixtures(average=average)
+    places = tuple(float(n) for n in range(0, 480, 4))
+    weights = np.full(120, 1.0)
+    weights[70] = 1.1
+    learn(map, view(0.0), state(*places, weights=tuple(weights / weights.sum())), stage)
+    assert map.means[:, 0].tolist() == [280.0]
+    assert map.weights.tolist() == [1.0]
+    learn(map, view(9.0), state(*places, weights=(1 / 120,) * 120), stage)
+    assert map.weights[map.owner == 1].sum() == pytest.approx(1.0), "of equals none is better than the others"
+
+
+def test_weights_stay_in_0_to_1_and_covariances_positive_definite_over_10000_updates_in_a_row() -> None:
+    rng = np.random.default_rng(0)
+    map, learned = ViewMixtures.empty(), Learned()
+    averages: tuple[Average, ...] = ("visits", "halves")
+
+    def random_lesson(least: float) -> Lesson:
+        parts = int(rng.integers(1, 4))
+        roots = rng.normal(0, 0.2, (parts, 3, 3))
+        covariances = roots @ roots.transpose(0, 2, 1) + np.eye(3) * least
+        weights = rng.random(parts) + 1e-3
+        values = rng.normal(0, 2.0, 2).astype(np.float32)
+        state = GaussianMixture(rng.normal(0, 1, (parts, 3)), covariances, weights / weights.sum())
+        return Lesson(Coefficients(values, values[None]), state, 0)
+
+    for _ in range(1000):
+        average = averages[int(rng.integers(2))]
+        stage = FusedMixtures(average=average, spread=bool(rng.random() < 0.5), max_views=12)
+        least = 10.0 ** rng.uniform(-6, -1)
+        lessons = Lessons(tuple(random_lesson(least) for _ in range(10)))
+        stage.step(Context("mapping"), lessons, ViewLimit(1.0), map, learned)
+        assert (map.weights >= 0).all()
+        assert (map.weights <= 1).all()
+        assert (map.counts > 0).all()
+        assert np.bincount(map.owner, map.weights, len(map)) == pytest.approx(1.0)
+        np.testing.assert_array_equal(map.covariances, map.covariances.transpose(0, 2, 1))
+        assert (np.linalg.eigvalsh(map.covariances) > 0).all()
+        assert (np.abs(map.means[:, 2]) <= np.pi).all()
+        assert len(map) <= 12
+    assert map.steps == 10_000
