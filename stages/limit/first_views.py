@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.values.pose import Motion
+from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import ViewLimit, WholeView
 
 Array = npt.NDArray[np.float64]
@@ -40,7 +41,8 @@ class FirstViewsLimit(Stage):
 
     The first `views` views between which the robot moved by `least_m` count; until then the limit follows from those so
     far, not settled, and there is none before the first pair. It is settled in the first log and holds for all that
-    follow. Manifest fact `view_limit`. Once settled, the limit says how many metres a robot drives until it is reached.
+    follow; a map keeps it, and where there is a `known` one that has it, nothing is measured. Manifest fact
+    `view_limit`. Once settled, the limit says how many metres a robot drives until it is reached.
     """
 
     views: Annotated[int, Bounds(ge=2)] = 100
@@ -58,8 +60,18 @@ class FirstViewsLimit(Stage):
         if self.apart >= self.views:
             raise ValueError(f"apart: of {self.views} views none are {self.apart} apart")
 
-    def step(self, ctx: Context, view: WholeView, motion: Motion | None, first: FirstViews) -> Out:
+    def step(
+        self,
+        ctx: Context,
+        view: WholeView,
+        motion: Motion | None,
+        first: FirstViews,
+        known: ViewMixtures | None = None,
+    ) -> Out:
         """Take one view in."""
+        if first.limit is None and known is not None and known.limit is not None:
+            first.limit = known.limit
+            ctx.fact("view_limit", round(first.limit.distance, 4))
         if first.limit is None or not first.limit.settled:
             first.since += 0.0 if motion is None else math.hypot(motion.x, motion.y)
             if not len(first.views) or first.since >= self.least_m:

@@ -3,11 +3,13 @@
 from typing import Annotated
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.values.views import ViewLimit
+from omninav.stages.values.pose import Motion
+from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.views import ViewLimit, WholeView
 
 
 class FixedLimit(Stage):
-    """A given distance between views, in their own unit."""
+    """A given distance between views, in their own unit. It needs nothing of what the others measure."""
 
     distance: Annotated[float, Bounds(gt=0)] = 100.0
 
@@ -16,6 +18,12 @@ class FixedLimit(Stage):
 
         limit: ViewLimit
 
-    def step(self, ctx: Context) -> Out:
+    def step(
+        self,
+        ctx: Context,
+        view: WholeView | None = None,
+        motion: Motion | None = None,
+        known: ViewMixtures | None = None,
+    ) -> Out:
         """Give it."""
         return self.Out(limit=ViewLimit(self.distance))

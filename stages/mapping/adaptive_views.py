@@ -95,6 +95,7 @@ class AdaptiveViews(Stage):
         self, ctx: Context, lessons: Lessons | None, limit: ViewLimit | None, map: ViewMixtures, waiting: BeforeLimit
     ) -> Out:
         """Learn from what this tick has to teach."""
+        map.take_limit(limit)
         ready = due(() if lessons is None else lessons.items, limit, map, waiting)
         if not ready:
             return self.Out(map=map)

@@ -71,6 +71,7 @@ class FusedMixtures(Stage):
         self, ctx: Context, lessons: Lessons | None, limit: ViewLimit | None, map: ViewMixtures, learned: Learned
     ) -> Out:
         """Learn from what this tick has to teach."""
+        map.take_limit(limit)
         lessons = Lessons(()) if lessons is None else lessons
         open_from = math.inf if lessons.open_from is None else lessons.open_from
         learned.open = [taught for taught in learned.open if taught.index >= open_from]

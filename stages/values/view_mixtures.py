@@ -10,7 +10,7 @@ from omninav.pipeline.problems import BadInput
 
 from .growing import GrowingArrays
 from .pose import PoseSource
-from .views import WholeView
+from .views import ViewLimit, WholeView
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -27,7 +27,7 @@ class ViewMixtures(GrowingArrays, Value):
     not sum to 1; `counts` (C,) how many observations each has taken in (eta). A component's heading is that of a robot
     that sees the view as it was kept: the pose that fits a view seen turned by t has the heading plus t.
     `steps`: views learned from so far. `next_name`: the number for the next view. `pose_source`: what the first pose
-    came from.
+    came from. `limit`: the settled limit within which its views count as the same place's, None until there is one.
     """
 
     in_place = True
@@ -44,6 +44,7 @@ class ViewMixtures(GrowingArrays, Value):
     steps: int
     next_name: int
     pose_source: PoseSource
+    limit: ViewLimit | None = None
 
     @classmethod
     def empty(cls) -> "ViewMixtures":
@@ -130,6 +131,11 @@ class ViewMixtures(GrowingArrays, Value):
     def take_poses_from(self, source: PoseSource) -> None:
         """Say where the first pose came from."""
         self.put(pose_source=source)
+
+    def take_limit(self, limit: ViewLimit | None) -> None:
+        """Keep the limit it is learned with, once that is settled."""
+        if limit is not None and limit.settled:
+            self.put(limit=limit)
 
 
 class ViewEvent(Value):

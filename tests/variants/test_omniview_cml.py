@@ -79,6 +79,7 @@ WORDS = (
     "variant=omniview_cml",
     f"log=[{HOUSE / 'tour.mcap'},{HOUSE / 'drive.mcap'}]",
     "nodes.source.stop=45",
+    "nodes.limit.views=40",
     "checkpoint_s=0.05",
     "cache=null",
 )
@@ -141,8 +142,12 @@ def test_a_saved_map_is_read_only_or_grows_on_and_forgetting_is_a_word(whole: Pa
         return read_artifact(run / "map.omap")
 
     before = content(whole)
-    frozen = content(drive("frozen", "mapping=frozen"))
-    assert encode(frozen) == encode(before)
+    def limit(run: Path):
+        return json.loads((run / "manifest.json").read_text())["facts"]["view_limit"]
+
+    frozen = drive("frozen", "mapping=frozen")
+    assert encode(content(frozen)) == encode(before)
+    assert limit(frozen) == limit(whole) == round(before.limit.distance, 4)
     grown = content(drive("grown", "forgetting=passive"))
     assert grown.steps > before.steps
     assert np.isin(before.names, grown.names).mean() > 0.9

@@ -1,9 +1,15 @@
 """A given limit between views."""
 
 from omninav.pipeline import Context
+from omninav.pipeline.stage import signature
+from omninav.stages.limit.first_views import FirstViewsLimit
 from omninav.stages.limit.fixed import FixedLimit
 
 
 def test_a_fixed_limit_is_given_at_once() -> None:
     limit = FixedLimit(distance=7.0).step(Context("limit")).limit
     assert (limit.distance, limit.settled) == (7.0, True)
+
+
+def test_it_can_stand_in_for_one_that_is_measured() -> None:
+    assert set(signature(FirstViewsLimit).inputs) <= set(signature(FixedLimit).inputs)
