@@ -142,6 +142,7 @@ def test_a_saved_map_is_read_only_or_grows_on_and_forgetting_is_a_word(whole: Pa
         return read_artifact(run / "map.omap")
 
     before = content(whole)
+
     def limit(run: Path):
         return json.loads((run / "manifest.json").read_text())["facts"]["view_limit"]
 
