@@ -78,10 +78,10 @@ def wrong_shares(
     rows: list[dict[int, float]] = []
     for frame, (event, parts) in enumerate(zip(events, mixtures, strict=True)):
         if event is not None:
+            seen |= zip(event.inserted.tolist(), event.seen.tolist(), strict=True)
             for name in event.removed.tolist():
                 now.pop(name, None)
         if parts is not None:
-            seen |= zip(parts.new.tolist(), parts.seen.tolist(), strict=True)
             for name in np.unique(parts.names).tolist():
                 if name not in seen or not np.isfinite(path[seen[name]]).all():
                     continue

@@ -160,13 +160,8 @@ class ViewEvent(Value):
 
 
 class MixturesNow(Value):
-    """Components of some views after a tick: `names` (C,) of their views, `means` (C, 3) m and rad, `weights` (C,).
-
-    `new`: (n,) names of the views that came in this tick; `seen`: (n,) the ticks in which they had been seen.
-    """
+    """Components of some views after a tick: `names` (C,) of their views, `means` (C, 3) m and rad, `weights` (C,)."""
 
     names: npt.NDArray[np.int64]
     means: npt.NDArray[np.float32]
     weights: npt.NDArray[np.float32]
-    new: Ints
-    seen: Ints

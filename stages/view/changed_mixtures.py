@@ -21,4 +21,4 @@ class ChangedMixtures(Stage):
         mine = np.flatnonzero(np.isin(map.names[map.owner], events.changed))
         names = map.names[map.owner[mine]]
         means, weights = map.means[mine].astype(np.float32), map.weights[mine].astype(np.float32)
-        return self.Out(mixtures=MixturesNow(names, means, weights, events.inserted, events.seen))
+        return self.Out(mixtures=MixturesNow(names, means, weights))

@@ -15,21 +15,16 @@ CTX = Context("wrong places")
 NONE = np.empty(0, np.int64)
 
 
-def event(inserted=(), removed=()):
+def event(inserted=(), removed=(), seen=None):
     came, went = np.array(inserted, np.int64), np.array(removed, np.int64)
-    return ViewEvent(1, 1, came, came, went, "", came, np.zeros(len(came)), np.zeros((len(came), 2)), came * 0)
+    at = came if seen is None else np.array(seen, np.int64)
+    return ViewEvent(1, 1, came, at, went, "", came, np.zeros(len(came)), np.zeros((len(came), 2)), came * 0)
 
 
-def mixture(*parts, new=(), seen=()):
+def mixture(*parts):
     names, xs, weights = zip(*parts, strict=True)
     means = np.array([(x, 0.0, 0.0) for x in xs], np.float32)
-    return MixturesNow(
-        np.array(names, np.int64),
-        means,
-        np.array(weights, np.float32),
-        np.array(new, np.int64),
-        np.array(seen, np.int64),
-    )
+    return MixturesNow(np.array(names, np.int64), means, np.array(weights, np.float32))
 
 
 @pytest.fixture
@@ -37,9 +32,9 @@ def life():
     # The robot goes from x = 0 by 1 m a frame. Reference 0 comes where it is; 1 and 2 come 10 m off.
     events = [event([0]), event([1]), event([2]), event(), event(), event()]
     mixtures = [
-        mixture((0, 0.0, 1.0), new=[0], seen=[0]),
-        mixture((1, 11.0, 1.0), new=[1], seen=[1]),
-        mixture((2, 12.0, 1.0), new=[2], seen=[2]),
+        mixture((0, 0.0, 1.0)),
+        mixture((1, 11.0, 1.0)),
+        mixture((2, 12.0, 1.0)),
         mixture((1, 11.0, 0.5), (1, 1.0, 0.5)),
         mixture((1, 1.0, 1.0)),
         mixture((2, 12.0, 0.2), (2, 2.0, 0.6)),
@@ -75,15 +70,15 @@ def test_a_map_without_wrong_places_says_only_that(life):
 
 def test_what_is_learned_late_is_held_against_where_it_was_seen(life):
     truth = life[2]
-    late = [event()] * 4 + [event([0]), event()]
-    parts = [None] * 4 + [mixture((0, 1.0, 1.0), new=[0], seen=[1]), None]
+    late = [event()] * 4 + [event([0], seen=[1]), event()]
+    parts = [None] * 4 + [mixture((0, 1.0, 1.0)), None]
     near = WrongPlaces(wrong_m=2.0).step(CTX, late, parts, truth).metrics.values["wrong_places"]
     assert near["references"] == 0
 
 
 def test_points_lie_along_the_way_where_they_were_seen_however_late_they_came(life):
-    late = [event()] * 4 + [event([0, 1]), event()]
-    parts = [None] * 4 + [mixture((0, 20.0, 1.0), (1, 20.0, 1.0), new=[0, 1], seen=[3, 1]), None]
+    late = [event()] * 4 + [event([0, 1], seen=[3, 1]), event()]
+    parts = [None] * 4 + [mixture((0, 20.0, 1.0), (1, 20.0, 1.0)), None]
     found = WrongPlaces().step(CTX, late, parts, life[2]).metrics.values["wrong_places"]
     assert found["along_m"] == [0.0, 2.0]
 
@@ -95,9 +90,8 @@ def corrected(later_by_a_lap_each: int, points: int = 12, laps: int = 9):
         for lap in range(laps):
             frame = 40 * lap + 10 + 2 * point
             wrong = lap < 3 + point // later_by_a_lap_each
-            events[frame] = event([point] if lap == 0 else [])
-            new = {"new": [point], "seen": [frame]} if lap == 0 else {}
-            mixtures[frame] = mixture((point, 50.0 if wrong else 2.0 * point, 1.0), **new)
+            events[frame] = event([point], seen=[frame]) if lap == 0 else event()
+            mixtures[frame] = mixture((point, 50.0 if wrong else 2.0 * point, 1.0))
     truth = [Pose(float(frame % 40 - 10), 0.0, 0.0) for frame in range(40 * laps)]
     return WrongPlaces().step(CTX, events, mixtures, truth).metrics.values
 
