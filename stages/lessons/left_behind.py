@@ -137,7 +137,7 @@ class LeftBehind(Stage):
         first = next(known, latest)
         if first == latest or behind.past[first].index <= after:
             return []
-        means, covariances, missed = led(behind, first, end, jumped=False)
+        means, covariances, missed = led(behind, first, end)
         if missed > self.missed_below:
             return []
         put = {}
@@ -176,16 +176,17 @@ def remember(lesson: Lesson, model: UncertainMotion | None, behind: Behind, long
     behind.jumps = [jump for jump in behind.jumps if jump[0] >= behind.past[0].index]
 
 
-def led(behind: Behind, row: int, end: tuple[Array, Array], jumped: bool = True) -> tuple[Array, Array, float]:
+def led(behind: Behind, row: int, end: tuple[Array, Array]) -> tuple[Array, Array, float]:
     """The way from a certain state in the past to the present one, `end`, along odometry: see `reconstructed`.
 
-    `jumped`: what is known of `end` came from the map alone, not from that state by odometry.
+    The two count as independent: after a jump, and where the map has made the present state much more certain, what is
+    known of it comes from the map.
     """
     start = certain_state(behind.past[row].state)
     assert start is not None
     steps = [increment(way.way, way.sigmas) for way in behind.ways[row:]]
     motions, noise = (np.stack(each) for each in zip(*steps, strict=True))
-    return reconstructed(*start, motions, noise, *end, independent=jumped)
+    return reconstructed(*start, motions, noise, *end)
 
 
 def put_right(behind: Behind, states: dict[int, GaussianMixture]) -> list[Lesson]:
