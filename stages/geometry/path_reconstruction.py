@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from .se2 import wrap
+from .se2 import chain, compose, wrap
 
 Array = npt.NDArray[np.float64]
 
@@ -25,12 +25,12 @@ def reconstructed(
     each in the frame of where it began; `noise`: (N, 3, 3) their covariances in that frame. Row 0 is the first end, row
     N the last.
 
-    `independent`: what is known of the last end does not come from the first one. Then each pose is what the way from
-    the first end says of it, times what the way back from the last end says of it (ten Hagen & Kroese 2002, forwards
-    and backwards): the two share no motion. Otherwise the last end is a filter's state, which knows the first end and
-    the motions already and would count them twice; only what it has learned beyond them goes back along the way (Rauch,
-    Tung & Striebel 1965), and row N is the last end as it is. Motions are linearised around the result of the round
-    before, so that the result is the most likely way, also where the headings had to turn a lot.
+    `independent`: what is known of the last end does not come from the first one, and the last pose is what the way
+    from the first end says of it, times the last end. Otherwise the last end is a filter's state, which knows the first
+    end and the motions already and would count them twice: it is the last pose as it is. Either way only what is known
+    of the last pose beyond the way goes back along it (Rauch, Tung & Striebel 1965), which for independent ends is what
+    ten Hagen & Kroese 2002 have forwards and backwards. Motions are linearised around the result of the round before,
+    so that the result is the most likely way, also where the headings had to turn a lot.
 
     The third value is the squared Mahalanobis distance by which odometry misses the last end (3 degrees of freedom): a
     large one says that the robot was lifted, or that an end is wrong.
@@ -40,15 +40,16 @@ def reconstructed(
     last_covariance = np.ascontiguousarray(last_covariance, np.float64)
     motions = np.ascontiguousarray(motions, np.float64).reshape(-1, 3)
     noise = np.ascontiguousarray(noise, np.float64).reshape(-1, 3, 3)
-    backwards = _both_ways if independent else _back_from_the_filter
-    at = _led(first, motions, noise)  # the way around which motions are linearised: at first where odometry leads
-    covariances, missed = np.empty((len(at), 3, 3)), 0.0
+    # The way around which motions are linearised: at first where odometry leads.
+    at, missed = np.vstack([first, compose(first, chain(motions))]), 0.0
     for turn in range(rounds):
         ahead, ahead_covariance = _ahead(first, first_covariance, motions, noise, at)
+        gap, both = _wrapped(last - ahead[-1]), ahead_covariance[-1] + last_covariance
         if turn == 0:
-            gap = _wrapped(last - ahead[-1])
-            missed = float(gap @ np.linalg.solve(ahead_covariance[-1] + last_covariance, gap))
-        at, covariances = backwards(motions, noise, at, ahead, ahead_covariance, last, last_covariance)
+            missed = float(gap @ np.linalg.solve(both, gap))
+        share = ahead_covariance[-1] @ np.linalg.inv(both) if independent else np.eye(3)
+        covariance = share @ last_covariance
+        at, covariances = _back(motions, noise, at, ahead, ahead_covariance, ahead[-1] + share @ gap, covariance)
     return np.column_stack([at[:, :2], wrap(at[:, 2])]), covariances, missed
 
 
@@ -70,15 +71,6 @@ def _linearised(pose: Array, motion: Array, noise: Array) -> tuple[Array, Array,
 
 
 @numba.njit(cache=True, nogil=True)
-def _led(first: Array, motions: Array, noise: Array) -> Array:
-    at = np.empty((len(motions) + 1, 3))
-    at[0] = first
-    for k in range(len(motions)):
-        at[k + 1] = _linearised(at[k], motions[k], noise[k])[0]
-    return at
-
-
-@numba.njit(cache=True, nogil=True)
 def _ahead(first: Array, first_covariance: Array, motions: Array, noise: Array, at: Array) -> tuple[Array, Array]:
     # What the first end and the motions say of each pose.
     ahead, covariance = np.empty((len(at), 3)), np.empty((len(at), 3, 3))
@@ -91,31 +83,13 @@ def _ahead(first: Array, first_covariance: Array, motions: Array, noise: Array, 
 
 
 @numba.njit(cache=True, nogil=True)
-def _both_ways(
+def _back(
     motions: Array, noise: Array, at: Array, ahead: Array, ahead_covariance: Array, last: Array, last_covariance: Array
 ) -> tuple[Array, Array]:
+    # All poses, from what the way so far says of them and what is known of the last one.
     fresh, covariances = np.empty(ahead.shape), np.empty(ahead_covariance.shape)
-    back, back_covariance = last.copy(), last_covariance.copy()
-    for k in range(len(at) - 1, -1, -1):
-        share = ahead_covariance[k] @ np.linalg.inv(ahead_covariance[k] + back_covariance)
-        fresh[k] = ahead[k] + share @ _wrapped(back - ahead[k])
-        both = share @ back_covariance
-        covariances[k] = 0.5 * (both + both.T)
-        if k > 0:
-            end, slope, spread = _linearised(at[k - 1], motions[k - 1], noise[k - 1])
-            undo = np.linalg.inv(slope)
-            back = at[k - 1] + undo @ _wrapped(back - end)
-            back_covariance = undo @ (back_covariance + spread) @ undo.T
-    return fresh, covariances
-
-
-@numba.njit(cache=True, nogil=True)
-def _back_from_the_filter(
-    motions: Array, noise: Array, at: Array, ahead: Array, ahead_covariance: Array, last: Array, last_covariance: Array
-) -> tuple[Array, Array]:
-    fresh, covariances = np.empty(ahead.shape), np.empty(ahead_covariance.shape)
-    n = len(at) - 1
-    fresh[n], covariances[n] = ahead[n] + _wrapped(last - ahead[n]), last_covariance
+    n = len(motions)
+    fresh[n], covariances[n] = last, 0.5 * (last_covariance + last_covariance.T)
     for k in range(n - 1, -1, -1):
         slope = _linearised(at[k], motions[k], noise[k])[1]
         gain = ahead_covariance[k] @ slope.T @ np.linalg.inv(ahead_covariance[k + 1])

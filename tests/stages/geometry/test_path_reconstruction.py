@@ -119,13 +119,17 @@ def test_what_a_filter_learned_by_its_end_goes_back_along_the_way_as_in_the_whol
         np.testing.assert_allclose(mine, theirs, atol=0.06 * np.abs(theirs).max())
 
 
-@settings(max_examples=40, deadline=None)
-@given(st.integers(0, 10_000), st.integers(1, 40), st.floats(0.0, 3.0))
-def test_smoothed_covariances_are_positive_definite_whatever_the_end(seed, number, gap):
+def drawn(seed, number, gap):
     rng = np.random.default_rng(seed)
     motions = rng.normal(0, [0.3, 0.05, 0.4], (number, 3))
     noise = np.stack([np.diag(rng.uniform(1e-6, 0.1, 3)) for _ in range(number)])
-    first, last = rng.normal(0, 1, 3), rng.normal(0, 1, 3) * gap
+    return rng.normal(0, 1, 3), motions, noise, rng.normal(0, 1, 3) * gap, rng
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10_000), st.integers(1, 40), st.floats(0.0, 3.0))
+def test_smoothed_covariances_are_positive_definite_whatever_the_end(seed, number, gap):
+    first, motions, noise, last, rng = drawn(seed, number, gap)
     ends = np.diag(rng.uniform(1e-4, 0.5, 3)), np.diag(rng.uniform(1e-4, 5.0, 3))
     means, covariances, _ = reconstructed(first, ends[0], motions, noise, last, ends[1], independent=False)
     assert np.isfinite(means).all()
@@ -135,10 +139,7 @@ def test_smoothed_covariances_are_positive_definite_whatever_the_end(seed, numbe
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10_000), st.integers(1, 40), st.floats(0.0, 3.0))
 def test_covariances_are_positive_definite_and_never_larger_than_forwards_alone(seed, number, gap):
-    rng = np.random.default_rng(seed)
-    motions = rng.normal(0, [0.3, 0.05, 0.4], (number, 3))
-    noise = np.stack([np.diag(rng.uniform(1e-6, 0.1, 3)) for _ in range(number)])
-    first, last = rng.normal(0, 1, 3), rng.normal(0, 1, 3) * gap
+    first, motions, noise, last, rng = drawn(seed, number, gap)
     ends = np.diag(rng.uniform(1e-4, 0.5, 3))
     means, covariances, _ = reconstructed(first, ends, motions, noise, last, ends)
     assert np.isfinite(means).all()
