@@ -12,6 +12,7 @@ from hypothesis import settings
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT.parent / "shared" / "data"
+needs_data = pytest.mark.skipif(not DATA.exists(), reason=f"no recordings: {DATA} does not exist")
 
 settings.register_profile("omninav", deadline=None)  # the first call of a compiled function takes what it takes
 settings.load_profile("omninav")

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import DATA
+from conftest import DATA, needs_data
 
 FILES = ("trajectory.tum", "metrics.json", "map.omap")
 
@@ -62,7 +62,7 @@ def written(checkpoint: Path) -> int:
         return 0
 
 
-@pytest.mark.skipif(not DATA.exists(), reason=f"no recordings: {DATA} does not exist")
+@needs_data
 def test_a_run_killed_while_views_wait_to_be_learned_or_may_be_taken_back_resumes_to_the_same_bytes(tmp_path: Path):
     """Each view waits for 4 m, some 18 pictures, and what it taught is put right later: at any moment some wait."""
     logs = f"log=[{DATA / 'photoreal-house' / 'tour.mcap'},{DATA / 'photoreal-house' / 'drive.mcap'}]"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import DATA
+from conftest import DATA, needs_data
 
 from omninav.pipeline.artifact import read_artifact
 from omninav.pipeline.codec import decode, encode
@@ -74,7 +74,6 @@ def test_what_waits_as_the_last_log_ends_is_learned_after_it(tmp_path: Path):
 
 
 HOUSE = DATA / "photoreal-house"
-needs_house = pytest.mark.skipif(not DATA.exists(), reason=f"no recordings: {DATA} does not exist")
 WORDS = (
     "variant=omniview_cml",
     f"log=[{HOUSE / 'tour.mcap'},{HOUSE / 'drive.mcap'}]",
@@ -100,7 +99,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place / "runs" / "latest"
 
 
-@needs_house
+@needs_data
 def test_two_logs_of_a_house_grow_one_map_and_the_second_finds_itself_in_it(whole: Path):
     metrics = json.loads((whole / "metrics.json").read_text())
     assert [log["frames"] for log in metrics["logs"]] == [45, 45]
@@ -110,7 +109,7 @@ def test_two_logs_of_a_house_grow_one_map_and_the_second_finds_itself_in_it(whol
     assert (whole / "trajectory.tum").read_bytes() == (whole / "trajectory_1.tum").read_bytes()
 
 
-@needs_house
+@needs_data
 def test_a_killed_run_resumes_to_the_same_map_and_trajectory(whole: Path, tmp_path: Path):
     moments = random.Random(3)
     process, kills = start(tmp_path, *WORDS), 0
@@ -130,7 +129,7 @@ def test_a_killed_run_resumes_to_the_same_map_and_trajectory(whole: Path, tmp_pa
         assert (tmp_path / "runs" / "latest" / name).read_bytes() == (whole / name).read_bytes(), name
 
 
-@needs_house
+@needs_data
 def test_a_saved_map_is_read_only_or_grows_on_and_forgetting_is_a_word(whole: Path, tmp_path: Path):
     def drive(name: str, *words: str) -> Path:
         log = f"log={HOUSE / 'drive.mcap'}"
