@@ -19,6 +19,7 @@ from omninav.stages.values.scan import Scan
 
 from .opening import open_recording
 from .recording import Recording, UnreadableRecording
+from .splice import Splice, as_if_driven, check_splices, crossed, spliced_frames
 from .topics import Topics
 
 Array = npt.NDArray[np.float64]
@@ -42,7 +43,9 @@ class LogSource(Source):
 
     `log` names one recording or several (see `open_recording`); without one, `route` of the simulated `world` is driven
     on `day` (or one after the other on several), with `events` on its way. `first`, `stop` and `stride` select frames
-    of each. After a pause of more than `new_log_after` seconds another log begins: several days may lie in one file.
+    of each. `splices`: [[60, 300]] goes on with picture 300 of each log once the first 60 are through, and odometry
+    has not noticed: a kidnapping made of a log that has none. After a pause of more than `new_log_after` seconds
+    another log begins: several days may lie in one file.
     Poses are metres and radians; stamps are header stamps. `motion` is the SE(2) increment of the odometry between
     the pictures' own times, absent at the first picture of each log; where pictures are left out it spans the gap.
 
@@ -61,6 +64,7 @@ class LogSource(Source):
     first: Annotated[int, Bounds(ge=0)] = 0
     stop: Annotated[int, Bounds(ge=1)] | None = None
     stride: Annotated[int, Bounds(ge=1)] = 1
+    splices: tuple[Splice, ...] = ()
     new_log_after: Annotated[float, Bounds(gt=0)] = 3600.0
     synthetic_distance_noise: Annotated[float, Bounds(ge=0.10)] = 0.10
     synthetic_turn_noise_deg_per_m: Annotated[float, Bounds(ge=3.0)] = 3.0
@@ -128,12 +132,13 @@ class LogSource(Source):
         )
         truth = None if recording.truth is None else recording.truth[frame]
         odometry, increment = None, None
+        told = self._told[position.log]
         if recording.odometry is not None:
-            odometry = recording.odometry[frame]
-            increment = None if last is None else between(recording.odometry[last], odometry)
+            odometry = told[frame]
+            increment = None if last is None else between(told[last], odometry)
         elif recording.truth is not None:
             if last is not None:
-                increment = self._disturbed(ctx, between(recording.truth[last], recording.truth[frame]))
+                increment = self._disturbed(ctx, between(told[last], told[frame]))
                 moved = compose((position.x, position.y, position.heading), increment)
                 position.x, position.y, position.heading = (float(value) for value in moved)
             odometry = np.array([position.x, position.y, position.heading])
@@ -171,18 +176,23 @@ class LogSource(Source):
             raise UnreadableRecording("no recording is named; type log=PATH")
         else:
             recordings = [open_recording(str(name), self.topics, self.camera, self.layouts) for name in names]
-        self._recordings, self._frames = [], []
+        self._recordings, self._frames, self._told = [], [], []
         for recording in recordings:
-            frames = np.arange(len(recording.stamps))[self.first : self.stop : self.stride]
+            check_splices(self.splices, len(recording.stamps), recording.name)
+            frames = spliced_frames(self.splices, len(recording.stamps))[self.first : self.stop : self.stride]
             if not len(frames):
                 raise UnreadableRecording(
                     f"{recording.name}: first={self.first}, stop={self.stop} leaves none of its frames; "
                     "type nodes.source.first=0 nodes.source.stop=null"
                 )
-            pauses = np.flatnonzero(np.diff(recording.stamps[frames]) > self.new_log_after * 1e9) + 1
-            for part in np.split(frames, pauses):
+            poses = recording.truth if recording.odometry is None else recording.odometry
+            told = np.empty((0, 3)) if poses is None else as_if_driven(poses, self.splices)
+            pauses = np.diff(recording.stamps[frames]) > self.new_log_after * 1e9
+            pauses &= ~crossed(self.splices, frames)
+            for part in np.split(frames, np.flatnonzero(pauses) + 1):
                 self._recordings.append(recording)
                 self._frames.append(part)
+                self._told.append(told)
         self._opened = recordings
         self._lost = [recording.dropped.copy() for recording in recordings]
 
