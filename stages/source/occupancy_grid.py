@@ -26,7 +26,8 @@ def read_occupancy(file: Path) -> OccupancyGrid:
         negate, mode = bool(said.get("negate", 0)), str(said.get("mode", "trinary"))
         picture = file.parent / str(said["image"])
     except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError) as error:
-        raise BadInput(f"{file}: not a map_server map ({error}); give the .yaml beside a map's picture") from None
+        why = " ".join(str(error).split())
+        raise BadInput(f"{file}: not a map_server map ({why}); give the .yaml beside a map's picture") from None
     levels = cv2.imread(str(picture), cv2.IMREAD_GRAYSCALE)
     if levels is None:
         raise BadInput(f"{file}: its picture {picture.name} cannot be read")

@@ -1,0 +1,1 @@
+"""From where the views of a map can be seen."""

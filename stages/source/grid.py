@@ -1,0 +1,159 @@
+"""The occupancy grid of where the robot drives, and where in it the robot may be."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import KDTree
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.files import digest_file
+from omninav.pipeline.problems import BadInput
+from omninav.stages.simulator.config import WorldConfig
+from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.occupancy import occupancy
+from omninav.stages.simulator.world import World
+from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.reach import Reach
+
+from .occupancy_grid import coarser, read_occupancy
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+FROM_TOUR = "from_tour"
+
+
+class PlaceGrid(Stage):
+    """The occupancy grid of a place, in cells of about `resolution` metres, and the free space that a robot reaches.
+
+    `grid`: a map_server file; `from_tour`, a stand-in made of the free path of the map's references (see `along_path`:
+    `around`, in reaches of port `reach`, else of `reach_m`); or null: the simulated world's own on its first day, where
+    no `log` is named. Free space is what is at least `clearance_m` from anything occupied and, with `map` wired,
+    connected to its references; a stand-in's is all of it. Raises BadInput where there is a log and no grid.
+    """
+
+    grid: str | None = None
+    resolution: Annotated[float, Bounds(gt=0)] = 0.1
+    clearance_m: Annotated[float, Bounds(ge=0)] = 0.2
+    around: Annotated[float, Bounds(gt=0)] = 2.0
+    reach_m: Annotated[float, Bounds(gt=0)] = 0.5
+    log: str | tuple[str, ...] | None = None
+    tour: str | tuple[str, ...] | None = None
+    world: WorldConfig = DEMO
+
+    class Out(Outputs):
+        """`grid`, and `free`: where the robot may be."""
+
+        grid: OccupancyGrid
+        free: FreeSpace
+
+    def inputs_digest(self) -> str | None:
+        """Of the file, where one is read. Raises BadInput where there is a log and no grid, before anything runs."""
+        file = self._file()
+        if file is None:
+            return None
+        read_occupancy(file)
+        return digest_file(file)
+
+    def step(self, ctx: Context, map: ReferenceGraph | None = None, reach: Reach | None = None) -> Out:
+        """Read, take or make the grid."""
+        file = self._file()
+        if self.grid == FROM_TOUR:
+            if map is None or not len(map):
+                raise BadInput("grid: from_tour needs a map with references; give tour=FILE, or grid=FOLDER/map.yaml")
+            unit = self.reach_m if reach is None else reach.metres
+            grid = along_path(map.poses, map.edges, self.around * unit, self.resolution)
+            ctx.fact("grid", "a stand-in made from the tour's free path: walls are where it ends, not where they are")
+            ctx.count("grid_is_a_stand_in", detail="grid: made from the tour's free path; a map_server file is better")
+        elif file is not None:
+            grid = coarser(read_occupancy(file), self.resolution)
+            ctx.fact("grid", file.name)
+        else:
+            cells, origin = occupancy(World(self.world, 0), self.resolution)
+            grid = OccupancyGrid(np.where(cells, OCCUPIED, FREE).astype(np.uint8), self.resolution, origin, "world")
+            ctx.fact("grid", f"of the built-in world {self.world.name}")
+        clearance = 0.0 if grid.made_from == "tour" else self.clearance_m
+        space = free_space(grid, clearance, None if map is None else map.poses)
+        if space is None:
+            ctx.count("references_off_the_free_space", detail="grid: no reference lies in free cells; all are kept")
+            space = free_space(grid, clearance, None)
+        if space is None:
+            raise BadInput(f"grid: no cell is free and {clearance:g} m from obstacles; use a smaller clearance_m")
+        return self.Out(grid=grid, free=space)
+
+    def _file(self) -> Path | None:
+        if self.grid == FROM_TOUR:
+            return None
+        if self.grid is not None:
+            file = Path(self.grid).expanduser()
+            if file.is_dir():
+                file = file / "map.yaml"
+            if not file.is_file():
+                raise BadInput(f"grid: {file} is no file; give a map_server map, or grid={FROM_TOUR}")
+            return file
+        if self.log is None and self.tour is None:
+            return None
+        beside = self._beside()
+        known = f"grid={beside}" if beside is not None else "grid=FOLDER/map.yaml (of ROS map_server)"
+        raise BadInput(
+            f"grid: visibility areas need an occupancy grid, and a log brings none; give {known}, or grid={FROM_TOUR}, "
+            "a stand-in made from the tour's free path"
+        )
+
+    def _beside(self) -> Path | None:
+        for names in (self.tour, self.log):
+            for name in () if names is None else (names,) if isinstance(names, str) else names:
+                path = Path(name).expanduser()
+                for grid in (path.parent / f"{path.stem}.grid" / "map.yaml", path.parent / "map.yaml"):
+                    if grid.is_file():
+                        return grid
+        return None
+
+
+def free_space(grid: OccupancyGrid, clearance: float, references: Array | None) -> FreeSpace | None:
+    """Free cells whose centre is at least `clearance` metres from any occupied cell; None where there are none.
+
+    With `references` (R, >= 2), only what is connected to one of them.
+    """
+    free = grid.cells == FREE
+    if clearance > 0.0 and (grid.cells == OCCUPIED).any():
+        gap = cv2.distanceTransform((grid.cells != OCCUPIED).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        free &= grid.resolution * (gap - 0.5) >= clearance
+    if references is not None:
+        _, labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=8)
+        row, column = grid.cells_of(references).T
+        inside = (row >= 0) & (row < free.shape[0]) & (column >= 0) & (column < free.shape[1])
+        free &= np.isin(labels, np.setdiff1d(labels[row[inside], column[inside]], 0))
+    return FreeSpace(grid.centres(*np.nonzero(free)), grid.resolution) if free.any() else None
+
+
+def along_path(poses: Array, edges: npt.NDArray[np.int64], reach: float, resolution: float) -> OccupancyGrid:
+    """A grid that stands in for an unknown one: free within `reach` metres of a path, with a wall around it.
+
+    The path are places (R, >= 2) and the straight `edges` (E, 2) between them. The wall is one cell thick; what lies
+    behind it is unknown. So a view sees the end of the free path ahead of it, and its visibility area is the stretch of
+    path from which that end is in sight: right along the path and beside it, and never through what nobody drove along.
+    """
+    places: Array = np.asarray(poses[:, :2], np.float64)
+    if len(edges):
+        ends = places[edges]
+        steps = max(1, math.ceil(float(np.hypot(*(ends[:, 1] - ends[:, 0]).T).max()) / resolution))
+        between = np.linspace(0.0, 1.0, steps + 1)[:, None, None]
+        places = np.concatenate([places, ((1 - between) * ends[:, 0] + between * ends[:, 1]).reshape(-1, 2)])
+    margin = reach + 2 * resolution
+    origin = np.floor((places.min(axis=0) - margin) / resolution) * resolution
+    columns, rows = (int(n) for n in np.ceil((places.max(axis=0) + margin - origin) / resolution))
+    grid = OccupancyGrid(
+        np.full((rows, columns), UNKNOWN, np.uint8), resolution, (float(origin[0]), float(origin[1])), "tour"
+    )
+    tree: Any = KDTree(places)  # type: ignore[no-untyped-call]
+    centres = grid.centres(*np.divmod(np.arange(rows * columns), columns))
+    free: Mask = np.isfinite(tree.query(centres, distance_upper_bound=reach)[0]).reshape(rows, columns)
+    grid.cells[cv2.dilate(free.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = OCCUPIED
+    grid.cells[free] = FREE
+    return grid

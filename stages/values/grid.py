@@ -1,0 +1,69 @@
+"""What stands where in the plane, cell by cell, and where a robot may be."""
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Value
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Cells = npt.NDArray[np.uint8]
+
+FREE, OCCUPIED, UNKNOWN = 0, 1, 2
+"""States of a cell."""
+
+GridSource = Literal["map", "world", "tour"]
+"""Where a grid comes from: a map file, the built-in world, or a stand-in made from the free path of a tour."""
+
+
+class OccupancyGrid(Value):
+    """Cells of the plane that are free, occupied or unknown (the constants of this file).
+
+    `cells`: (rows, columns) uint8, row 0 at the lowest y. `resolution`: a cell's width (m). `origin`: x, y (m, map
+    frame) of the lower left corner of cell (0, 0). `made_from`: what it is.
+    """
+
+    cells: Cells
+    resolution: float
+    origin: tuple[float, float]
+    made_from: GridSource = "map"
+
+    def cells_of(self, points: Array) -> Ints:
+        """Row and column of the cells in which points (N, >= 2) lie: (N, 2), also of cells that are not there."""
+        return cells_of(points, self.origin, self.resolution)
+
+    def states_at(self, points: Array) -> Cells:
+        """States of the cells in which points (N, >= 2) lie: (N,), unknown outside the grid."""
+        row, column = self.cells_of(points).T
+        inside = (row >= 0) & (row < self.cells.shape[0]) & (column >= 0) & (column < self.cells.shape[1])
+        states = np.full(len(row), UNKNOWN, np.uint8)
+        states[inside] = self.cells[row[inside], column[inside]]
+        return states
+
+    def centres(self, rows: Ints, columns: Ints) -> Array:
+        """Centres (m) of cells: (N, 2)."""
+        centres: Array = np.array(self.origin) + self.resolution * (np.column_stack([columns, rows]) + 0.5)
+        return centres
+
+
+def cells_of(points: Array, origin: tuple[float, float], resolution: float) -> Ints:
+    """Row and column of the cells in which points (N, >= 2) lie: (N, 2)."""
+    cells: Ints = np.floor((points[:, 1::-1] - origin[::-1]) / resolution).astype(np.int64)
+    return cells
+
+
+class FreeSpace(Value):
+    """Where the robot may be. `centres`: (N, 2) x, y (m, map frame) of square cells; `cell`: their width (m)."""
+
+    centres: Array
+    cell: float
+
+    def draw(self, rng: np.random.Generator, number: int) -> Array:
+        """Poses drawn uniformly over the cells, all headings alike: (number, 3) m, m, rad."""
+        poses = np.empty((number, 3))
+        chosen = rng.integers(len(self.centres), size=number)
+        poses[:, :2] = self.centres[chosen] + self.cell * (rng.random((number, 2)) - 0.5)
+        poses[:, 2] = rng.uniform(-np.pi, np.pi, number)
+        return poses
