@@ -5,11 +5,12 @@ from typing import Annotated, Literal
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.pipeline.problems import BadInput
 from omninav.stages.geometry.segments import similarity_at
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
 from omninav.stages.values.maps import FeatureKind, ReferenceEvent, ReferenceGraph, within
-from omninav.stages.values.pose import Pose, PoseSource
+from omninav.stages.values.pose import Pose
+
+from .pose_of_view import Supervised, pose_of_view
 
 
 class Along(State):
@@ -30,7 +31,7 @@ class LearnReferenceGraph(Stage):
     distance_m: Annotated[float, Bounds(gt=0)] = 0.02
     vicinity_m: Annotated[float, Bounds(gt=0)] = 0.5
     similarity: Annotated[float, Bounds(ge=0, le=1)] = 0.6
-    supervised: Literal["auto", "truth", "odometry"] = "auto"
+    supervised: Supervised = "auto"
 
     class Out(Outputs):
         """The grown map, and what this tick did to it."""
@@ -50,12 +51,7 @@ class LearnReferenceGraph(Stage):
         """Take one view into the map, or not."""
         if ctx.tick.first_of_log:
             along.reference = -1
-            if ctx.tick.log and len(map) and map.pose_source == "odometry":
-                raise BadInput(
-                    "mapping: each log's odometry has a frame of its own, so several logs without ground truth make no "
-                    "one map; give one tour, or tours with ground truth"
-                )
-        pose = self._pose(ctx, odometry, truth, map)
+        pose = pose_of_view(ctx, odometry, truth, map, self.supervised)
         if pose is None:
             along.reference = -1  # no edge across a gap
             return self.Out(map=map)
@@ -72,21 +68,6 @@ class LearnReferenceGraph(Stage):
             map.join(along.reference, here)
         along.reference = here
         return self.Out(map=map, events=event)
-
-    def _pose(self, ctx: Context, odometry: Pose | None, truth: Pose | None, map: ReferenceGraph) -> Pose | None:
-        if not len(map):
-            source: PoseSource = "truth" if truth is not None and self.supervised != "odometry" else "odometry"
-            if self.supervised == "truth" and truth is None:
-                raise BadInput(
-                    "mapping: the tour has no ground truth for its first picture; "
-                    "use a tour with /ground_truth/pose, or nodes.mapping.supervised=auto"
-                )
-            map.take_poses_from(source)
-            ctx.fact("map_poses", source)
-        pose = truth if map.pose_source == "truth" else odometry
-        if pose is None:
-            ctx.count("view_without_pose", detail=f"mapping: pictures without {map.pose_source} are not mapped")
-        return pose
 
     def _reason(
         self,

@@ -1,0 +1,39 @@
+"""Where a view was taken: by the tour's truth, or by its odometry."""
+
+from typing import Literal
+
+from omninav.pipeline import Context
+from omninav.pipeline.problems import BadInput
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose, PoseSource
+
+Supervised = Literal["auto", "truth", "odometry"]
+
+
+def pose_of_view(
+    ctx: Context, odometry: Pose | None, truth: Pose | None, map: ReferenceGraph, supervised: Supervised
+) -> Pose | None:
+    """The pose to keep with a view; None where there is none, which is counted.
+
+    The first view settles for the whole map where poses come from: truth where there is any and `supervised` is not
+    odometry. Raises BadInput where `supervised` is truth and there is none, and where a second log follows one whose
+    poses are odometry.
+    """
+    if ctx.tick.first_of_log and ctx.tick.log and len(map) and map.pose_source == "odometry":
+        raise BadInput(
+            "mapping: each log's odometry has a frame of its own, so several logs without ground truth make no "
+            "one map; give one tour, or tours with ground truth"
+        )
+    if not len(map):
+        source: PoseSource = "truth" if truth is not None and supervised != "odometry" else "odometry"
+        if supervised == "truth" and truth is None:
+            raise BadInput(
+                "mapping: the tour has no ground truth for its first picture; "
+                "use a tour with /ground_truth/pose, or nodes.mapping.supervised=auto"
+            )
+        map.take_poses_from(source)
+        ctx.fact("map_poses", source)
+    pose = truth if map.pose_source == "truth" else odometry
+    if pose is None:
+        ctx.count("view_without_pose", detail=f"mapping: pictures without {map.pose_source} are not mapped")
+    return pose
