@@ -1,4 +1,4 @@
-"""Pictures: as the camera gave them, and as panoramas in one common form."""
+"""Pictures: as the camera gave them, as panoramas in one common form, and as views that look one way each."""
 
 import math
 
@@ -30,6 +30,22 @@ class Panorama(Value):
     pixels: Pixels
     elevation_top: float | None = None
     elevation_bottom: float | None = None
+
+
+class Windows(Value):
+    """Perspective pictures taken at once, each of which looks one way, level or not.
+
+    `pixels`: (W, rows, columns, 3) uint8, blue-green-red, the scene's left on the left. `headings` (W,): azimuths of
+    their optical axes (radians, counter-clockwise from the robot's forward). `field`: horizontal field of view of each
+    (radians). `seen` (W, rows, columns): False where the camera that they were cut from sees nothing, which is black;
+    None: all is seen.
+    """
+
+    bulky = True
+    pixels: Pixels
+    headings: npt.NDArray[np.float64]
+    field: float
+    seen: npt.NDArray[np.bool_] | None = None
 
 
 def column_azimuths(columns: int) -> npt.NDArray[np.float64]:

@@ -24,3 +24,15 @@ class Similarities(Value):
     stands_for: npt.NDArray[np.float64] | None = None
     exponent: float | None = None
     colour_scale: float | None = None
+
+
+class Answers(Value):
+    """The references of a map that are most similar to the present view, the most similar first.
+
+    `references` (k,): their indices in the map. `similarities` (k,) in [0, 1] and `turns` (k,): each at its best
+    heading, and how far the robot is then turned from the reference's own (radians, counter-clockwise).
+    """
+
+    references: npt.NDArray[np.int64]
+    similarities: npt.NDArray[np.float32]
+    turns: npt.NDArray[np.float64]

@@ -1,0 +1,209 @@
+"""Histograms of Haar integrals: how often which products of neighbours occur, wherever and however turned."""
+
+from typing import Annotated, Literal, NamedTuple
+
+import cv2
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.problems import BadInput
+from omninav.pipeline.results import Metrics
+from omninav.stages.values.features import SegmentHistograms
+from omninav.stages.values.image import Panorama, Pixels, Windows
+
+from .rotation_means import AngularWeights, Kernel
+from .segments import segment_edges
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+Floats = npt.NDArray[np.float32]
+Radius = Annotated[float, Bounds(ge=0)]
+Scale = Annotated[float, Bounds(gt=0)]
+Borders = Literal["crop", "wrap"]
+
+
+class Binning(NamedTuple):
+    """How values in [0, 1] of three channels are counted.
+
+    `bins` per channel; `joint`: one histogram over all channels (bins^3, the first slowest), else one for each, behind
+    one another and with equal shares of the mass. `weighted`: a value counts for the two bins whose middles it lies
+    between, by its distance from them.
+    """
+
+    bins: int = 8
+    joint: bool = True
+    weighted: bool = True
+
+    @property
+    def length(self) -> int:
+        """Number of bins of all channels."""
+        return self.bins**3 if self.joint else 3 * self.bins
+
+    def shares(self, values: Floats, usable: Bools) -> tuple[Array, float]:
+        """Histogram of values (N, 3) as shares of all N, and the standard error of its bins if these N are a sample.
+
+        Values that are not `usable` (N,) count nowhere. The error is the root of the sum of the bins' variances: the
+        expected distance of the histogram from that of everything the sample was drawn from.
+        """
+        counts = np.zeros(self.length)
+        squares = _count(values, usable, self.bins, self.joint, self.weighted, counts)
+        shares = counts / len(values)
+        variance = max(squares / len(values) - float(shares @ shares), 0.0)
+        return shares, float(np.sqrt(variance / len(values)))
+
+
+@numba.njit(cache=True, nogil=True)
+def _count(values: Floats, usable: Bools, bins: int, joint: bool, weighted: bool, counts: Array) -> float:
+    # Gives the sum over values of their squared shares: 1 each where all of a value goes to one bin.
+    low, part = np.empty(3, np.int64), np.empty(3)
+    squares = 0.0
+    for n in range(len(values)):
+        if not usable[n]:
+            continue
+        for c in range(3):
+            place = values[n, c] * bins - (0.5 if weighted else 0.0)
+            low[c] = min(max(int(np.floor(place)), 0), bins - 1)
+            part[c] = min(max(place - low[c], 0.0), 1.0) if weighted and low[c] + 1 < bins else 0.0
+        if joint:
+            for corner in range(8):
+                share, cell = 1.0, 0
+                for c in range(3):
+                    upper = (corner >> c) & 1
+                    share *= part[c] if upper else 1.0 - part[c]
+                    cell = cell * bins + low[c] + upper
+                if share > 0.0:
+                    counts[cell] += share
+                    squares += share * share
+        else:
+            for c in range(3):
+                below, above = (1.0 - part[c]) / 3.0, part[c] / 3.0
+                counts[c * bins + low[c]] += below
+                squares += below * below
+                if above > 0.0:
+                    counts[c * bins + low[c] + 1] += above
+                    squares += above * above
+    return squares
+
+
+def padded(pixels: Pixels, by: int, wraps_rows: bool, wraps_columns: bool) -> Floats:
+    """A picture in [0, 1] with `by` more pixels on each side: from the other one where it wraps, else repeated."""
+    scaled = pixels.astype(np.float32) * np.float32(1.0 / 255.0)
+    rows, columns = (cv2.BORDER_WRAP if wraps else cv2.BORDER_REPLICATE for wraps in (wraps_rows, wraps_columns))
+    higher = cv2.copyMakeBorder(scaled, by, by, 0, 0, rows)
+    wider: Floats = cv2.copyMakeBorder(higher, 0, 0, by, by, columns).astype(np.float32, copy=False)
+    return wider
+
+
+def usable_pixels(shape: tuple[int, int], by: int, crop_rows: bool, crop_columns: bool, seen: Bools | None) -> Bools:
+    """Which pixels of a picture (rows, columns) have all their neighbours within `by` pixels in it, and `seen`."""
+    usable = np.ones(shape, np.bool_)
+    if crop_rows:
+        usable[:by] = usable[max(shape[0] - by, 0) :] = False
+    if crop_columns:
+        usable[:, :by] = usable[:, max(shape[1] - by, 0) :] = False
+    if seen is not None:
+        around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * by + 1, 2 * by + 1))
+        usable &= cv2.erode(seen.astype(np.uint8), around).astype(np.bool_)
+    return usable
+
+
+class HaarIntegral(Stage):
+    """Histograms of products of neighbouring pixels, averaged over rotations: invariant to turns and shifts.
+
+    Wolf, Burgard & Burkhardt 2005, section IV. A kernel (r1, r2) is f = M(0, r1) M(r2, at 90 degrees), in pixels; it is
+    averaged over `angles` rotations around each pixel, per colour channel, with bilinear interpolation (equation 4,
+    errata 40 and 42), and the averages are counted: `histogram` joint or separate over the channels, `bins` per
+    channel, `weighted` or not (Binning). The histograms of several kernels follow one another with equal shares of the
+    mass, and all of them once for each of the `scales` that kernels are enlarged by. `root`: of the square root of the
+    product, whose values fill the bins more evenly. `angular_weights` linear: weighted means against the discretisation
+    of the angle (rotation_means.Kernel).
+
+    `borders` crop (erratum 41): pixels whose neighbours lie outside the picture count nowhere, so that histograms sum
+    to less than 1; a panorama goes on around the circle. wrap: the paper's "modulo N", both ways, of all pictures.
+    `integration` monte_carlo: at `samples` pixels of each segment only, drawn at random; what that costs is said
+    (metric `standard_error`: the expected distance of a segment's histogram from the full one, in the last picture).
+    A panorama is described in `segments` equal parts, windows one by one. Raises BadInput where a picture is smaller
+    than a kernel.
+    """
+
+    kernels: tuple[tuple[Radius, Radius], ...] = ((3.0, 4.0),)
+    scales: tuple[Scale, ...] = (1.0,)
+    angles: Annotated[int, Bounds(ge=1)] = 36
+    angular_weights: AngularWeights = "equal"
+    root: bool = True
+    histogram: Literal["joint", "separate"] = "joint"
+    bins: Annotated[int, Bounds(ge=1, le=64)] = 8
+    weighted: bool = True
+    segments: Annotated[int, Bounds(ge=1)] = 8
+    borders: Borders = "crop"
+    integration: Literal["full", "monte_carlo"] = "full"
+    samples: Annotated[int, Bounds(ge=1)] = 2000
+
+    class Out(Outputs):
+        """The description of the view; `metrics`: what random integration costs."""
+
+        features: SegmentHistograms
+        metrics: Metrics | None = None
+
+    def __post_init__(self) -> None:
+        """There must be a kernel, and a size to take it at."""
+        if not self.kernels:
+            raise ValueError("kernels: at least one is needed; write kernels: [[3, 4]]")
+        if not self.scales:
+            raise ValueError("scales: at least one is needed; write scales: [1.0]")
+
+    def step(self, ctx: Context, panorama: Panorama | Windows) -> Out:
+        """Describe one panorama, or some windows."""
+        errors: list[float] = []
+        if isinstance(panorama, Windows):
+            seen = [None] * len(panorama.pixels) if panorama.seen is None else list(panorama.seen)
+            values = [
+                self._described(ctx, pixels, 1, False, part, errors)[0]
+                for pixels, part in zip(panorama.pixels, seen, strict=True)
+            ]
+            features = SegmentHistograms(np.stack(values), panorama.headings, len(self.scales))
+        else:
+            described = self._described(ctx, panorama.pixels, self.segments, True, None, errors)
+            features = SegmentHistograms(described, scales=len(self.scales))
+        if not errors:
+            return self.Out(features=features)
+        figures = {"samples": self.samples, "standard_error": float(np.mean(errors))}
+        return self.Out(features=features, metrics=Metrics({"haar_integral": figures}))
+
+    def _described(
+        self, ctx: Context, pixels: Pixels, segments: int, circle: bool, seen: Bools | None, errors: list[float]
+    ) -> Floats:
+        """Histograms of a picture's segments: (segments, scales x kernels x bins)."""
+        kernels = [
+            Kernel((scale * one, scale * other), self.angles, self.angular_weights, self.root)
+            for scale in self.scales
+            for one, other in self.kernels
+        ]
+        wrap, (rows, columns) = self.borders == "wrap", pixels.shape[:2]
+        binning = Binning(self.bins, self.histogram == "joint", self.weighted)
+        edges = segment_edges(columns, segments)
+        described = np.empty((segments, len(kernels), binning.length))
+        for k, kernel in enumerate(kernels):
+            if kernel.margin >= min(rows, columns):
+                raise BadInput(
+                    f"features: a picture of {columns} x {rows} pixels is too small for a kernel of {kernel.margin}; "
+                    "write nodes.features.kernels=[[3,4]] and nodes.features.scales=[1.0], or unwarp to a larger one"
+                )
+            picture = padded(pixels, kernel.margin + 1, wrap, wrap or circle)
+            usable = usable_pixels((rows, columns), kernel.margin, not wrap, not (wrap or circle), seen)
+            if self.integration == "full":
+                means = kernel.means(picture)
+            for j in range(segments):
+                first, end = int(edges[j]), int(edges[j + 1])
+                if self.integration == "full":
+                    part = means[:, first:end].reshape(-1, 3), usable[:, first:end].ravel()
+                    described[j, k], _ = binning.shares(*part)
+                else:
+                    row = ctx.rng.integers(0, rows, self.samples)
+                    column = ctx.rng.integers(first, end, self.samples)
+                    part = kernel.means_at(picture, row, column), usable[row, column]
+                    described[j, k], error = binning.shares(*part)
+                    errors.append(error)
+        return (described / len(self.kernels)).reshape(segments, -1).astype(np.float32)

@@ -1,0 +1,182 @@
+"""Haar integrals over rotations: what a product of two neighbours is on average as the kernel turns around a pixel.
+
+Wolf, Burgard & Burkhardt 2005, section IV, equation 4 and algorithm 1, with +t instead of -t in equation 3: the value
+at a pixel is that of its own neighbourhood (erratum 40).
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
+
+AngularWeights = Literal["equal", "linear"]
+
+
+class Taps(NamedTuple):
+    """Where a factor of the kernel is read at each angle: four pixels and their bilinear weights.
+
+    `rows`, `columns` (angles, 4): offsets from the pixel that the kernel turns around. `weights` (angles, 4).
+    """
+
+    rows: Ints
+    columns: Ints
+    weights: Floats
+
+
+def circle_taps(radius: float, angles: int, turn: float = 0.0) -> Taps:
+    """The taps at `angles` equal steps around a circle of `radius` pixels; the first lies at `turn` radians.
+
+    Angles run from the direction of growing columns to that of growing rows.
+    """
+    angle = 2.0 * math.pi * np.arange(angles) / angles + turn
+    # Rounded, so that a neighbour on the very pixel is not read from the one before with a weight of 1e-16.
+    x, y = np.round(radius * np.cos(angle), 9), np.round(radius * np.sin(angle), 9)
+    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    right, down = x - column, y - row
+    return Taps(
+        np.stack([row, row, row + 1, row + 1], axis=1),
+        np.stack([column, column + 1, column, column + 1], axis=1),
+        np.stack([(1 - right) * (1 - down), right * (1 - down), (1 - right) * down, right * down], axis=1).astype(
+            np.float32
+        ),
+    )
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _row_of_taps(flat: Floats, at: int, offsets: Ints, weights: Floats, out: Floats) -> None:
+    length = len(out)
+    s0, s1 = flat[at + offsets[0] : at + offsets[0] + length], flat[at + offsets[1] : at + offsets[1] + length]
+    s2, s3 = flat[at + offsets[2] : at + offsets[2] + length], flat[at + offsets[3] : at + offsets[3] + length]
+    w0, w1, w2, w3 = weights[0], weights[1], weights[2], weights[3]
+    for x in range(length):
+        out[x] = (w0 * s0[x] + w1 * s1[x]) + (w2 * s2[x] + w3 * s3[x])
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _means(
+    flat: Floats,
+    stride: int,
+    start: int,
+    first: Ints,
+    first_weights: Floats,
+    second: Ints,
+    second_weights: Floats,
+    linear: bool,
+    root: bool,
+    out: Floats,
+) -> None:
+    # One row of all channels at a time, angle by angle: the inner loops are whole vector instructions.
+    angles, (rows, length) = len(first), out.shape
+    share = np.float32(1.0 / angles)
+    one, other, total = np.empty(length, np.float32), np.empty(length, np.float32), np.empty(length, np.float32)
+    others = np.empty((angles if linear else 0, length), np.float32)
+    for row in range(rows):
+        at = start + row * stride
+        for p in range(angles if linear else 0):
+            _row_of_taps(flat, at, second[p], second_weights[p], others[p])
+        total[:] = np.float32(0)
+        for p in range(angles):
+            _row_of_taps(flat, at, first[p], first_weights[p], one)
+            if linear:
+                before, here, after = others[p - 1], others[p], others[p + 1 if p + 1 < angles else 0]
+                for x in range(length):
+                    other[x] = (before[x] + np.float32(4) * here[x] + after[x]) * np.float32(1.0 / 6.0)
+            else:
+                _row_of_taps(flat, at, second[p], second_weights[p], other)
+            if root:
+                for x in range(length):
+                    total[x] += np.sqrt(one[x] * other[x])
+            else:
+                for x in range(length):
+                    total[x] += one[x] * other[x]
+        for x in range(length):
+            out[row, x] = total[x] * share
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _means_at(
+    flat: Floats,
+    starts: Ints,
+    first: Ints,
+    first_weights: Floats,
+    second: Ints,
+    second_weights: Floats,
+    linear: bool,
+    root: bool,
+    out: Floats,
+) -> None:
+    angles, channels = len(first), out.shape[1]
+    share = np.float32(1.0 / angles)
+    one, other = np.empty(angles, np.float32), np.empty(angles, np.float32)
+    for n in range(len(starts)):
+        for channel in range(channels):
+            at = starts[n] + channel
+            for p in range(angles):
+                one[p] = other[p] = np.float32(0)
+                for k in range(4):
+                    one[p] += first_weights[p, k] * flat[at + first[p, k]]
+                    other[p] += second_weights[p, k] * flat[at + second[p, k]]
+            total = np.float32(0)
+            for p in range(angles):
+                there = other[p]
+                if linear:
+                    after = other[p + 1 if p + 1 < angles else 0]
+                    there = (other[p - 1] + np.float32(4) * there + after) * np.float32(1.0 / 6.0)
+                total += np.sqrt(one[p] * there) if root else one[p] * there
+            out[n, channel] = total * share
+
+
+class Kernel(NamedTuple):
+    """A product of two neighbours, f = M(0, r1) M(r2, at 90 degrees), and how it is integrated over its rotations.
+
+    `radii`: (r1, r2) pixels. `angles`: how many rotations. `weights` equal: their plain mean; linear: the mean of the
+    product of two factors that are linear between angles, which is a weighted one (1/6, 4/6, 1/6). `root`: the
+    integrand is the square root of the product.
+    """
+
+    radii: tuple[float, float]
+    angles: int = 36
+    weights: AngularWeights = "equal"
+    root: bool = False
+
+    @property
+    def margin(self) -> int:
+        """How many pixels around one it reads."""
+        return math.ceil(max(self.radii))
+
+    def _taps(self, stride: int, channels: int) -> tuple[Ints, Floats, Ints, Floats]:
+        first = circle_taps(self.radii[0], self.angles)
+        second = circle_taps(self.radii[1], self.angles, math.pi / 2)
+        return (
+            first.rows * stride + first.columns * channels,
+            first.weights,
+            second.rows * stride + second.columns * channels,
+            second.weights,
+        )
+
+    def means(self, padded: Floats) -> Floats:
+        """The integral at each pixel of a picture: (rows, columns, channels), of values in [0, 1] in [0, 1].
+
+        `padded` (rows + 2 m, columns + 2 m, channels) is the picture with m = `margin` + 1 more pixels on each side.
+        """
+        m, (rows, columns, channels) = self.margin + 1, padded.shape
+        stride = columns * channels
+        out = np.empty((rows - 2 * m, (columns - 2 * m) * channels), np.float32)
+        taps = self._taps(stride, channels)
+        _means(padded.ravel(), stride, m * stride + m * channels, *taps, self.weights == "linear", self.root, out)
+        return out.reshape(rows - 2 * m, columns - 2 * m, channels)
+
+    def means_at(self, padded: Floats, rows: Ints, columns: Ints) -> Floats:
+        """The integral at some pixels (N,), (N,) of a picture that is padded as for `means`: (N, channels)."""
+        m, (_, wide, channels) = self.margin + 1, padded.shape
+        stride = wide * channels
+        out = np.empty((len(rows), channels), np.float32)
+        starts = (rows + m) * stride + (columns + m) * channels
+        _means_at(padded.ravel(), starts, *self._taps(stride, channels), self.weights == "linear", self.root, out)
+        return out

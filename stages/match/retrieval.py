@@ -1,0 +1,151 @@
+"""Similarity as image retrieval has it: the intersection of histograms over what the query holds."""
+
+import math
+from typing import Annotated
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Stage
+from omninav.pipeline.problems import BadInput
+from omninav.stages.geometry.se2 import wrap
+from omninav.stages.geometry.segments import LANES, turned_views
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.features import SegmentHistograms
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.reach import Reach
+from omninav.stages.values.similarity import Answers, Similarities
+
+from .candidates import NearBelief, check_alike
+
+Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
+
+
+@numba.njit(cache=True, nogil=True)
+def _intersect(references: Floats, chosen: Ints, query: Floats, sums: Floats, held: Ints, out: Floats) -> None:
+    # Turns of the query are the innermost axis: each loop over them is vector instructions.
+    scales, segments, bins, lanes = query.shape
+    common, total, best = np.empty(lanes, np.float32), np.empty(lanes, np.float32), np.empty(lanes, np.float32)
+    for n in range(len(chosen)):
+        reference = references[chosen[n]]
+        best[:] = np.float32(0)
+        for own in range(scales):
+            # One of the two is always taken at its first scale: scales of both at once would cancel.
+            for other in range(scales if own == 0 else 1):
+                total[:] = np.float32(0)
+                for j in range(segments):
+                    common[:] = np.float32(0)
+                    for k in range(held[own, j, 0]):
+                        b = held[own, j, 1 + k]
+                        here, there = reference[j, other * bins + b], query[own, j, b]
+                        if here > 0:
+                            for h in range(lanes):
+                                common[h] += there[h] if there[h] < here else here
+                    for h in range(lanes):
+                        total[h] += common[h] * sums[own, j, h]
+                for h in range(lanes):
+                    best[h] = total[h] if total[h] > best[h] else best[h]
+        for h in range(out.shape[1]):
+            out[n, h] = best[h]
+
+
+def normalised_intersections(
+    references: Floats, queries: Floats, scales: int = 1, chosen: Ints | None = None
+) -> Floats:
+    """Similarity of a query at some turns to references: (chosen, turns) float32 in [0, 1].
+
+    sum_k min(q_k, d_k) / sum_k q_k of a query's histogram q and a reference's d, in this order (Wolf, Burgard &
+    Burkhardt 2005, equation 5; erratum 43), on average over segments. `references` (R, segments, scales x bins),
+    `queries` (turns, segments, scales x bins): of several scales the best is taken, the query at its first scale
+    against each of the reference's, and the other way round. A segment whose query holds nothing counts as 0. `chosen`:
+    indices of the references to compare; None: all.
+    """
+    chosen = np.arange(len(references)) if chosen is None else chosen
+    turns, segments, length = queries.shape
+    query = np.zeros((scales, segments, length // scales, -(-turns // LANES) * LANES), np.float32)
+    query[..., :turns] = queries.reshape(turns, segments, scales, -1).transpose(2, 1, 3, 0)
+    sums = query.sum(axis=2, dtype=np.float64) * segments
+    weights = np.divide(1.0, sums, out=np.zeros_like(sums), where=sums > 0.0).astype(np.float32)
+    held = np.zeros((scales, segments, 1 + length // scales), np.int64)  # which bins any turn of the query holds
+    for own, j in np.ndindex(scales, segments):
+        bins = np.flatnonzero(query[own, j].any(axis=1))
+        held[own, j, 0], held[own, j, 1 : 1 + len(bins)] = len(bins), bins
+    out = np.empty((len(chosen), turns), np.float32)
+    _intersect(np.ascontiguousarray(references, np.float32), chosen, query, weights, held, out)
+    return np.minimum(out, np.float32(1.0))
+
+
+def window_turns(directions: npt.NDArray[np.float64]) -> Ints:
+    """Which of some windows a robot sees a reference's picture in, if turned by 2 pi h / W from it: (W,) indices.
+
+    `directions` (W,): where the windows look, evenly around the robot and one of them straight ahead. Raises BadInput
+    where they do not.
+    """
+    number = len(directions)
+    turns = -directions * number / (2.0 * math.pi)
+    nearest = np.round(turns)
+    columns = nearest.astype(np.int64) % number
+    if np.abs(turns - nearest).max() > 0.01 * number or len(np.unique(columns)) < number:
+        shown = ", ".join(f"{math.degrees(d):g}" for d in directions)
+        raise BadInput(
+            f"match: pictures that look towards {shown} deg are not evenly around the robot with one straight ahead; "
+            "give the camera yaw: 0 and turn the robot's frame, or use unwarp=by_camera or unwarp=window"
+        )
+    windows = np.empty(number, np.int64)
+    windows[columns] = np.arange(number)
+    return windows
+
+
+class Retrieval(NearBelief, Stage):
+    """Similarity as image retrieval has it: the intersection of histograms, over what the query holds.
+
+    Wolf, Burgard & Burkhardt 2005, section IV, equation 5: sum min(q, d) / sum q, the mean over a panorama's segments,
+    at `headings` turns; where features come at several scales, at the best one. Windows each look for themselves:
+    column h is the window that looks where a reference does if the robot is turned by 2 pi h / W from it; a single one
+    has one column. `answers`: the `best` most similar references, each at its best heading.
+    All references are compared; with a `radius`, those near the belief (candidates.NearBelief). Raises BadInput where
+    the map was learned with other features.
+    """
+
+    radius: Annotated[float, Bounds(ge=0)] = 0.0
+    best: Annotated[int, Bounds(ge=1)] = 9
+
+    class Out(NearBelief.Out):
+        """How alike view and references are, and the answers to the query."""
+
+        answers: Answers | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        features: SegmentHistograms,
+        map: ReferenceGraph,
+        near: Particles | None = None,
+        reach: Reach | None = None,
+    ) -> Out:
+        """Look one view up."""
+        if features.directions is None:
+            check_alike(features, map)
+            headings = self.headings if len(features.values) > 1 else 1
+            queries = turned_views(features.values, headings)
+        else:
+            check_alike(SegmentHistograms(features.values[:1]), map)
+            queries = features.values[window_turns(features.directions), None]
+        chosen, stands_for = self.candidates(ctx, map, near, reach)
+        values = normalised_intersections(map.features, queries, features.scales, chosen)
+        similarities = Similarities(values, chosen, stands_for)
+        if not len(map) or not ctx.is_read("answers"):
+            return self.Out(similarities=similarities)
+        return self.Out(similarities=similarities, answers=best_answers(similarities, self.best))
+
+
+def best_answers(similarities: Similarities, number: int) -> Answers:
+    """The `number` most similar references, the most similar first, equal ones in the map's order."""
+    values, headings = similarities.values, similarities.values.shape[1]
+    turns = values.argmax(axis=1)
+    peaks = values[np.arange(len(values)), turns]
+    rows = np.argsort(-peaks, kind="stable")[:number]
+    references = rows if similarities.candidates is None else similarities.candidates[rows]
+    return Answers(references, peaks[rows], wrap(2.0 * np.pi * turns[rows] / headings))

@@ -1,0 +1,77 @@
+import math
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.pipeline.artifact import write_artifact
+from omninav.pipeline.problems import BadInput
+from omninav.stages.features.haar_integral import HaarIntegral
+from omninav.stages.mapping.image_database import ImageDatabase, LastTaken
+from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
+from omninav.stages.values.image import Windows
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
+
+Tour = list[tuple[float, float, float]]
+
+
+def views(segments: int, bins: int = 8, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).random((segments, bins)).astype(np.float32) / bins
+
+
+def learned(stage: ImageDatabase, tour: Tour, features: SegmentFeatures, odometry_only: bool = False) -> ReferenceGraph:
+    ctx, map, last = Context("mapping"), ReferenceGraph.empty(), LastTaken()
+    for number, pose in enumerate(tour):
+        ctx.tick = Tick(number, number, first_of_log=number == 0)
+        truth = None if odometry_only else Pose(*pose)
+        map = stage.step(ctx, features, Pose(*pose), truth, map, last).map
+    return map
+
+
+STRAIGHT: Tour = [(0.1 * number, 0.0, 0.0) for number in range(21)]
+
+
+def test_every_picture_is_a_reference_by_default_and_they_are_joined_in_order() -> None:
+    map = learned(ImageDatabase(), STRAIGHT, SegmentHistograms(views(4)))
+    assert np.allclose(map.poses, STRAIGHT)
+    assert map.features.shape == (21, 4, 8)
+    assert map.edges.tolist() == [[n, n + 1] for n in range(20)]
+    assert map.pose_source == "truth"
+
+
+def test_pictures_are_as_far_apart_as_asked() -> None:
+    map = learned(ImageDatabase(apart_m=0.45), STRAIGHT, SegmentHistograms(views(4)))
+    assert np.allclose(map.poses[:, 0], [0.0, 0.5, 1.0, 1.5, 2.0])
+    turning: Tour = [(0.0, 0.0, math.radians(10.0 * number)) for number in range(37)]
+    map = learned(ImageDatabase(apart_m=0.45, apart_deg=25.0), turning, SegmentHistograms(views(4)))
+    assert np.allclose(np.degrees(map.poses[:, 2]), np.arange(0, 361, 30))
+    assert len(learned(ImageDatabase(apart_m=0.45), turning, SegmentHistograms(views(4)))) == 1
+
+
+def test_each_window_is_a_reference_that_looks_its_own_way() -> None:
+    directions = np.array([0.0, math.pi / 2, math.pi, -math.pi / 2])
+    tour: Tour = [(0.0, 0.0, 0.0), (1.0, 2.0, 3.0)]
+    seen = SegmentHistograms(views(4), directions)
+    map = learned(ImageDatabase(), tour, seen)
+    assert map.features.shape == (8, 1, 8)
+    assert np.array_equal(map.features[4:, 0], seen.values)
+    assert np.allclose(map.poses[4:, :2], (1.0, 2.0))
+    assert np.allclose(np.exp(1j * map.poses[4:, 2]), np.exp(1j * (3.0 + directions)))
+    assert (np.abs(map.poses[:, 2]) <= math.pi).all()
+    assert map.edges.tolist() == [[n, n + 4] for n in range(4)]
+
+
+def test_poses_are_odometry_where_there_is_no_truth_unless_truth_is_asked_for() -> None:
+    map = learned(ImageDatabase(), STRAIGHT, SegmentHistograms(views(4)), odometry_only=True)
+    assert map.pose_source == "odometry"
+    with pytest.raises(BadInput, match="no ground truth for its first picture"):
+        learned(ImageDatabase(supervised="truth"), STRAIGHT, SegmentHistograms(views(4)), odometry_only=True)
+
+
+def test_the_paper_s_936_images_take_at_most_4_megabytes(tmp_path) -> None:
+    picture = np.random.default_rng(1).integers(0, 256, (1, 60, 80, 3), dtype=np.uint8)
+    features = HaarIntegral().step(Context("features"), Windows(picture, np.zeros(1), 1.0)).features
+    map = learned(ImageDatabase(), [(0.01 * n, 0.0, 0.0) for n in range(936)], features)
+    write_artifact(tmp_path / "map.omap", map)
+    assert (tmp_path / "map.omap").stat().st_size <= 4e6
