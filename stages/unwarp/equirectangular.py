@@ -8,6 +8,7 @@ import numpy as np
 from omninav.pipeline import Bounds
 from omninav.pipeline.problems import BadInput
 from omninav.stages.values.camera import Camera, Equirectangular
+from omninav.stages.values.image import column_azimuths
 
 from .strip import strip_columns
 from .table import Table, TableUnwarp, fixed_point, other_camera
@@ -27,7 +28,7 @@ def equirectangular_table(
     elevation = top + (bottom - top) * (np.arange(rows) + 0.5) / rows
     per_row = (camera.elevation_bottom - camera.elevation_top) / camera.height_px
     v = np.clip((elevation - camera.elevation_top) / per_row - 0.5, 0.0, camera.height_px - 1.0)
-    u_all, v_all = np.meshgrid(strip_columns(camera, columns), v)
+    u_all, v_all = np.meshgrid(strip_columns(camera, column_azimuths(columns)), v)
     return fixed_point(u_all, v_all, top, bottom, wraps=True)
 
 

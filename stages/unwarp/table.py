@@ -31,11 +31,14 @@ class Table(NamedTuple):
     elevation_bottom: float | None = None
     wraps: bool = False
 
+    def remapped(self, pixels: Pixels) -> Pixels:
+        """Another picture made of this one; what lies outside the picture is black."""
+        border = cv2.BORDER_WRAP if self.wraps else cv2.BORDER_CONSTANT
+        return cast(Pixels, cv2.remap(pixels, self.whole, self.part, cv2.INTER_LINEAR, borderMode=border))
+
     def apply(self, pixels: Pixels) -> Panorama:
         """The panorama of a picture; what lies outside the picture is black."""
-        border = cv2.BORDER_WRAP if self.wraps else cv2.BORDER_CONSTANT
-        mapped = cv2.remap(pixels, self.whole, self.part, cv2.INTER_LINEAR, borderMode=border)
-        return Panorama(cast(Pixels, mapped), self.elevation_top, self.elevation_bottom)
+        return Panorama(self.remapped(pixels), self.elevation_top, self.elevation_bottom)
 
 
 def fixed_point(

@@ -1,0 +1,118 @@
+"""Cuts perspective windows from an omnidirectional picture: what ordinary cameras in its place would see."""
+
+import math
+from typing import Annotated, NamedTuple, cast
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.problems import BadInput
+from omninav.stages.geometry.se2 import wrap
+from omninav.stages.values.camera import Camera, Perspective
+from omninav.stages.values.image import Image, Pixels, Windows
+
+from .rays import pixels_of_rays
+from .table import Table, fixed_point
+
+Array = npt.NDArray[np.float64]
+
+
+def window_rays(heading: float, pitch: float, field: float, columns: int, rows: int) -> Array:
+    """Directions (rows, columns, 3) in the robot's frame that the pixels of a perspective picture look along.
+
+    `heading` (rad, counter-clockwise from forward) and `pitch` (rad above the horizon) of its optical axis, `field` its
+    horizontal field of view (rad). Pixels are square.
+    """
+    focal = columns / (2.0 * math.tan(field / 2.0))
+    right = (np.arange(columns) + 0.5 - columns / 2.0) / focal
+    up = (rows / 2.0 - 0.5 - np.arange(rows)) / focal
+    ahead = math.cos(pitch) - math.sin(pitch) * up[:, None] + 0.0 * right
+    high = math.sin(pitch) + math.cos(pitch) * up[:, None] + 0.0 * right
+    left = -right + 0.0 * up[:, None]
+    cos, sin = math.cos(heading), math.sin(heading)
+    return np.stack([cos * ahead - sin * left, sin * ahead + cos * left, high], axis=-1)
+
+
+class WindowTable(NamedTuple):
+    """A camera's windows, one below the other as one remap `table`; `seen` (W, rows, columns) or None: all is seen."""
+
+    table: Table
+    seen: npt.NDArray[np.bool_] | None
+
+    def windows(self, pixels: Pixels, headings: Array, field: float, rows: int) -> Windows:
+        """Windows of a picture; black where the camera sees nothing."""
+        cut = self.table.remapped(pixels)
+        cut = cut.reshape(len(headings), rows, *cut.shape[1:])
+        if self.seen is not None:
+            cut[~self.seen] = 0
+        return Windows(cut, headings, field, self.seen)
+
+
+class PerspectiveWindow(Stage):
+    """Perspective windows cut from an omnidirectional picture, or the picture of an ordinary camera as it is.
+
+    Wolf, Burgard & Burkhardt 2005, section VI: their robot has ordinary cameras. `directions`: how many windows,
+    evenly around the robot, counter-clockwise from straight ahead; 1: an ordinary camera that looks ahead. Each shows
+    `field_deg` horizontally in `columns` x `rows` square pixels, its axis `pitch_deg` above the horizon. What the
+    camera does not see is black there, and said. An ordinary camera's picture is only resized, and shows what it shows.
+    Raises BadInput for a camera of which elevations are not known, windows that show nothing, and several
+    `directions` of an ordinary camera.
+    """
+
+    directions: Annotated[int, Bounds(ge=1)] = 1
+    field_deg: Annotated[float, Bounds(gt=0, lt=180)] = 60.0
+    columns: Annotated[int, Bounds(ge=8)] = 320
+    rows: Annotated[int, Bounds(ge=1)] = 240
+    pitch_deg: Annotated[float, Bounds(ge=-90, le=90)] = 0.0
+
+    class Out(Outputs):
+        """The windows, where other unwarps give a panorama."""
+
+        panorama: Windows
+
+    def setup(self, ctx: Context) -> None:
+        """No table yet: the camera comes with the first picture."""
+        self._camera: Camera | None = None
+        self._table: WindowTable | None = None
+
+    def step(self, ctx: Context, image: Image, camera: Camera) -> Out:
+        """Cut the windows of one picture."""
+        if isinstance(camera, Perspective):
+            return self.Out(panorama=self._ordinary(image, camera))
+        headings = wrap(2.0 * math.pi * np.arange(self.directions) / self.directions)
+        if self._table is None or camera is not self._camera:
+            self._table, self._camera = self._built(ctx, camera, headings), camera
+        return self.Out(panorama=self._table.windows(image.pixels, headings, math.radians(self.field_deg), self.rows))
+
+    def _built(self, ctx: Context, camera: Camera, headings: Array) -> WindowTable:
+        size = math.radians(self.pitch_deg), math.radians(self.field_deg), self.columns, self.rows
+        rays = np.stack([window_rays(float(heading), *size) for heading in headings])
+        u, v = pixels_of_rays(camera, rays)
+        seen = ~(np.isnan(u) | np.isnan(v))
+        if not seen.any():
+            raise BadInput(
+                f"unwarp: the camera sees nothing of a window of {self.field_deg:g} deg at {self.pitch_deg:g} deg "
+                "above the horizon; set nodes.unwarp.pitch_deg and field_deg"
+            )
+        dark = 1.0 - float(seen.mean())
+        if dark > 0.0:
+            ctx.count(
+                "windows_beyond_the_camera",
+                detail=f"unwarp: {100 * dark:.1f} % of the windows lie outside of what the camera sees, and are black; "
+                "nodes.unwarp.pitch_deg or a smaller field_deg moves them inside",
+            )
+        table = fixed_point(u.reshape(-1, self.columns), v.reshape(-1, self.columns), wraps=True)
+        return WindowTable(table, None if dark == 0.0 else seen)
+
+    def _ordinary(self, image: Image, camera: Perspective) -> Windows:
+        if self.directions > 1:
+            raise BadInput(
+                f"unwarp: an ordinary camera looks one way, not {self.directions}; write nodes.unwarp.directions=1"
+            )
+        pixels, size = image.pixels, (self.columns, self.rows)
+        if pixels.shape[1::-1] != size:
+            pixels = cast(Pixels, cv2.resize(pixels, size, interpolation=cv2.INTER_AREA))
+        field = 2.0 * math.atan(camera.width / (2.0 * camera.focal_x))
+        return Windows(pixels[np.newaxis], np.array([camera.yaw]), field)
