@@ -9,6 +9,7 @@ from omninav.pipeline.problems import BadInput
 from omninav.stages.geometry.particles import uniform_around
 from omninav.stages.geometry.se2 import wrap
 from omninav.stages.values.belief import Particles
+from omninav.stages.values.grid import FreeSpace
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.reach import Reach
@@ -17,11 +18,10 @@ from omninav.stages.values.reach import Reach
 class Start(Stage):
     """A belief at the first picture of each log, and none later.
 
-    `at`: `uniform` over the area within `around` reaches (port `reach`, else of `reach_m`) of the map's references, all
-    headings; `truth`, the log's first true
-    pose; `origin`; or x, y, heading, sigma of position, sigma of heading (m, m, rad, m, rad). `truth` and `origin` are
-    spread by 0.1 m and 0.1 rad.
-    Raises BadInput where `truth` or a map is asked for and there is none.
+    `at`: `uniform` over the free space (port `area`), where that is wired, else over the area within `around` reaches
+    (port `reach`, else of `reach_m`) of the map's references, all headings; `truth`, the log's first true pose;
+    `origin`; or x, y, heading, sigma of position, sigma of heading (m, m, rad, m, rad). `truth` and `origin` are spread
+    by 0.1 m and 0.1 rad. Raises BadInput where `truth` or a map is asked for and there is none.
     """
 
     at: Literal["uniform", "truth", "origin"] | tuple[float, float, float, float, float] = "uniform"
@@ -34,11 +34,20 @@ class Start(Stage):
 
         belief: Particles | None = None
 
-    def step(self, ctx: Context, map: ReferenceGraph | None, truth: Pose | None, reach: Reach | None = None) -> Out:
+    def step(
+        self,
+        ctx: Context,
+        map: ReferenceGraph | None,
+        truth: Pose | None,
+        reach: Reach | None = None,
+        area: FreeSpace | None = None,
+    ) -> Out:
         """Give the first belief."""
         if not ctx.tick.first_of_log:
             return self.Out()
-        if self.at == "uniform":
+        if self.at == "uniform" and area is not None:
+            poses = area.draw(ctx.rng, self.number)
+        elif self.at == "uniform":
             if map is None or not len(map):
                 raise BadInput(
                     "start: `uniform` needs a map with references; use start=origin, start=truth, or give a map"

@@ -1,0 +1,74 @@
+"""Bootstrap resampling with random samples, and a first belief over free space."""
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.pipeline.problems import BadInput
+from omninav.stages.fusion.random_samples import RandomSamples
+from omninav.stages.fusion.start import Start
+from omninav.stages.values.belief import Likelihood, Particles
+from omninav.stages.values.grid import FreeSpace
+
+AREA = FreeSpace(np.array([[50.5, 50.5], [51.5, 50.5]]), 1.0)
+
+
+def belief(number: int, spread: float = 1.0) -> Particles:
+    return Particles(np.random.default_rng(0).normal(0, spread, (number, 3)), np.full(number, 1 / number))
+
+
+def fuse(stage: RandomSamples, particles: Particles, values: np.ndarray, area: FreeSpace | None, seed: int = 0):
+    ctx = Context("fusion", np.random.default_rng(seed))
+    return stage.step(ctx, particles, Likelihood(values), area).belief, ctx
+
+
+def test_random_samples_replace_as_many_resampled_ones_and_weigh_alike():
+    out, _ = fuse(RandomSamples(), belief(5000), np.ones(5000), AREA)
+    assert len(out.poses) == 5000
+    assert np.allclose(out.weights, 1 / 5000)
+    anywhere = out.poses[:, 0] > 40
+    assert anywhere.sum() == 50
+    assert (out.poses[anywhere, 0] >= 50).all()
+    assert (out.poses[anywhere, 0] < 52).all()
+
+
+def test_the_others_are_drawn_by_weight_times_likelihood():
+    # A Gaussian times a Gaussian likelihood: the posterior mean is worked by hand, (0 + 0.5 / 0.1^2) / (1 + 1 / 0.1^2).
+    particles = belief(50_000)
+    values = np.exp(-0.5 * ((particles.poses[:, 0] - 0.5) / 0.1) ** 2)
+    out, _ = fuse(RandomSamples(random=0), particles, values, None)
+    assert len(out.poses) == 5000
+    assert out.poses[:, 0].mean() == pytest.approx(50 / 101, abs=0.01)
+    assert out.poses[:, 0].std() == pytest.approx((1 / 101) ** 0.5, rel=0.1)
+
+
+@pytest.mark.parametrize("values", [np.zeros(1000), np.full(1000, np.nan), np.full(1000, np.inf)])
+def test_a_view_that_nothing_explains_is_passed_over_and_told_of(values: np.ndarray):
+    out, ctx = fuse(RandomSamples(number=1000, random=0), belief(1000), values, None)
+    assert np.allclose(np.sort(out.poses[:, 0]), np.sort(belief(1000).poses[:, 0]))
+    assert ctx.counts["belief_without_support"] == 1
+
+
+def test_the_same_seed_gives_the_same_samples():
+    one, other = (fuse(RandomSamples(), belief(5000), np.linspace(0, 1, 5000), AREA, seed=4)[0] for _ in range(2))
+    assert np.array_equal(one.poses, other.poses)
+
+
+def test_all_samples_may_be_random():
+    out, _ = fuse(RandomSamples(number=40, random=50), belief(40), np.ones(40), AREA)
+    assert len(out.poses) == 40
+    assert (out.poses[:, 0] > 40).all()
+
+
+def test_random_samples_without_a_free_space_are_refused_in_one_line():
+    with pytest.raises(BadInput, match=r"fusion\.area"):
+        fuse(RandomSamples(), belief(10), np.ones(10), None)
+
+
+def test_a_uniform_start_is_spread_over_the_free_space_where_it_is_wired():
+    ctx = Context("first_belief", np.random.default_rng(0))
+    ctx.tick = Tick(0, 0, first_of_log=True)
+    first = Start(number=4000).step(ctx, None, None, area=AREA).belief
+    assert first.poses[:, 0].min() >= 50
+    assert first.poses[:, 0].mean() == pytest.approx(51, abs=4 * (2 / 12**0.5) / 4000**0.5)
+    assert np.abs(first.poses[:, 2]).max() == pytest.approx(np.pi, abs=0.01)
