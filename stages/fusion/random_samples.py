@@ -42,8 +42,9 @@ class RandomSamples(Stage):
             ctx.count("belief_without_support", detail="fusion: no particle explains the picture; weights kept")
             weights = particles.weights
         number = min(self.random, self.number)
-        drawn = systematic(weights, self.number - number, float(ctx.rng.random())) if number < self.number else []
-        poses = particles.poses[drawn]
+        poses = np.empty((0, 3))
+        if number < self.number:
+            poses = particles.poses[systematic(weights, self.number - number, float(ctx.rng.random()))]
         if area is not None and number:
             poses = np.concatenate([poses, area.draw(ctx.rng, number)])
         return self.Out(belief=Particles(poses, np.full(self.number, 1.0 / self.number)))
