@@ -115,10 +115,11 @@ class HaarIntegral(Stage):
     Wolf, Burgard & Burkhardt 2005, section IV. A kernel (r1, r2) is f = M(0, r1) M(r2, at 90 degrees), in pixels; it is
     averaged over `angles` rotations around each pixel, per colour channel, with bilinear interpolation (equation 4,
     errata 40 and 42), and the averages are counted: `histogram` joint or separate over the channels, `bins` per
-    channel, `weighted` or not (Binning). The histograms of several kernels follow one another with equal shares of the
-    mass, and all of them once for each of the `scales` that kernels are enlarged by. `root`: of the square root of the
-    product, whose values fill the bins more evenly. `angular_weights` linear: weighted means against the discretisation
-    of the angle (rotation_means.Kernel).
+    channel, `weighted` or not (Binning); null: 8 of windows, 5 of a panorama's segments, with either of which the
+    paper's 936 images stay below its 4 MB. The histograms of several kernels follow one another with equal shares of
+    the mass, and all of them once for each of the `scales` that kernels are enlarged by. `root`: of the square root of
+    the product, whose values fill the bins more evenly. `angular_weights` linear: weighted means against the
+    discretisation of the angle (rotation_means.Kernel).
 
     `borders` crop (erratum 41): pixels whose neighbours lie outside the picture count nowhere, so that histograms sum
     to less than 1; a panorama goes on around the circle. wrap: the paper's "modulo N", both ways, of all pictures.
@@ -134,7 +135,7 @@ class HaarIntegral(Stage):
     angular_weights: AngularWeights = "equal"
     root: bool = True
     histogram: Literal["joint", "separate"] = "joint"
-    bins: Annotated[int, Bounds(ge=1, le=64)] = 8
+    bins: Annotated[int, Bounds(ge=1, le=64)] | None = None
     weighted: bool = True
     segments: Annotated[int, Bounds(ge=1)] = 8
     borders: Borders = "crop"
@@ -160,20 +161,30 @@ class HaarIntegral(Stage):
         if isinstance(panorama, Windows):
             seen = [None] * len(panorama.pixels) if panorama.seen is None else list(panorama.seen)
             values = [
-                self._described(ctx, pixels, 1, False, part, errors)[0]
+                self._described(ctx, pixels, 1, self._binning(8), part, errors)[0]
                 for pixels, part in zip(panorama.pixels, seen, strict=True)
             ]
             features = SegmentHistograms(np.stack(values), panorama.headings, len(self.scales))
         else:
-            described = self._described(ctx, panorama.pixels, self.segments, True, None, errors)
+            described = self._described(ctx, panorama.pixels, self.segments, self._binning(5), None, errors, True)
             features = SegmentHistograms(described, scales=len(self.scales))
         if not errors:
             return self.Out(features=features)
         figures = {"samples": self.samples, "standard_error": float(np.mean(errors))}
         return self.Out(features=features, metrics=Metrics({"haar_integral": figures}))
 
+    def _binning(self, bins: int) -> Binning:
+        return Binning(bins if self.bins is None else self.bins, self.histogram == "joint", self.weighted)
+
     def _described(
-        self, ctx: Context, pixels: Pixels, segments: int, circle: bool, seen: Bools | None, errors: list[float]
+        self,
+        ctx: Context,
+        pixels: Pixels,
+        segments: int,
+        binning: Binning,
+        seen: Bools | None,
+        errors: list[float],
+        circle: bool = False,
     ) -> Floats:
         """Histograms of a picture's segments: (segments, scales x kernels x bins)."""
         kernels = [
@@ -182,7 +193,6 @@ class HaarIntegral(Stage):
             for one, other in self.kernels
         ]
         wrap, (rows, columns) = self.borders == "wrap", pixels.shape[:2]
-        binning = Binning(self.bins, self.histogram == "joint", self.weighted)
         edges = segment_edges(columns, segments)
         described = np.empty((segments, len(kernels), binning.length))
         for k, kernel in enumerate(kernels):
