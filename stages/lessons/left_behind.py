@@ -56,19 +56,20 @@ class LeftBehind(Stage):
     cannot be what was believed are learned with it: once more, where they had been learned. It
     looks back over `longest` views.
 
-    `back_propagate`: for robots that nobody lifts (Porta & Kroese 2004, section 3.2, last sentence). Where the map
+    `back_propagate` (Porta & Kroese 2004, section 3.2, last sentence, for robots that nobody lifts). Where the map
     makes the state at least `improved` times as certain (the root of the determinants' ratio) as it was one picture
     before, and odometry leads there, the states since it was last known as well are worked out from both ends (ten
     Hagen & Kroese 2002), and those that are known better by it take the place of what was learned; so do those that
-    `retrace` puts right. A jump, which odometry does not explain, ends it. `mapping=fused_mixtures` takes lessons back,
-    other maps learn them once more.
+    `retrace` puts right. A jump, which odometry does not explain, ends it, so that a robot that is lifted now and then
+    gains by it too (docs/experiments/cml_defaults.md). `mapping=fused_mixtures` takes lessons back, other maps learn
+    them once more.
     """
 
     metres: Annotated[float, Bounds(ge=0)] = 4.0
     longest: Annotated[int, Bounds(ge=0)] = 500
     retrace: bool = True
     missed_below: Annotated[float, Bounds(ge=0)] = 16.3
-    back_propagate: bool = False
+    back_propagate: bool = True
     improved: Annotated[float, Bounds(gt=1)] = 2.0
 
     class Out(Outputs):

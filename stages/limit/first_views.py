@@ -42,7 +42,7 @@ class FirstViewsLimit(Stage):
     The first `views` views between which the robot moved by `least_m` count; until then the limit follows from those so
     far, not settled, and there is none before the first pair. It is settled in the first log and holds for all that
     follow; a map keeps it, and where there is a `known` one that has it, nothing is measured. Manifest fact
-    `view_limit`. Once settled, the limit says how many metres a robot drives until it is reached.
+    `view_limit`. The limit says how many metres a robot drives until it is reached.
     """
 
     views: Annotated[int, Bounds(ge=2)] = 100
@@ -85,9 +85,9 @@ class FirstViewsLimit(Stage):
             return
         distance = self.share * float(np.median(pairs))
         ctx.fact("view_limit", round(distance, 4))
-        first.limit = ViewLimit(distance, settled=False)
-        if len(first.views) >= self.views:
-            first.limit = ViewLimit(distance, metres=way_beyond(distance, first.table, first.ways))
+        settled = len(first.views) >= self.views
+        first.limit = ViewLimit(distance, settled, way_beyond(distance, first.table, first.ways))
+        if settled:
             first.views, first.table, first.ways = first.views[:0], [], []
 
 

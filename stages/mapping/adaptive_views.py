@@ -132,7 +132,7 @@ class AdaptiveViews(Stage):
         turns[rows] = view.turns(map.views[rows])
         self._take_in(state, alike, turns, map)
         weights = np.empty(len(map.weights))
-        alike_m = (0.0 if limit is None else limit.metres) or UNMEASURED_M
+        alike_m = (limit.metres if limit is not None and limit.settled else 0.0) or UNMEASURED_M
         _weigh(
             state.means,
             state.covariances,

@@ -69,7 +69,7 @@ class ViewLimit(Value):
     """The distance between views within which they count as the same place's: delta_y, E_max. In the views' unit.
 
     `settled`: False while it is still being measured. `metres`: how far a robot drives until what it sees is beyond the
-    limit, 0 where nobody measured that.
+    limit, as far as is known by now, 0 where nobody measured that.
     """
 
     distance: float

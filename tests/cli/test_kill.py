@@ -66,7 +66,7 @@ def written(checkpoint: Path) -> int:
 def test_a_run_killed_while_views_wait_to_be_learned_or_may_be_taken_back_resumes_to_the_same_bytes(tmp_path: Path):
     """Each view waits for 4 m, some 18 pictures, and what it taught is put right later: at any moment some wait."""
     logs = f"log=[{DATA / 'photoreal-house' / 'tour.mcap'},{DATA / 'photoreal-house' / 'drive.mcap'}]"
-    words = ("variant=particle_cml", logs, "nodes.source.stop=90", "nodes.lessons.back_propagate=true", "cache=null")
+    words = ("variant=particle_cml", logs, "nodes.source.stop=90", "cache=null")
     for place in (tmp_path / "whole", tmp_path / "killed"):
         place.mkdir()
     assert start(tmp_path / "whole", *words).wait(timeout=300) == 0

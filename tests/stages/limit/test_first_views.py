@@ -40,8 +40,9 @@ def test_one_apart_all_pairs_count() -> None:
     assert [told(limit) for limit in found] == [None, (2.0, False), (2.0, False), (3.0, True), (3.0, True)]
 
 
-def test_a_settled_limit_says_how_far_a_robot_drives_until_it_is_reached() -> None:
-    limit = limits(FirstViewsLimit(views=5, apart=2), [0, 1, 3, 7, 8])[0][-1]
+@pytest.mark.parametrize("views", [5, 100], ids=["settled", "being measured"])
+def test_a_limit_says_how_far_a_robot_drives_until_it_is_reached(views: int) -> None:
+    limit = limits(FirstViewsLimit(views=views, apart=2), [0, 1, 3, 7, 8])[0][-1]
     assert limit is not None
     # From 0 the first view at 3.25 or more is 7, three steps of 0.1 m on; from 1 and from 3 it is 7 too: 0.3, 0.2, 0.1.
     assert limit.metres == pytest.approx(0.2)

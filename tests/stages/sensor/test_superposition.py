@@ -12,7 +12,7 @@ from omninav.stages.geometry.se2 import wrap
 from omninav.stages.sensor.superposition import Superposition
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import Neighbours
+from omninav.stages.values.views import Neighbours, ViewLimit
 
 CTX = Context("sensor")
 
@@ -107,3 +107,22 @@ def test_it_is_the_sum_over_views_and_components_written_as_two_loops() -> None:
             turned = means[k : k + 1] + np.array([0, 0, turns[j]])
             wanted += alike[j] * density(points, turned, covariances[k : k + 1], weights[k : k + 1])
     assert density(points, found.means, found.covariances, found.weights) == pytest.approx(wanted, rel=1e-9)
+
+
+def test_a_view_with_an_extent_may_be_seen_from_around_where_it_was_learned() -> None:
+    # At 0.25 and at half of the limit, of a drive whose views reach it after 2 m: 0.5 m and 1 m in x and in y.
+    stage, limit = Superposition(extent=True), ViewLimit(2.0, metres=2.0)
+    neighbours = Neighbours(np.array([1, 0]), np.array([0.5, 1.0]), np.array([0.75, 0.5]), np.zeros(2), 0.5)
+    wide, plain = stage.step(CTX, neighbours, TWO, limit).hypothesis, said(Superposition(), neighbours)
+    assert wide is not None
+    added = wide.covariances - plain.covariances
+    assert added == pytest.approx(np.array([np.diag([way**2, way**2, 0.0]) for way in (1.0, 0.5, 0.5)]))
+    np.testing.assert_array_equal(wide.means, plain.means)
+    np.testing.assert_array_equal(wide.weights, plain.weights)
+
+
+@pytest.mark.parametrize("limit", [None, ViewLimit(2.0), ViewLimit(0.0, metres=2.0)])
+def test_without_a_measured_way_there_is_no_extent(limit: ViewLimit | None) -> None:
+    found = Superposition(extent=True).step(CTX, near([1], [0.9]), TWO, limit).hypothesis
+    assert found is not None
+    np.testing.assert_array_equal(found.covariances, said(Superposition(), near([1], [0.9])).covariances)
