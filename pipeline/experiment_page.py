@@ -5,6 +5,7 @@ import itertools
 import json
 import math
 import shlex
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -271,7 +272,7 @@ def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
     colours = {
         name: PALETTE[n % len(PALETTE)] for n, name in enumerate(dict.fromkeys(_named(c, shown) for c in conditions))
     }
-    heights: list[float] = []
+    levels: list[float] = []  # of each line: a map that grows from one reference is no reason for powers of ten
     with picture(4.6 * len(boxes) + 0.4, 3.8) as drawn:
         grid = drawn.canvas.subplots(1, len(boxes), squeeze=False, sharey=True)[0]
         for axes, box in zip(grid, boxes, strict=True):
@@ -288,7 +289,7 @@ def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
                     continue
                 y = curve.times * y
                 name, middle = _named(condition, shown), np.nanmean(y, axis=0)
-                heights += [float(each) for each in middle]
+                levels.append(float(np.nanmedian(middle)))
                 marker = "o" if len(x) <= 30 else None
                 axes.plot(
                     x, middle, color=colours[name], label=name or "ours", linewidth=1.5, marker=marker, markersize=3
@@ -297,14 +298,14 @@ def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
                     low, high = np.nanpercentile(y, [25, 75], axis=0)
                     axes.fill_between(x, low, high, color=colours[name], alpha=0.18, linewidth=0)
             for index, (label, (x, y)) in enumerate(alike.items()):
-                heights += [float(each) for each in y]
+                levels.append(float(np.nanmedian(y)))
                 axes.plot(x, y, color="#555555", linestyle=("--", ":", "-.")[index % 3], linewidth=1.3, label=label)
             axes.set_title(box)
             axes.set_xlabel(curve.along)
             axes.locator_params(axis="x", integer=not curve.at)  # there is no lap 1.5
-        if not heights:
+        if not levels:
             return b""
-        _scale(grid[0], heights)
+        _scale(grid[0], levels, 10.0)
         grid[0].set_ylabel(curve.title)
         _legend_above(drawn.canvas, grid)
     return drawn.content
@@ -374,7 +375,7 @@ def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
     columns, rows = experiment.labels(experiment.page.columns), _row_labels(experiment)
     width = 0.8 / len(rows)
     all_heights: list[float] = []
-    with picture(max(5.0, 1.1 + 0.42 * len(columns) * (len(rows) + 1)), 3.6) as drawn:
+    with picture(max(5.0, 1.1 + len(columns) * max(0.42 * (len(rows) + 1), 0.95)), 3.6) as drawn:
         axes = drawn.canvas.subplots()
         for index, labels in enumerate(rows):
             at = np.arange(len(columns)) + (index - (len(rows) - 1) / 2) * width
@@ -405,7 +406,7 @@ def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
                 )
         if experiment.published.get(name):
             axes.plot([], [], "D", color="white", markeredgecolor="#111111", markersize=5, label="paper")
-        axes.set_xticks(np.arange(len(columns)), columns)
+        axes.set_xticks(np.arange(len(columns)), [textwrap.fill(c, 14) for c in columns])
         axes.set_ylabel(measure.title)
         _scale(axes, all_heights)
         axes.grid(axis="x", visible=False)
@@ -424,10 +425,10 @@ def _legend_above(canvas: Any, grid: Any) -> None:
         canvas.legend(lines.values(), lines.keys(), loc="outside upper left", ncols=min(3, len(lines)))
 
 
-def _scale(axes: Any, heights: Sequence[float]) -> None:
-    """From zero up; in powers of ten where the highest would hide the lowest."""
+def _scale(axes: Any, heights: Sequence[float], apart: float = 20.0) -> None:
+    """From zero up; in powers of ten where the highest, `apart` times the lowest, would hide it."""
     above = [height for height in heights if height > 0]
-    if above and max(above) > 20 * min(above):
+    if above and max(above) > apart * min(above):
         axes.set_yscale("log")
         axes.set_ylim(bottom=0.5 * min(above))
     else:
