@@ -1,13 +1,14 @@
 """What the robot saw: a few panoramas one above the other."""
 
+import math
 from collections.abc import Sequence
 from typing import Annotated
 
-import cv2
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.results import Figure
+from omninav.stages.values.album import decoded
 from omninav.stages.values.image import Pixels
 
 from .moments import spread_out
@@ -16,7 +17,7 @@ from .style import picture
 
 
 class PanoramaStrip(Stage):
-    """Panoramas of a few frames of the last log, azimuth in degrees along the lower edge."""
+    """Panoramas or windows of a few frames of the last log, azimuth in degrees along the lower edge."""
 
     frames: Annotated[int, Bounds(ge=1, le=8)] = 4
 
@@ -32,38 +33,44 @@ class PanoramaStrip(Stage):
         if not kept:
             return self.Out()
         chosen = [kept[i] for i in spread_out(len(kept), self.frames)]
-        pictures = [(tick.frame, _decoded(shot)) for tick, shot in chosen]
+        pictures = [(tick.frame, decoded(shot.jpeg)) for tick, shot in chosen]
+        headings = chosen[0][1].headings
+        shown = (
+            "Windows as the features stage gets them, from the left to the right: where each looks stands below it."
+            if headings
+            else "Panoramas as the features stage gets them: forward (0°) in the middle, left of the robot "
+            "(+90°) on the left, both edges straight behind."
+        )
         return self.Out(
             figure=Figure(
                 name="panorama_strip",
                 title="What the robot saw",
-                caption="Panoramas as the features stage gets them: forward (0°) in the middle, left of the robot "
-                "(+90°) on the left, both edges straight behind.",
-                content=_draw(pictures),
+                caption=shown,
+                content=_draw(pictures, headings),
                 media_type="image/jpeg",
                 order=5,
             )
         )
 
 
-def _decoded(shot: EncodedPanorama) -> Pixels:
-    pixels = cv2.imdecode(np.frombuffer(shot.jpeg, np.uint8), cv2.IMREAD_COLOR)
-    if pixels is None:
-        raise ValueError("a snapshot that was encoded by PanoramaSnapshot cannot be decoded")
-    return pixels.astype(np.uint8, copy=False)
-
-
-def _draw(pictures: Sequence[tuple[int, Pixels]]) -> bytes:
+def _draw(pictures: Sequence[tuple[int, Pixels]], headings: Sequence[float]) -> bytes:
     rows, columns = pictures[0][1].shape[:2]
     height = float(np.clip(7.2 * rows / columns, 0.5, 2.2))
+    ticks: list[float] = [180, 90, 0, -90, -180]
+    labels = [f"{tick:g}" for tick in ticks]
+    if headings:
+        ticks = [180.0 - 360.0 * (n + 0.5) / len(headings) for n in range(len(headings))]
+        labels = [f"{math.degrees(heading):.0f}" for heading in headings]
     with picture(8.0, len(pictures) * (height + 0.12) + 0.45, media_type="image/jpeg") as drawn:
         for number, (frame, pixels) in enumerate(pictures):
             axes = drawn.canvas.add_subplot(len(pictures), 1, number + 1)
             axes.imshow(pixels[:, :, ::-1], extent=(180, -180, 0, 1), aspect="auto", interpolation="antialiased")
+            if len(headings) == 1:
+                axes.set_box_aspect(rows / columns)
             axes.set_yticks([])
             axes.set_ylabel(f"frame\n{frame}", rotation=0, ha="right", va="center", fontsize=8)
             axes.grid(visible=False)
-            axes.set_xticks([180, 90, 0, -90, -180])
+            axes.set_xticks(ticks, labels)
             axes.tick_params(labelbottom=number == len(pictures) - 1)
             if number == len(pictures) - 1:
                 axes.set_xlabel("azimuth (°), counter-clockwise from forward")

@@ -1,0 +1,37 @@
+"""Pictures of a map's references, kept beside it."""
+
+from typing import cast
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Value
+
+from .image import Pixels
+
+
+class Album(Value):
+    """A small picture of each reference of a map, in the map's order, for people to look at.
+
+    `jpegs`: their JPEG bytes one after the other; picture n lies from `ends[n]` to `ends[n + 1]`.
+    """
+
+    jpegs: npt.NDArray[np.uint8]
+    ends: npt.NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.ends) - 1
+
+    def picture(self, reference: int) -> Pixels:
+        """The picture of a reference: (rows, columns, 3), blue-green-red."""
+        return decoded(self.jpegs[self.ends[reference] : self.ends[reference + 1]])
+
+
+def decoded(jpeg: bytes | npt.NDArray[np.uint8]) -> Pixels:
+    """A picture of JPEG bytes that were made here: (rows, columns, 3), blue-green-red."""
+    content = np.frombuffer(jpeg, np.uint8) if isinstance(jpeg, bytes) else jpeg
+    pixels = cv2.imdecode(content, cv2.IMREAD_COLOR)
+    if pixels is None:
+        raise ValueError("a picture that was encoded here cannot be decoded")
+    return cast(Pixels, pixels.astype(np.uint8, copy=False))

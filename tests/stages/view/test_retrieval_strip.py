@@ -1,0 +1,95 @@
+import cv2
+import numpy as np
+import pytest
+from small_run import small_run
+
+from omninav.pipeline import Context, Tick
+from omninav.pipeline.codec import decode, encode
+from omninav.stages.mapping.album import CollectAlbum, InAlbum, ReferenceSnapshot
+from omninav.stages.values.album import Album, decoded
+from omninav.stages.values.image import Panorama, Windows
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.similarity import Answers
+from omninav.stages.view.panorama_snapshot import PanoramaSnapshot
+from omninav.stages.view.panorama_strip import PanoramaStrip
+from omninav.stages.view.retrieval_strip import RetrievalStrip
+
+CTX = Context("view")
+
+
+def plain(*levels: int, rows: int = 30, columns: int = 40) -> np.ndarray:
+    return np.stack([np.full((rows, columns, 3), level, np.uint8) for level in levels])
+
+
+def windows(*levels: int) -> Windows:
+    return Windows(plain(*levels), 2 * np.pi * np.arange(len(levels)) / len(levels), 1.0)
+
+
+def an_album(map: ReferenceGraph) -> Album:
+    shots, state = [], InAlbum()
+    grown = ReferenceGraph.empty()
+    for n in range(len(map)):
+        pose = Pose(*map.poses[n].tolist())
+        grown.insert(pose, map.features[n], map.kind)
+        shots.append(ReferenceSnapshot().step(CTX, Panorama(plain(5 * n, columns=160)[0]), grown, state).pictures)
+    return CollectAlbum().step(CTX, [shot for shot in shots if shot is not None]).album
+
+
+def test_an_album_holds_a_picture_of_each_reference_and_can_be_kept() -> None:
+    run = small_run()
+    album = an_album(run.map)
+    assert len(album) == len(run.map)
+    kept = decode(encode(album))
+    for n in range(len(run.map)):
+        assert np.allclose(kept.picture(n), 5 * n, atol=2)
+
+
+def test_of_windows_each_has_its_picture_and_pictures_not_taken_have_none() -> None:
+    state, stage, map = InAlbum(), ReferenceSnapshot(columns=20), ReferenceGraph.empty()
+    for pose in ((0, 0, 0), (0, 0, 1), (0, 0, 2)):
+        map.insert(Pose(*pose), np.zeros((1, 4), np.float32), "histograms")
+    first = stage.step(CTX, windows(10, 100, 200), map, state).pictures
+    assert first is not None
+    assert [round(decoded(jpeg).mean()) for jpeg in first.jpegs] == pytest.approx([10, 100, 200], abs=2)
+    assert decoded(first.jpegs[0]).shape == (15, 20, 3)
+    assert stage.step(CTX, windows(1, 2, 3), map, state).pictures is None
+
+
+def test_windows_are_kept_side_by_side_from_the_left_to_the_right() -> None:
+    # ahead, left, behind, right: as a panorama they are behind, left, ahead, right
+    shot = PanoramaSnapshot().step(CTX, Tick(0, 0), windows(0, 80, 160, 240)).snapshot
+    assert shot is not None
+    seen = [round(float(part.mean())) for part in np.split(decoded(shot.jpeg), 4, axis=1)]
+    assert seen == pytest.approx([160, 80, 0, 240], abs=3)
+    assert np.degrees(shot.headings) == pytest.approx([180, 90, 0, 270])
+    figure = PanoramaStrip().step(CTX, [Tick(0, 0)], [shot]).figure
+    assert figure is not None
+    assert "Windows" in figure.caption
+
+
+@pytest.mark.parametrize("with_album", [True, False])
+@pytest.mark.parametrize("kind", ["panorama", "windows"])
+def test_queries_and_their_answers_are_drawn(kind: str, with_album: bool) -> None:
+    run = small_run()
+    answers = Answers(np.arange(9), np.linspace(0.9, 0.5, 9).astype(np.float32), np.zeros(9))
+    seen = Panorama(plain(120, columns=160)[0]) if kind == "panorama" else windows(120, 40)
+    shots = [PanoramaSnapshot().step(CTX, tick, seen).snapshot for tick in run.ticks]
+    album = an_album(run.map) if with_album else None
+    drawn = [
+        RetrievalStrip().step(CTX, run.ticks, shots, [answers] * len(run.ticks), run.truth, run.map, album).figure
+        for _ in range(2)
+    ]
+    assert drawn[0] is not None
+    assert drawn[0].content == drawn[1].content
+    assert ("no album" in drawn[0].caption) is not with_album
+    pixels = cv2.imdecode(np.frombuffer(drawn[0].content, np.uint8), cv2.IMREAD_COLOR)
+    assert pixels.shape[1] == 1100
+    assert pixels.std() > 5
+    assert len(drawn[0].content) < 400_000
+
+
+def test_a_drive_without_answers_has_no_strip() -> None:
+    run = small_run()
+    nothing = [None] * len(run.ticks)
+    assert RetrievalStrip().step(CTX, run.ticks, nothing, nothing, run.truth, run.map).figure is None
