@@ -113,23 +113,25 @@ def _means_at(
 ) -> None:
     angles, channels = len(first), out.shape[1]
     share = np.float32(1.0 / angles)
-    one, other = np.empty(angles, np.float32), np.empty(angles, np.float32)
+    one, other = np.empty((angles, channels), np.float32), np.empty((angles, channels), np.float32)
     for n in range(len(starts)):
-        for channel in range(channels):
-            at = starts[n] + channel
-            for p in range(angles):
-                one[p] = other[p] = np.float32(0)
-                for k in range(4):
-                    one[p] += first_weights[p, k] * flat[at + first[p, k]]
-                    other[p] += second_weights[p, k] * flat[at + second[p, k]]
+        at = starts[n]
+        for p in range(angles):
+            f0, f1, f2, f3 = at + first[p, 0], at + first[p, 1], at + first[p, 2], at + first[p, 3]
+            s0, s1, s2, s3 = at + second[p, 0], at + second[p, 1], at + second[p, 2], at + second[p, 3]
+            v, w = first_weights[p], second_weights[p]
+            for c in range(channels):
+                one[p, c] = (v[0] * flat[f0 + c] + v[1] * flat[f1 + c]) + (v[2] * flat[f2 + c] + v[3] * flat[f3 + c])
+                other[p, c] = (w[0] * flat[s0 + c] + w[1] * flat[s1 + c]) + (w[2] * flat[s2 + c] + w[3] * flat[s3 + c])
+        for c in range(channels):
             total = np.float32(0)
             for p in range(angles):
-                there = other[p]
+                there = other[p, c]
                 if linear:
-                    after = other[p + 1 if p + 1 < angles else 0]
-                    there = (other[p - 1] + np.float32(4) * there + after) * np.float32(1.0 / 6.0)
-                total += np.sqrt(one[p] * there) if root else one[p] * there
-            out[n, channel] = total * share
+                    after = other[p + 1 if p + 1 < angles else 0, c]
+                    there = (other[p - 1, c] + np.float32(4) * there + after) * np.float32(1.0 / 6.0)
+                total += np.sqrt(one[p, c] * there) if root else one[p, c] * there
+            out[n, c] = total * share
 
 
 class Kernel(NamedTuple):
