@@ -1,0 +1,54 @@
+"""Success as in Wolf, Burgard & Burkhardt 2005: all frames count, and a carried robot is found again."""
+
+import math
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.geometry.se2 import compose
+from omninav.stages.metric.success_rate import SuccessRate
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.pose import Motion, Pose
+
+
+def success(
+    off: list[tuple[float, float]], modes: list[float] | None = None, carried: int | None = None, **options: float
+):
+    """The metric of a robot that drives 0.5 m a frame and is believed `off` (m aside, degrees) in each."""
+    truth = [
+        np.array([0.5 * n + (7.0 if carried is not None and n >= carried else 0.0), 0.0, 0.0]) for n in range(len(off))
+    ]
+    ticks = [Tick(n, n, 0, n, n == 0) for n in range(len(off))]
+    estimates = []
+    for n, (aside, degrees) in enumerate(off):
+        pose = Pose(*(float(v) for v in compose(truth[n], (0.0, aside, math.radians(degrees)))))
+        estimates.append(PoseEstimate(pose, np.eye(3), 1.0 if modes is None else modes[n], pose))
+    motion = [None] + [Motion(0.5, 0.0, 0.0)] * (len(off) - 1)
+    poses = [Pose(*(float(v) for v in each)) for each in truth]
+    out = SuccessRate(**options).step(Context("success"), ticks, estimates, poses, motion)
+    assert out.metrics is not None
+    return out.metrics.values["success"]
+
+
+def test_all_frames_count_and_both_limits_hold() -> None:
+    found = success([(9.0, 0.0), (1.9, 30.0), (1.9, 40.0), (0.0, 0.0), (2.1, 0.0)])
+    assert found["within_rate"] == pytest.approx(2 / 5)
+    assert found["at_end"] == 0.0
+    assert "carried_at" not in found
+
+
+def test_one_mode_is_a_good_frame_in_which_it_holds_nearly_all_of_the_belief() -> None:
+    assert success([(9.0, 0.0), (0.1, 0.0), (0.1, 0.0)], [1.0, 0.5, 0.95])["one_mode_after_frames"] == 2
+    assert success([(9.0, 0.0), (0.1, 0.0)], [1.0, 0.5])["one_mode_after_frames"] is None
+
+
+def test_a_carried_robot_is_found_again_after_as_many_frames_as_it_was_not() -> None:
+    found = success([(0.0, 0.0)] * 12 + [(7.0, 0.0)] * 4 + [(0.3, 5.0)] * 10, carried=12)
+    assert (found["carried_at"], found["recovered_after_frames"]) == (12, 4)
+    assert success([(0.0, 0.0)] * 12 + [(7.0, 0.0)] * 14, carried=12)["recovered_after_frames"] is None
+
+
+def test_without_truth_there_is_nothing_to_say() -> None:
+    ticks = [Tick(n, n, 0, n, n == 0) for n in range(2)]
+    assert SuccessRate().step(Context("success"), ticks, [None, None], [None, None], [None, None]).metrics is None
