@@ -19,11 +19,11 @@ class SuccessRate(Stage):
     """The share of frames in which the estimate is within `within_m` and `within_deg` of the truth.
 
     Wolf, Burgard & Burkhardt 2005, section VI-D (2 m, 35 degrees): all frames count, finding the robot at first
-    included, which is why 100 % is not reached (erratum 46a). Of the last log, under `success`: `within_rate`; `at_end`, 1
-    where the last frame is good, else 0; `one_mode_after_frames`, how many frames went by before the belief's heaviest
-    mode held `one_mode` of it in a good frame (None: never). Where the robot was carried (its true pose left the way of
-    its odometry by more than `carried_m` between two frames), `carried_at` says before which frame, and
-    `recovered_after_frames` how many frames later the estimate is good for ten in a row (None: never).
+    included, which is why 100 % is not reached (erratum 46a). Of the last log, under `success`: `within_rate`;
+    `at_end`, 1 where the last frame is good, else 0; `one_mode_after_frames`, how many frames went by before the
+    belief's heaviest mode held `one_mode` of it in a good frame (None: never). Where the robot was carried (its true
+    pose left the way of its odometry by more than `carried_m` between two frames), `carried_at` says before which
+    frame, and `recovered_after_frames` how many frames later the estimate is good for ten in a row (None: never).
     """
 
     within_m: Annotated[float, Bounds(gt=0)] = 2.0
