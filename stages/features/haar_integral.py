@@ -10,10 +10,10 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.problems import BadInput
 from omninav.pipeline.results import Metrics
+from omninav.stages.geometry.rotation_means import AngularWeights, Kernel, padded
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels, Windows
 
-from .rotation_means import AngularWeights, Kernel
 from .segments import segment_edges
 
 Array = npt.NDArray[np.float64]
@@ -87,15 +87,6 @@ def _count(values: Floats, usable: Bools, bins: int, joint: bool, weighted: bool
     return squares
 
 
-def padded(pixels: Pixels, by: int, wraps_rows: bool, wraps_columns: bool) -> Floats:
-    """A picture in [0, 1] with `by` more pixels on each side: from the other one where it wraps, else repeated."""
-    scaled = pixels.astype(np.float32) * np.float32(1.0 / 255.0)
-    rows, columns = (cv2.BORDER_WRAP if wraps else cv2.BORDER_REPLICATE for wraps in (wraps_rows, wraps_columns))
-    higher = cv2.copyMakeBorder(scaled, by, by, 0, 0, rows)
-    wider: Floats = cv2.copyMakeBorder(higher, 0, 0, by, by, columns).astype(np.float32, copy=False)
-    return wider
-
-
 def usable_pixels(shape: tuple[int, int], by: int, crop_rows: bool, crop_columns: bool, seen: Bools | None) -> Bools:
     """Which pixels of a picture (rows, columns) have all their neighbours within `by` pixels in it, and `seen`."""
     usable = np.ones(shape, np.bool_)
@@ -119,7 +110,7 @@ class HaarIntegral(Stage):
     paper's 936 images stay below its 4 MB. The histograms of several kernels follow one another with equal shares of
     the mass, and all of them once for each of the `scales` that kernels are enlarged by. `root`: of the square root of
     the product, whose values fill the bins more evenly. `angular_weights` linear: weighted means against the
-    discretisation of the angle (rotation_means.Kernel).
+    discretisation of the angle (geometry/rotation_means.py).
 
     `borders` crop (erratum 41): pixels whose neighbours lie outside the picture count nowhere, so that histograms sum
     to less than 1; a panorama goes on around the circle. wrap: the paper's "modulo N", both ways, of all pictures.

@@ -7,6 +7,7 @@ at a pixel is that of its own neighbourhood (erratum 40).
 import math
 from typing import Literal, NamedTuple
 
+import cv2
 import numba
 import numpy as np
 import numpy.typing as npt
@@ -132,6 +133,15 @@ def _means_at(
                     there = (other[p - 1, c] + np.float32(4) * there + after) * np.float32(1.0 / 6.0)
                 total += np.sqrt(one[p, c] * there) if root else one[p, c] * there
             out[n, c] = total * share
+
+
+def padded(pixels: npt.NDArray[np.uint8], by: int, wraps_rows: bool, wraps_columns: bool) -> Floats:
+    """A picture in [0, 1] with `by` more pixels on each side: from the other one where it wraps, else repeated."""
+    scaled = pixels.astype(np.float32) * np.float32(1.0 / 255.0)
+    rows, columns = (cv2.BORDER_WRAP if wraps else cv2.BORDER_REPLICATE for wraps in (wraps_rows, wraps_columns))
+    higher = cv2.copyMakeBorder(scaled, by, by, 0, 0, rows)
+    wider: Floats = cv2.copyMakeBorder(higher, 0, 0, by, by, columns).astype(np.float32, copy=False)
+    return wider
 
 
 class Kernel(NamedTuple):
