@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.evidence import best_headings, contrast_power, fresh_share
 from omninav.stages.geometry.nearby import NearestCells, nearest_cells
 from omninav.stages.geometry.se2 import wrap
 from omninav.stages.values.belief import Likelihood, Particles
@@ -94,18 +95,6 @@ def expected_similarity(
     """
     poses, similarity = np.ascontiguousarray(poses), np.ascontiguousarray(similarity)
     return _expected(poses, references, rows, similarity, *cells, fade, ordinary)
-
-
-@numba.njit(cache=True, nogil=True)
-def best_headings(values: Floats) -> Floats:
-    """Each reference's similarity at its best heading: (references, headings) -> (references,)."""
-    out = np.empty(len(values), np.float32)
-    for n in range(len(values)):  # numpy's maximum along so short an axis takes ten times as long
-        best = values[n, 0]
-        for h in range(1, values.shape[1]):
-            best = max(best, values[n, h])
-        out[n] = best
-    return out
 
 
 def weighted_quantile(values: Floats, weights: Array, quantile: float) -> float:
@@ -225,18 +214,12 @@ class NearReferences(Stage):
         return expected_similarity(poses, map.poses, self._cells, rows, values, self.fade * unit, floor)
 
     def _power(self, best: Floats, stands_for: Array | None = None) -> float:
-        if self.power is not None:
-            return self.power
-        logarithms = np.log(np.maximum(best, 1e-12)).astype(np.float64)
-        centre = np.average(logarithms, weights=stands_for)
-        spread = math.sqrt(float(np.average(np.square(logarithms - centre), weights=stands_for)))
-        return self.contrast / max(spread, 1e-6)
+        return contrast_power(best, self.contrast, stands_for) if self.power is None else self.power
 
     def _fresh(self, motion: Motion | None, unit: float) -> float:
         """Share of the picture's evidence that is new."""
-        if motion is None or self.independent <= 0.0:
-            return 1.0
-        return min(1.0, max(self.standing, math.hypot(motion.x, motion.y) / (self.independent * unit)))
+        way = None if motion is None else math.hypot(motion.x, motion.y)
+        return fresh_share(way, self.independent * unit, self.standing)
 
     def _from_field(self, ctx: Context, field: "Field", references: Array, unit: float) -> Particles:
         chosen, turns = np.divmod(field.draw(ctx.rng, self.proposals), field.headings)

@@ -1,0 +1,226 @@
+"""Particles weighed by the visibility areas they lie in, against equations 6 to 8 written out."""
+
+import math
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.pipeline.problems import BadInput
+from omninav.stages.areas.line_of_sight import axes_of, visibility_areas
+from omninav.stages.geometry.evidence import contrast_power, fresh_share
+from omninav.stages.sensor.visibility import Visibility, looks_at, mean_ahead, sums_by_turn, visible_points
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.grid import FREE, OCCUPIED, OccupancyGrid
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Motion
+from omninav.stages.values.reach import Reach
+from omninav.stages.values.similarity import Similarities
+from omninav.stages.values.visibility import VisibilityAreas
+
+RNG = np.random.default_rng(3)
+
+
+def a_room() -> OccupancyGrid:
+    cells = np.full((30, 40), FREE, np.uint8)
+    cells[[0, -1], :] = cells[:, [0, -1]] = OCCUPIED
+    cells[10:13, 15:25] = cells[20:, 28] = OCCUPIED
+    return OccupancyGrid(cells, 0.1, (-1.0, 2.0))
+
+
+ROOM = a_room()
+FREE_CELLS = ROOM.centres(*np.nonzero(ROOM.cells == FREE))
+REFERENCES = np.column_stack([FREE_CELLS[RNG.integers(len(FREE_CELLS), size=25)], RNG.uniform(-3, 3, 25)])
+
+
+def a_map(poses: np.ndarray = REFERENCES, segments: int = 1) -> ReferenceGraph:
+    features = np.zeros((len(poses), segments, 1), np.float32)
+    return ReferenceGraph(poses, features, "histograms", np.zeros((0, 2), np.int64), "truth")
+
+
+def some_poses(number: int) -> np.ndarray:
+    return np.column_stack([RNG.uniform(-1.2, 3.2, number), RNG.uniform(1.8, 5.2, number), RNG.uniform(-9, 9, number)])
+
+
+def wrapped(angle: float) -> float:
+    return (angle + math.pi) % (2 * math.pi) - math.pi
+
+
+def by_equation_7(areas: VisibilityAreas, pose: np.ndarray, values: np.ndarray, otherwise: float, window, around):
+    """The mean over all views j whose area holds the pose, with d(psi), worked view by view."""
+    row, column = np.floor((pose[1::-1] - np.array(areas.origin[::-1])) / areas.resolution).astype(int)
+    total = mass = 0.0
+    headings = values.shape[1]
+    for reference, sector in np.argwhere(areas.target >= 0):
+        t = areas.target[reference, sector]
+        inside = 0 <= row < areas.shape[0] and 0 <= column < areas.shape[1] and areas.mask(t)[row, column]
+        if not inside:
+            continue
+        point = areas.points[t]
+        direction = math.atan2(point[1] - pose[1], point[0] - pose[0])
+        if around:
+            seen = REFERENCES[reference]
+            theirs = math.atan2(point[1] - seen[1], point[0] - seen[0])
+            # turned as the headings differ, less the parallax of the point
+            turn = (pose[2] - seen[2]) - (direction - theirs)
+            total += float(
+                np.interp(turn * headings / (2 * np.pi), np.arange(headings), values[reference], period=headings)
+            )
+            mass += 1.0
+        else:
+            weight = window(abs(wrapped(pose[2] - direction)))
+            total, mass = total + weight * values[reference, 0], mass + weight
+    return total / mass if mass > 0 else otherwise
+
+
+WINDOWS = {
+    "step": lambda psi: float(psi <= math.radians(20)),
+    "triangle": lambda psi: max(0.0, 1 - psi / math.radians(20)),
+    "gaussian": lambda psi: math.exp(-0.5 * (psi / math.radians(20)) ** 2) * (psi <= math.radians(60)),
+}
+
+
+@pytest.mark.parametrize("shape", ["step", "triangle", "gaussian"])
+def test_an_ordinary_cameras_particles_weigh_what_equations_7_and_8_say(shape):
+    areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
+    values = RNG.random((25, 1))
+    sums, number = sums_by_turn(looks_at(areas, REFERENCES), np.arange(25), values, np.ones(25))
+    poses = some_poses(300)
+    found = mean_ahead(poses, visible_points(areas), areas.points, sums[:, 0], number, 0.25, math.radians(20), shape)
+    words = [by_equation_7(areas, pose, values, 0.25, WINDOWS[shape], False) for pose in poses]
+    assert np.allclose(found, words, atol=1e-5)
+    assert 0.05 < (found != 0.25).mean() < 0.95
+
+
+@pytest.mark.parametrize("sectors", [1, 5])
+def test_particles_that_see_all_around_take_each_view_turned_to_where_they_see_its_point(sectors):
+    areas = visibility_areas(REFERENCES, ROOM, axes_of(sectors))
+    # a wave between columns 10 degrees apart is at most (pi / 18)^2 / 8 / 2 = 0.002 off a line, which is drawn twice
+    values = 0.5 + 0.5 * np.cos(np.arange(36) * np.pi / 18 + RNG.uniform(0, 6, (25, 1)))
+    stage = Visibility(power=1.0)
+    stage.setup(Context("sensor"))
+    poses = some_poses(300)
+    out = stage.step(
+        Context("sensor"),
+        Similarities(values.astype(np.float32)),
+        Particles(poses, np.full(300, 1 / 300)),
+        a_map(),
+        areas,
+    ).likelihood
+    words = [by_equation_7(areas, pose, values, float(values.mean()), None, True) for pose in poses]
+    assert np.allclose(out.values * values.max(), words, atol=0.004)
+    assert out.anywhere * values.max() == pytest.approx(values.mean(), rel=1e-5)
+
+
+def weighed(stage: Visibility, values: np.ndarray, poses: np.ndarray, areas: VisibilityAreas, **more: object):
+    stage.setup(Context("sensor"))
+    particles = Particles(poses, np.full(len(poses), 1 / len(poses)))
+    return stage.step(Context("sensor"), Similarities(values.astype(np.float32), **more), particles, a_map(), areas)
+
+
+def test_a_robot_at_a_references_own_pose_takes_it_as_it_is():
+    areas = visibility_areas(REFERENCES[:1], ROOM, axes_of(7))
+    values = (0.5 + 0.5 * np.cos(np.arange(36) * np.pi / 18 + 1.0)).astype(np.float32)[None]
+    stage = Visibility(power=1.0)
+    stage.setup(Context("sensor"))
+    for column in (0, 9, 20):
+        pose = REFERENCES[:1] + np.array([0, 0, 2 * np.pi * column / 36])
+        out = stage.step(
+            Context("sensor"), Similarities(values), Particles(pose, np.ones(1)), a_map(REFERENCES[:1], 7), areas
+        )
+        assert out.likelihood.values[0] * values.max() == pytest.approx(values[0, column], abs=0.004)
+
+
+def test_k_of_0_weighs_the_mean_similarity_of_the_present_view_to_the_database():
+    areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
+    values = RNG.random((25, 1))
+    far = np.array([[50.0, 50.0, 0.0], [-0.95, 2.05, 0.0]])  # outside of the grid; in a wall
+    out = weighed(Visibility(power=1.0), values, far, areas).likelihood
+    assert np.allclose(out.values * values.max(), values.mean())
+    assert out.anywhere * values.max() == pytest.approx(values.mean(), rel=1e-6)
+
+
+def test_the_power_is_taken_from_the_view_unless_it_is_given():
+    best = RNG.uniform(0.3, 0.9, 200).astype(np.float32)
+    power = contrast_power(best, 3.0)
+    assert np.log(best.astype(float) ** power).std() == pytest.approx(3.0, rel=1e-5)
+    areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
+    values, poses = RNG.uniform(0.5, 0.8, (25, 1)), some_poses(200)
+    own = weighed(Visibility(contrast=3.0), values, poses, areas).likelihood.values
+    given = weighed(Visibility(power=contrast_power(values[:, 0].astype(np.float32), 3.0)), values, poses, areas)
+    assert np.allclose(own, given.likelihood.values)
+
+
+def test_similarities_are_raised_before_they_are_averaged():
+    areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
+    values, poses = RNG.uniform(0.5, 1.0, (25, 1)), some_poses(200)
+    cubed = weighed(Visibility(power=3.0), values, poses, areas).likelihood.values
+    assert np.allclose(
+        cubed, weighed(Visibility(power=1.0), (values / values.max()) ** 3, poses, areas).likelihood.values
+    )
+
+
+def test_references_that_were_not_compared_count_nowhere_and_those_that_stand_for_many_count_as_many():
+    areas = visibility_areas(REFERENCES, ROOM, axes_of(3))
+    values, poses = RNG.random((25, 36)), some_poses(300)
+    some = np.array([1, 4, 7, 20])
+    found = weighed(Visibility(power=1.0), values[some], poses, areas, candidates=some).likelihood
+    only = VisibilityAreas(
+        areas.axes,
+        np.where(np.isin(np.arange(25), some)[:, None], areas.target, -1).astype(np.int32),
+        areas.points,
+        areas.starts,
+        areas.runs,
+        areas.shape,
+        areas.resolution,
+        areas.origin,
+    )
+    held = np.zeros_like(values)
+    held[some] = values[some]
+    words = weighed(Visibility(power=1.0), held, poses, only).likelihood
+    known = np.abs(words.values - words.anywhere) > 1e-9
+    assert np.allclose(found.values[known], words.values[known], atol=1e-6)
+    twice = weighed(Visibility(power=1.0), values[some], poses, areas, candidates=some, stands_for=np.full(4, 2.0))
+    assert np.allclose(twice.likelihood.values, found.values, atol=1e-6)
+
+
+def test_a_standing_robots_pictures_are_little_evidence_where_that_is_asked_for():
+    assert fresh_share(0.1, 0.0, 0.05) == 1.0
+    assert fresh_share(None, 0.5, 0.05) == 1.0
+    assert fresh_share(0.0, 0.5, 0.05) == 0.05
+    assert fresh_share(0.1, 0.5, 0.05) == pytest.approx(0.2)
+    areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
+    values, poses = RNG.uniform(0.5, 1.0, (25, 1)).astype(np.float32), some_poses(50)
+    stage, particles = Visibility(power=1.0, independent=0.75), Particles(poses, np.full(50, 0.02))
+    stage.setup(Context("sensor"))
+
+    def at(motion: Motion):
+        return stage.step(
+            Context("sensor"), Similarities(values), particles, a_map(), areas, motion, Reach(0.4)
+        ).likelihood
+
+    moving, standing = at(Motion(0.3, 0.0, 0.0)), at(Motion(0.0, 0.0, 0.1))
+    assert (moving.fresh, standing.fresh) == pytest.approx((1.0, 0.05))
+    assert np.allclose(standing.values, moving.values**0.05)
+
+
+def test_which_way_a_robot_sees_follows_from_the_match_or_is_said():
+    areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
+    poses, one = some_poses(100), RNG.random((25, 1))
+    all_alike = np.repeat(one, 36, axis=1)
+    ahead = weighed(Visibility(power=1.0), one, poses, areas).likelihood.values
+    assert np.allclose(weighed(Visibility(power=1.0, sees="ahead"), all_alike, poses, areas).likelihood.values, ahead)
+    around = weighed(Visibility(power=1.0, sees="around"), one, poses, areas).likelihood.values
+    assert np.allclose(weighed(Visibility(power=1.0), all_alike, poses, areas).likelihood.values, around, atol=1e-6)
+    assert not np.allclose(ahead, around)
+
+
+def test_an_empty_map_says_nothing():
+    areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
+    assert (weighed(Visibility(), np.zeros((0, 36)), some_poses(5), areas).likelihood.values == 1).all()
+
+
+def test_areas_of_another_map_are_refused_in_one_line():
+    areas = visibility_areas(REFERENCES[:3], ROOM, axes_of(1))
+    with pytest.raises(BadInput, match="25 references, the visibility areas are of 3"):
+        weighed(Visibility(), RNG.random((25, 1)), some_poses(5), areas)
