@@ -37,6 +37,8 @@ class PanoramaStrip(Stage):
         headings = chosen[0][1].headings
         shown = (
             "Windows as the features stage gets them, from the left to the right: where each looks stands below it."
+            if len(headings) > 1
+            else "The camera's picture as the features stage gets it."
             if headings
             else "Panoramas as the features stage gets them: forward (0°) in the middle, left of the robot "
             "(+90°) on the left, both edges straight behind."
@@ -61,12 +63,12 @@ def _draw(pictures: Sequence[tuple[int, Pixels]], headings: Sequence[float]) -> 
     if headings:
         ticks = [180.0 - 360.0 * (n + 0.5) / len(headings) for n in range(len(headings))]
         labels = [f"{math.degrees(heading):.0f}" for heading in headings]
+    if len(headings) == 1:
+        return _side_by_side(pictures)
     with picture(8.0, len(pictures) * (height + 0.12) + 0.45, media_type="image/jpeg") as drawn:
         for number, (frame, pixels) in enumerate(pictures):
             axes = drawn.canvas.add_subplot(len(pictures), 1, number + 1)
             axes.imshow(pixels[:, :, ::-1], extent=(180, -180, 0, 1), aspect="auto", interpolation="antialiased")
-            if len(headings) == 1:
-                axes.set_box_aspect(rows / columns)
             axes.set_yticks([])
             axes.set_ylabel(f"frame\n{frame}", rotation=0, ha="right", va="center", fontsize=8)
             axes.grid(visible=False)
@@ -74,4 +76,16 @@ def _draw(pictures: Sequence[tuple[int, Pixels]], headings: Sequence[float]) -> 
             axes.tick_params(labelbottom=number == len(pictures) - 1)
             if number == len(pictures) - 1:
                 axes.set_xlabel("azimuth (°), counter-clockwise from forward")
+    return drawn.content
+
+
+def _side_by_side(pictures: Sequence[tuple[int, Pixels]]) -> bytes:
+    """Pictures of an ordinary camera: as high as they are wide, more or less, and all look the same way."""
+    rows, columns = pictures[0][1].shape[:2]
+    with picture(8.0, 8.0 / len(pictures) * rows / columns + 0.3, media_type="image/jpeg") as drawn:
+        for number, (frame, pixels) in enumerate(pictures):
+            axes = drawn.canvas.add_subplot(1, len(pictures), number + 1)
+            axes.imshow(pixels[:, :, ::-1], interpolation="antialiased")
+            axes.set_title(f"frame {frame}", fontsize=8)
+            axes.set_axis_off()
     return drawn.content

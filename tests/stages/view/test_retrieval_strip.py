@@ -106,3 +106,12 @@ def test_the_feature_matrix_of_one_frame_is_drawn(kind: str) -> None:
     assert figure is not None
     assert "frame 5" in figure.caption
     assert cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR).std() > 5
+
+
+def test_pictures_that_look_one_way_stand_side_by_side() -> None:
+    shots = [PanoramaSnapshot().step(CTX, Tick(0, 0), windows(level)).snapshot for level in (40, 200)]
+    figure = PanoramaStrip().step(CTX, [Tick(0, 0), Tick(1, 1, frame=1)], shots).figure
+    assert figure is not None
+    assert "camera's picture" in figure.caption
+    drawn = cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR)
+    assert drawn.shape[1] > 2 * drawn.shape[0]
