@@ -90,8 +90,8 @@ def window_turns(directions: npt.NDArray[np.float64]) -> Ints:
     if np.abs(turns - nearest).max() > 0.01 * number or len(np.unique(columns)) < number:
         shown = ", ".join(f"{math.degrees(d):g}" for d in directions)
         raise BadInput(
-            f"match: pictures that look towards {shown} deg; they must lie evenly around the robot, one straight ahead, "
-            "to be told from its turns; use an ordinary camera with yaw: 0, or an omnidirectional one"
+            f"match: pictures that look towards {shown} deg; they must lie evenly around the robot, one straight "
+            "ahead, to be told from its turns; use an ordinary camera with yaw: 0, or an omnidirectional one"
         )
     windows = np.empty(number, np.int64)
     windows[columns] = np.arange(number)
