@@ -11,6 +11,7 @@ from omninav.stages.geometry.gaussians import moments
 from omninav.stages.geometry.particles import weighted_moments
 from omninav.stages.values.belief import GaussianMixture, Particles, PoseEstimate
 from omninav.stages.values.drives import Array
+from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.map_places import AnyMap, map_poses
 from omninav.stages.values.pose import Pose
 
@@ -20,6 +21,7 @@ from .style import (
     PARTICLE,
     TRUTH,
     draw_gaussians,
+    draw_grid,
     draw_map,
     draw_pose,
     extent_of,
@@ -39,6 +41,7 @@ class BeliefSnapshots(Stage):
     """The belief over the map at `moments` frames of the last log, dense at its beginning, with estimate and truth.
 
     Particles are dots; a mixture's Gaussians are ellipses of two standard deviations, as opaque as they weigh.
+    With `grid` wired, all of it over what is occupied there.
     """
 
     moments: Annotated[int, Bounds(ge=1, le=12)] = 6
@@ -56,6 +59,7 @@ class BeliefSnapshots(Stage):
         estimates: Sequence[PoseEstimate | None],
         truth: Sequence[Pose | None],
         map: AnyMap | None = None,
+        grid: OccupancyGrid | None = None,
     ) -> Out:
         """The whole run at once."""
         last = [tick for tick in ticks]
@@ -78,7 +82,7 @@ class BeliefSnapshots(Stage):
                 caption=f"{len(panels)} moments of the drive, dense at its beginning. Pink: {_named(panels[0][2])}; "
                 "arrows: the estimate (blue) and the true pose (black). The spread is the standard deviation of the "
                 "distance from the belief's mean.",
-                content=_draw(panels, map),
+                content=_draw(panels, map, grid),
                 order=30,
             )
         )
@@ -88,7 +92,9 @@ def _row(pose: Pose | None) -> Array:
     return np.full(3, np.nan) if pose is None else np.array([pose.x, pose.y, pose.heading])
 
 
-def _draw(panels: Sequence[tuple[int, float, Shown, Array, Array]], map: AnyMap | None) -> bytes:
+def _draw(
+    panels: Sequence[tuple[int, float, Shown, Array, Array]], map: AnyMap | None, grid: OccupancyGrid | None
+) -> bytes:
     columns = min(3, len(panels))
     rows = -(-len(panels) // columns)
     everything = [map_poses(map)] if map is not None and len(map) else [_poses(panel[2]) for panel in panels]
@@ -97,6 +103,7 @@ def _draw(panels: Sequence[tuple[int, float, Shown, Array, Array]], map: AnyMap 
     with picture(9.0, rows * fitting_height(extent, 9.0 / columns, 2.0, 4.5), dpi=100) as drawn:
         for number, (frame, seconds, belief, estimate, truth) in enumerate(panels):
             axes = drawn.canvas.add_subplot(rows, columns, number + 1)
+            draw_grid(axes, grid)
             draw_map(axes, map)
             _draw_belief(axes, belief)
             draw_pose(axes, truth, arrow, TRUTH, "ground truth")

@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from omninav.pipeline.picture import Picture, picture
 from omninav.stages.values.floor_plan import FloorPlan
+from omninav.stages.values.grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from omninav.stages.values.map_places import AnyMap
 from omninav.stages.values.view_mixtures import ViewMixtures
 
@@ -16,12 +17,14 @@ if TYPE_CHECKING:
 __all__ = [
     "Picture",
     "draw_gaussians",
+    "draw_grid",
     "draw_map",
     "draw_plan",
     "draw_pose",
     "extent_of",
     "faded",
     "fitting_height",
+    "grid_extent",
     "picture",
     "plan_axes",
 ]
@@ -103,6 +106,23 @@ def draw_plan(axes: "Axes", plan: FloorPlan | None) -> None:
     axes.add_collection(
         PolyCollection(list(plan.outlines), facecolors=EDGE, edgecolors=EDGE, linewidths=0.6, zorder=0.5)
     )
+
+
+def draw_grid(axes: "Axes", grid: OccupancyGrid | None) -> None:
+    """What is occupied in dark grey and what is unknown in light grey, under everything else."""
+    if grid is None:
+        return
+    colours = np.zeros((*grid.cells.shape, 4))
+    colours[grid.cells == OCCUPIED] = faded("#6d727b", np.ones(1))[0]
+    colours[grid.cells == UNKNOWN] = faded("#eceef1", np.ones(1))[0]
+    axes.imshow(colours, extent=grid_extent(grid), origin="lower", interpolation="nearest", zorder=0.4)
+
+
+def grid_extent(grid: OccupancyGrid) -> tuple[float, float, float, float]:
+    """Where a grid lies: x from, x to, y from, y to (m)."""
+    rows, columns = grid.cells.shape
+    x, y = grid.origin
+    return x, x + columns * grid.resolution, y, y + rows * grid.resolution
 
 
 def faded(colour: str, opacity: Array) -> Array:

@@ -8,14 +8,18 @@ from omninav.pipeline import Context, Outputs, Stage, Tick
 from omninav.pipeline.results import Figure
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.drives import Array, Drive, drives, known
+from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.map_places import AnyMap, map_poses
 from omninav.stages.values.pose import Motion, Pose
 
-from .style import ESTIMATE, MARK, ODOMETRY, TRUTH, draw_map, extent_of, fitting_height, picture, plan_axes
+from .style import ESTIMATE, MARK, ODOMETRY, TRUTH, draw_grid, draw_map, extent_of, fitting_height, picture, plan_axes
 
 
 class TrajectoryOverMap(Stage):
-    """Estimate, truth and odometry alone over the map's references and edges, one panel per log (map frame, m)."""
+    """Estimate, truth and odometry alone over the map's references and edges, one panel per log (map frame, m).
+
+    With `grid` wired, all of it over what is occupied there.
+    """
 
     class Out(Outputs):
         """`figure`: the last log; `earlier`: where there are several, the ones before it in one picture."""
@@ -31,6 +35,7 @@ class TrajectoryOverMap(Stage):
         truth: Sequence[Pose | None],
         motion: Sequence[Motion | None],
         map: AnyMap | None = None,
+        grid: OccupancyGrid | None = None,
     ) -> Out:
         """The whole run at once."""
         logs = drives(ticks, estimates, truth, motion)
@@ -40,7 +45,7 @@ class TrajectoryOverMap(Stage):
             name="trajectory_over_map",
             title="Trajectory over the map",
             caption=_caption(logs[-1], map),
-            content=_draw(logs[-1:], map),
+            content=_draw(logs[-1:], map, grid),
             order=10,
         )
         if len(logs) == 1:
@@ -49,7 +54,7 @@ class TrajectoryOverMap(Stage):
             name="trajectory_over_map_earlier",
             title="Trajectories of the earlier logs",
             caption=f"The {len(logs) - 1} log(s) before the last one, in their order.",
-            content=_draw(logs[:-1], map),
+            content=_draw(logs[:-1], map, grid),
             order=11,
         )
         return self.Out(figure=last, earlier=earlier)
@@ -66,7 +71,7 @@ def _caption(drive: Drive, map: AnyMap | None) -> str:
     return " ".join(words).replace(" ;", ";")
 
 
-def _draw(logs: Sequence[Drive], map: AnyMap | None) -> bytes:
+def _draw(logs: Sequence[Drive], map: AnyMap | None, grid: OccupancyGrid | None) -> bytes:
     columns = min(len(logs), 2)
     rows = -(-len(logs) // columns)
     extent = _shown(logs, map)
@@ -74,6 +79,7 @@ def _draw(logs: Sequence[Drive], map: AnyMap | None) -> bytes:
     with picture(8.0, rows * fitting_height(extent, width, 2.6, 8.5 if columns == 1 else 5.0)) as drawn:
         for number, drive in enumerate(logs):
             axes = drawn.canvas.add_subplot(rows, columns, number + 1)
+            draw_grid(axes, grid)
             draw_map(axes, map)
             odometry = drive.odometry_alone()
             if odometry is not None:

@@ -1,0 +1,66 @@
+import cv2
+import numpy as np
+from small_run import small_run
+
+from omninav.pipeline import Context
+from omninav.stages.areas.line_of_sight import axes_of, visibility_areas
+from omninav.stages.values.grid import FREE, OCCUPIED, OccupancyGrid
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
+from omninav.stages.view.belief_snapshots import BeliefSnapshots
+from omninav.stages.view.trajectory_over_map import TrajectoryOverMap
+from omninav.stages.view.visibility_areas import ShowVisibilityAreas, views_by_cell
+
+CTX = Context("view")
+
+
+def a_room() -> OccupancyGrid:
+    cells = np.full((20, 30), FREE, np.uint8)
+    cells[[0, -1], :] = cells[:, [0, -1]] = cells[8:10, 10:20] = OCCUPIED
+    return OccupancyGrid(cells, 0.2, (0.0, 0.0))
+
+
+ROOM = a_room()
+POSES = np.array([[1.0, 1.0, 0.3], [3.0, 1.0, 1.6], [5.0, 3.0, 3.0], [1.5, 3.3, -1.0]])
+MAP = ReferenceGraph(POSES, np.zeros((4, 3, 1), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth")
+
+
+def pixels(content: bytes) -> np.ndarray:
+    return cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+
+
+def test_views_are_counted_cell_by_cell():
+    areas = visibility_areas(POSES, ROOM, axes_of(3))
+    counts = sum(areas.mask(target).astype(int) for target in areas.target.ravel() if target >= 0)
+    np.testing.assert_array_equal(views_by_cell(areas), counts)
+
+
+def test_areas_are_drawn_over_the_grid_the_same_every_time():
+    areas = visibility_areas(POSES, ROOM, axes_of(3))
+    truth = [Pose(1.0 + 0.1 * k, 1.0, 0.0) for k in range(10)]
+    figure = ShowVisibilityAreas(examples=2).step(CTX, MAP, areas, ROOM, truth).figure
+    assert pixels(figure.content).std() > 20
+    assert "2 of 4 references" in figure.caption
+    assert "3 points lambda" in figure.caption
+    again = ShowVisibilityAreas(examples=2).step(CTX, MAP, areas, ROOM, truth).figure
+    assert again.content == figure.content
+    without = ShowVisibilityAreas(examples=2).step(CTX, MAP, areas, ROOM).figure
+    assert without.content != figure.content
+
+
+def test_a_stand_in_is_called_one():
+    areas = visibility_areas(POSES, ROOM, axes_of(1))
+    grid = OccupancyGrid(ROOM.cells, ROOM.resolution, ROOM.origin, "tour")
+    assert "stand-in" in ShowVisibilityAreas(examples=1).step(CTX, MAP, areas, grid).figure.caption
+
+
+def test_a_grid_lies_under_paths_and_beliefs_where_it_is_wired():
+    run = small_run()
+    paths = [TrajectoryOverMap().step(CTX, *run.drive, run.map, grid).figure for grid in (None, ROOM)]
+    assert paths[0].content != paths[1].content
+    ticks, estimates, truth, _ = run.drive
+    beliefs = [
+        BeliefSnapshots(moments=2).step(CTX, ticks, run.beliefs, estimates, truth, run.map, grid).figure
+        for grid in (None, ROOM)
+    ]
+    assert beliefs[0].content != beliefs[1].content
