@@ -11,6 +11,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.problems import BadInput
 from omninav.stages.geometry.evidence import best_headings, contrast_power, fresh_share
 from omninav.stages.values.belief import Likelihood, Particles
+from omninav.stages.values.grid import cells_of
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.reach import Reach
@@ -78,6 +79,15 @@ def _by_cell(starts: Shorts, runs: npt.NDArray[np.uint16], rows: int, columns: i
                 items[filled[cell]] = t
                 filled[cell] += 1
     return first, items
+
+
+def sees_any(poses: Array, cells: Cells) -> npt.NDArray[np.bool_]:
+    """Whether any point is visible from poses (N, 3): (N,)."""
+    row, column = cells_of(poses, cells.origin, cells.resolution).T
+    inside = (row >= 0) & (row < cells.rows) & (column >= 0) & (column < cells.columns)
+    number = np.where(inside, row * cells.columns + column, 0)
+    sees: npt.NDArray[np.bool_] = inside & (cells.starts[number + 1] > cells.starts[number])
+    return sees
 
 
 def looks_at(areas: VisibilityAreas, poses: Array) -> Looks:
@@ -289,6 +299,9 @@ class Visibility(Stage):
     heading; 1 is the paper's. Each is raised before they are averaged. With `independent` and `motion` wired, pictures
     taken at one place count as less than one: likelihoods are raised to the way since the picture before over so many
     reaches (port `reach`, else of `reach_m`), down to `standing`; 0, as in the paper: never.
+
+    `retrieval` false is the ablation of section VI-E: all particles that lie in any visibility area weigh alike, and
+    all others nothing, whatever the picture shows.
     """
 
     window_deg: Annotated[float, Bounds(gt=0, le=180)] = 5.0
@@ -299,6 +312,7 @@ class Visibility(Stage):
     independent: Annotated[float, Bounds(ge=0)] = 0.0
     standing: Annotated[float, Bounds(ge=0, le=1)] = 0.05
     reach_m: Annotated[float, Bounds(gt=0)] = 0.5
+    retrieval: bool = True
 
     class Out(Outputs):
         """Likelihood of each particle."""
@@ -331,6 +345,8 @@ class Visibility(Stage):
                 )
             self._areas = areas
             self._cells, self._looks = visible_points(areas), looks_at(areas, map.poses)
+        if not self.retrieval:
+            return self.Out(likelihood=Likelihood(sees_any(particles.poses, self._cells).astype(np.float64)))
         candidates = np.arange(len(map)) if similarities.candidates is None else similarities.candidates
         rows = np.full(len(map), -1, np.int64)
         rows[candidates] = np.arange(len(candidates))

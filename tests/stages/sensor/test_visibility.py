@@ -224,3 +224,18 @@ def test_areas_of_another_map_are_refused_in_one_line():
     areas = visibility_areas(REFERENCES[:3], ROOM, axes_of(1))
     with pytest.raises(BadInput, match="25 references, the visibility areas are of 3"):
         weighed(Visibility(), RNG.random((25, 1)), some_poses(5), areas)
+
+
+def test_without_retrieval_all_particles_in_any_area_weigh_alike():
+    areas = visibility_areas(REFERENCES[:3], ROOM, axes_of(1))
+    anywhere = sum(areas.mask(t).astype(int) for t in range(len(areas.points))) > 0
+    poses = some_poses(400)
+    alike = Similarities(RNG.random((3, 36)).astype(np.float32))
+    stage, particles = Visibility(retrieval=False), Particles(poses, np.full(400, 1 / 400))
+    stage.setup(Context("sensor"))
+    values = stage.step(Context("sensor"), alike, particles, a_map(REFERENCES[:3]), areas).likelihood.values
+    for pose, value in zip(poses, values, strict=True):
+        row, column = np.floor((pose[1::-1] - np.array(areas.origin[::-1])) / areas.resolution).astype(int)
+        inside = 0 <= row < 30 and 0 <= column < 40 and anywhere[row, column]
+        assert value == float(inside)
+    assert set(values) == {0.0, 1.0}
