@@ -26,8 +26,9 @@ Numbers = npt.NDArray[np.uint32]
 Single = np.floating[Any]
 Window = Literal["step", "triangle", "gaussian"]
 
+SHAPES: dict[Window, int] = {"step": 0, "triangle": 1, "gaussian": 2}
 FADED = 3.0
-"""Beyond so many standard deviations a Gaussian window is 0."""
+"""Beyond so many standard deviations a Gaussian is 0."""
 ATAN = (0.1590383972660733, -0.05115725038296156, 0.023334547989038373, -0.0062283931965400755)
 """atan(t) / 2 pi on [0, 1] as t, t^3, t^5, t^7: a least-squares fit that is off by 0.005 degrees at most."""
 
@@ -49,12 +50,14 @@ class Cells(NamedTuple):
 class Looks(NamedTuple):
     """Views that look at points, point by point: those at point t are `starts[t]` to `starts[t + 1]`.
 
-    `reference` (A,): whose they are. `bearing` (A,): where its robot sees the point, from its heading (rad).
+    `reference` (A,): whose they are. `bearing` (A,): where its robot sees the point, from its heading (rad). `place`
+    (A, 2): where it stood (m).
     """
 
     starts: Ints
     reference: Shorts
     bearing: Array
+    place: Array
 
 
 def visible_points(areas: VisibilityAreas) -> Cells:
@@ -99,7 +102,7 @@ def looks_at(areas: VisibilityAreas, poses: Array) -> Looks:
     starts = np.searchsorted(target, np.arange(len(areas.points) + 1))
     way = areas.points[target] - poses[reference, :2]
     bearing = np.arctan2(way[:, 1], way[:, 0]) - poses[reference, 2]
-    return Looks(starts, reference.astype(np.int32), bearing)
+    return Looks(starts, reference.astype(np.int32), bearing, poses[reference, :2].copy())
 
 
 def sums_by_turn(looks: Looks, rows: Ints, values: Array, each: Array) -> tuple[Floats, Floats]:
@@ -112,7 +115,7 @@ def sums_by_turn(looks: Looks, rows: Ints, values: Array, each: Array) -> tuple[
     many views there are. `rows` (references,): a reference's row in `values`, -1 where it was not compared; `each`
     (R,): how many it counts as.
     """
-    return _sums(*looks, rows, np.ascontiguousarray(values), each)
+    return _sums(looks.starts, looks.reference, looks.bearing, rows, np.ascontiguousarray(values), each)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -232,10 +235,9 @@ def mean_ahead(
     point, wrapped to [-pi, pi) (erratum 44). d(psi) is 1 up to `window` radians and 0 beyond (`step`, the paper's),
     falls to 0 there (`triangle`), or has it as its standard deviation (`gaussian`). `otherwise`: where K = 0.
     """
-    shapes = {"step": 0, "triangle": 1, "gaussian": 2}
     farthest = min(FADED * window if shape == "gaussian" else window, math.pi)
     poses, points = np.ascontiguousarray(poses), np.ascontiguousarray(points)
-    return _ahead(poses, *cells, points, sums, number, otherwise, window, math.cos(farthest), shapes[shape])
+    return _ahead(poses, *cells, points, sums, number, otherwise, window, math.cos(farthest), SHAPES[shape])
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -281,6 +283,94 @@ def _ahead(
     return out
 
 
+def mean_near(
+    poses: Array,
+    cells: Cells,
+    points: Array,
+    looks: Looks,
+    rows: Ints,
+    values: Array,
+    each: Array,
+    otherwise: float,
+    near: float,
+    window: float | None = None,
+    shape: Window = "step",
+) -> Array:
+    """Equations 7 and 8 where views count less the farther from a robot they were taken: (N, 3) -> (N,).
+
+    p(M_j | l) of equation 6 falls with the distance d between both as exp(-d^2 / (2 near^2)), and is 0 beyond
+    3 `near` (m). `window` (rad) and `shape` as in `mean_ahead`; None: all around, where `values` (R, headings) are
+    looked up as in `sums_by_turn`. `rows`, `each`: as there. `otherwise`: where K = 0.
+    """
+    farthest = math.pi if window is None else min(FADED * window if shape == "gaussian" else window, math.pi)
+    at = np.ascontiguousarray(poses), *cells, np.ascontiguousarray(points), *looks, rows, np.ascontiguousarray(values)
+    return _near(*at, each, otherwise, near, window is None, window or math.pi, farthest, SHAPES[shape])
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _near(
+    poses: Array,
+    starts: Ints,
+    items: Numbers,
+    origin: tuple[float, float],
+    resolution: float,
+    rows: int,
+    columns: int,
+    points: Array,
+    first: Ints,
+    reference: Shorts,
+    bearing: Array,
+    place: Array,
+    row_of: Ints,
+    values: Array,
+    each: Array,
+    otherwise: float,
+    near: float,
+    around: bool,
+    window: float,
+    farthest: float,
+    shape: int,
+) -> Array:
+    headings = values.shape[1]
+    decay, beyond = -0.5 / (near * near), (FADED * near) ** 2
+    out = np.empty(len(poses))
+    for n in range(len(poses)):
+        out[n] = otherwise
+        x, y, heading = poses[n, 0], poses[n, 1], poses[n, 2]
+        i, j = math.floor((y - origin[1]) / resolution), math.floor((x - origin[0]) / resolution)
+        if not (0 <= i < rows and 0 <= j < columns):
+            continue
+        total, mass = 0.0, 0.0
+        for t in items[starts[i * columns + j] : starts[i * columns + j + 1]]:
+            past, known = 0.0, False
+            for a in range(first[t], first[t + 1]):
+                right, up, row = place[a, 0] - x, place[a, 1] - y, row_of[reference[a]]
+                far = right * right + up * up
+                if row < 0 or far > beyond:
+                    continue
+                if not known:
+                    past = heading - math.atan2(points[t, 1] - y, points[t, 0] - x)
+                    past -= 2 * math.pi * math.floor((past + math.pi) / (2 * math.pi))
+                    known = True
+                weight, value = each[row] * math.exp(decay * far), values[row, 0]
+                if around:
+                    turn = (past + bearing[a]) / (2 * math.pi) * headings
+                    turn -= headings * math.floor(turn / headings)
+                    whole = min(int(turn), headings - 1)
+                    before, after = values[row, whole], values[row, whole + 1 if whole + 1 < headings else 0]
+                    value = before + (after - before) * (turn - whole)
+                elif abs(past) > farthest:
+                    break
+                elif shape:
+                    aside = abs(past) / window
+                    weight *= 1.0 - aside if shape == 1 else math.exp(-0.5 * aside * aside)
+                total += weight * value
+                mass += weight
+        if mass > 0.0:
+            out[n] = total / mass
+    return out
+
+
 class Visibility(Stage):
     """Likelihood of particles from the views whose visibility areas they lie in.
 
@@ -296,7 +386,9 @@ class Visibility(Stage):
 
     Similarities hardly differ between places (erratum 45), and so do their means. So they are raised to a power: null
     takes it from the view, `contrast` nats for each standard deviation of log S over the references, each at its best
-    heading; 1 is the paper's. Each is raised before they are averaged. With `independent` and `motion` wired, pictures
+    heading; 1 is the paper's. Each is raised before they are averaged. The paper's p(M_j | l) is uniform over all views
+    whose area holds the particle; with `nearness` it falls with the distance between the particle and where the view
+    was taken, a Gaussian of so many reaches. With `independent` and `motion` wired, pictures
     taken at one place count as less than one: likelihoods are raised to the way since the picture before over so many
     reaches (port `reach`, else of `reach_m`), down to `standing`; 0, as in the paper: never.
 
@@ -309,6 +401,7 @@ class Visibility(Stage):
     sees: Literal["auto", "ahead", "around"] = "auto"
     power: Annotated[float, Bounds(gt=0)] | None = None
     contrast: Annotated[float, Bounds(gt=0)] = 2.0
+    nearness: Annotated[float, Bounds(gt=0)] | None = None
     independent: Annotated[float, Bounds(ge=0)] = 0.0
     standing: Annotated[float, Bounds(ge=0, le=1)] = 0.05
     reach_m: Annotated[float, Bounds(gt=0)] = 0.5
@@ -355,16 +448,17 @@ class Visibility(Stage):
         power = contrast_power(best, self.contrast, similarities.stands_for) if self.power is None else self.power
         raised: Array = (values.astype(np.float64) / max(float(best.max()), 1e-12)) ** power
         anywhere = float(np.average(raised.mean(axis=1), weights=each))
-        if values.shape[1] > 1 if self.sees == "auto" else self.sees == "around":
-            sums, number = sums_by_turn(self._looks, rows, raised, each)
-            mean = mean_around(particles.poses, self._cells, areas.points, sums, number, anywhere)
+        around = values.shape[1] > 1 if self.sees == "auto" else self.sees == "around"
+        window, unit = math.radians(self.window_deg), self.reach_m if reach is None else reach.metres
+        where = particles.poses, self._cells, areas.points
+        if self.nearness is not None:
+            ahead = (None if around else window, self.shape)
+            mean = mean_near(*where, self._looks, rows, raised, each, anywhere, self.nearness * unit, *ahead)
+        elif around:
+            mean = mean_around(*where, *sums_by_turn(self._looks, rows, raised, each), anywhere)
         else:
             sums, number = sums_by_turn(self._looks, rows, raised[:, :1], each)
-            window = math.radians(self.window_deg)
-            mean = mean_ahead(
-                particles.poses, self._cells, areas.points, sums[:, 0], number, anywhere, window, self.shape
-            )
-        unit = self.reach_m if reach is None else reach.metres
+            mean = mean_ahead(*where, sums[:, 0], number, anywhere, window, self.shape)
         way = None if motion is None else math.hypot(motion.x, motion.y)
         fresh = fresh_share(way, self.independent * unit, self.standing)
         return self.Out(likelihood=Likelihood(mean**fresh, anywhere, fresh))

@@ -46,7 +46,9 @@ def wrapped(angle: float) -> float:
     return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
-def by_equation_7(areas: VisibilityAreas, pose: np.ndarray, values: np.ndarray, otherwise: float, window, around):
+def by_equation_7(
+    areas: VisibilityAreas, pose: np.ndarray, values: np.ndarray, otherwise: float, window, around, near=None
+):
     """The mean over all views j whose area holds the pose, with d(psi), worked view by view."""
     row, column = np.floor((pose[1::-1] - np.array(areas.origin[::-1])) / areas.resolution).astype(int)
     total = mass = 0.0
@@ -58,17 +60,19 @@ def by_equation_7(areas: VisibilityAreas, pose: np.ndarray, values: np.ndarray, 
             continue
         point = areas.points[t]
         direction = math.atan2(point[1] - pose[1], point[0] - pose[0])
+        far = math.dist(REFERENCES[reference, :2], pose[:2])
+        nearness = 1.0 if near is None else math.exp(-0.5 * (far / near) ** 2) * (far <= 3 * near)
         if around:
             seen = REFERENCES[reference]
             theirs = math.atan2(point[1] - seen[1], point[0] - seen[0])
             # turned as the headings differ, less the parallax of the point
             turn = (pose[2] - seen[2]) - (direction - theirs)
-            total += float(
+            total += nearness * float(
                 np.interp(turn * headings / (2 * np.pi), np.arange(headings), values[reference], period=headings)
             )
-            mass += 1.0
+            mass += nearness
         else:
-            weight = window(abs(wrapped(pose[2] - direction)))
+            weight = nearness * window(abs(wrapped(pose[2] - direction)))
             total, mass = total + weight * values[reference, 0], mass + weight
     return total / mass if mass > 0 else otherwise
 
@@ -112,10 +116,30 @@ def test_particles_that_see_all_around_take_each_view_turned_to_where_they_see_i
     assert out.anywhere * values.max() == pytest.approx(values.mean(), rel=1e-5)
 
 
-def weighed(stage: Visibility, values: np.ndarray, poses: np.ndarray, areas: VisibilityAreas, **more: object):
+@pytest.mark.parametrize(("sectors", "shape"), [(1, "step"), (1, "triangle"), (1, "gaussian"), (5, None)])
+def test_views_count_less_the_farther_away_they_were_taken_where_that_is_asked_for(sectors, shape):
+    areas = visibility_areas(REFERENCES, ROOM, axes_of(sectors))
+    values = RNG.random((25, 36))
+    stage = Visibility(
+        power=1.0, nearness=0.5, window_deg=20.0, shape=shape or "step", sees="ahead" if shape else "auto"
+    )
+    poses = some_poses(300)
+    found = weighed(stage, values, poses, areas, reach=Reach(0.8)).likelihood.values * np.float32(values.max())
+    values = values.astype(np.float32).astype(float)
+    window = WINDOWS[shape] if shape else None
+    words = [by_equation_7(areas, pose, values, float(values.mean()), window, not shape, 0.4) for pose in poses]
+    assert np.allclose(found, words, atol=1e-5)
+    assert 0.05 < (np.abs(found - values.mean()) > 1e-6).mean() < 0.95
+
+
+def weighed(
+    stage: Visibility, values: np.ndarray, poses: np.ndarray, areas: VisibilityAreas, reach=None, **more: object
+):
     stage.setup(Context("sensor"))
     particles = Particles(poses, np.full(len(poses), 1 / len(poses)))
-    return stage.step(Context("sensor"), Similarities(values.astype(np.float32), **more), particles, a_map(), areas)
+    return stage.step(
+        Context("sensor"), Similarities(values.astype(np.float32), **more), particles, a_map(), areas, None, reach
+    )
 
 
 def test_a_robot_at_a_references_own_pose_takes_it_as_it_is():
