@@ -387,10 +387,11 @@ class Visibility(Stage):
     Similarities hardly differ between places (erratum 45), and so do their means. So they are raised to a power: null
     takes it from the view, `contrast` nats for each standard deviation of log S over the references, each at its best
     heading; 1 is the paper's. Each is raised before they are averaged. The paper's p(M_j | l) is uniform over all views
-    whose area holds the particle; with `nearness` it falls with the distance between the particle and where the view
-    was taken, a Gaussian of so many reaches. With `independent` and `motion` wired, pictures
-    taken at one place count as less than one: likelihoods are raised to the way since the picture before over so many
-    reaches (port `reach`, else of `reach_m`), down to `standing`; 0, as in the paper: never.
+    whose area holds the particle; with `near_m` it falls with the distance between the particle and where the view was
+    taken, as a Gaussian of so many metres: not of reaches, which are hardly any where windows of one place look
+    different ways. With `independent` and `motion` wired, pictures taken at one place count as less than one:
+    likelihoods are raised to the way since the picture before over so many reaches (port `reach`, else of `reach_m`),
+    down to `standing`; 0, as in the paper: never.
 
     `retrieval` false is the ablation of section VI-E: all particles that lie in any visibility area weigh alike, and
     all others nothing, whatever the picture shows.
@@ -401,7 +402,7 @@ class Visibility(Stage):
     sees: Literal["auto", "ahead", "around"] = "auto"
     power: Annotated[float, Bounds(gt=0)] | None = None
     contrast: Annotated[float, Bounds(gt=0)] = 2.0
-    nearness: Annotated[float, Bounds(gt=0)] | None = None
+    near_m: Annotated[float, Bounds(gt=0)] | None = None
     independent: Annotated[float, Bounds(ge=0)] = 0.0
     standing: Annotated[float, Bounds(ge=0, le=1)] = 0.05
     reach_m: Annotated[float, Bounds(gt=0)] = 0.5
@@ -451,9 +452,9 @@ class Visibility(Stage):
         around = values.shape[1] > 1 if self.sees == "auto" else self.sees == "around"
         window, unit = math.radians(self.window_deg), self.reach_m if reach is None else reach.metres
         where = particles.poses, self._cells, areas.points
-        if self.nearness is not None:
+        if self.near_m is not None:
             ahead = (None if around else window, self.shape)
-            mean = mean_near(*where, self._looks, rows, raised, each, anywhere, self.nearness * unit, *ahead)
+            mean = mean_near(*where, self._looks, rows, raised, each, anywhere, self.near_m, *ahead)
         elif around:
             mean = mean_around(*where, *sums_by_turn(self._looks, rows, raised, each), anywhere)
         else:

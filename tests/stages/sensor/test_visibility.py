@@ -120,11 +120,9 @@ def test_particles_that_see_all_around_take_each_view_turned_to_where_they_see_i
 def test_views_count_less_the_farther_away_they_were_taken_where_that_is_asked_for(sectors, shape):
     areas = visibility_areas(REFERENCES, ROOM, axes_of(sectors))
     values = RNG.random((25, 36))
-    stage = Visibility(
-        power=1.0, nearness=0.5, window_deg=20.0, shape=shape or "step", sees="ahead" if shape else "auto"
-    )
+    stage = Visibility(power=1.0, near_m=0.4, window_deg=20.0, shape=shape or "step", sees="ahead" if shape else "auto")
     poses = some_poses(300)
-    found = weighed(stage, values, poses, areas, reach=Reach(0.8)).likelihood.values * np.float32(values.max())
+    found = weighed(stage, values, poses, areas).likelihood.values * np.float32(values.max())
     values = values.astype(np.float32).astype(float)
     window = WINDOWS[shape] if shape else None
     words = [by_equation_7(areas, pose, values, float(values.mean()), window, not shape, 0.4) for pose in poses]
@@ -132,14 +130,10 @@ def test_views_count_less_the_farther_away_they_were_taken_where_that_is_asked_f
     assert 0.05 < (np.abs(found - values.mean()) > 1e-6).mean() < 0.95
 
 
-def weighed(
-    stage: Visibility, values: np.ndarray, poses: np.ndarray, areas: VisibilityAreas, reach=None, **more: object
-):
+def weighed(stage: Visibility, values: np.ndarray, poses: np.ndarray, areas: VisibilityAreas, **more: object):
     stage.setup(Context("sensor"))
     particles = Particles(poses, np.full(len(poses), 1 / len(poses)))
-    return stage.step(
-        Context("sensor"), Similarities(values.astype(np.float32), **more), particles, a_map(), areas, None, reach
-    )
+    return stage.step(Context("sensor"), Similarities(values.astype(np.float32), **more), particles, a_map(), areas)
 
 
 def test_a_robot_at_a_references_own_pose_takes_it_as_it_is():
