@@ -9,16 +9,16 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.problems import BadInput
 from omninav.stages.geometry.particles import systematic
 from omninav.stages.values.belief import Likelihood, Particles
-from omninav.stages.values.grid import FreeSpace
 
 
 class RandomSamples(Stage):
     """Importance weights, bootstrap resampling at every picture, and random samples against lost or kidnapped robots.
 
     Wolf, Burgard & Burkhardt 2005, sections III and VI-C: of `number` samples (5000 in the paper) `random` (50) are
-    drawn anew at each picture, uniformly over the free space (port `area`) with all headings, instead of that many
-    resampled ones, so that the number stays (erratum 47). Resampling is systematic; all weights are equal afterwards.
-    Raises BadInput where random samples are wanted and there is no `area`.
+    taken anew at each picture from the `proposals`, drawn by their weights, instead of that many resampled ones, so
+    that the number stays (erratum 47). With `sensor=visibility` they are uniform over the free space with all headings,
+    as in the paper. Resampling is systematic; all weights are equal afterwards.
+    Raises BadInput where random samples are wanted and nobody proposes any.
     """
 
     number: Annotated[int, Bounds(ge=1)] = 5000
@@ -29,12 +29,14 @@ class RandomSamples(Stage):
 
         belief: Particles
 
-    def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, area: FreeSpace | None = None) -> Out:
+    def step(
+        self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None = None
+    ) -> Out:
         """Fuse prediction and observation."""
-        if self.random and area is None:
+        if self.random and proposals is None:
             raise BadInput(
-                "fusion: random samples need a free space to be drawn from; wire fusion.area (occupancy.free), or use "
-                "nodes.fusion.random=0"
+                "fusion: random samples need poses to be drawn from; wire fusion.proposals to a sensor that gives them "
+                "(nodes.sensor.proposals above 0), or type nodes.fusion.random=0"
             )
         weights = particles.weights * likelihood.values
         total = float(weights.sum())
@@ -45,6 +47,7 @@ class RandomSamples(Stage):
         poses = np.empty((0, 3))
         if number < self.number:
             poses = particles.poses[systematic(weights, self.number - number, float(ctx.rng.random()))]
-        if area is not None and number:
-            poses = np.concatenate([poses, area.draw(ctx.rng, number)])
+        if proposals is not None and number:
+            drawn = systematic(proposals.weights, number, float(ctx.rng.random()))
+            poses = np.concatenate([poses, proposals.poses[drawn]])
         return self.Out(belief=Particles(poses, np.full(self.number, 1.0 / self.number)))

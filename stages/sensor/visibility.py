@@ -11,7 +11,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.problems import BadInput
 from omninav.stages.geometry.evidence import best_headings, contrast_power, fresh_share
 from omninav.stages.values.belief import Likelihood, Particles
-from omninav.stages.values.grid import cells_of
+from omninav.stages.values.grid import FreeSpace, cells_of
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.reach import Reach
@@ -393,6 +393,9 @@ class Visibility(Stage):
     likelihoods are raised to the way since the picture before over so many reaches (port `reach`, else of `reach_m`),
     down to `standing`; 0, as in the paper: never.
 
+    `proposals`: poses anywhere in the free space (port `free`), all headings, of equal weight, drawn anew at each
+    picture; `fusion=random_samples` takes its random samples from them. Without a free space there are none.
+
     `retrieval` false is the ablation of section VI-E: all particles that lie in any visibility area weigh alike, and
     all others nothing, whatever the picture shows.
     """
@@ -407,11 +410,13 @@ class Visibility(Stage):
     standing: Annotated[float, Bounds(ge=0, le=1)] = 0.05
     reach_m: Annotated[float, Bounds(gt=0)] = 0.5
     retrieval: bool = True
+    proposals: Annotated[int, Bounds(ge=0)] = 100
 
     class Out(Outputs):
-        """Likelihood of each particle."""
+        """Likelihood of each particle, and poses anywhere."""
 
         likelihood: Likelihood
+        proposals: Particles | None = None
 
     def setup(self, ctx: Context) -> None:
         """No lists yet: areas and map come with the first picture."""
@@ -426,11 +431,12 @@ class Visibility(Stage):
         areas: VisibilityAreas,
         motion: Motion | None = None,
         reach: Reach | None = None,
+        free: FreeSpace | None = None,
     ) -> Out:
         """Weigh all particles."""
-        values = similarities.values
+        values, proposals = similarities.values, self._anywhere(ctx, free)
         if not values.size:
-            return self.Out(likelihood=Likelihood(np.ones(len(particles.poses))))
+            return self.Out(likelihood=Likelihood(np.ones(len(particles.poses))), proposals=proposals)
         if areas is not self._areas:
             if len(areas.target) != len(map):
                 raise BadInput(
@@ -440,7 +446,8 @@ class Visibility(Stage):
             self._areas = areas
             self._cells, self._looks = visible_points(areas), looks_at(areas, map.poses)
         if not self.retrieval:
-            return self.Out(likelihood=Likelihood(sees_any(particles.poses, self._cells).astype(np.float64)))
+            seen = sees_any(particles.poses, self._cells).astype(np.float64)
+            return self.Out(likelihood=Likelihood(seen), proposals=proposals)
         candidates = np.arange(len(map)) if similarities.candidates is None else similarities.candidates
         rows = np.full(len(map), -1, np.int64)
         rows[candidates] = np.arange(len(candidates))
@@ -462,4 +469,9 @@ class Visibility(Stage):
             mean = mean_ahead(*where, sums[:, 0], number, anywhere, window, self.shape)
         way = None if motion is None else math.hypot(motion.x, motion.y)
         fresh = fresh_share(way, self.independent * unit, self.standing)
-        return self.Out(likelihood=Likelihood(mean**fresh, anywhere, fresh))
+        return self.Out(likelihood=Likelihood(mean**fresh, anywhere, fresh), proposals=proposals)
+
+    def _anywhere(self, ctx: Context, free: FreeSpace | None) -> Particles | None:
+        if free is None or not self.proposals:
+            return None
+        return Particles(free.draw(ctx.rng, self.proposals), np.full(self.proposals, 1.0 / self.proposals))

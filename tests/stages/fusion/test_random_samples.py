@@ -17,19 +17,24 @@ def belief(number: int, spread: float = 1.0) -> Particles:
     return Particles(np.random.default_rng(0).normal(0, spread, (number, 3)), np.full(number, 1 / number))
 
 
-def fuse(stage: RandomSamples, particles: Particles, values: np.ndarray, area: FreeSpace | None, seed: int = 0):
+def anywhere(seed: int = 0) -> Particles:
+    return Particles(AREA.draw(np.random.default_rng(seed), 100), np.full(100, 0.01))
+
+
+def fuse(stage: RandomSamples, particles: Particles, values: np.ndarray, proposals: Particles | None, seed: int = 0):
     ctx = Context("fusion", np.random.default_rng(seed))
-    return stage.step(ctx, particles, Likelihood(values), area).belief, ctx
+    return stage.step(ctx, particles, Likelihood(values), proposals).belief, ctx
 
 
 def test_random_samples_replace_as_many_resampled_ones_and_weigh_alike():
-    out, _ = fuse(RandomSamples(), belief(5000), np.ones(5000), AREA)
+    out, _ = fuse(RandomSamples(), belief(5000), np.ones(5000), anywhere())
     assert len(out.poses) == 5000
     assert np.allclose(out.weights, 1 / 5000)
-    anywhere = out.poses[:, 0] > 40
-    assert anywhere.sum() == 50
-    assert (out.poses[anywhere, 0] >= 50).all()
-    assert (out.poses[anywhere, 0] < 52).all()
+    fresh = out.poses[:, 0] > 40
+    assert fresh.sum() == 50
+    assert (out.poses[fresh, 0] >= 50).all()
+    assert (out.poses[fresh, 0] < 52).all()
+    assert len(np.unique(out.poses[fresh, 0])) == 50
 
 
 def test_the_others_are_drawn_by_weight_times_likelihood():
@@ -50,18 +55,24 @@ def test_a_view_that_nothing_explains_is_passed_over_and_told_of(values: np.ndar
 
 
 def test_the_same_seed_gives_the_same_samples():
-    one, other = (fuse(RandomSamples(), belief(5000), np.linspace(0, 1, 5000), AREA, seed=4)[0] for _ in range(2))
+    one, other = (fuse(RandomSamples(), belief(5000), np.linspace(0, 1, 5000), anywhere(), seed=4)[0] for _ in range(2))
     assert np.array_equal(one.poses, other.poses)
 
 
+def test_proposals_are_drawn_by_their_weights():
+    two = Particles(np.array([[60.0, 0, 0], [70.0, 0, 0]]), np.array([0.1, 0.9]))
+    out, _ = fuse(RandomSamples(), belief(5000), np.ones(5000), two)
+    assert [(out.poses[:, 0] == x).sum() for x in (60.0, 70.0)] == [5, 45]
+
+
 def test_all_samples_may_be_random():
-    out, _ = fuse(RandomSamples(number=40, random=50), belief(40), np.ones(40), AREA)
+    out, _ = fuse(RandomSamples(number=40, random=50), belief(40), np.ones(40), anywhere())
     assert len(out.poses) == 40
     assert (out.poses[:, 0] > 40).all()
 
 
-def test_random_samples_without_a_free_space_are_refused_in_one_line():
-    with pytest.raises(BadInput, match=r"fusion\.area"):
+def test_random_samples_that_nobody_proposes_are_refused_in_one_line():
+    with pytest.raises(BadInput, match=r"fusion\.proposals"):
         fuse(RandomSamples(), belief(10), np.ones(10), None)
 
 

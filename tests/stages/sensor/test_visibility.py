@@ -11,7 +11,7 @@ from omninav.stages.areas.line_of_sight import axes_of, visibility_areas
 from omninav.stages.geometry.evidence import contrast_power, fresh_share
 from omninav.stages.sensor.visibility import Visibility, looks_at, mean_ahead, sums_by_turn, visible_points
 from omninav.stages.values.belief import Particles
-from omninav.stages.values.grid import FREE, OCCUPIED, OccupancyGrid
+from omninav.stages.values.grid import FREE, OCCUPIED, FreeSpace, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.reach import Reach
@@ -257,3 +257,19 @@ def test_without_retrieval_all_particles_in_any_area_weigh_alike():
         inside = 0 <= row < 30 and 0 <= column < 40 and anywhere[row, column]
         assert value == float(inside)
     assert set(values) == {0.0, 1.0}
+
+
+def test_proposals_are_anywhere_in_the_free_space_and_absent_without_one():
+    areas = visibility_areas(REFERENCES[:3], ROOM, axes_of(1))
+    free = FreeSpace(np.array([[50.5, 50.5], [51.5, 50.5]]), 1.0)
+    poses, alike = some_poses(20), Similarities(RNG.random((3, 1)).astype(np.float32))
+    for retrieval in (True, False):
+        stage, ctx = Visibility(retrieval=retrieval, proposals=40), Context("sensor", np.random.default_rng(0))
+        stage.setup(ctx)
+        given = alike, Particles(poses, np.full(20, 1 / 20)), a_map(REFERENCES[:3]), areas
+        proposed = stage.step(ctx, *given, free=free).proposals
+        assert proposed is not None
+        assert proposed.poses.shape == (40, 3)
+        assert (proposed.poses[:, 0] >= 50).all()
+        assert proposed.weights.tolist() == [1 / 40] * 40
+        assert stage.step(ctx, *given).proposals is None
