@@ -1,0 +1,74 @@
+"""Localisation by retrieved images and visibility areas: as a user runs it, and stage by stage in exchange."""
+
+import json
+from pathlib import Path
+
+import pytest
+from conftest import DATA, needs_data
+from hydra import compose, initialize_config_module
+
+from omninav.pipeline.app import complete
+from omninav.pipeline.problems import ProblemsFound
+from omninav.pipeline.run import plan
+
+HOUSE = DATA / "photoreal-house"
+
+
+def planned(*words: str):
+    with initialize_config_module("omninav.conf", version_base="1.3"):
+        return plan(complete(compose("config", overrides=list(words))))
+
+
+@pytest.mark.parametrize("variant", ["retrieval_mcl", "omniview_mcl"])
+@pytest.mark.parametrize("features", ["haar_integral", "hsv_histogram"])
+@pytest.mark.parametrize("match", ["retrieval", "selective"])
+@pytest.mark.parametrize("sensor", ["visibility", "near_references"])
+@pytest.mark.parametrize("fusion", ["random_samples", "importance_resampling"])
+def test_each_stage_of_one_variant_serves_the_other(variant: str, features: str, match: str, sensor: str, fusion: str):
+    words = (f"features={features}", f"match={match}", f"sensor={sensor}", f"fusion={fusion}")
+    nodes = planned(f"variant={variant}", *words).graph.nodes
+    assert ("areas" in nodes) == (sensor == "visibility")
+    assert ("retrieval_view" in nodes) == (match == "retrieval")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("features=hsv_histogram", "unwarp=window"), "gives Windows"),
+        (("features=fourier",), "has no output 'features'"),
+        (("fusion=agreement",), "hypothesis"),
+    ],
+    ids=["a window for who wants a circle", "features of another kind", "a fusion of another kind"],
+)
+def test_what_cannot_be_exchanged_is_explained_before_anything_runs(words: tuple[str, ...], said: str):
+    with pytest.raises(ProblemsFound) as found:
+        planned("variant=retrieval_mcl", *words)
+    assert said in str(found.value)
+
+
+@needs_data
+def test_without_a_grid_one_line_says_what_is_missing_and_how_to_get_one(omninav, tmp_path: Path):
+    ended = omninav("variant=retrieval_mcl", f"tour={HOUSE}/tour.mcap", f"log={HOUSE}/drive.mcap")
+    assert ended.returncode == 2
+    assert len(ended.stderr.strip().splitlines()) == 1
+    assert f"grid={HOUSE / 'map.yaml'}" in ended.stderr
+    assert "grid=from_tour" in ended.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@needs_data
+@pytest.mark.parametrize("grid", [f"{HOUSE}/map.yaml", "from_tour"], ids=["its grid", "a stand-in"])
+def test_the_house_is_found_from_anywhere(omninav, tmp_path: Path, grid: str):
+    words = ("variant=retrieval_mcl", f"tour={HOUSE}/tour.mcap", f"log={HOUSE}/drive.mcap", f"grid={grid}")
+    omninav(*words, check=True)
+    run = (tmp_path / "runs" / "latest").resolve()
+    metrics = json.loads((run / "metrics.json").read_text())
+    after = metrics["after_convergence"]
+    assert after["position_error_m"]["median"] < 0.5
+    assert after["position_error_m"]["max"] < 2.0
+    assert after["heading_error_deg"]["median"] < 8.0
+    assert metrics["visibility"]["grid"] == ("tour" if grid == "from_tour" else "map")
+    report = (run / "report.html").read_text()
+    assert "Visibility areas" in report
+    assert "What the image database answers" in report
+    assert ("stand-in" in report) == (grid == "from_tour")
