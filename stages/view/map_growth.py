@@ -40,8 +40,8 @@ class MapGrowth(Stage):
                 title="The map over time",
                 caption=f"{came.sum()} references came, {went.sum()} went{f' ({told})' if told else ''}; "
                 f"{found[-1].views} with {found[-1].components} components were left. Below, how many came and went "
-                f"per {_width(len(ticks))} frames, by when it was learned, some way behind where it was seen. Dotted lines: "
-                "a new log begins.",
+                f"per {_width(len(ticks))} frames, by when it was learned, some way behind where it was seen. Dotted "
+                "lines: a new log begins.",
                 content=_draw(
                     len(ticks),
                     starts,
