@@ -1,18 +1,22 @@
 """Visibility areas and the weights they give, at the size of Wolf, Burgard & Burkhardt 2005: 936 images, 37 x 14 m."""
 
 import time
+from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 
 from omninav.pipeline import Context
 from omninav.stages.areas.line_of_sight import axes_of, visibility_areas
-from omninav.stages.sensor.visibility import Visibility
+from omninav.stages.sensor.visibility import FADED, Visibility, looks_at, seen_from
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.grid import FREE, OCCUPIED, FreeSpace, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 
 from .table import Row, medians
+
+Array = npt.NDArray[np.float64]
 
 IMAGES, SAMPLES, ROOMS = 936, 5000, 8
 
@@ -22,7 +26,11 @@ def rows() -> list[Row]:
     grid = _floor()
     space = FreeSpace(grid.centres(*np.nonzero(grid.cells == FREE)), grid.resolution)
     poses = space.draw(np.random.default_rng(0), IMAGES)
-    return [*_of(grid, space, poses, 1, 1, "windows"), *_of(grid, space, poses, 8, 36, "panoramas of 8 sectors")]
+    return [
+        *_of(grid, space, poses, 1, 1, "windows", 5.0),
+        *_of(grid, space, poses[: IMAGES // 8], 8, 36, "panoramas of 8 sectors", 5.0),
+        *_of(grid, space, poses, 8, 36, "panoramas of 8 sectors", None),
+    ]
 
 
 def _floor() -> OccupancyGrid:
@@ -43,21 +51,34 @@ def _floor() -> OccupancyGrid:
     return OccupancyGrid(cells, 0.1, (0.0, 0.0))
 
 
-def _of(grid: OccupancyGrid, space: FreeSpace, poses: np.ndarray, sectors: int, headings: int, what: str) -> list[Row]:
+def _of(
+    grid: OccupancyGrid, space: FreeSpace, poses: Array, sectors: int, headings: int, what: str, limit: float | None
+) -> list[Row]:
     visibility_areas(poses[:2], grid, axes_of(sectors))  # compiled
     began = time.perf_counter()
     areas = visibility_areas(poses, grid, axes_of(sectors))
-    taken = time.perf_counter() - began
+    taken, images = time.perf_counter() - began, len(poses)
     whole = ReferenceGraph(
-        poses, np.zeros((IMAGES, sectors, 1), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth"
+        poses, np.zeros((images, sectors, 1), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth"
     )
-    alike = Similarities(np.random.default_rng(2).uniform(0.4, 0.9, (IMAGES, headings)).astype(np.float32))
+    alike = Similarities(np.random.default_rng(2).uniform(0.4, 0.9, (images, headings)).astype(np.float32))
     particles = Particles(space.draw(np.random.default_rng(3), SAMPLES), np.full(SAMPLES, 1 / SAMPLES))
-    ctx, sensor = Context("sensor"), Visibility()
-    sensor.setup(ctx)
-    weights = medians({"ours": lambda: sensor.step(ctx, alike, particles, whole, areas)}, rounds=20)["ours"]
+    near = Visibility().near_m or np.inf
+    looks = looks_at(areas, poses, each_view=True)
+    lists = seen_from(areas, looks, FADED * near)
+    listing = medians({"ours": lambda: seen_from(areas, looks, FADED * near)}, rounds=3)["ours"]
+
+    def weighing(sensor: Visibility) -> Callable[[], object]:
+        ctx = Context("sensor")
+        sensor.setup(ctx)
+        return lambda: sensor.step(ctx, alike, particles, whole, areas)
+
+    weights = medians({"near": weighing(Visibility()), "all": weighing(Visibility(near_m=None))}, rounds=20)
     return [
-        Row(f"visibility areas of {IMAGES} {what}, 37 x 14 m at 10 cm", taken, "s", limit=10.0),
+        Row(f"visibility areas of {images} {what}, 37 x 14 m at 10 cm", taken, "s", limit=10.0),
         Row("the same, stored", areas.nbytes / 1e6, "MB", limit=2.0),
-        Row(f"weights of {SAMPLES} samples against all of them", weights * 1e3, "ms", limit=5.0),
+        Row(f"lists of the views within {FADED * near:g} m of each cell", listing, "s", limit=5.0),
+        Row("the same, in memory", lists.items.nbytes / 1e6, "MB"),
+        Row(f"weights of {SAMPLES} samples, views near them", weights["near"] * 1e3, "ms", limit=limit),
+        Row("the same, all views in sight (the paper's)", weights["all"] * 1e3, "ms", limit=5.0),
     ]
