@@ -359,7 +359,20 @@ def complete(config: Any, variants: Callable[[str], Any] | None = None) -> dict[
     from .run import without_absent
 
     of_variant = variants or _configured_variants()
-    graph_keys = {"variant", "nodes", "wires", "artifacts", "saves", "log", "tour", "map", "route", "day", "events"}
+    graph_keys = {
+        "variant",
+        "nodes",
+        "wires",
+        "artifacts",
+        "saves",
+        "log",
+        "tour",
+        "map",
+        "route",
+        "day",
+        "events",
+        "splices",
+    }
     try:
         plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
         for name, spec in (plain.get("artifacts") or {}).items():
@@ -382,7 +395,8 @@ def complete(config: Any, variants: Callable[[str], Any] | None = None) -> dict[
                 if str(key) not in graph_keys:
                     other[key] = config._get_node(key)
             other.update({"tour": None, "map": None} | {key: spec.get(key) for key in ("log", "route", "day")})
-            other.events = spec.get("events") or []  # who lifts the robot on its drive does not lift it on its tour
+            for lift in ("events", "splices"):  # who lifts the robot on its drive does not lift it on its tour
+                other[lift] = spec.get(lift) or []
             for node in spec.get("share") or ():
                 if config.nodes.get(node) is not None:
                     other.nodes[node] = OmegaConf.to_container(config.nodes[node], resolve=False)

@@ -20,7 +20,7 @@ def check_splices(splices: Sequence[Splice], frames: int, name: str) -> None:
         if not end < after < to < frames:
             raise UnreadableRecording(
                 f"{name}: the splice [{after}, {to}] does not lead onwards between {end} and {frames - 1}; type "
-                "nodes.source.splices=[[60,300]] to go on with picture 300 once the first 60 are through"
+                "splices=[[60,300]] to go on with picture 300 once the first 60 are through"
             )
         end = to
 

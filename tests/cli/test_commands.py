@@ -67,6 +67,7 @@ def test_check_says_who_reads_the_truth(omninav):
         "belief_view",
         "similarity_view",
         "result_log",
+        "success",
     }
 
 

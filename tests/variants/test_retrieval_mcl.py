@@ -46,6 +46,14 @@ def test_what_cannot_be_exchanged_is_explained_before_anything_runs(words: tuple
     assert said in str(found.value)
 
 
+def test_who_is_carried_on_its_drive_is_not_carried_on_its_tour():
+    with initialize_config_module("omninav.conf", version_base="1.3"):
+        config = complete(compose("config", overrides=["variant=retrieval_mcl", "splices=[[3,6]]"]))
+    assert config["nodes"]["source"]["splices"] == [[3, 6]]
+    for name in ("map", "album"):
+        assert config["artifacts"][name]["graph"]["nodes"]["source"]["splices"] == []
+
+
 @needs_data
 def test_without_a_grid_one_line_says_what_is_missing_and_how_to_get_one(omninav, tmp_path: Path):
     ended = omninav("variant=retrieval_mcl", f"tour={HOUSE}/tour.mcap", f"log={HOUSE}/drive.mcap")
