@@ -8,7 +8,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.se2 import wrap
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
-from omninav.stages.values.maps import FeatureKind, ReferenceEvent, ReferenceGraph
+from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph, kind_of
 from omninav.stages.values.pose import Pose
 
 from .pose_of_view import Supervised, pose_of_view
@@ -59,13 +59,14 @@ class ImageDatabase(Stage):
         pose = pose_of_view(ctx, odometry, truth, map, self.supervised)
         if pose is None or not self._far(pose, last):
             return self.Out(map=map)
-        kind: FeatureKind = "histograms" if isinstance(features, SegmentHistograms) else "colours"
         directions = features.directions if isinstance(features, SegmentHistograms) else None
         if directions is None:
-            added = [map.insert(pose, features.values, kind)]
+            added = [map.insert(pose, features.values, kind_of(features))]
         else:
             added = [
-                map.insert(Pose(pose.x, pose.y, float(wrap(pose.heading + direction))), window[np.newaxis], kind)
+                map.insert(
+                    Pose(pose.x, pose.y, float(wrap(pose.heading + direction))), window[np.newaxis], kind_of(features)
+                )
                 for direction, window in zip(directions, features.values, strict=True)
             ]
         if last.reference >= 0:

@@ -6,8 +6,8 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.segments import similarity_at
-from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
-from omninav.stages.values.maps import FeatureKind, ReferenceEvent, ReferenceGraph, within
+from omninav.stages.values.features import SegmentFeatures
+from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph, kind_of, within
 from omninav.stages.values.pose import Pose
 
 from .pose_of_view import Supervised, pose_of_view
@@ -55,12 +55,11 @@ class LearnReferenceGraph(Stage):
         if pose is None:
             along.reference = -1  # no edge across a gap
             return self.Out(map=map)
-        kind: FeatureKind = "histograms" if isinstance(features, SegmentHistograms) else "colours"
         near = within(map.poses, pose.x, pose.y, max(self.distance_m, self.vicinity_m))
         reason = self._reason(features, pose, map, near)
         event = None
         if reason is not None:
-            here = map.insert(pose, features.values, kind)
+            here = map.insert(pose, features.values, kind_of(features))
             event = ReferenceEvent(here, reason)
         else:
             here = int(near[0])

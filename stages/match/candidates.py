@@ -11,8 +11,8 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs
 from omninav.pipeline.problems import BadInput
 from omninav.stages.values.belief import Particles
-from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
-from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.features import SegmentFeatures
+from omninav.stages.values.maps import ReferenceGraph, kind_of
 from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
@@ -127,12 +127,11 @@ class NearBelief:
 
 def check_alike(features: SegmentFeatures, map: ReferenceGraph) -> bool:
     """Whether view and map are histograms (else colours). Raises BadInput where they do not describe views alike."""
-    histograms = isinstance(features, SegmentHistograms)
-    kind = "histograms" if histograms else "colours"
+    kind = kind_of(features)
     shape = tuple(map.features.shape[1:])
     if len(map) and (map.kind != kind or shape != features.values.shape):
         raise BadInput(
             f"map: its views are {map.kind} of {shape[0]} segments x {shape[1]} bins, the present one is {kind} of "
             f"{features.values.shape[0]} x {features.values.shape[1]}; learn the map anew with these features"
         )
-    return histograms
+    return kind == "histograms"

@@ -45,16 +45,13 @@ class SuccessRate(Stage):
         motion: Sequence[Motion | None],
     ) -> Out:
         """The whole run at once."""
-        shares = [
-            (tick.log, 0.0 if each is None else each.mode_weight) for tick, each in zip(ticks, estimates, strict=True)
-        ]
         found = drives(ticks, estimates, truth, motion)
         if not found or not found[-1].has_truth:
             return self.Out()
         drive = found[-1]
-        return self.Out(
-            metrics=Metrics({"success": self._of(drive, np.array([s for log, s in shares if log == drive.log]))})
-        )
+        of_drive = (each for tick, each in zip(ticks, estimates, strict=True) if tick.log == drive.log)
+        modes = np.array([0.0 if each is None else each.mode_weight for each in of_drive])
+        return self.Out(metrics=Metrics({"success": self._of(drive, modes)}))
 
     def _of(self, drive: Drive, modes: Array) -> dict[str, Any]:
         scored = known(drive.truth)

@@ -190,9 +190,7 @@ class NearReferences(Stage):
         if map is not self._map or len(map) != self._length:
             self._cells = nearest_cells(map.poses, self.neighbours, unit / CELLS_PER_REACH, FADED * self.fade * unit)
             self._map, self._length = map, len(map)
-        candidates = np.arange(len(map)) if similarities.candidates is None else similarities.candidates
-        rows = np.full(len(map), -1, np.int64)
-        rows[candidates] = np.arange(len(candidates))
+        candidates, rows = similarities.rows(len(map))
         best, each = best_headings(np.ascontiguousarray(values)), similarities.stands_for
         floor = ordinary_match(best, map.poses[candidates], self.strangers * unit, self.ordinary, each)
         power, fresh, top = self._power(best, each), self._fresh(motion, unit), max(float(best.max()), 1e-12)

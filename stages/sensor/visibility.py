@@ -377,9 +377,7 @@ class Visibility(Stage):
         if not self.retrieval:
             seen = sees_any(particles.poses, self._cells).astype(np.float64)
             return self.Out(likelihood=Likelihood(seen), proposals=proposals)
-        candidates = np.arange(len(map)) if similarities.candidates is None else similarities.candidates
-        rows = np.full(len(map), -1, np.int64)
-        rows[candidates] = np.arange(len(candidates))
+        _, rows = similarities.rows(len(map))
         each = np.ones(len(values)) if similarities.stands_for is None else similarities.stands_for
         best = best_headings(np.ascontiguousarray(values))
         power = contrast_power(best, self.contrast, similarities.stands_for) if self.power is None else self.power

@@ -7,10 +7,16 @@ import numpy.typing as npt
 
 from omninav.pipeline import Value
 
+from .features import SegmentFeatures, SegmentHistograms
 from .growing import GrowingArrays
 from .pose import Pose, PoseSource
 
 FeatureKind = Literal["histograms", "colours"]
+
+
+def kind_of(features: SegmentFeatures) -> FeatureKind:
+    """What a map calls features like these."""
+    return "histograms" if isinstance(features, SegmentHistograms) else "colours"
 
 
 class ReferenceGraph(GrowingArrays, Value):
