@@ -131,6 +131,7 @@ class ExperimentRun:
         self.cores = experiment.cores or len(os.sched_getaffinity(0))
         self.started = datetime.now()
         self.logs: dict[str, Log] = {}
+        self._drives: dict[str, str] = {}
         drives = experiment.drives or {"": ""}
         self.cells = [
             self._cell(condition, drive, experiment.variant, (experiment.set, condition.words, driven), words)
@@ -284,15 +285,20 @@ class ExperimentRun:
                         cell.error = f"its log ({log.name}) could not be simulated: {failed[log.name]}"
 
     def _use_log(self, cell: Cell, graph: Graph, config: dict[str, Any], route: Any, day: Any) -> None:
-        """Let the graph's source read a simulated log instead of rendering for itself, where no log is named."""
+        """Let the graph's source read a simulated log instead of rendering for itself, where no log is named.
+
+        What the log was made of is no longer among the source's parameters: drives that look alike are one.
+        """
         source = graph.source
         if source is None or "world" not in source.parameters or source.parameters.get("log") is not None:
             return
         world = cell.config["world"]
         events = config["nodes"][source.name].get("events") or []
         identity = json.dumps([world, route, day, events], sort_keys=True)
-        if identity not in self.logs:
-            digest = source.stage.inputs_digest() or digest_text(identity)
+        if identity not in self._drives:
+            self._drives[identity] = source.stage.inputs_digest() or digest_text(identity)
+        digest = self._drives[identity]
+        if digest not in self.logs:
             name = f"{world.get('name', 'world')} {route} day {day}{' with events' if events else ''}"
             made = self.compose(["variant=simulate"])
             place = Path(str(cell.config.get("cache") or self.folder)).resolve() / "logs"
@@ -301,8 +307,11 @@ class ExperimentRun:
                 if isinstance(node, dict) and "world" in node:
                     node |= {"world": world, "route": route, "day": day, "events": events}
                     node["log"] = f"{folder}.part/drive.mcap"
-            self.logs[identity] = Log(name, made, folder)
-        config["nodes"][source.name]["log"] = str(self.logs[identity].file)
+            self.logs[digest] = Log(name, made, folder)
+        node = config["nodes"][source.name]
+        config["nodes"][source.name] = {
+            name: value for name, value in node.items() if name not in ("world", "route", "day", "events")
+        } | {"log": str(self.logs[digest].file)}
 
     # maps
 

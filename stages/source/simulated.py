@@ -15,7 +15,7 @@ from omninav.stages import simulator
 from omninav.stages.geometry import catadioptric, odometry_noise, se2
 from omninav.stages.simulator import tours
 from omninav.stages.simulator.cameras import Rays, camera_of, camera_rays, shutter_times
-from omninav.stages.simulator.config import Event, WorldConfig
+from omninav.stages.simulator.config import Day, Event, WorldConfig
 from omninav.stages.simulator.obstacles import Obstacles, gather, nearest
 from omninav.stages.simulator.odometry import draw_bias, odometry
 from omninav.stages.simulator.people import Person, Track
@@ -203,9 +203,14 @@ class SimulatedRecording:
         return self._world.people_at(seconds, Track(self._seconds, self.driven))
 
     def digest(self) -> str:
-        """sha256 over the world, the route, the day, the events and the code that renders it."""
+        """sha256 over what the drive sees of the world, the route, the day, the events and the code that renders it."""
         events = json.dumps([dataclasses.asdict(event) for event in self.events])
-        return digest_text(simulation_digest(self.world), self.route, str(self.day), events)
+        return digest_text(simulation_digest(self._seen()), self.route, str(self.day), events)
+
+    def _seen(self) -> WorldConfig:
+        """The world without the days before and after the drive: drives of a day are alike whatever others bring."""
+        to_come = self.world.days[self.day + 1 :] if self._lasts is not None else ()
+        return dataclasses.replace(self.world, days=(*(Day(),) * self.day, self.world.day(self.day), *to_come))
 
 
 def refuse_no_room(world: WorldConfig, room: Obstacles, place: Sequence[float], where: str) -> None:
