@@ -1,0 +1,24 @@
+"""What in one view is what in another."""
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Value
+
+Ints = npt.NDArray[np.int64]
+
+
+class Correspondences(Value):
+    """Pairs of features, one of each of two views, that look alike; the best first.
+
+    `first` (M,) and `second` (M,): their rows in the features of the first and of the second view. Nothing is in two
+    pairs. `distance` (M,): how different they look, in the units of whoever matched them. In homing the first view is
+    the current one and the second the target.
+    """
+
+    first: Ints
+    second: Ints
+    distance: npt.NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.first)

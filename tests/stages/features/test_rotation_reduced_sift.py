@@ -1,0 +1,90 @@
+"""Patches of a turned robot's views, on the mirror image and on the panorama."""
+
+import math
+
+import numpy as np
+import pytest
+from turned_robot import CAMERA, both_kinds, look, wrapped
+
+from omninav.pipeline import Context
+from omninav.pipeline.problems import BadInput
+from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
+from omninav.stages.values.image import Image, Panorama
+from omninav.stages.values.local_features import LocalFeatures
+
+
+def found(picture: Image | Panorama, **parameters: object) -> LocalFeatures:
+    stage, context = RotationReducedSift(**parameters), Context("features")
+    stage.setup(context)
+    features = stage.step(context, picture=picture, camera=CAMERA).features
+    assert isinstance(features, LocalFeatures)
+    return features
+
+
+def mutual(one: LocalFeatures, other: LocalFeatures) -> tuple[np.ndarray, np.ndarray]:
+    gaps = ((one.descriptors[:, None].astype(float) - other.descriptors[None].astype(float)) ** 2).sum(axis=-1)
+    nearest = gaps.argmin(axis=1)
+    first = np.flatnonzero(gaps.argmin(axis=0)[nearest] == np.arange(len(one)))
+    return first, nearest[first]
+
+
+@both_kinds
+@pytest.mark.parametrize("turn", [0.7, 2.9])
+def test_a_robot_that_turns_sees_the_same_patches_turned_the_other_way(kind: str, turn: float) -> None:
+    one, other = found(look(kind, 0.0)), found(look(kind, turn))
+    first, second = mutual(one, other)
+    azimuth = [np.arctan2(f.bearings[:, 1], f.bearings[:, 0]) for f in (one, other)]
+    off = np.abs(wrapped(azimuth[1][second] - azimuth[0][first] + turn))
+    right = off < math.radians(1.5)
+    assert right.sum() > 180
+    assert right.mean() > 0.9
+    assert np.median(off[right]) < math.radians(0.25)
+    higher = np.arcsin(one.bearings[first, 2]) - np.arcsin(other.bearings[second, 2])
+    assert np.median(np.abs(higher[right])) < math.radians(0.25)
+    assert np.median(np.abs(one.colours[first][right] - other.colours[second][right])) < 0.02
+
+
+def test_the_radius_stands_in_for_the_orientation_that_is_not_measured() -> None:
+    one, other = found(look("mirror", 0.0)), found(look("mirror", math.pi / 2))
+    upright = [found(Panorama(look("mirror", heading).pixels)) for heading in (0.0, math.pi / 2)]
+    assert len(mutual(one, other)[0]) > 1.5 * len(mutual(*upright)[0])  # the same pictures, columns for radii
+
+
+def test_of_a_turned_camera_the_bearings_are_the_robots() -> None:
+    features = found(look("mirror", 0.0))
+    level = features.points - (CAMERA.centre_x, CAMERA.centre_y)
+    around = np.arctan2(level[:, 1], level[:, 0]) + CAMERA.yaw
+    assert np.abs(wrapped(np.arctan2(features.bearings[:, 1], features.bearings[:, 0]) - around)).max() < 1e-9
+    assert np.linalg.norm(features.bearings, axis=1) == pytest.approx(np.ones(len(features)))
+    radius = np.hypot(*level.T)
+    assert radius.min() > CAMERA.inner_radius_px
+    assert radius.max() < CAMERA.outer_radius_px
+
+
+def test_patches_across_a_panoramas_seam_are_found_once() -> None:
+    panorama = look("panorama", 0.0)
+    rolled = Panorama(np.roll(panorama.pixels, 100, axis=1), panorama.elevation_top, panorama.elevation_bottom)
+    one, other = found(panorama, largest=10**6), found(rolled, largest=10**6)
+    moved = np.column_stack([(one.points[:, 0] + 100) % 720, one.points[:, 1]])
+    gaps = np.abs(moved[:, None] - other.points[None]).max(axis=-1)
+    assert (gaps.min(axis=1) < 0.5).mean() > 0.9
+    assert (one.points[:, 0] >= -0.5).all()
+    assert (one.points[:, 0] < 719.5).all()
+
+
+def test_the_strongest_come_first_and_own_orientation_is_lowes() -> None:
+    few, many = found(look("mirror", 0.0), features=50), found(look("mirror", 0.0), features=200)
+    assert len(few) == 50
+    assert (few.points == many.points[:50]).all()
+    own = found(look("mirror", 0.0), orientation="own", features=50)
+    assert not (own.descriptors == few.descriptors).all()
+
+
+def test_a_picture_of_nothing_has_no_features_and_one_without_a_camera_is_refused() -> None:
+    empty = found(Panorama(np.zeros((80, 360, 3), np.uint8)))
+    assert len(empty) == 0
+    assert empty.descriptors.shape == (0, 128)
+    stage = RotationReducedSift()
+    stage.setup(Context("features"))
+    with pytest.raises(BadInput, match=r"wires\.features\.camera=source\.camera"):
+        stage.step(Context("features"), picture=Image(np.zeros((48, 64, 3), np.uint8)))
