@@ -1,0 +1,123 @@
+"""Which features of two views belong together, by what they look like."""
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import KDTree
+
+Ints = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float32]
+Array = npt.NDArray[np.float64]
+
+
+class Pairs(NamedTuple):
+    """Matched rows of a first and a second view, and how far apart they are: each (M,), the nearest first."""
+
+    first: Ints
+    second: Ints
+    distance: Array
+
+    def chosen(self, kept: npt.NDArray[np.bool_]) -> "Pairs":
+        """Some of them."""
+        return Pairs(self.first[kept], self.second[kept], self.distance[kept])
+
+
+NO_PAIRS = Pairs(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
+
+
+@numba.njit(cache=True, nogil=True)
+def _mutual(squares: Floats, ratio: float, first: Ints, second: Ints, distance: Array) -> int:
+    rows, columns = squares.shape
+    nearest_row = np.zeros(columns, np.int64)
+    least = np.full(columns, np.inf, np.float32)
+    next_least = np.full(columns, np.inf, np.float32)
+    nearest = np.zeros(rows, np.int64)
+    one = np.full(rows, np.inf, np.float32)
+    two = np.full(rows, np.inf, np.float32)
+    for i in range(rows):
+        for j in range(columns):
+            d = squares[i, j]
+            if d < one[i]:
+                two[i], one[i], nearest[i] = one[i], d, j
+            elif d < two[i]:
+                two[i] = d
+            if d < least[j]:
+                next_least[j], least[j], nearest_row[j] = least[j], d, i
+            elif d < next_least[j]:
+                next_least[j] = d
+    found = 0
+    for i in range(rows):
+        j = nearest[i]
+        d = max(one[i], np.float32(0.0))
+        if nearest_row[j] == i and d <= ratio * ratio * two[i] and d <= ratio * ratio * next_least[j]:
+            first[found], second[found], distance[found] = i, j, np.sqrt(d)
+            found += 1
+    return found
+
+
+def mutual_nearest(squares: Floats, ratio: float) -> Pairs:
+    """Pairs of which each is the other's nearest, and by `ratio` nearer than the second nearest of either.
+
+    `squares` (N, M) float32: squared distances. A row or column without a second nearest passes the ratio. (Goedeme et
+    al. 2007, section 3.4.)
+    """
+    rows, columns = squares.shape
+    if not rows or not columns:
+        return NO_PAIRS
+    first, second, distance = np.empty(rows, np.int64), np.empty(rows, np.int64), np.empty(rows)
+    found = _mutual(squares, ratio, first, second, distance)
+    return _nearest_first(first[:found], second[:found], distance[:found])
+
+
+def _nearest_first(first: Ints, second: Ints, distance: Array) -> Pairs:
+    order = np.argsort(distance, kind="stable")
+    return Pairs(first[order], second[order], distance[order])
+
+
+def squared_distances(one: npt.ArrayLike, other: npt.ArrayLike) -> Floats:
+    """Squared Euclidean distances (N, M) float32 of rows (N, D) and (M, D); exact for whole numbers as SIFT's."""
+    a, b = np.asarray(one, np.float32), np.asarray(other, np.float32)
+    squares: Floats = a @ b.T
+    squares *= -2.0
+    squares += np.einsum("nd,nd->n", a, a)[:, None]
+    squares += np.einsum("nd,nd->n", b, b)
+    return squares
+
+
+def spreads(*parts: Floats) -> Floats:
+    """Standard deviation (D,) of each element over the rows of all parts together; 1 where it does not vary."""
+    spread = np.concatenate(parts).std(axis=0, dtype=np.float64)
+    return np.where(spread > 1e-9, spread, 1.0).astype(np.float32)
+
+
+def mahalanobis_matches(one: Floats, other: Floats, ratio: float) -> Pairs:
+    """`mutual_nearest` of rows (N, D) and (M, D) in which each element counts by its spread over both.
+
+    d_ij = sqrt(sum_k (x_ik - x_jk)^2 / sigma_k^2) (Goedeme et al. 2007, equation 2 as erratum 26 reads it).
+    """
+    if not len(one) or not len(other):
+        return NO_PAIRS
+    sigma = spreads(one, other)
+    return mutual_nearest(squared_distances(one / sigma, other / sigma), ratio)
+
+
+def tree_matches(one: npt.ArrayLike, other: npt.ArrayLike, ratio: float) -> Pairs:
+    """The pairs of `mutual_nearest` by a kd-tree over each view: exact, and quicker only for few elements D."""
+    a, b = np.asarray(one, np.float64), np.asarray(other, np.float64)
+    if not len(a) or not len(b):
+        return NO_PAIRS
+    gap, nearest = _two_nearest(b, a)
+    back_gap, back = _two_nearest(a, b)
+    first = np.arange(len(a))
+    second = nearest[:, 0]
+    kept = back[second, 0] == first
+    kept &= (gap[:, 0] <= ratio * gap[:, 1]) & (back_gap[second, 0] <= ratio * back_gap[second, 1])
+    return _nearest_first(first[kept], second[kept].astype(np.int64), gap[kept, 0])
+
+
+def _two_nearest(stored: Array, asked: Array) -> tuple[Array, Ints]:
+    tree = KDTree(stored)  # type: ignore[no-untyped-call]
+    gap, nearest = tree.query(asked, k=2)  # type: ignore[no-untyped-call]
+    return gap, nearest

@@ -1,0 +1,122 @@
+"""How far apart two views are, by what they have in common and how it is arranged."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.values.local_features import ColumnSegments, LocalFeatures
+
+from .matching import NO_PAIRS, Pairs, mahalanobis_matches, mutual_nearest, squared_distances, tree_matches
+from .se2 import wrap
+
+Array = npt.NDArray[np.float64]
+
+
+class Matching(NamedTuple):
+    """How features are matched. `ratio`: to the second nearest, of patches and of columns. `colour`: how far apart the
+    colours of two patches may lie (Euclidean, of three correlations). `search`: through all, or by kd-trees."""
+
+    ratio: float = 0.8
+    column_ratio: float = 0.8
+    colour: float = 0.5
+    search: str = "all"
+
+
+class Measure(NamedTuple):
+    """What a visual distance is made of: the least number of matches, and the least mean angle (rad) that counts."""
+
+    least_matches: int = 8
+    least_angle: float = math.radians(0.5)
+
+
+class Compared(NamedTuple):
+    """Two views compared. `distance`: inf where too little matches. `turn` (rad): how far the second view's robot is
+    turned, counter-clockwise, against the first's. `matches` and `of`: how many of the mean number of features."""
+
+    distance: float
+    turn: float
+    matches: int
+    of: float
+
+
+NOTHING = Compared(math.inf, 0.0, 0, 0.0)
+
+
+def match_patches(one: LocalFeatures, other: LocalFeatures, by: Matching) -> Pairs:
+    """Patches of two views that look alike and have alike colours (Goedeme et al. 2007, sections 3.2 and 3.4)."""
+    if not len(one) or not len(other):
+        return NO_PAIRS
+    if by.search == "kd_tree":
+        pairs = tree_matches(one.descriptors, other.descriptors, by.ratio)
+    else:
+        pairs = mutual_nearest(squared_distances(one.descriptors, other.descriptors), by.ratio)
+    apart = np.linalg.norm(one.colours[pairs.first] - other.colours[pairs.second], axis=1)
+    return pairs.chosen(apart <= by.colour)
+
+
+def match_columns(one: ColumnSegments, other: ColumnSegments, by: Matching) -> Pairs:
+    """Column segments of two views that look alike (section 3.4, equation 2)."""
+    return mahalanobis_matches(one.descriptors, other.descriptors, by.column_ratio)
+
+
+def azimuths(features: LocalFeatures) -> Array:
+    """Azimuths (N,) of patches: radians, counter-clockwise from forward."""
+    around: Array = np.arctan2(features.bearings[:, 1], features.bearings[:, 0])
+    return around
+
+
+def alignment(angles: Array) -> tuple[float, Array]:
+    """The circular mean of angles (N,), and what is left of each after it: within pi."""
+    mean = math.atan2(float(np.sin(angles).sum()), float(np.cos(angles).sum()))
+    return mean, np.asarray(wrap(angles - mean), np.float64)
+
+
+def local_distance(angles: Array, first: int, second: int, by: Measure) -> tuple[float, float]:
+    """Visual distance by matches, and the turn that aligns the views.
+
+    D = (n1 + n2) sum |theta_i| / (2 N^2) (Goedeme et al. 2007, equations 3 and 4 as erratum 27 reads them): the mean
+    number of features over that of matches, times the mean angle in radians between matches once both views are turned
+    alike by the circular mean. `angles` (N,): azimuth in the second view less that in the first. `first`, `second`: n1
+    and n2. One match would be a perfect one, so that there must be `least_matches`, else D is inf; and the mean angle
+    is at least `least_angle`.
+    """
+    number = len(angles)
+    if number < max(1, by.least_matches):
+        return math.inf, 0.0
+    turn, left = alignment(angles)
+    apart = max(float(np.abs(left).mean()), by.least_angle)
+    return (first + second) / (2.0 * number) * apart, turn
+
+
+def compare(
+    one: LocalFeatures | None,
+    other: LocalFeatures | None,
+    columns: ColumnSegments | None,
+    other_columns: ColumnSegments | None,
+    matching: Matching,
+    measure: Measure,
+) -> Compared:
+    """Two views by their local features, of whichever kinds both have."""
+    angles, first, second = [], 0, 0
+    if one is not None and other is not None:
+        pairs = match_patches(one, other, matching)
+        angles.append(azimuths(other)[pairs.second] - azimuths(one)[pairs.first])
+        first, second = len(one), len(other)
+    if columns is not None and other_columns is not None:
+        pairs = match_columns(columns, other_columns, matching)
+        angles.append(other_columns.azimuths[pairs.second] - columns.azimuths[pairs.first])
+        first, second = first + len(columns), second + len(other_columns)
+    if not angles:
+        return NOTHING
+    apart = np.concatenate(angles)
+    distance, turn = local_distance(apart, first, second, measure)
+    # what is seen further left stands in a view that was turned to the right
+    return Compared(distance, -turn, len(apart), (first + second) / 2.0)
+
+
+def colours_apart(one: npt.ArrayLike, other: npt.ArrayLike) -> Array:
+    """How far global colours lie apart: Euclidean over the last axis (section 4.2.1)."""
+    gap: Array = np.linalg.norm(np.asarray(one, np.float64) - np.asarray(other, np.float64), axis=-1)
+    return gap
