@@ -299,10 +299,11 @@ class ExperimentRun:
             self._drives[identity] = source.stage.inputs_digest() or digest_text(identity)
         digest = self._drives[identity]
         if digest not in self.logs:
-            name = f"{world.get('name', 'world')} {route} day {day}{' with events' if events else ''}"
+            drive = f"{world.get('name', 'world')} {route} day {day}{' with events' if events else ''}"
+            name = f"{drive} {digest[:12]}"  # two worlds of one name differ in what else was said of them
             made = self.compose(["variant=simulate"])
             place = Path(str(cell.config.get("cache") or self.folder)).resolve() / "logs"
-            folder = place / f"{re.sub('[^A-Za-z0-9]+', '_', name)}_{digest[:12]}"
+            folder = place / re.sub("[^A-Za-z0-9]+", "_", name)
             for node in made["nodes"].values():
                 if isinstance(node, dict) and "world" in node:
                     node |= {"world": world, "route": route, "day": day, "events": events}
