@@ -21,14 +21,15 @@ class SuccessRate(Stage):
     Wolf, Burgard & Burkhardt 2005, section VI-D (2 m, 35 degrees): all frames count, finding the robot at first
     included, which is why 100 % is not reached (erratum 46a). Of the last log, under `success`: `within_rate`;
     `at_end`, 1 where the last frame is good, else 0; `one_mode_after_frames`, how many frames went by before the
-    belief's heaviest mode held `one_mode` of it in a good frame (None: never). Where the robot was carried (its true
-    pose left the way of its odometry by more than `carried_m` between two frames), `carried_at` says before which
-    frame, and `recovered_after_frames` how many frames later the estimate is good for ten in a row (None: never).
+    belief's heaviest mode, a metre and 30 degrees around it, held the share `one_mode` of the belief in a good frame
+    (None: never; from a half on no other mode is as heavy). Where the robot was carried (its true pose left the way of
+    its odometry by more than `carried_m` between two frames), `carried_at` says before which frame, and
+    `recovered_after_frames` how many frames later the estimate is good for ten in a row (None: never).
     """
 
     within_m: Annotated[float, Bounds(gt=0)] = 2.0
     within_deg: Annotated[float, Bounds(gt=0, le=180)] = 35.0
-    one_mode: Annotated[float, Bounds(gt=0, le=1)] = 0.9
+    one_mode: Annotated[float, Bounds(gt=0, le=1)] = 0.5
     carried_m: Annotated[float, Bounds(gt=0)] = 1.0
 
     class Out(Outputs):
