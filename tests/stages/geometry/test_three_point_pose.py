@@ -1,0 +1,129 @@
+"""Poses from three points and from many, against poselib, over the full sphere."""
+
+import math
+
+import numpy as np
+import poselib
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+from two_views import angle_deg, unit
+
+from omninav.stages.geometry.three_point_pose import grunert, refined_camera, sees, three_point_pose
+
+SEEDS = st.integers(0, 10**6)
+
+
+def scene(seed: int, number: int, planar: bool = False) -> tuple[np.ndarray, ...]:
+    rng = np.random.default_rng(seed)
+    rotation = (Rotation.from_euler("z", rng.uniform(-3, 3)) if planar else Rotation.random(rng=rng)).as_matrix()
+    translation = rng.normal(size=3) * (1.0, 1.0, 0.0 if planar else 1.0)
+    points = rng.normal(size=(number, 3)) * 3.0
+    return rotation, translation, points, unit((points - translation) @ rotation)
+
+
+def noisy(bearings: np.ndarray, points: np.ndarray, wrong: int, seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    bearings = unit(bearings + math.radians(0.1) * rng.normal(size=bearings.shape))
+    bearings[:wrong] = unit(rng.normal(size=(wrong, 3)))
+    return bearings
+
+
+@settings(max_examples=300)
+@given(SEEDS)
+def test_the_poses_of_three_points_are_those_of_poselib(seed: int) -> None:
+    rotation, translation, points, bearings = scene(seed, 3)
+    rotations, translations = grunert(bearings, points)
+    theirs = poselib.p3p(bearings, points)  # takes the world to the camera: the inverse
+    for other in [(pose.R.T, -pose.R.T @ pose.t) for pose in theirs]:
+        if np.abs(unit(points - other[1]) @ other[0] - bearings).max() < 1e-7:  # close to a double root they are rough
+            apart = [
+                max(np.abs(r - other[0]).max(), np.abs(t - other[1]).max())
+                for r, t in zip(rotations, translations, strict=True)
+            ]
+            assert min(apart) < 1e-3
+    assert 1 <= len(rotations) <= 4
+    apart = [
+        max(np.abs(r - rotation).max(), np.abs(t - translation).max())
+        for r, t in zip(rotations, translations, strict=True)
+    ]
+    assert min(apart) < 1e-3
+
+
+@given(SEEDS)
+def test_each_solution_sees_the_points_where_they_are_seen(seed: int) -> None:
+    _, _, points, bearings = scene(seed, 3)
+    for rotation, translation in zip(*grunert(bearings, points), strict=True):
+        assert np.linalg.det(rotation) == pytest.approx(1.0)
+        assert unit((points - translation) @ rotation) == pytest.approx(bearings, abs=1e-6)
+
+
+def test_where_the_formula_for_u_is_0_by_0_the_pose_is_found_all_the_same() -> None:
+    # A camera over the middle of an equilateral triangle: all angles equal, v = 1, cos gamma = v cos alpha.
+    angles = np.array([0.0, 2.0, 4.0]) * math.pi / 3
+    points = np.stack([np.cos(angles), np.sin(angles), np.zeros(3)], axis=1)
+    bearings = unit(points - [0.0, 0.0, 2.0])
+    found = grunert(bearings, points)
+    assert min(np.abs(t - [0.0, 0.0, 2.0]).max() for t in found[1]) < 1e-6
+
+
+def test_points_that_coincide_say_nothing() -> None:
+    bearings = np.eye(3)
+    assert len(grunert(bearings, np.array([[1.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]]))[0]) == 0
+    assert len(grunert(bearings, np.zeros((3, 3)))[0]) == 0
+
+
+@settings(max_examples=20)
+@given(SEEDS, st.booleans())
+def test_the_camera_is_found_among_as_many_wrong_points(seed: int, planar: bool) -> None:
+    rotation, translation, points, bearings = scene(seed, 100, planar)
+    found = three_point_pose(noisy(bearings, points, 50, seed), points, np.random.default_rng(seed), planar=planar)
+    assert found is not None
+    assert angle_deg(found.rotation, rotation) < 0.2
+    assert np.linalg.norm(found.translation - translation) < 0.03
+    assert found.inliers[50:].mean() > 0.9
+    if planar:
+        assert found.translation[2] == 0.0
+        assert found.rotation[2, 2] == 1.0
+
+
+def test_refined_it_is_as_good_as_poselibs() -> None:
+    ours, theirs = [], []
+    for seed in range(20):
+        rotation, translation, points, bearings = scene(seed, 60)
+        ahead = bearings[:, 2] > 0.3  # its refinement wants a pinhole camera
+        points, seen = points[ahead], noisy(bearings[ahead], points[ahead], 0, seed)
+        found = refined_camera(rotation, translation, seen, points, math.radians(5.0))
+        start = poselib.CameraPose()
+        start.R, start.t = rotation.T, -rotation.T @ translation
+        camera = {"model": "PINHOLE", "width": 2, "height": 2, "params": [1.0, 1.0, 0.0, 0.0]}
+        other, _ = poselib.refine_absolute_pose(
+            seen[:, :2] / seen[:, 2:], points, start, camera, {"loss_type": "TRIVIAL"}
+        )
+        ours.append(np.linalg.norm(found[1] - translation))
+        theirs.append(np.linalg.norm(-other.R.T @ other.t - translation))
+    assert np.median(ours) <= 1.1 * np.median(theirs)
+
+
+def test_the_same_seed_gives_the_same_pose() -> None:
+    _, _, points, bearings = scene(1, 60)
+    seen = noisy(bearings, points, 30, 1)
+    one, two = (three_point_pose(seen, points, np.random.default_rng(3)) for _ in range(2))
+    assert one is not None
+    assert two is not None
+    assert np.array_equal(one.rotation, two.rotation)
+    assert np.array_equal(one.translation, two.translation)
+
+
+def test_too_few_points_say_nothing() -> None:
+    _, _, points, bearings = scene(1, 2)
+    assert three_point_pose(bearings, points, np.random.default_rng(0)) is None
+    same = np.ones((5, 3))
+    assert three_point_pose(unit(same), same, np.random.default_rng(0)) is None
+
+
+def test_what_is_seen_is_told_by_the_angle() -> None:
+    points = np.array([[2.0, 0.0, 0.0], [0.0, 0.0, -3.0]])
+    tilted = unit(np.array([[1.0, 0.01, 0.0], [0.0, 0.05, -1.0]]))
+    assert sees(np.eye(3), np.zeros(3), tilted, points, math.radians(1.0)).tolist() == [True, False]
