@@ -1,0 +1,96 @@
+"""Random problems of two views, to try what solves them."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
+from omninav.stages.values.two_views import BearingPairs, RelativeView
+
+
+class Posed(State):
+    """How many problems there have been."""
+
+    problems: int = 0
+
+
+class TwoViews(Source):
+    """Pairs of views of points all around a camera, some of them paired wrongly: one random problem per tick.
+
+    The baseline is 1. `number` points lie within `elevation_deg` of the horizon, uniformly on that part of the sphere,
+    `nearest` to `farthest` baselines away from view 1. `noise_deg`: standard deviation of each bearing's error, along
+    each of two directions across it. A share `wrong` of the bearings of view 2 looks anywhere on that part of the
+    sphere instead. `planar`: view 2 is a robot's that drove on a floor; else it was taken anywhere, turned anyhow.
+    """
+
+    problems: Annotated[int, Bounds(ge=1)] = 100
+    number: Annotated[int, Bounds(ge=1)] = 100
+    wrong: Annotated[float, Bounds(ge=0, lt=1)] = 0.5
+    noise_deg: Annotated[float, Bounds(ge=0)] = 0.1
+    elevation_deg: Annotated[float, Bounds(gt=0, le=90)] = 90.0
+    nearest: Annotated[float, Bounds(gt=0)] = 1.5
+    farthest: Annotated[float, Bounds(gt=0)] = 6.0
+    planar: bool = True
+
+    class Out(Outputs):
+        """`pairs`: the problem. `truth`: its answer; inliers are the pairs that are not wrong."""
+
+        tick: Tick
+        pairs: BearingPairs
+        truth: RelativeView
+
+    def length(self) -> int | None:
+        """Problems in all."""
+        return self.problems
+
+    def step(self, ctx: Context, posed: Posed) -> Out | None:
+        """The next problem; None when there were enough."""
+        if posed.problems >= self.problems:
+            return None
+        rng, index = ctx.rng, posed.problems
+        posed.problems += 1
+        if self.planar:
+            turn, along = rng.uniform(-math.pi, math.pi, 2)
+            cos, sin = math.cos(turn), math.sin(turn)
+            rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+            translation = np.array([math.cos(along), math.sin(along), 0.0])
+        else:
+            rotation, translation = _any_rotation(rng), self._directions(rng, 1, 90.0)[0]
+        distance = rng.uniform(self.nearest, self.farthest, (self.number, 1))
+        points = distance * self._directions(rng, self.number, self.elevation_deg)
+        first, second = self._seen(rng, points), self._seen(rng, (points - translation) @ rotation)
+        right = np.arange(self.number) >= round(self.wrong * self.number)
+        second[~right] = self._directions(rng, self.number - int(right.sum()), self.elevation_deg)
+        return self.Out(
+            tick=Tick(index=index, stamp=index * 10**9, frame=index, first_of_log=index == 0),
+            pairs=BearingPairs(first, second),
+            truth=RelativeView(rotation, translation, right),
+        )
+
+    def _seen(self, rng: np.random.Generator, points: np.ndarray) -> np.ndarray:
+        bearings = _unit(points)
+        return _unit(bearings + math.radians(self.noise_deg) * rng.normal(size=bearings.shape))
+
+    def _directions(self, rng: np.random.Generator, number: int, elevation_deg: float) -> np.ndarray:
+        around = rng.uniform(-math.pi, math.pi, number)
+        up = rng.uniform(-1.0, 1.0, number) * math.sin(math.radians(elevation_deg))
+        level = np.sqrt(1.0 - up * up)
+        return np.stack([level * np.cos(around), level * np.sin(around), up], axis=-1)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    unit: np.ndarray = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return unit
+
+
+def _any_rotation(rng: np.random.Generator) -> np.ndarray:
+    # A uniform unit quaternion as a matrix.
+    w, x, y, z = _unit(rng.normal(size=4))
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )

@@ -1,0 +1,30 @@
+"""Two views of the same points, as bearings, and how the second was taken from the first."""
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Value
+
+Array = npt.NDArray[np.float64]
+
+
+class BearingPairs(Value):
+    """What in one view is what in another. `first`, `second`: (N, 3) unit vectors in the robot's frame of each view."""
+
+    first: Array
+    second: Array
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+class RelativeView(Value):
+    """Camera 2 seen from camera 1: X1 = R X2 + t with `rotation` R (3, 3) and unit `translation` t (3,).
+
+    `inliers` (N,): which pairs agree with it. `samples`: how many were tried (0: known, not found).
+    """
+
+    rotation: Array
+    translation: Array
+    inliers: npt.NDArray[np.bool_]
+    samples: int = 0

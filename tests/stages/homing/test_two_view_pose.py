@@ -1,0 +1,71 @@
+"""Random problems of two views, their solvers, and what is said of them."""
+
+import math
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.stages.geometry.epipolar import shared_residuals
+from omninav.stages.homing.two_view_pose import TwoViewPose
+from omninav.stages.metric.two_view_errors import TwoViewErrors
+from omninav.stages.source.two_views import Posed, TwoViews
+from omninav.stages.values.two_views import BearingPairs, RelativeView
+
+
+def problems(seed: int = 0, **how) -> list[TwoViews.Out]:
+    source, ctx, posed = TwoViews(**how), Context("source", np.random.default_rng(seed)), Posed()
+    source.setup(ctx)
+    found = []
+    while (out := source.step(ctx, posed)) is not None:
+        found.append(out)
+    return found
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_pairs_that_are_not_wrong_fit_the_true_pose_and_the_others_do_not(planar: bool) -> None:
+    made = problems(problems=3, planar=planar, noise_deg=0.0, wrong=0.3)
+    assert [out.tick.index for out in made] == [0, 1, 2]
+    for out in made:
+        truth, pairs = out.truth, out.pairs
+        residuals = shared_residuals(truth.rotation, truth.translation, pairs.first, pairs.second)
+        assert residuals[truth.inliers] == pytest.approx(np.zeros(70), abs=1e-7)
+        assert np.median(residuals[~truth.inliers]) > 0.1
+        assert np.linalg.norm(truth.translation) == pytest.approx(1.0)
+        assert np.linalg.det(truth.rotation) == pytest.approx(1.0)
+        assert planar == (truth.translation[2] == 0.0)
+
+
+def test_points_keep_within_the_elevations_of_a_camera() -> None:
+    for out in problems(problems=2, elevation_deg=30.0, noise_deg=0.0):
+        assert np.abs(out.pairs.first[:, 2]).max() <= math.sin(math.radians(30.0)) + 1e-12
+
+
+def test_every_problem_of_a_robot_on_a_floor_is_solved() -> None:
+    made, ctx = problems(problems=30), Context("homing", np.random.default_rng(1))
+    found = [TwoViewPose().step(ctx, out.pairs).view for out in made]
+    metrics = TwoViewErrors().step(ctx, [out.truth for out in made], found).metrics.values["two_views"]
+    assert metrics["success_rate"] == 1.0
+    assert metrics["direction_error_deg"]["median"] < 0.2
+    assert metrics["rotation_error_deg"]["p95"] < 0.4
+
+
+def test_too_few_pairs_are_counted() -> None:
+    ctx = Context("homing")
+    assert TwoViewPose().step(ctx, BearingPairs(np.zeros((1, 3)), np.zeros((1, 3)))).view is None
+    assert ctx.counts["no_relative_pose"] == 1
+
+
+def test_errors_are_the_angles_between_the_poses() -> None:
+    # Turned by 2 degrees about the vertical, the direction off by 5: one of two within 3 degrees, one not found.
+    a, b = math.radians(2.0), math.radians(5.0)
+    turned = np.array([[math.cos(a), -math.sin(a), 0.0], [math.sin(a), math.cos(a), 0.0], [0.0, 0.0, 1.0]])
+    ahead, none = np.array([1.0, 0.0, 0.0]), np.zeros(0, np.bool_)
+    truth = [RelativeView(np.eye(3), ahead, none)] * 3
+    off = RelativeView(turned, np.array([math.cos(b), math.sin(b), 0.0]), none, 32)
+    found = [off, RelativeView(turned, ahead, none, 64), None]
+    values = TwoViewErrors().step(Context("errors"), truth, found).metrics.values["two_views"]
+    assert values["success_rate"] == pytest.approx(1 / 3)
+    assert values["rotation_error_deg"]["median"] == pytest.approx(2.0)
+    assert values["direction_error_deg"]["median"] == pytest.approx(2.5)
+    assert values["samples"] == 48.0
