@@ -7,10 +7,10 @@ import numpy as np
 
 from omninav.pipeline import Bounds
 from omninav.pipeline.problems import BadInput
+from omninav.stages.geometry.rays import strip_columns
 from omninav.stages.values.camera import Camera, Equirectangular
 from omninav.stages.values.image import column_azimuths
 
-from .strip import strip_columns
 from .table import Table, TableUnwarp, fixed_point, other_camera
 
 

@@ -1,23 +1,12 @@
 """Brings a finished strip of the full circle into the common form."""
 
-import math
-
 import numpy as np
-import numpy.typing as npt
 
-from omninav.stages.values.camera import Camera, Cylindrical, Equirectangular
+from omninav.stages.geometry.rays import strip_columns
+from omninav.stages.values.camera import Camera, Cylindrical
 from omninav.stages.values.image import column_azimuths
 
 from .table import Table, TableUnwarp, fixed_point, other_camera
-
-Array = npt.NDArray[np.float64]
-
-
-def strip_columns(camera: Cylindrical | Equirectangular, azimuths: Array) -> Array:
-    """The strip's column (pixel centres at integers) that looks along each azimuth (rad), of the same shape."""
-    turned = azimuths * (-1.0 if camera.sense == "clockwise" else 1.0)
-    edge = camera.column_of_forward + turned * camera.width / (2.0 * math.pi)
-    return np.mod(edge, camera.width) - 0.5
 
 
 def strip_table(camera: Cylindrical, columns: int, rows: int) -> Table:

@@ -9,11 +9,11 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.problems import BadInput
+from omninav.stages.geometry.rays import pixels_of_rays
 from omninav.stages.geometry.se2 import wrap
 from omninav.stages.values.camera import Camera, Perspective
 from omninav.stages.values.image import Image, Pixels, Windows
 
-from .rays import pixels_of_rays
 from .table import Table, fixed_point
 
 Array = npt.NDArray[np.float64]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from omninav.pipeline.problems import BadInput
 from omninav.stages.geometry.bearings import camera_bearings, panorama_bearings, unit_vectors
-from omninav.stages.unwarp.rays import pixels_of_rays
+from omninav.stages.geometry.rays import panorama_points, pixels_of_rays
 from omninav.stages.values.camera import Camera, Cylindrical, Donut, Equirectangular, Fisheye, HyperbolicMirror
 from omninav.stages.values.camera import Perspective as Pinhole
 from omninav.stages.values.image import column_azimuths
@@ -34,6 +34,15 @@ def test_a_bearing_is_the_ray_whose_pixel_it_was_taken_from(camera: Camera, azim
     if np.isnan(u) or np.isnan(v) or (strip and not 0.01 < float(v) < camera.height_px - 1.01):
         return  # out of sight, or clamped to a strip's edge
     assert camera_bearings(np.array([u, v]), camera) == pytest.approx(ray, abs=1e-7)
+
+
+@given(azimuth=st.floats(-3.1, 3.1), elevation=st.floats(-0.39, 0.49), known=st.booleans())
+def test_a_point_of_a_panorama_comes_back_from_its_bearing(azimuth: float, elevation: float, known: bool) -> None:
+    span = (0.5, -0.4) if known else (None, None)
+    ray = unit_vectors(azimuth, elevation)
+    point = panorama_points(ray, (90, 360), *span)
+    assert panorama_bearings(point, (90, 360), *span) == pytest.approx(ray, abs=1e-9)
+    assert np.isnan(panorama_points(unit_vectors(azimuth, 1.2), (90, 360), *span)[1])
 
 
 def test_columns_of_a_panorama_look_where_the_common_form_says() -> None:

@@ -6,12 +6,18 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry.catadioptric import project
 from omninav.stages.values.camera import Camera, Cylindrical, Equirectangular, Fisheye, HyperbolicMirror
 
-from .strip import strip_columns
+from .catadioptric import project
 
 Array = npt.NDArray[np.float64]
+
+
+def strip_columns(camera: Cylindrical | Equirectangular, azimuths: Array) -> Array:
+    """The strip's column (pixel centres at integers) that looks along each azimuth (rad), of the same shape."""
+    turned = azimuths * (-1.0 if camera.sense == "clockwise" else 1.0)
+    edge = camera.column_of_forward + turned * camera.width / (2.0 * math.pi)
+    return np.mod(edge, camera.width) - 0.5
 
 
 def pixels_of_rays(camera: Camera, rays: Array) -> tuple[Array, Array]:
@@ -50,6 +56,22 @@ def pixels_of_rays(camera: Camera, rays: Array) -> tuple[Array, Array]:
                 "can be cut from it; give its model in camera.yaml (projection: hyperbolic, fisheye, equirectangular, "
                 "or cylindrical with elevation_top and elevation_bottom), or use unwarp=by_camera"
             )
+
+
+def panorama_points(rays: Array, shape: tuple[int, ...], top: float | None, bottom: float | None) -> Array:
+    """Columns and rows (..., 2) at which rays (..., 3) are seen in a `Panorama` of `shape`: NaN above and below it.
+
+    The inverse of `bearings.panorama_bearings`.
+    """
+    rows, columns = shape[:2]
+    if top is None or bottom is None:
+        top = math.pi * rows / columns
+        bottom = -top
+    azimuth = np.arctan2(rays[..., 1], rays[..., 0])
+    elevation = np.arctan2(rays[..., 2], np.hypot(rays[..., 0], rays[..., 1]))
+    share = (elevation - top) / (bottom - top)
+    row = np.where((share >= 0.0) & (share <= 1.0), share * rows - 0.5, np.nan)
+    return np.stack([np.mod((math.pi - azimuth) * columns / (2.0 * math.pi), columns) - 0.5, row], axis=-1)
 
 
 def _in_ring(camera: HyperbolicMirror | Fisheye, u: Array, v: Array) -> tuple[Array, Array]:
