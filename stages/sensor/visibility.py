@@ -330,7 +330,7 @@ class Visibility(Stage):
     window_deg: Annotated[float, Bounds(gt=0, le=180)] = 5.0
     shape: Window = "step"
     sees: Literal["auto", "ahead", "around"] = "auto"
-    power: Annotated[float, Bounds(gt=0)] | None = None
+    power: Annotated[float, Bounds(gt=0)] | None = 1.0
     contrast: Annotated[float, Bounds(gt=0)] = 2.0
     near_m: Annotated[float, Bounds(gt=0)] | None = 1.0
     independent: Annotated[float, Bounds(ge=0)] = 0.0

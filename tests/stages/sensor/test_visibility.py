@@ -188,13 +188,13 @@ def test_k_of_0_weighs_the_mean_similarity_of_the_present_view_to_the_database()
     assert out.anywhere * values.max() == pytest.approx(values.mean(), rel=1e-6)
 
 
-def test_the_power_is_taken_from_the_view_unless_it_is_given():
+def test_without_a_power_it_is_taken_from_the_view():
     best = RNG.uniform(0.3, 0.9, 200).astype(np.float32)
     power = contrast_power(best, 3.0)
     assert np.log(best.astype(float) ** power).std() == pytest.approx(3.0, rel=1e-5)
     areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
     values, poses = RNG.uniform(0.5, 0.8, (25, 1)), some_poses(200)
-    own = weighed(Visibility(contrast=3.0), values, poses, areas).likelihood.values
+    own = weighed(Visibility(power=None, contrast=3.0), values, poses, areas).likelihood.values
     given = weighed(Visibility(power=contrast_power(values[:, 0].astype(np.float32), 3.0)), values, poses, areas)
     assert np.allclose(own, given.likelihood.values)
 
