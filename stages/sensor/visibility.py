@@ -313,10 +313,10 @@ class Visibility(Stage):
 
     Similarities hardly differ between places (erratum 45), and so do their means. They may be raised to a `power`; 1 is
     the paper's, and null takes it from the view: `contrast` nats for each standard deviation of log S over the
-    references, each at its best heading. Each is raised before they are averaged. The paper's p(M_j | l) is uniform over
-    all views whose area holds the particle (`near_m` null); here it falls with the distance between the particle and
-    where the view was taken, as a Gaussian of `near_m` metres: not of reaches, which differ from camera to camera in one
-    place.
+    references, each at its best heading. Each is raised before they are averaged. The paper's p(M_j | l) is uniform
+    over all views whose area holds the particle (`near_m` null); here it falls with the distance between the particle
+    and where the view was taken, as a Gaussian of `near_m` metres: not of reaches, which differ from camera to camera
+    in one place.
     With `independent` and `motion` wired, pictures taken at one place count as less than one: likelihoods are raised to
     the way since the picture before over so many reaches (port `reach`, else of `reach_m`), down to `standing`; 0, as
     in the paper: never. Defaults: docs/experiments/retrieval_mcl_defaults.md.
