@@ -217,7 +217,7 @@ class FindColumnSegments(Stage):
     lines: Annotated[int, Bounds(ge=8)] = 360
     largest: Annotated[int, Bounds(ge=1024)] = 76800
     blur: Annotated[float, Bounds(gt=0)] = 1.0
-    gradient: Annotated[float, Bounds(ge=0)] = 0.12
+    gradient: Annotated[float, Bounds(ge=0)] = 0.25
     shortest: Annotated[float, Bounds(ge=2)] = 8.0
     margin: Annotated[float, Bounds(ge=0)] = 0.2
     cluster: Annotated[float, Bounds(gt=0)] = 2.0

@@ -8,10 +8,11 @@ import numpy.typing as npt
 
 from omninav.stages.values.local_features import ColumnSegments, LocalFeatures
 
-from .matching import NO_PAIRS, Pairs, mahalanobis_matches, mutual_nearest, squared_distances, tree_matches
+from .matching import NO_PAIRS, Pairs, mahalanobis_matches, mutual_nearest, tree_matches
 from .se2 import wrap
 
 Array = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
 
 
 class Matching(NamedTuple):
@@ -41,18 +42,40 @@ class Compared(NamedTuple):
     of: float
 
 
-NOTHING = Compared(math.inf, 0.0, 0, 0.0)
+class Ready(NamedTuple):
+    """A view made ready to be compared often: its descriptors as float32, their squared lengths, and its azimuths."""
+
+    patches: LocalFeatures | None
+    columns: ColumnSegments | None
+    descriptors: Floats
+    squares: Floats
+    azimuths: Array
+
+
+def made_ready(patches: LocalFeatures | None, columns: ColumnSegments | None) -> Ready:
+    """A view of whichever kinds of features there are."""
+    looks = np.empty((0, 1), np.float32) if patches is None else patches.descriptors.astype(np.float32)
+    around = np.empty(0) if patches is None else azimuths(patches)
+    return Ready(patches, columns, looks, np.einsum("nd,nd->n", looks, looks), around)
 
 
 def match_patches(one: LocalFeatures, other: LocalFeatures, by: Matching) -> Pairs:
     """Patches of two views that look alike and have alike colours (Goedeme et al. 2007, sections 3.2 and 3.4)."""
-    if not len(one) or not len(other):
+    return _matched(made_ready(one, None), made_ready(other, None), by)
+
+
+def _matched(one: Ready, other: Ready, by: Matching) -> Pairs:
+    if one.patches is None or other.patches is None or not len(one.patches) or not len(other.patches):
         return NO_PAIRS
     if by.search == "kd_tree":
         pairs = tree_matches(one.descriptors, other.descriptors, by.ratio)
     else:
-        pairs = mutual_nearest(squared_distances(one.descriptors, other.descriptors), by.ratio)
-    apart = np.linalg.norm(one.colours[pairs.first] - other.colours[pairs.second], axis=1)
+        squares = one.descriptors @ other.descriptors.T
+        squares *= -2.0
+        squares += one.squares[:, None]
+        squares += other.squares
+        pairs = mutual_nearest(squares, by.ratio)
+    apart = np.linalg.norm(one.patches.colours[pairs.first] - other.patches.colours[pairs.second], axis=1)
     return pairs.chosen(apart <= by.colour)
 
 
@@ -77,39 +100,31 @@ def local_distance(angles: Array, first: int, second: int, by: Measure) -> tuple
     """Visual distance by matches, and the turn that aligns the views.
 
     D = (n1 + n2) sum |theta_i| / (2 N^2) (Goedeme et al. 2007, equations 3 and 4 as erratum 27 reads them): the mean
-    number of features over that of matches, times the mean angle in radians between matches once both views are turned
-    alike by the circular mean. `angles` (N,): azimuth in the second view less that in the first. `first`, `second`: n1
-    and n2. One match would be a perfect one, so that there must be `least_matches`, else D is inf; and the mean angle
-    is at least `least_angle`.
+    number of features over that of matches, times the mean angle between matches once both views are turned alike by
+    the circular mean. Its unit is not said in the paper; here it is the full turn, in which 0.5 makes places of about
+    the paper's size (in radians they would be a metre wide). `angles` (N,): azimuth in the second view less that in
+    the first. `first`, `second`: n1 and n2. One match would be a perfect one, so that there must be `least_matches`,
+    else D is inf; and the mean angle is at least `least_angle`.
     """
-    number = len(angles)
+    number, features = len(angles), (first + second) / 2.0
     if number < max(1, by.least_matches):
         return math.inf, 0.0
     turn, left = alignment(angles)
     apart = max(float(np.abs(left).mean()), by.least_angle)
-    return (first + second) / (2.0 * number) * apart, turn
+    return features / number * apart / (2.0 * math.pi), turn
 
 
-def compare(
-    one: LocalFeatures | None,
-    other: LocalFeatures | None,
-    columns: ColumnSegments | None,
-    other_columns: ColumnSegments | None,
-    matching: Matching,
-    measure: Measure,
-) -> Compared:
+def compare(one: Ready, other: Ready, matching: Matching, measure: Measure) -> Compared:
     """Two views by their local features, of whichever kinds both have."""
-    angles, first, second = [], 0, 0
-    if one is not None and other is not None:
-        pairs = match_patches(one, other, matching)
-        angles.append(azimuths(other)[pairs.second] - azimuths(one)[pairs.first])
-        first, second = len(one), len(other)
-    if columns is not None and other_columns is not None:
-        pairs = match_columns(columns, other_columns, matching)
-        angles.append(other_columns.azimuths[pairs.second] - columns.azimuths[pairs.first])
-        first, second = first + len(columns), second + len(other_columns)
-    if not angles:
-        return NOTHING
+    angles, first, second = [np.empty(0)], 0, 0
+    if one.patches is not None and other.patches is not None:
+        pairs = _matched(one, other, matching)
+        angles.append(other.azimuths[pairs.second] - one.azimuths[pairs.first])
+        first, second = len(one.patches), len(other.patches)
+    if one.columns is not None and other.columns is not None:
+        pairs = match_columns(one.columns, other.columns, matching)
+        angles.append(other.columns.azimuths[pairs.second] - one.columns.azimuths[pairs.first])
+        first, second = first + len(one.columns), second + len(other.columns)
     apart = np.concatenate(angles)
     distance, turn = local_distance(apart, first, second, measure)
     # what is seen further left stands in a view that was turned to the right

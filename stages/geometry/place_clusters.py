@@ -1,0 +1,109 @@
+"""Places along a drive, by visual distance alone: clusters, their parts along the drive, and what stands for them."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial.distance import squareform
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+
+def renumbered(labels: npt.ArrayLike) -> Ints:
+    """The same groups (N,), numbered from 0 in the order in which they first come."""
+    labels = np.asarray(labels)
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    order = np.argsort(np.argsort(first, kind="stable"), kind="stable")
+    return np.asarray(order[inverse.reshape(-1)], np.int64)
+
+
+def complete_linkage(distances: Array, size: float) -> Ints:
+    """Clusters (N,) in which no two views are further apart than `size` (Goedeme et al. 2007, section 4.4.1).
+
+    `distances` (N, N) symmetric, inf where two views have nothing in common. Numbered in the order of the views.
+    """
+    if len(distances) < 2:
+        return np.zeros(len(distances), np.int64)
+    finite = distances[np.isfinite(distances)]
+    beyond = 2.0 * max(float(finite.max(initial=0.0)), size) + 1.0
+    between = squareform(np.where(np.isfinite(distances), distances, beyond), checks=False)
+    return renumbered(fcluster(linkage(between, "complete"), size, "distance"))
+
+
+def groups(number: int, pairs: Ints) -> Ints:
+    """What hangs together (number,) by `pairs` (M, 2), numbered in order."""
+    ones = np.ones(len(pairs))
+    graph: Any = coo_matrix(  # type: ignore[no-untyped-call]
+        (ones, (pairs[:, 0], pairs[:, 1])), shape=(number, number)
+    )
+    return renumbered(connected_components(graph, directed=False)[1])
+
+
+def subclusters(cluster: Ints, tour: Ints, skipped: int = 0) -> Ints:
+    """Parts (N,) of clusters that the drive passed through without leaving them (section 4.4.2), in the drive's order.
+
+    `tour` (N,): views of different tours were not driven one after the other. Up to `skipped` views in between may
+    belong elsewhere.
+    """
+    number = len(cluster)
+    rows = []
+    for step in range(1, skipped + 2):
+        first = np.arange(max(number - step, 0))
+        same = (cluster[first] == cluster[first + step]) & (tour[first] == tour[first + step])
+        rows.append(np.column_stack([first[same], first[same] + step]))
+    return groups(number, np.concatenate(rows))
+
+
+def medoid(distances: Array, rows: Ints) -> int:
+    """The one of some views that is least far from the others, the first of several."""
+    apart = np.minimum(distances[np.ix_(rows, rows)], 1e6)  # views of one place need not have anything in common
+    return int(rows[np.argmin(apart.sum(axis=1))])
+
+
+class Hypotheses(NamedTuple):
+    """Pairs of subclusters of one cluster that may be one place: `pairs` (H, 2) subclusters, `medoids` (H, 2) views."""
+
+    pairs: Ints
+    medoids: Ints
+
+
+def hypotheses(cluster: Ints, subcluster: Ints, medoids: Ints) -> Hypotheses:
+    """Every pair of subclusters of one cluster (section 4.4.2). `medoids`: the view of each subcluster."""
+    pairs = []
+    of = np.array([cluster[np.flatnonzero(subcluster == number)[0]] for number in range(len(medoids))])
+    for number in range(len(medoids)):
+        later = np.flatnonzero((of == of[number]) & (np.arange(len(medoids)) > number))
+        pairs += [(number, int(other)) for other in later]
+    found = np.array(pairs, np.int64).reshape(-1, 2)
+    return Hypotheses(found, medoids[found])
+
+
+def between_hypotheses(medoids: Ints, frames: Ints) -> Array:
+    """Distances (H, H) between hypotheses, d_H of equation 8: the sum of their views', in pictures of the drive.
+
+    `medoids` (H, 2): views; `frames` (N,): their numbers along the drive. Views are paired in the order that is nearer.
+    """
+    at = frames[medoids].astype(np.float64)
+    apart = np.abs(at[:, None, :, None] - at[None, :, None, :])  # (H, H, 2, 2)
+    either: Array = np.minimum(apart[..., 0, 0] + apart[..., 1, 1], apart[..., 0, 1] + apart[..., 1, 0])
+    return either
+
+
+def path_images(matches: Array, way: Ints, least: int) -> Ints:
+    """As few of the views of a way as lead along it: each has `least` matches with the one before, where that can be.
+
+    `way`: views in the order of the drive; the first and the last are given and are not part of the answer.
+    """
+    chosen: list[int] = []
+    at = 0
+    while at < len(way) - 1:
+        near = np.flatnonzero(matches[way[at], way[at + 1 :]] >= least)
+        at = at + 1 + (int(near[-1]) if len(near) else 0)
+        if at < len(way) - 1:
+            chosen.append(int(way[at]))
+    return np.array(chosen, np.int64)

@@ -1,0 +1,172 @@
+"""A map of places and the ways between them, made of pictures alone."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Value
+
+from .local_features import ColumnSegments, GlobalMoments, LocalFeatures
+from .pose import PoseSource
+
+Array = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
+Small = npt.NDArray[np.int16]
+Bytes = npt.NDArray[np.uint8]
+
+ANGLE = math.pi / 32768.0
+"""Radians that one step of a stored angle stands for: 0.0055 degrees."""
+DRIVEN, LOOP = 0, 1
+"""Kinds of links: as the tour went; between two places that were found to be one."""
+
+
+class StoredViews(Value):
+    """What is kept of views, small: for each its patches, its columns and its colours. No pixel of any picture.
+
+    Of view v the patches are rows `starts[v]` to `starts[v + 1]`: `directions` (F, 2) int16, azimuth and elevation in
+    steps of `ANGLE`; `descriptors` (F, D) uint8; `colours` (F, 3) int8, in 127ths; `sizes` (F,) uint8, pixels. Its
+    columns are rows `column_starts[v]` to `column_starts[v + 1]`: `column_directions` (C, 3) int16, azimuth, upper and
+    lower end; `column_descriptors` (C, 10) float16; `column_weights` (C,) uint8. `moments` (V, 3): colours of it all.
+    """
+
+    starts: Ints
+    directions: Small
+    descriptors: Bytes
+    colours: npt.NDArray[np.int8]
+    sizes: Bytes
+    column_starts: Ints
+    column_directions: Small
+    column_descriptors: npt.NDArray[np.float16]
+    column_weights: Bytes
+    moments: Floats
+
+    def __len__(self) -> int:
+        return len(self.starts) - 1
+
+    def features(self, view: int) -> LocalFeatures:
+        """The patches of a view; their points in a picture are not known any more (NaN)."""
+        rows = slice(int(self.starts[view]), int(self.starts[view + 1]))
+        azimuth, elevation = (self.directions[rows].astype(np.float64) * ANGLE).T
+        level = np.cos(elevation)
+        bearings = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)], axis=-1)
+        return LocalFeatures(
+            bearings,
+            np.full((len(bearings), 2), np.nan),
+            self.descriptors[rows],
+            self.colours[rows].astype(np.float32) / np.float32(127.0),
+            self.sizes[rows].astype(np.float32),
+        )
+
+    def columns(self, view: int) -> ColumnSegments:
+        """The columns of a view; their points in a picture are not known any more (NaN)."""
+        rows = slice(int(self.column_starts[view]), int(self.column_starts[view + 1]))
+        angles = self.column_directions[rows].astype(np.float64) * ANGLE
+        return ColumnSegments(
+            angles[:, 0],
+            angles[:, 1:],
+            self.column_descriptors[rows].astype(np.float32),
+            self.column_weights[rows].astype(np.float32),
+            np.full((len(angles), 2, 2), np.nan),
+        )
+
+    def global_moments(self, view: int) -> GlobalMoments:
+        """The colours of a view as a whole."""
+        return GlobalMoments(self.moments[view])
+
+
+def stored(features: list[LocalFeatures], columns: list[ColumnSegments], moments: list[GlobalMoments]) -> StoredViews:
+    """Views made small; one entry of each list per view."""
+    bearings = np.concatenate([np.empty((0, 3)), *(f.bearings for f in features)])
+    azimuths = np.arctan2(bearings[:, 1], bearings[:, 0])
+    elevations = np.arcsin(np.clip(bearings[:, 2], -1.0, 1.0))
+    sides = [np.column_stack([c.azimuths, c.elevations]) for c in columns]
+    descriptors = [f.descriptors for f in features if len(f)] or [np.empty((0, 128), np.uint8)]
+    return StoredViews(
+        starts=np.cumsum([0, *(len(f) for f in features)], dtype=np.int64),
+        directions=_steps(np.column_stack([azimuths, elevations])),
+        descriptors=np.concatenate(descriptors),
+        colours=np.round(127.0 * _joined([f.colours for f in features], 3)).astype(np.int8),
+        sizes=np.clip(np.round(_joined([f.sizes[:, None] for f in features], 1)[:, 0]), 1, 255).astype(np.uint8),
+        column_starts=np.cumsum([0, *(len(c) for c in columns)], dtype=np.int64),
+        column_directions=_steps(_joined(sides, 3)),
+        column_descriptors=_joined([c.descriptors for c in columns], 10).astype(np.float16),
+        column_weights=np.clip(_joined([c.weights[:, None] for c in columns], 1)[:, 0], 0, 255).astype(np.uint8),
+        moments=np.stack([m.values for m in moments]) if moments else np.empty((0, 3), np.float32),
+    )
+
+
+def _joined(parts: Sequence[npt.NDArray[np.floating]], width: int) -> npt.NDArray[np.floating]:
+    return np.concatenate([np.empty((0, width), np.float32), *parts])
+
+
+def _steps(angles: npt.NDArray[np.floating]) -> Small:
+    steps = np.round(angles / ANGLE).astype(np.int64)
+    return ((steps + 32768) % 65536 - 32768).astype(np.int16)
+
+
+class TopologicalMap(Value):
+    """Places and the ways between them (Goedeme et al. 2007, section 4).
+
+    `views`: the medoid of each place, and path images on the ways between. `places` (P,): each place's medoid, a view.
+    `owner` (V,): the place that each view belongs to. `names` (P,): names of places, "" for none.
+    `links` (L, 2): neighbouring places, in the order in which they were driven through. `kinds` (L,): DRIVEN or LOOP.
+    `ways`: the path images of link l, rows `way_starts[l]` to `way_starts[l + 1]`, are views in the order from the
+    first to the second place, both medoids excluded: driven one after the other they lead there.
+    `frames` (V,): numbers of the views' pictures, counted on from tour to tour. `poses` (V, 3): x, y (m), heading (rad)
+    where they were taken, from `pose_source`: for scoring and drawing only. `spread`: the standard deviation of visual
+    distance within places, what its size means.
+    """
+
+    views: StoredViews
+    places: Ints
+    owner: Ints
+    names: tuple[str, ...]
+    links: Ints
+    kinds: npt.NDArray[np.int8]
+    way_starts: Ints
+    ways: Ints
+    frames: Ints
+    poses: Array
+    pose_source: PoseSource
+    spread: float
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def way(self, link: int) -> Ints:
+        """The path images of a link, from its first place to its second: views."""
+        return self.ways[self.way_starts[link] : self.way_starts[link + 1]]
+
+    def link(self, one: int, other: int) -> int | None:
+        """The link between two places, in whichever order it was driven; None where there is none."""
+        found = np.flatnonzero((np.sort(self.links, axis=1) == sorted((one, other))).all(axis=1))
+        return int(found[0]) if len(found) else None
+
+    def named(self, name: str) -> Ints:
+        """The places of a name."""
+        return np.array([place for place, own in enumerate(self.names) if own == name], np.int64)
+
+
+class LoopHypotheses(Value):
+    """What a map was made of: the tour's pictures, what they were taken for, and which of them were thought the same.
+
+    `poses` (N, 3): of all pictures, from the map's `pose_source`. `cluster`, `subcluster` and `place` (N,): what each
+    belongs to, subclusters numbered along the drive. `tour` (N,): which tour it is from. `pairs` (H, 2): the pictures
+    that stand for the two subclusters of each hypothesis. `apart` (H,): their visual distance. `initial` and `masses`
+    (H, 3): for, against and unknown, before and after the evidence of neighbours. `accepted` (H,).
+    """
+
+    poses: Array
+    cluster: Ints
+    subcluster: Ints
+    place: Ints
+    tour: Ints
+    pairs: Ints
+    apart: Array
+    initial: Array
+    masses: Array
+    accepted: npt.NDArray[np.bool_]
+    pose_source: PoseSource

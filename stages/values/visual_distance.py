@@ -1,0 +1,18 @@
+"""How far the present view is from the places of a map, by what is seen."""
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Value
+
+
+class VisualDistances(Value):
+    """Visual distance of the present view to each place's medoid (Goedeme et al. 2007, section 4.2).
+
+    `distances` (P,): 0 is the same, inf has nothing in common. `turns` (P,): how far the robot is turned, counter-
+    clockwise, against the medoid's heading (rad); 0 where the distance is inf. `matches` (P,): features that matched.
+    """
+
+    distances: npt.NDArray[np.float64]
+    turns: npt.NDArray[np.float64]
+    matches: npt.NDArray[np.int64]

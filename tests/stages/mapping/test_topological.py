@@ -1,0 +1,204 @@
+"""A map of a made-up world's places, of which everything is known."""
+
+import math
+
+import numpy as np
+import pytest
+from made_tour import Landmarks, along, mapped, scattered
+from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.spatial.distance import squareform
+
+from omninav.pipeline.codec import decode, encode
+from omninav.pipeline.problems import BadInput
+from omninav.stages.geometry.place_clusters import (
+    between_hypotheses,
+    complete_linkage,
+    hypotheses,
+    medoid,
+    path_images,
+    subclusters,
+)
+from omninav.stages.geometry.visual_distance import Matching, match_patches
+from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.topological_map import LOOP, LoopHypotheses, TopologicalMap
+
+SQUARE = [(8.0, 8.0), (32.0, 8.0), (32.0, 32.0), (8.0, 32.0), (8.0, 8.0)]
+WORLD = Landmarks(scattered(40.0, 40.0))
+
+
+def gaps(found: LoopHypotheses) -> np.ndarray:
+    """How far apart the two views of each hypothesis were taken (m)."""
+    return np.hypot(*np.diff(found.poses[found.pairs][:, :, :2], axis=1)[:, 0].T)
+
+
+@pytest.fixture(scope="module")
+def once() -> tuple[TopologicalMap, LoopHypotheses]:
+    out = mapped(WORLD, [along(SQUARE, 1.2)])
+    return out.map, out.hypotheses
+
+
+@pytest.fixture(scope="module")
+def twice() -> tuple[TopologicalMap, LoopHypotheses]:
+    out = mapped(WORLD, [along(SQUARE + SQUARE[1:], 1.2)])
+    return out.map, out.hypotheses
+
+
+def test_in_a_cluster_no_two_views_are_further_apart_than_its_size() -> None:
+    points = np.random.default_rng(0).random((60, 2))
+    apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
+    cluster = complete_linkage(apart, 0.3)
+    for number in range(cluster.max() + 1):
+        assert apart[np.ix_(cluster == number, cluster == number)].max() <= 0.3
+    by_scipy = fcluster(linkage(squareform(apart, checks=False), "complete"), 0.3, "distance")
+    assert ((cluster[:, None] == cluster[None]) == (by_scipy[:, None] == by_scipy[None])).all()
+    nothing = np.where(np.eye(4, dtype=bool), 0.0, math.inf)
+    assert complete_linkage(nothing, 0.5).tolist() == [0, 1, 2, 3]
+
+
+def test_a_cluster_falls_into_the_parts_that_the_drive_did_not_leave() -> None:
+    cluster = np.array([0, 0, 1, 0, 0, 1, 1, 1])
+    tour = np.array([0, 0, 0, 0, 0, 0, 1, 1])
+    assert subclusters(cluster, tour).tolist() == [0, 0, 1, 2, 2, 3, 4, 4]
+    assert subclusters(cluster, tour, skipped=1).tolist() == [0, 0, 1, 0, 0, 2, 3, 3]
+
+
+def test_every_two_parts_of_a_cluster_are_a_hypothesis() -> None:
+    cluster = np.array([0, 0, 1, 0, 0, 1, 0])
+    part = np.array([0, 0, 1, 2, 2, 3, 4])
+    found = hypotheses(cluster, part, np.array([1, 2, 3, 5, 6]))
+    assert found.pairs.tolist() == [[0, 2], [0, 4], [1, 3], [2, 4]]
+    assert found.medoids.tolist() == [[1, 3], [1, 6], [2, 5], [3, 6]]
+
+
+def test_hypotheses_are_as_far_apart_as_both_their_views_in_pictures() -> None:
+    views = np.array([[0, 3], [1, 2], [3, 1]])
+    frames = np.array([10, 12, 40, 50])
+    apart = between_hypotheses(views, frames)
+    assert apart[0, 1] == 2 + 10  # 10 with 12, 50 with 40
+    assert apart[0, 2] == 2 + 0  # either way around
+    assert (apart == apart.T).all()
+
+
+def test_a_medoid_is_the_least_far_from_all_others() -> None:
+    at = np.array([0.0, 1.0, 1.5, 5.0, 6.0, 9.0])
+    assert medoid(np.abs(at[:, None] - at[None]), np.arange(5)) == 2
+
+
+def test_path_images_are_few_and_each_sees_enough_of_the_one_before() -> None:
+    at = np.arange(10)
+    matches = 100 - 20 * np.abs(at[:, None] - at[None])
+    assert path_images(matches, at, 40).tolist() == [3, 6]
+    assert path_images(matches, at, 1000).tolist() == list(range(1, 9))
+    assert path_images(matches, at, -100).tolist() == []
+
+
+def test_a_ring_driven_once_is_a_ring_of_places(once: tuple[TopologicalMap, LoopHypotheses]) -> None:
+    made, found = once
+    assert 10 < len(made) < 0.5 * len(found.poses)
+    assert made.kinds.tolist() == [0] * len(made.links)
+    neighbours = np.bincount(made.links.ravel(), minlength=len(made))
+    assert (neighbours >= 1).all()
+    steps = np.hypot(*np.diff(made.poses[made.places[made.links]][:, :, :2], axis=1)[:, 0].T)
+    assert steps.max() < 10.0  # a robot sees 7 m far
+    for link, (one, other) in enumerate(made.links):
+        way = made.poses[[made.places[one], *made.way(link), made.places[other]], :2]
+        assert np.hypot(*np.diff(way, axis=0).T).max() < 6.5
+
+
+def test_a_second_round_is_found_to_be_the_first(twice: tuple[TopologicalMap, LoopHypotheses]) -> None:
+    _, found = twice
+    half = len(found.poses) // 2
+    assert (gaps(found)[found.accepted] < 2.5).all()
+    right = gaps(found) < 1.5
+    assert found.accepted[right].mean() > 0.6
+    same = np.mean([found.place[row] == found.place[row + half] for row in range(half)])
+    assert same > 0.6
+    assert (found.masses.sum(axis=1) == pytest.approx(1.0)) if len(found.masses) else False
+
+
+def test_what_looks_alike_by_chance_is_left_apart() -> None:
+    where, own = scattered(40.0, 40.0), np.arange(900)
+    copied = np.flatnonzero(np.hypot(where[:, 0] - 20.0, where[:, 1] - 8.0) < 3.0)
+    elsewhere = where.copy()
+    far = np.flatnonzero(np.hypot(where[:, 0] - 20.0, where[:, 1] - 32.0) < 3.0)
+    number = min(len(copied), len(far))
+    elsewhere[far[:number]] = where[copied[:number]] + (0.0, 24.0, 0.0)  # a corner that is furnished alike
+    own[far[:number]] = own[copied[:number]]
+    out = mapped(Landmarks(elsewhere, own), [along(SQUARE, 1.2)])
+    assert (gaps(out.hypotheses)[out.hypotheses.accepted] < 5.0).all()
+
+
+def test_two_maps_of_one_tour_are_the_same_bytes() -> None:
+    assert encode(mapped(WORLD, [along(SQUARE[:3], 1.6)]).map) == encode(mapped(WORLD, [along(SQUARE[:3], 1.6)]).map)
+
+
+def test_a_view_is_kept_small_and_can_still_be_matched(once: tuple[TopologicalMap, LoopHypotheses]) -> None:
+    made, _ = once
+    for place in (0, len(made) // 2):
+        view = int(made.places[place])
+        pose = Pose(*(float(number) for number in made.poses[view]))
+        kept, seen = made.views.features(view), WORLD.seen(pose)
+        pairs = match_patches(kept, seen, Matching())
+        assert len(pairs.first) == len(kept) <= 80
+        apart = np.arccos(np.clip((kept.bearings[pairs.first] * seen.bearings[pairs.second]).sum(axis=1), -1.0, 1.0))
+        assert apart.max() < math.radians(0.01)
+    assert len(encode(made)) < len(made.views) * 12_500
+    assert isinstance(decode(encode(made)), TopologicalMap)
+
+
+def test_a_map_grows_from_a_second_tour(once: tuple[TopologicalMap, LoopHypotheses]) -> None:
+    known, _ = once
+    shortcut = along([(8.0, 8.0), (20.0, 8.0), (20.0, 32.0), (8.0, 32.0)], 1.2)
+    out = mapped(WORLD, [shortcut], known=known)
+    grown = out.map
+    assert len(grown) > len(known)
+    before = known.poses[known.places, :2]
+    after = grown.poses[grown.places, :2]
+    near = np.hypot(*(before[:, None] - after[None]).transpose(2, 0, 1)).min(axis=1)
+    assert near.max() < 5.0  # nothing is lost
+    middle = np.hypot(*(after - (20.0, 20.0)).T).min()
+    assert middle < 4.0
+    assert grown.frames.max() > known.frames.max()
+    assert (gaps(out.hypotheses)[out.hypotheses.accepted] < 4.0).all()
+    assert out.hypotheses.accepted.any()
+
+
+def test_two_tours_at_once_make_one_map_with_no_link_from_end_to_start() -> None:
+    first, second = along(SQUARE[:3], 1.2), along([(8.0, 32.0), (8.0, 8.0), (20.0, 8.0)], 1.2)
+    made = mapped(WORLD, [first, second]).map
+    jump = made.poses[made.places[made.links]][:, :, :2]
+    assert np.hypot(*np.diff(jump, axis=1)[:, 0].T).max() < 10.0
+
+
+def test_accepted_places_can_stay_two_with_a_link(twice: tuple[TopologicalMap, LoopHypotheses]) -> None:
+    linked = mapped(WORLD, [along(SQUARE + SQUARE[1:], 1.2)], accepted="link").map
+    assert len(linked) > len(twice[0])
+    assert (linked.kinds == LOOP).sum() > 5
+    loop = int(np.flatnonzero(linked.kinds == LOOP)[0])
+    assert len(linked.way(loop)) == 0
+    assert linked.link(*linked.links[loop][::-1]) == loop
+
+
+def test_pictures_closer_together_than_asked_are_passed_over() -> None:
+    out = mapped(WORLD, [along(SQUARE[:2], 0.2)], every_s=4.0)
+    assert len(out.hypotheses.poses) == 30
+
+
+def test_poses_are_the_tours_truth_or_its_odometry_and_say_which() -> None:
+    tour = along(SQUARE[:2], 1.6)
+    assert mapped(WORLD, [tour]).map.pose_source == "truth"
+    known = mapped(WORLD, [tour], truth=False).map
+    assert known.pose_source == "odometry"
+    with pytest.raises(BadInput, match="no frame in common"):
+        mapped(WORLD, [tour], known=known)
+    with pytest.raises(BadInput, match=r"nodes\.mapping\.supervised=auto"):
+        mapped(WORLD, [tour], truth=False, supervised="truth")
+
+
+def test_a_tour_that_shows_nothing_makes_no_map() -> None:
+    with pytest.raises(BadInput, match="use another tour"):
+        mapped(WORLD, [[]])
+    nowhere = mapped(Landmarks(scattered(1.0, 1.0)), [along([(50.0, 50.0), (60.0, 50.0)], 2.0)])
+    assert len(nowhere.map) == 5  # each picture a place of its own, as far as anybody can tell
+    assert isinstance(nowhere.map.views.features(0), LocalFeatures)

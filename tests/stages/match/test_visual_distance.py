@@ -1,0 +1,69 @@
+"""The present view against the places of a made-up world's map, and against one other view."""
+
+import math
+
+import numpy as np
+import pytest
+from made_tour import Landmarks, along, mapped, scattered
+
+from omninav.pipeline import Context
+from omninav.pipeline.problems import BadInput
+from omninav.stages.match.correspondences import MatchFeatures
+from omninav.stages.match.visual_distance import MatchPlaces
+from omninav.stages.values.local_features import GlobalMoments, LocalFeatures
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.topological_map import TopologicalMap
+from omninav.stages.values.visual_distance import VisualDistances
+
+WORLD = Landmarks(scattered(40.0, 14.0, 400))
+GREY = GlobalMoments(np.zeros(3, np.float32))
+
+
+@pytest.fixture(scope="module")
+def made() -> TopologicalMap:
+    return mapped(WORLD, [along([(6.0, 7.0), (34.0, 7.0)], 1.0)]).map
+
+
+def compared(features: LocalFeatures, map: TopologicalMap, moments: GlobalMoments = GREY) -> VisualDistances:
+    stage, context = MatchPlaces(), Context("match")
+    stage.setup(context)
+    return stage.step(context, features=features, moments=moments, map=map).distances
+
+
+def test_the_place_where_a_robot_stands_is_the_nearest_and_says_how_it_is_turned(made: TopologicalMap) -> None:
+    for place in range(len(made)):
+        x, y, heading = made.poses[made.places[place]]
+        found = compared(WORLD.seen(Pose(x + 0.3, y - 0.3, heading + 2.0)), made)
+        assert int(np.argmin(found.distances)) == place
+        assert found.turns[place] == pytest.approx(2.0, abs=0.1)
+        assert found.matches[place] > 20
+
+
+def test_far_places_have_nothing_in_common_and_other_colours_are_not_looked_at(made: TopologicalMap) -> None:
+    found = compared(WORLD.seen(Pose(6.0, 7.0, 0.0)), made)
+    gap = np.abs(made.poses[made.places][:, 0] - 6.0)
+    assert np.isinf(found.distances[gap > 16.0]).all()
+    assert np.isfinite(found.distances[gap < 4.0]).all()
+    assert np.isinf(
+        compared(WORLD.seen(Pose(6.0, 7.0, 0.0)), made, GlobalMoments(np.ones(3, np.float32))).distances
+    ).all()
+
+
+def test_descriptors_of_another_kind_are_refused(made: TopologicalMap) -> None:
+    seen = WORLD.seen(Pose(6.0, 7.0, 0.0))
+    short = LocalFeatures(seen.bearings, seen.points, seen.descriptors[:, :64], seen.colours, seen.sizes)
+    with pytest.raises(BadInput, match="use the features it was made with"):
+        compared(short, made)
+
+
+@pytest.mark.parametrize("search", ["all", "kd_tree"])
+def test_correspondences_lead_from_the_present_view_to_the_target(search: str) -> None:
+    here, there = WORLD.seen(Pose(10.0, 7.0, 0.5)), WORLD.seen(Pose(11.0, 7.0, 0.0))
+    pairs = MatchFeatures(search=search).step(Context("match"), features=here, target=there).correspondences
+    assert len(pairs) > 30
+    assert (here.descriptors[pairs.first] == there.descriptors[pairs.second]).all()
+    assert pairs.distance.max() == pytest.approx(0.0, abs=1e-3)
+    assert len(np.unique(pairs.second)) == len(pairs)
+    nothing = MatchFeatures(search=search).step(Context("match"), features=here, target=there.chosen(slice(0, 0)))
+    assert len(nothing.correspondences) == 0
+    assert math.isfinite(pairs.distance.sum())
