@@ -81,8 +81,25 @@ class SinglePose(Belief):
         return PoseEstimate(self.pose, np.zeros((3, 3)), 1.0, self.pose)
 
 
+class PlaceBelief(Belief):
+    """Which place of a topological map the robot is at. `probabilities`: (P,), sum 1.
+
+    `poses` (P, 3): x, y (m), heading (rad): the robot's pose if it were where each place's medoid was taken, turned as
+    the present view is against that. Places have no size in metres: the covariance is zero.
+    """
+
+    probabilities: Array
+    poses: Array
+
+    def estimate(self) -> PoseEstimate:
+        place = int(np.argmax(self.probabilities))
+        mean = weighted_mean(self.poses, self.probabilities)
+        pose = Pose(*map(float, self.poses[place]))
+        return PoseEstimate(pose, np.zeros((3, 3)), float(self.probabilities[place]), Pose(*map(float, mean)))
+
+
 class Likelihood(Value):
-    """How well each particle explains the present view. `values`: (N,), not negative, any scale.
+    """How well each particle, or each place, explains the present view. `values`: (N,), not negative, any scale.
 
     `anywhere`: on the same scale, the mean over all poses the map knows: what a robot put down anywhere would get.
     None where it is not known. `fresh`: the share of the picture's evidence that is new, in [0, 1]; less than 1 where

@@ -1,0 +1,42 @@
+"""Weighs predicted places by the view: Bayes' rule over places."""
+
+import math
+
+import numpy as np
+
+from omninav.pipeline import Context, Outputs, Stage
+from omninav.stages.geometry.se2 import wrap
+from omninav.stages.values.belief import Likelihood, PlaceBelief
+from omninav.stages.values.topological_map import TopologicalMap
+from omninav.stages.values.visual_distance import VisualDistances
+
+
+class PlaceBayes(Stage):
+    """The belief over places after the view, and the pose that each would mean.
+
+    Goedemé et al. 2007, section 5.1, equation 12: what was predicted times how likely the view is there, normalised.
+    A place's pose is its medoid's, from the map, with the heading turned as the present view is against the medoid's.
+    """
+
+    class Out(Outputs):
+        """The belief after the view."""
+
+        belief: PlaceBelief
+
+    def step(
+        self,
+        ctx: Context,
+        prediction: PlaceBelief,
+        likelihood: Likelihood,
+        distances: VisualDistances,
+        map: TopologicalMap,
+    ) -> Out:
+        """Fuse prediction and observation."""
+        weights = prediction.probabilities * likelihood.values
+        total = float(weights.sum())
+        if not (math.isfinite(total) and total > 0.0):
+            ctx.count("belief_without_support", detail="fusion: no place explains the picture; belief kept")
+            weights, total = prediction.probabilities, 1.0
+        poses = map.poses[map.places].copy()
+        poses[:, 2] = wrap(poses[:, 2] + distances.turns)
+        return self.Out(belief=PlaceBelief(weights / total, np.asarray(poses)))

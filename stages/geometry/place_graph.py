@@ -1,0 +1,20 @@
+"""Distances over a graph of places, in links."""
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse.csgraph import shortest_path
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+def links_between(links: Ints, places: int) -> Array:
+    """How many links the shortest way between any two of so many places has: (P, P), inf where there is none.
+
+    `links` (L, 2): neighbouring places, whichever way round.
+    """
+    one, other = np.asarray(links, np.int64).reshape(-1, 2).T
+    beside = np.zeros((places, places))
+    beside[one, other] = beside[other, one] = 1.0
+    distances: Array = shortest_path(beside, directed=False, unweighted=True)
+    return distances

@@ -1,0 +1,69 @@
+"""The belief over places, against sums done by hand."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omninav.stages.geometry.place_graph import links_between
+from omninav.stages.motion.place_transitions import transitions
+from omninav.stages.sensor.place_likelihood import place_likelihoods
+from omninav.stages.values.belief import PlaceBelief
+
+CHAIN = np.array([[0, 1], [1, 2], [2, 3]])
+
+
+def test_links_are_counted_along_the_shortest_way_in_either_direction():
+    apart = links_between(np.vstack([CHAIN, [[3, 0]]]), 5)
+    assert apart[:4, :4].tolist() == [[0, 1, 2, 1], [1, 0, 1, 2], [2, 1, 0, 1], [1, 2, 1, 0]]
+    assert np.isinf(apart[4, :4]).all()
+    assert apart[4, 4] == 0
+
+
+def test_from_each_place_the_chances_sum_to_one_though_places_have_more_or_fewer_neighbours():
+    chances = transitions(links_between(CHAIN, 4), 1.0, 0.0)
+    near, far, farther = math.exp(-1), math.exp(-4), math.exp(-9)
+    assert chances[0] == pytest.approx(np.array([1, near, far, farther]) / (1 + near + far + farther))
+    assert chances[1] == pytest.approx(np.array([near, 1, near, far]) / (1 + 2 * near + far))
+
+
+def test_who_was_carried_to_an_island_is_found_by_chance_only():
+    apart = links_between(CHAIN, 5)
+    assert transitions(apart, 1.0, 0.0)[0, 4] == 0.0
+    assert transitions(apart, 1.0, 0.1)[0, 4] == pytest.approx(0.1 / 5)
+
+
+def test_without_a_spread_it_is_that_of_the_map():
+    apart = links_between(CHAIN, 4)  # 4 times 0, 6 times 1, 4 times 2, twice 3: mean 1.25, variance 15 / 16
+    given, measured = transitions(apart, math.sqrt(15 / 16), 0.0), transitions(apart, None, 0.0)
+    np.testing.assert_allclose(measured, given)
+
+
+def test_a_map_of_one_place_stays_there():
+    assert transitions(links_between(np.zeros((0, 2), np.int64), 1), None, 0.01) == pytest.approx(np.ones((1, 1)))
+
+
+def test_likelihood_is_a_gaussian_of_visual_distance_that_never_falls_to_nothing():
+    values = place_likelihoods(np.array([0.0, 0.5, math.inf]), 0.5, 0.01)
+    assert values == pytest.approx([1.0, 0.01 + 0.99 * math.exp(-1), 0.01])
+
+
+@given(st.integers(1, 12), st.integers(0, 2**32 - 1), st.floats(0.0, 1.0))
+def test_a_step_of_bayes_leaves_a_belief_that_sums_to_one(places, seed, anywhere):
+    rng = np.random.default_rng(seed)
+    chances = transitions(links_between(rng.integers(0, places, (places, 2)), places), None, anywhere)
+    before = rng.dirichlet(np.ones(places))
+    after = (before @ chances) * place_likelihoods(rng.exponential(1.0, places), 1.0, 0.01)
+    assert (before @ chances).sum() == pytest.approx(1.0)
+    assert (after / after.sum()).sum() == pytest.approx(1.0)
+    assert (after > 0).sum() >= (before > 0).sum() * (anywhere < 1.0)
+
+
+def test_the_estimate_is_the_most_probable_place_turned_as_the_view_is():
+    poses = np.array([[0.0, 0.0, 0.0], [4.0, 2.0, 1.0]])
+    estimate = PlaceBelief(np.array([0.3, 0.7]), poses).estimate()
+    assert (estimate.pose.x, estimate.pose.y, estimate.pose.heading) == (4.0, 2.0, 1.0)
+    assert estimate.mode_weight == pytest.approx(0.7)
+    assert estimate.mean.x == pytest.approx(2.8)
