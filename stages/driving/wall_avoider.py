@@ -11,6 +11,8 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.values.command import Command
 from omninav.stages.values.scan import Scan
 
+from .ring import free_ahead, roomier_side
+
 F64 = npt.NDArray[np.float64]
 
 
@@ -23,19 +25,6 @@ class Memory(State):
 
     side: int = 0
     ranges: F64 = field(default_factory=_no_ranges)
-
-
-def free_ahead(ranges: F64, azimuths: F64, radius: float, margin: float) -> float:
-    """How far (m) a disc of `radius` m can go straight on, `margin` m clear on both sides; (N,) ranges and azimuths."""
-    ahead, beside = ranges * np.cos(azimuths), np.abs(ranges * np.sin(azimuths))
-    in_the_way = (np.cos(azimuths) > 0.1) & (beside < radius + margin)
-    return float(ahead[in_the_way].min(initial=float(ranges.max()))) - radius
-
-
-def roomier_side(ranges: F64, azimuths: F64) -> float:
-    """Where there is more room in front: the mean way (m) to the left of (N,) ranges, negative to the right."""
-    front = np.cos(azimuths) > -0.1
-    return float((ranges * np.sin(azimuths))[front].mean())
 
 
 class WallAvoider(Stage):

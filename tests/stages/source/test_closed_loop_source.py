@@ -9,7 +9,8 @@ import pytest
 
 from omninav.pipeline import Context
 from omninav.pipeline.codec import decode, encode, encode_state, restore_state
-from omninav.stages.driving.wall_avoider import Memory, WallAvoider, free_ahead, roomier_side
+from omninav.stages.driving.ring import free_ahead, roomier_side
+from omninav.stages.driving.wall_avoider import Memory, WallAvoider
 from omninav.stages.simulator.cameras import shutter_times
 from omninav.stages.simulator.config import Delivery, Event, MirrorCamera, OdometryNoise, Ranges, Sensor, WorldConfig
 from omninav.stages.simulator.demo import DEMO

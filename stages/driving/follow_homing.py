@@ -1,0 +1,101 @@
+"""Where the homing vector points, as fast as is safe."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.stages.geometry.se2 import wrap
+from omninav.stages.values.command import Command
+from omninav.stages.values.homing import DrivingStatus, HomingVector, PathProgress
+from omninav.stages.values.scan import Scan
+
+from .ring import free_ahead, way_through
+
+
+class Patience(State):
+    """For how many ticks in a row the target has been lost, and for how many there has been no way through."""
+
+    lost: int = 0
+    blocked: int = 0
+
+
+class FollowHoming(Stage):
+    """Turns towards the homing vector and drives, around what the ring of ranges says is in the way, and docks.
+
+    Goedemé et al. 2007, section 7.2.4, on a lower level of its own. `speed` (m/s) and `turning` (rad/s) are limits; it
+    turns by `gain` (1/s) times the angle that is left, on the spot beyond `on_the_spot_deg`. Close to the last view it
+    slows down: to `closing` (1/s) times the metres left where odometry has told the unit, else by the share of the way
+    that is left, not below `creep` m/s. While it docks it only turns.
+
+    Towards a direction it drives if a disc of `radius` m has `room` m free there, `margin` m clear on both sides, or
+    what is left of the way; else towards the free direction closest to it. Readings nearer than `stop_at` m ahead stop
+    it. Where no direction is free for `patience` ticks it stands and is `blocked`. A lost target: it goes on to where
+    it was believed for `patience` ticks, and only where metres are known; then it stands and is `lost`. Both say why on
+    `status`, for whoever re-localises and plans anew.
+    """
+
+    speed: Annotated[float, Bounds(gt=0)] = 0.4
+    turning: Annotated[float, Bounds(gt=0)] = 0.8
+    gain: Annotated[float, Bounds(gt=0)] = 1.5
+    closing: Annotated[float, Bounds(gt=0)] = 0.7
+    creep: Annotated[float, Bounds(gt=0)] = 0.05
+    on_the_spot_deg: Annotated[float, Bounds(gt=0)] = 35.0
+    radius: Annotated[float, Bounds(gt=0)] = 0.25
+    margin: Annotated[float, Bounds(ge=0)] = 0.1
+    room: Annotated[float, Bounds(gt=0)] = 0.8
+    stop_at: Annotated[float, Bounds(gt=0)] = 0.15
+    patience: Annotated[int, Bounds(ge=1)] = 10
+
+    class Out(Outputs):
+        command: Command
+        status: DrivingStatus
+
+    def step(
+        self,
+        ctx: Context,
+        patience: Patience,
+        vector: HomingVector | None = None,
+        progress: PathProgress | None = None,
+        scan: Scan | None = None,
+    ) -> Out:
+        """The command of this tick. Without a `scan` it trusts that nothing is in the way."""
+        if progress is not None and progress.arrived:
+            return self._stand("arrived", "")
+        if vector is None:
+            return self._stand("waiting", "there is no target")
+        patience.lost = patience.lost + 1 if vector.state == "lost" else 0
+        if vector.state == "lost" and (patience.lost > self.patience or vector.metres is None):
+            ctx.count("stood_lost")
+            return self._stand("lost", vector.why)
+        if progress is not None and progress.docking:
+            return self.Out(command=Command(0.0, self._turn(vector.turn)), status=DrivingStatus("docking"))
+        left = math.inf if vector.metres is None else vector.metres
+        direction: float | None = vector.direction
+        if scan is not None:
+            ranges = np.minimum(scan.ranges, scan.farthest)
+            room = max(self.stop_at, min(self.room, left))
+            direction = way_through(ranges, scan.azimuths(), vector.direction, room, self.radius, self.margin)
+        patience.blocked = patience.blocked + 1 if direction is None else 0
+        if direction is None:
+            if patience.blocked <= self.patience:  # somebody may be passing by
+                return self._stand("driving", "waiting for a way through")
+            ctx.count("stood_blocked")
+            return self._stand("blocked", f"nothing is free for {self.room:g} m towards the target")
+        direction = float(wrap(direction))
+        if abs(direction) > math.radians(self.on_the_spot_deg):
+            return self.Out(command=Command(0.0, self._turn(direction)), status=DrivingStatus("driving"))
+        speed = self.speed * math.cos(direction)
+        if progress is None or progress.last:
+            slowed = self.closing * left if vector.metres is not None else self.speed * vector.ratio / 0.3
+            speed = min(speed, max(self.creep, slowed))
+        if scan is not None and free_ahead(ranges, scan.azimuths(), self.radius, 0.0) < self.stop_at:
+            speed = 0.0
+        return self.Out(command=Command(speed, self._turn(direction)), status=DrivingStatus("driving"))
+
+    def _turn(self, angle: float) -> float:
+        return max(-self.turning, min(self.turning, self.gain * angle))
+
+    def _stand(self, state: str, why: str) -> Out:
+        return self.Out(command=Command(0.0, 0.0), status=DrivingStatus(state, why))  # type: ignore[arg-type]

@@ -1,0 +1,36 @@
+"""Room around a robot, by a ring of ranges."""
+
+import numpy as np
+import numpy.typing as npt
+
+F64 = npt.NDArray[np.float64]
+
+
+def free_ahead(ranges: F64, azimuths: F64, radius: float, margin: float) -> float:
+    """How far (m) a disc of `radius` m can go straight on, `margin` m clear on both sides; (N,) ranges and azimuths."""
+    ahead, beside = ranges * np.cos(azimuths), np.abs(ranges * np.sin(azimuths))
+    in_the_way = (np.cos(azimuths) > 0.1) & (beside < radius + margin)
+    return float(ahead[in_the_way].min(initial=float(ranges.max()))) - radius
+
+
+def roomier_side(ranges: F64, azimuths: F64) -> float:
+    """Where there is more room in front: the mean way (m) to the left of (N,) ranges, negative to the right."""
+    front = np.cos(azimuths) > -0.1
+    return float((ranges * np.sin(azimuths))[front].mean())
+
+
+def way_through(ranges: F64, azimuths: F64, wanted: float, room: float, radius: float, margin: float) -> float | None:
+    """The direction (rad) closest to `wanted` in which a disc can go `room` m straight on.
+
+    In steps of 5 degrees, of two equally close ones that with more room; None where there is none up to 90 degrees off.
+    """
+    step = np.radians(5.0)
+    for k in range(19):
+        found = [
+            (free_ahead(ranges, azimuths - at, radius, margin), at)
+            for at in ((wanted,) if k == 0 else (wanted + k * step, wanted - k * step))
+        ]
+        free, at = max(found, key=lambda pair: pair[0])
+        if free >= room:
+            return float(at)
+    return None

@@ -1,0 +1,191 @@
+"""Homing in the built-in world: vectors against the poses that pictures were taken from."""
+
+import functools
+import math
+
+import cv2
+import numpy as np
+import pytest
+from turned_robot import CAMERA, both_kinds, look, wrapped
+
+from omninav.pipeline import Context
+from omninav.pipeline.codec import decode, encode, encode_state, restore_state
+from omninav.pipeline.problems import BadInput
+from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
+from omninav.stages.geometry.matching import mutual_nearest
+from omninav.stages.geometry.se2 import between
+from omninav.stages.homing.visual_homing import Memory, VisualHoming
+from omninav.stages.values.correspondences import Correspondences
+from omninav.stages.values.homing import HomingTarget, HomingVector
+from omninav.stages.values.image import Image, Panorama
+from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.pose import Motion
+
+TARGET = (5.0, 5.0, 0.4)
+
+
+@functools.cache
+def described(kind: str, pose: tuple[float, float, float]) -> LocalFeatures:
+    stage, context = RotationReducedSift(), Context("features")
+    stage.setup(context)
+    return stage.step(context, picture=look(kind, pose[2], *pose[:2]), camera=CAMERA).features
+
+
+def matched(features: LocalFeatures, other: LocalFeatures) -> Correspondences:
+    one, two = features.descriptors.astype(np.float32), other.descriptors.astype(np.float32)
+    squares = (one**2).sum(axis=1)[:, None] + (two**2).sum(axis=1)[None] - 2.0 * one @ two.T
+    return Correspondences(*mutual_nearest(squares.astype(np.float32), 0.85))
+
+
+class Homing:
+    """The stage with the memory that an engine would keep for it."""
+
+    def __init__(self, kind: str = "mirror", seed: int = 0, **parameters) -> None:
+        self.stage, self.kind = VisualHoming(**parameters), kind
+        self.ctx, self.memory = Context("homing", np.random.default_rng(seed)), Memory()
+        self.target = HomingTarget(3, described(kind, TARGET))
+
+    def at(self, pose, motion=None, matches=True, picture: Image | Panorama | None = None, share=1.0) -> HomingVector:
+        pairs = features = None
+        if matches:
+            features = described(self.kind, pose)
+            pairs = matched(features, self.target.features)
+            kept = slice(0, round(share * len(pairs)))
+            pairs = Correspondences(pairs.first[kept], pairs.second[kept], pairs.distance[kept])
+        picture = look(self.kind, pose[2], *pose[:2]) if picture is None else picture
+        self.out = self.stage.step(self.ctx, self.memory, picture, self.target, features, pairs, CAMERA, motion)
+        assert self.out.vector is not None
+        return self.out.vector
+
+
+def off_deg(vector: HomingVector, pose) -> tuple[float, float]:
+    way = between(pose, TARGET)
+    direction = wrapped(vector.direction - math.atan2(way[1], way[0]))
+    return abs(math.degrees(direction)), abs(math.degrees(wrapped(vector.turn - way[2])))
+
+
+def astray(vector: HomingVector, pose, start: float) -> float:
+    """How far (m) from where the target is the vector ends, `start` (m) being the way to it at first."""
+    way, said = between(pose, TARGET), vector.ratio * start
+    return math.dist((said * math.cos(vector.direction), said * math.sin(vector.direction)), way[:2])
+
+
+def drive(steps: int, start=(4.0, 4.2, -0.5), end=(4.8, 4.84, 0.3)) -> list[tuple[float, float, float]]:
+    return [tuple(float(v) for v in row) for row in np.linspace(start, end, steps)]
+
+
+@both_kinds
+@pytest.mark.parametrize("pose", [(4.2, 4.6, 0.4), (5.9, 5.2, 2.0), (5.0, 4.1, -2.5), (4.6, 5.8, 0.0)])
+def test_the_first_vector_points_to_where_the_target_was_taken(kind: str, pose) -> None:
+    vector = Homing(kind).at(pose)
+    assert vector.state == "new"
+    direction, turn = off_deg(vector, pose)
+    assert direction < 3.0
+    assert turn < 1.0
+    assert vector.distance == pytest.approx(1.0)
+    assert vector.ratio == pytest.approx(1.0)
+    assert vector.metres is None
+
+
+def test_a_target_ahead_to_the_left_is_at_a_positive_angle() -> None:
+    vector = Homing().at((4.2, 4.6, 0.0))  # (0.8, 0.4) away, straight on is +x; the target looks 0.4 rad further left
+    assert vector.direction == pytest.approx(math.atan2(0.4, 0.8), abs=0.05)
+    assert vector.turn == pytest.approx(0.4, abs=0.02)
+
+
+@both_kinds
+def test_on_the_way_the_vector_follows_the_local_map_without_any_match(kind: str) -> None:
+    poses, homing = drive(9), Homing(kind)
+    start = math.dist(poses[0][:2], TARGET[:2])
+    for k, pose in enumerate(poses):
+        vector = homing.at(pose, matches=k == 0)
+        assert vector.state == ("tracking" if k else "new")
+        assert off_deg(vector, pose)[1] < 2.0
+        assert astray(vector, pose, start) < 0.1
+
+
+def test_odometry_tells_metres() -> None:
+    poses, homing = drive(9), Homing()
+    for before, pose in zip([None, *poses], poses, strict=False):
+        motion = None if before is None else Motion(*(float(v) for v in between(before, pose)))
+        vector = homing.at(pose, motion)
+    assert vector.metres == pytest.approx(math.dist(poses[-1][:2], TARGET[:2]), abs=0.08)
+
+
+def test_nearness_tells_a_view_that_hardly_differs_from_the_first_tick_on() -> None:
+    assert Homing().at((5.02, 5.01, 1.4)).nearness < 0.03
+    assert Homing().at((4.0, 4.2, 1.4)).nearness > 0.1
+
+
+def test_what_was_covered_is_found_again() -> None:
+    homing, poses = Homing(), drive(13)
+    for k, pose in enumerate(poses[:3]):
+        homing.at(pose, matches=k == 0)
+    covered = look("mirror", poses[3][2], *poses[3][:2]).pixels.copy()
+    cv2.ellipse(covered, (320, 240), (240, 240), 0, 0, 120, (90, 90, 90), -1)  # a third of all azimuths
+    homing.at(poses[3], matches=False, picture=Image(covered))
+    lost = np.bincount(homing.out.tracks.kinds, minlength=4)
+    assert lost[0] > 0.2 * lost.sum()
+    vector = homing.at(poses[4], matches=False)
+    again = np.bincount(homing.out.tracks.kinds, minlength=4)
+    assert again[0] < 0.5 * lost[0]
+    assert off_deg(vector, poses[4])[0] < 6.0
+    kinds, points = homing.out.tracks.kinds, homing.out.tracks.points
+    assert np.isfinite(points[(kinds == 1) | (kinds == 2)]).all()
+
+
+def test_a_map_is_made_anew_where_more_is_matched() -> None:
+    homing = Homing(too_near=0.02)
+    homing.at((4.0, 4.2, -0.5), share=0.4)
+    few, ratio = homing.memory.made_of, []
+    for pose in drive(4)[1:]:
+        ratio.append(homing.at(pose).ratio)
+    assert homing.memory.made_of > few
+    assert ratio[-1] == pytest.approx(
+        math.dist(drive(4)[-1][:2], TARGET[:2]) / math.dist((4.0, 4.2), TARGET[:2]), abs=0.1
+    )
+
+
+def test_a_lost_target_says_why() -> None:
+    homing = Homing()
+    vector = homing.at((4.2, 4.6, 0.4), matches=False)
+    assert (vector.state, vector.inliers) == ("lost", 0)
+    assert vector.why == "0 of 0 matches with the target view agree, 8 are needed"
+    assert homing.ctx.counts["lost_target"] == 1
+    homing.at((4.2, 4.6, 0.4))
+    blank = Image(np.full_like(look("mirror", 0.4).pixels, 80))
+    vector = homing.at((4.2, 4.6, 0.4), matches=False, picture=blank)
+    assert vector.state == "lost"
+    assert vector.why.startswith("0 tracked features agree on where the robot is, 8 are needed; 0 of 0 matches")
+    assert off_deg(vector, (4.2, 4.6, 0.4))[0] < 3.0  # what was known last
+    assert homing.at((4.2, 4.6, 0.4)).state == "tracking"  # as soon as it is matched again
+
+
+def test_the_memory_of_a_killed_run_goes_on_to_the_same_vectors() -> None:
+    poses, homing, other = drive(6), Homing(), Homing()
+    for pose in poses[:3]:
+        homing.at(pose)
+    restore_state(other.memory, decode(encode(encode_state(homing.memory))))
+    other.ctx.rng.bit_generator.state = homing.ctx.rng.bit_generator.state
+    for pose in poses[3:]:
+        one, two = homing.at(pose), other.at(pose)
+        assert (one.direction, one.turn, one.ratio, one.inliers) == (two.direction, two.turn, two.ratio, two.inliers)
+
+
+def test_without_a_target_there_is_nothing_to_say() -> None:
+    homing = Homing()
+    homing.at((4.2, 4.6, 0.4))
+    out = homing.stage.step(homing.ctx, homing.memory, look("mirror", 0.4), None, camera=CAMERA)
+    assert out.vector is None
+    assert not homing.memory.mapped
+
+
+def test_what_is_not_wired_is_said() -> None:
+    homing = Homing()
+    with pytest.raises(BadInput, match=r"wires\.homing\.camera=source\.camera"):
+        homing.stage.step(homing.ctx, homing.memory, look("mirror", 0.4), homing.target)
+    alien = Correspondences(np.array([9999]), np.array([0]), np.zeros(1))
+    with pytest.raises(BadInput, match="correspondences that are not those of the present features"):
+        homing.stage.step(
+            homing.ctx, homing.memory, look("mirror", 0.4), homing.target, described("mirror", TARGET), alien, CAMERA
+        )
