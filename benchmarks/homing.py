@@ -1,0 +1,172 @@
+"""Relative poses, camera poses and homing, at the sizes of Goedemé et al. 2007: 100 bearings, half wrong; 320x240."""
+
+import math
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import poselib
+
+from omninav.pipeline import Context
+from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
+from omninav.stages.geometry.consensus import relative_pose
+from omninav.stages.geometry.epipolar import planar_two_points
+from omninav.stages.geometry.three_point_pose import grunert, three_point_pose
+from omninav.stages.homing.visual_homing import Memory, VisualHoming
+from omninav.stages.match.correspondences import MatchFeatures
+from omninav.stages.simulator.cameras import camera_of, camera_rays
+from omninav.stages.simulator.config import MirrorCamera
+from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.renderer import render
+from omninav.stages.simulator.world import World
+from omninav.stages.values.homing import HomingTarget
+from omninav.stages.values.image import Image
+
+from .table import Row, medians
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+from two_views import angle_deg, two_views, unit
+
+SCENES = 200
+SMALL = MirrorCamera(
+    width=320, height_px=240, focal=248.5, centre=(159.5, 119.5), inner_radius_px=17.0, outer_radius_px=119.0
+)
+
+
+def rows() -> list[Row]:
+    """Medians on one OpenCV thread, so that ratios hold on any machine."""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        return [*_relative(), *_absolute(), *_homing()]
+    finally:
+        cv2.setNumThreads(threads)
+
+
+def _relative() -> list[Row]:
+    scenes = [two_views(seed, 100, wrong=0.5, noise_deg=0.1) for seed in range(SCENES)]
+    errors: dict[str, list[tuple[float, float]]] = {"planar": [], "five_point": []}
+    for solver, found in errors.items():
+        for seed, (rotation, translation, first, second) in enumerate(scenes[: SCENES if solver == "planar" else 50]):
+            pose = relative_pose(first, second, np.random.default_rng(seed), solver)  # type: ignore[arg-type]
+            assert pose is not None
+            found.append((angle_deg(pose.rotation, rotation), angle_deg(pose.translation, translation)))
+    two, five = np.array(errors["planar"]), np.array(errors["five_point"])
+    _, _, first, second = scenes[0]
+    upright = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])  # our z is poselib's y
+    here, there = (np.ascontiguousarray(b[50:52] @ upright.T) for b in (first, second))
+    taken = medians(
+        {
+            solver: lambda solver=solver: relative_pose(first, second, np.random.default_rng(0), solver)
+            for solver in ("planar", "five_point")
+        }
+    )
+    eight = medians({"eight": lambda: relative_pose(first, second, np.random.default_rng(0), "eight_point")}, rounds=3)
+    inner = medians(
+        {
+            "ours": lambda: planar_two_points(first[50:52], second[50:52]),
+            "theirs": lambda: poselib.relpose_upright_planar_2pt(there, here),
+        },
+        inner=50,
+    )
+    what = "relative pose, 100 bearings, half of them wrong"
+    return [
+        Row(f"{what}: two points", taken["planar"] * 1e3, "ms", limit=5.0),
+        Row(
+            "… runs within 3 degrees",
+            100.0 * float((two.max(axis=1) < 3).mean()),
+            "%",
+            limit=100.0,
+            higher_is_better=True,
+        ),
+        Row(
+            "… median error of the direction",
+            float(np.median(two[:, 1])),
+            "deg",
+            "by five points (poselib's)",
+            float(np.median(five[:, 1])),
+            limit=1.0,
+            of_peer=True,
+        ),
+        Row(
+            "… median error of the rotation",
+            float(np.median(two[:, 0])),
+            "deg",
+            "by five points (poselib's)",
+            float(np.median(five[:, 0])),
+            limit=1.0,
+            of_peer=True,
+        ),
+        Row(f"{what}: five points", taken["five_point"] * 1e3, "ms"),
+        Row(f"{what}: eight points", eight["eight"] * 1e3, "ms"),
+        Row("one sample of two points", inner["ours"] * 1e6, "us", "poselib upright_planar_2pt", inner["theirs"] * 1e6),
+    ]
+
+
+def _absolute() -> list[Row]:
+    rng = np.random.default_rng(0)
+    points = rng.uniform([-3.0, -3.0, 2.0], [3.0, 3.0, 8.0], (100, 3))  # before a pinhole camera, which the peer wants
+    bearings = unit(unit(points) + 0.001 * rng.normal(size=(100, 3)))
+    bearings[:50] = unit(np.append(rng.uniform(-1, 1, (50, 2)), np.ones((50, 1)), axis=1))
+    flat = bearings[:, :2] / bearings[:, 2:]
+    camera = {"model": "PINHOLE", "width": 2, "height": 2, "params": [1.0, 1.0, 0.0, 0.0]}
+    options = {"max_reproj_error": math.tan(math.radians(0.5)), "success_prob": 0.9999}
+    taken = medians(
+        {
+            "ours": lambda: three_point_pose(bearings, points, np.random.default_rng(0)),
+            "theirs": lambda: poselib.estimate_absolute_pose(flat, points, camera, options, {}),
+        }
+    )
+    inner = medians(
+        {
+            "ours": lambda: grunert(bearings[50:53], points[50:53]),
+            "theirs": lambda: poselib.p3p(bearings[50:53], points[50:53]),
+        },
+        inner=50,
+    )
+    return [
+        Row(
+            "camera pose, 100 points, half of them wrong",
+            taken["ours"] * 1e3,
+            "ms",
+            "poselib (pinhole)",
+            taken["theirs"] * 1e3,
+        ),
+        Row("one sample of three points", inner["ours"] * 1e6, "us", "poselib p3p", inner["theirs"] * 1e6),
+    ]
+
+
+def _homing() -> list[Row]:
+    camera, rays, scene = camera_of(SMALL), camera_rays(camera_of(SMALL)), World(DEMO).scene
+    way = np.linspace((4.0, 4.2, -0.5), (4.8, 4.84, 0.3), 12)
+    pictures = [Image(render(scene, rays, tuple(pose), 0.9)) for pose in way]
+    sift, match, ctx = RotationReducedSift(), MatchFeatures(), Context("homing")
+    sift.setup(ctx)
+    match.setup(ctx)
+    seen = [sift.step(ctx, picture, camera).features for picture in pictures]
+    goal = sift.step(ctx, Image(render(scene, rays, (5.0, 5.0, 0.4), 0.9)), camera).features
+    target, stage = HomingTarget(0, goal), VisualHoming()
+    pairs = [match.step(ctx, features, goal).correspondences for features in seen]
+
+    def begin() -> None:
+        stage.step(Context("h", np.random.default_rng(0)), Memory(), pictures[0], target, seen[0], pairs[0], camera)
+
+    def begin_all() -> None:
+        features = sift.step(ctx, pictures[0], camera).features
+        found = match.step(ctx, features, goal).correspondences
+        stage.step(Context("h", np.random.default_rng(0)), Memory(), pictures[0], target, features, found, camera)
+
+    def drive() -> None:
+        memory, own = Memory(), Context("h", np.random.default_rng(0))
+        for picture, features, found in zip(pictures, seen, pairs, strict=True):
+            out = stage.step(own, memory, picture, target, features, found, camera)
+        assert out.vector is not None
+        assert out.vector.state == "tracking"
+
+    taken = medians({"begin": begin, "begin_all": begin_all, "drive": drive}, rounds=15)
+    return [
+        Row("homing, 320x240: an update", (taken["drive"] - taken["begin"]) / (len(way) - 1) * 1e3, "ms", limit=25.0),
+        Row("homing, 320x240: a new target", taken["begin"] * 1e3, "ms", limit=100.0),
+        Row("… with features and matching", taken["begin_all"] * 1e3, "ms", limit=100.0),
+    ]
