@@ -6,7 +6,20 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-PARTS = ("engine", "images", "retrieval", "renderer", "filter", "visibility", "cml", "mixtures", "homing", "logs", "command_line")
+PARTS = (
+    "engine",
+    "images",
+    "retrieval",
+    "renderer",
+    "filter",
+    "visibility",
+    "cml",
+    "mixtures",
+    "topological",
+    "homing",
+    "logs",
+    "command_line",
+)
 
 
 def main() -> int:

@@ -1,0 +1,129 @@
+"""What a topological map costs: the features of a pair of views and their matches, a map of a tour, a look at it."""
+
+import math
+import time
+
+import cv2
+import numpy as np
+
+from omninav.pipeline import Context, Tick
+from omninav.pipeline.codec import encode
+from omninav.stages.features.column_segments import FindColumnSegments
+from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
+from omninav.stages.geometry.visual_distance import Matching, match_columns, match_patches
+from omninav.stages.mapping.topological import TopologicalMapping
+from omninav.stages.match.visual_distance import MatchPlaces
+from omninav.stages.simulator.cameras import camera_of, camera_rays
+from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.renderer import render
+from omninav.stages.simulator.world import World
+from omninav.stages.values.camera import HyperbolicMirror
+from omninav.stages.values.image import Image, Pixels
+from omninav.stages.values.local_features import GlobalMoments, LocalFeatures
+from omninav.stages.values.pose import Pose
+
+from .table import Row, medians
+
+IMAGES, PLACES = 545, 60
+
+
+def rows() -> list[Row]:
+    """Medians on one OpenCV thread, so that ratios hold on any machine."""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        return [*_pair(), *_map()]
+    finally:
+        cv2.setNumThreads(threads)
+
+
+def two_views() -> tuple[list[Pixels], HyperbolicMirror]:
+    """Two views of the built-in world, 320 x 240, half a metre apart and turned, and their camera."""
+    camera = camera_of(DEMO.camera)
+    assert isinstance(camera, HyperbolicMirror)
+    scene, rays = World(DEMO).scene, camera_rays(camera)
+    seen = [render(scene, rays, pose, 0.9) for pose in ((5.0, 5.0, 0.0), (5.5, 5.2, 0.6))]
+    half = HyperbolicMirror(
+        320, 240, camera.focal_x / 2, camera.focal_y / 2, 159.5, 119.5, camera.a, camera.b,
+        camera.inner_radius_px / 2, camera.outer_radius_px / 2, 0.0, camera.height, camera.yaw,
+    )  # fmt: skip
+    return [cv2.resize(pixels, (320, 240), interpolation=cv2.INTER_AREA) for pixels in seen], half
+
+
+def _pair() -> list[Row]:
+    pictures, camera = two_views()
+    sift, columns, context = RotationReducedSift(), FindColumnSegments(), Context("features")
+    sift.setup(context)
+    own = cv2.SIFT.create(nfeatures=sift.features, contrastThreshold=sift.contrast)
+    brute = cv2.BFMatcher(cv2.NORM_L2)
+
+    def patches() -> list[LocalFeatures]:
+        return [sift.step(context, picture=Image(pixels), camera=camera).features for pixels in pictures]
+
+    def both() -> int:
+        first, second = patches()
+        pieces = [columns.step(context, picture=Image(pixels), camera=camera).columns for pixels in pictures]
+        pairs = match_patches(first, second, Matching()).first, match_columns(*pieces, Matching()).first
+        return len(pairs[0]) + len(pairs[1])
+
+    def plain() -> int:
+        found = [own.detectAndCompute(cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY), None)[1] for pixels in pictures]
+        return sum(a.distance < 0.8 * b.distance for a, b in brute.knnMatch(*found, k=2))
+
+    taken = medians({"both": both, "patches": patches, "plain": plain}, rounds=11)
+    return [
+        Row(
+            "patches and columns of two views of 320x240, matched",
+            taken["both"] * 1e3,
+            "ms",
+            "cv2.SIFT, cv2.BFMatcher of both",
+            taken["plain"] * 1e3,
+            limit=40.0,
+        ),
+        Row("patches of both alone, with bearings and colours", taken["patches"] * 1e3, "ms"),
+    ]
+
+
+def a_tour(images: int, landmarks: int = 6000, seen: int = 200) -> tuple[list[LocalFeatures], list[Pose]]:
+    """Features along two rounds of a made-up place: of the landmarks around, each with a look of its own."""
+    rng = np.random.default_rng(0)
+    where = rng.uniform((0.0, 0.0, 0.0), (60.0, 60.0, 3.0), (landmarks, 3))
+    looks = rng.integers(0, 100, (landmarks, 128)).astype(np.uint8)
+    colours = rng.uniform(-1.0, 1.0, (landmarks, 3)).astype(np.float32)
+    around = 4.0 * math.pi * np.arange(images) / images
+    poses = [Pose(30.0 + 22.0 * math.cos(a), 30.0 + 22.0 * math.sin(a), a + math.pi / 2) for a in around]
+    views = []
+    for pose in poses:
+        gap = where - (pose.x, pose.y, 0.9)
+        near = np.argsort(np.hypot(gap[:, 0], gap[:, 1]), kind="stable")[:seen]
+        cos, sin = math.cos(pose.heading), math.sin(pose.heading)
+        turned = gap[near] @ np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        bearings = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+        sizes = np.full(seen, 4.0, np.float32)
+        noise = rng.integers(0, 12, (seen, 128)).astype(np.uint8)
+        views.append(LocalFeatures(bearings, np.zeros((seen, 2)), looks[near] + noise, colours[near], sizes))
+    return views, poses
+
+
+def _map() -> list[Row]:
+    views, poses = a_tour(IMAGES)
+    grey = GlobalMoments(np.zeros(3, np.float32))  # all alike: no two views can be told apart at a glance
+    ticks = [Tick(row, row * 10**9) for row in range(IMAGES)]
+    start = time.process_time()
+    out = TopologicalMapping().step(
+        Context("mapping"), ticks=ticks, features=views, moments=[grey] * IMAGES, truth=poses
+    )
+    taken = time.process_time() - start
+    size = len(encode(out.map)) / len(out.map.views) * PLACES / 1e6
+    few = TopologicalMapping(every_s=0.0, place_size=1e-6, support=1.0).step(
+        Context("mapping"), ticks=ticks[:PLACES], features=views[:PLACES], moments=[grey] * PLACES, truth=poses[:PLACES]
+    )
+    assert len(few.map) == PLACES
+    match, context = MatchPlaces(), Context("match")
+    match.setup(context)
+    look = medians({"look": lambda: match.step(context, views[-1], grey, few.map)}, rounds=15)["look"]
+    return [
+        Row(f"map of {IMAGES} views, 200 patches each, none told apart at a glance", taken, "s CPU", limit=180.0),
+        Row(f"{PLACES} views of it in a file", size, "MB", limit=1.68),
+        Row(f"visual distance of a view to {PLACES} places", look * 1e3, "ms", limit=100.0),
+    ]
