@@ -1,5 +1,6 @@
 """Makes a topological map of a tour, once all its pictures are known."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from typing import Annotated, Literal, NamedTuple
@@ -21,6 +22,7 @@ from omninav.stages.geometry.visual_distance import (
 )
 from omninav.stages.values.local_features import ColumnSegments, GlobalMoments, LocalFeatures
 from omninav.stages.values.pose import Pose, PoseSource
+from omninav.stages.values.rooms import Rooms
 from omninav.stages.values.topological_map import DRIVEN, LOOP, LoopHypotheses, TopologicalMap, stored
 
 from .pose_of_view import Supervised
@@ -92,7 +94,8 @@ class TopologicalMapping(Stage):
     On the way from place to place path images are kept, each with at least `path_matches` matches with the one before,
     as homing needs them. Of each view the
     `patches` are kept that were found again in most of the pictures around it, and the `columns` heaviest. A map grows
-    where `known` is wired: its views take part, its places stay together. Poses are kept for scoring and drawing only:
+    where `known` is wired: its views take part, its places stay together. Places are called after `rooms`, where these
+    are wired and poses are truth: what an owner would tell the robot. Poses are kept for scoring and drawing only:
     the tour's truth, without it (`supervised: auto`) its odometry. Raises BadInput where `supervised: truth` finds
     none, where no picture shows anything, or where known and new poses are not of one source.
     """
@@ -135,6 +138,7 @@ class TopologicalMapping(Stage):
         odometry: Sequence[Pose | None] = (),
         truth: Sequence[Pose | None] = (),
         known: TopologicalMap | None = None,
+        rooms: Rooms | None = None,
     ) -> Out:
         """The whole tour at once."""
         source = self._pose_source(ctx, truth, known)
@@ -158,7 +162,8 @@ class TopologicalMapping(Stage):
         colours = np.stack([view.moments.values for view in views]).astype(np.float64)
         ready = [made_ready(view.features, view.columns) for view in views]
         compared = compare_all(ctx, ready, colours, self.colour, matching, measure)
-        return self._map_of(views, compared, source, known, matching)
+        out = self._map_of(views, compared, source, known, matching)
+        return out if rooms is None or source != "truth" else dataclasses.replace(out, map=with_names(out.map, rooms))
 
     def _kept(
         self,
@@ -391,23 +396,22 @@ def old_ways(known: TopologicalMap, place: Ints) -> dict[tuple[int, int], Ints]:
     return ways
 
 
+def with_names(map: TopologicalMap, rooms: Rooms) -> TopologicalMap:
+    """The map with places called after the room that their medoid was taken in, where they have no name yet."""
+    at = [rooms.at(float(x), float(y)) for x, y, _ in map.poses[map.places]]
+    names = tuple(own or room for own, room in zip(map.names, at, strict=True))
+    return dataclasses.replace(map, names=names)
+
+
 def with_loops(map: TopologicalMap, pairs: Ints) -> TopologicalMap:
     """The map with links between places that were found to be one, without path images: they look alike."""
     new = [pair for pair in dict.fromkeys(map_pair(pair) for pair in pairs) if map.link(*pair) is None]
     number = len(new)
-    return TopologicalMap(
-        map.views,
-        map.places,
-        map.owner,
-        map.names,
-        np.concatenate([map.links, np.array(new, np.int64).reshape(-1, 2)]),
-        np.append(map.kinds, np.full(number, LOOP, np.int8)),
-        np.append(map.way_starts, np.full(number, map.way_starts[-1])),
-        map.ways,
-        map.frames,
-        map.poses,
-        map.pose_source,
-        map.spread,
+    return dataclasses.replace(
+        map,
+        links=np.concatenate([map.links, np.array(new, np.int64).reshape(-1, 2)]),
+        kinds=np.append(map.kinds, np.full(number, LOOP, np.int8)),
+        way_starts=np.append(map.way_starts, np.full(number, map.way_starts[-1])),
     )
 
 

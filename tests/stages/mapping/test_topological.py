@@ -1,5 +1,6 @@
 """A map of a made-up world's places, of which everything is known."""
 
+import itertools
 import math
 
 import numpy as np
@@ -19,8 +20,10 @@ from omninav.stages.geometry.place_clusters import (
     subclusters,
 )
 from omninav.stages.geometry.visual_distance import Matching, match_patches
+from omninav.stages.mapping.topological import with_names
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Pose
+from omninav.stages.values.rooms import Rooms
 from omninav.stages.values.topological_map import LOOP, LoopHypotheses, TopologicalMap
 
 SQUARE = [(8.0, 8.0), (32.0, 8.0), (32.0, 32.0), (8.0, 32.0), (8.0, 8.0)]
@@ -102,8 +105,11 @@ def test_a_ring_driven_once_is_a_ring_of_places(once: tuple[TopologicalMap, Loop
     steps = np.hypot(*np.diff(made.poses[made.places[made.links]][:, :, :2], axis=1)[:, 0].T)
     assert steps.max() < 10.0  # a robot sees 7 m far
     for link, (one, other) in enumerate(made.links):
-        way = made.poses[[made.places[one], *made.way(link), made.places[other]], :2]
-        assert np.hypot(*np.diff(way, axis=0).T).max() < 6.5
+        way = [int(view) for view in (made.places[one], *made.way(link), made.places[other])]
+        for here, there in itertools.pairwise(way):
+            seen = [WORLD.seen(Pose(*(float(number) for number in made.poses[view]))) for view in (here, there)]
+            found = len(match_patches(*seen, Matching()).first)
+            assert found >= 20 or abs(made.frames[here] - made.frames[there]) == 1
 
 
 def test_a_second_round_is_found_to_be_the_first(twice: tuple[TopologicalMap, LoopHypotheses]) -> None:
@@ -194,6 +200,20 @@ def test_poses_are_the_tours_truth_or_its_odometry_and_say_which() -> None:
         mapped(WORLD, [tour], known=known)
     with pytest.raises(BadInput, match=r"nodes\.mapping\.supervised=auto"):
         mapped(WORLD, [tour], truth=False, supervised="truth")
+
+
+def test_places_are_called_after_the_smallest_room_that_their_medoid_is_in() -> None:
+    corners = np.array([[0.0, 0.0, 40.0, 10.0], [20.0, 6.0, 26.0, 10.0]])
+    rooms = Rooms(("corridor", "kitchen"), corners)
+    assert rooms.at(21.0, 7.0) == "kitchen"
+    assert rooms.at(50.0, 7.0) == ""
+    made = mapped(WORLD, [along(SQUARE[:3], 1.6)]).map
+    named = with_names(made, rooms)
+    for place, name in enumerate(named.names):
+        assert name == rooms.at(*made.poses[made.places[place]][:2])
+    assert {"corridor", "kitchen", ""} == set(named.names)
+    assert named.named("kitchen").tolist() == [p for p, name in enumerate(named.names) if name == "kitchen"]
+    assert with_names(named, Rooms(("hall",), np.array([[0.0, 0.0, 40.0, 40.0]]))).named("kitchen").size
 
 
 def test_a_tour_that_shows_nothing_makes_no_map() -> None:

@@ -1,0 +1,26 @@
+"""What people call the parts of a place."""
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Value
+
+
+class Rooms(Value):
+    """Named rectangles of a floor, as its owner knows them: truth.
+
+    `names` (R,); `corners` (R, 4): least x, least y, greatest x, greatest y (m, map frame).
+    """
+
+    is_truth = True
+    names: tuple[str, ...]
+    corners: npt.NDArray[np.float64]
+
+    def at(self, x: float, y: float) -> str:
+        """The room at a point, the smallest of several; "" where there is none."""
+        x0, y0, x1, y1 = self.corners.T
+        inside = np.flatnonzero((x0 <= x) & (x <= x1) & (y0 <= y) & (y <= y1))
+        if not len(inside):
+            return ""
+        areas = (x1 - x0)[inside] * (y1 - y0)[inside]
+        return self.names[int(inside[np.argmin(areas)])]
