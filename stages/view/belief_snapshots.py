@@ -1,4 +1,4 @@
-"""How a belief came together: its particles or Gaussians at a few moments of a drive."""
+"""How a belief came together: its particles, Gaussians or places at a few moments of a drive."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -9,7 +9,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.results import Figure
 from omninav.stages.geometry.gaussians import moments
 from omninav.stages.geometry.particles import weighted_moments
-from omninav.stages.values.belief import GaussianMixture, Particles, PoseEstimate
+from omninav.stages.values.belief import GaussianMixture, Particles, PlaceBelief, PoseEstimate
 from omninav.stages.values.drives import Array
 from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.map_places import AnyMap, map_poses
@@ -34,13 +34,14 @@ from .style import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Shown = Particles | GaussianMixture
+Shown = Particles | GaussianMixture | PlaceBelief
 
 
 class BeliefSnapshots(Stage):
     """The belief over the map at `moments` frames of the last log, dense at its beginning, with estimate and truth.
 
-    Particles are dots; a mixture's Gaussians are ellipses of two standard deviations, as opaque as they weigh.
+    Particles are dots; a mixture's Gaussians are ellipses of two standard deviations, as opaque as they weigh; places
+    are discs, as large as they are probable.
     With `grid` wired, all of it over what is occupied there.
     """
 
@@ -122,16 +123,21 @@ def _draw(
 
 
 def _poses(belief: Shown) -> Array:
-    return belief.poses if isinstance(belief, Particles) else belief.means
+    return belief.means if isinstance(belief, GaussianMixture) else belief.poses
 
 
 def _named(belief: Shown) -> str:
+    if isinstance(belief, PlaceBelief):
+        return "places, as large as they are probable"
     return "particles" if isinstance(belief, Particles) else "Gaussians, two standard deviations wide"
 
 
 def _draw_belief(axes: "Axes", belief: Shown) -> None:
     x, y = _poses(belief)[:, :2].T
-    if isinstance(belief, Particles):
+    if isinstance(belief, PlaceBelief):
+        size = 4.0 + 140.0 * belief.probabilities
+        axes.scatter(x, y, s=size, color=PARTICLE, alpha=0.6, linewidths=0, zorder=3, label="probability")
+    elif isinstance(belief, Particles):
         axes.scatter(x, y, s=5, color=PARTICLE, alpha=0.6, linewidths=0, zorder=3, label="particles")
     else:
         colours = faded(PARTICLE, np.clip(belief.weights, 0.15, 1))
@@ -141,10 +147,11 @@ def _draw_belief(axes: "Axes", belief: Shown) -> None:
 
 def _spread(belief: Shown) -> float:
     """Standard deviation (m) of the distance from the belief's mean."""
-    if not len(belief.weights):
+    if not len(_poses(belief)):
         return float("nan")
-    if isinstance(belief, Particles):
-        _, covariance = weighted_moments(belief.poses, belief.weights)
-    else:
+    if isinstance(belief, GaussianMixture):
         _, covariance, _ = moments(belief.means, belief.covariances, belief.weights)
+    else:
+        weights = belief.probabilities if isinstance(belief, PlaceBelief) else belief.weights
+        _, covariance = weighted_moments(belief.poses, weights)
     return float(np.sqrt(max(covariance[0, 0] + covariance[1, 1], 0.0)))

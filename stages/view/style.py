@@ -9,6 +9,7 @@ from omninav.pipeline.picture import Picture, picture
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from omninav.stages.values.map_places import AnyMap
+from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 if TYPE_CHECKING:
@@ -47,7 +48,8 @@ def plan_axes(axes: "Axes", extent: tuple[float, float, float, float] | None = N
 
 
 def draw_map(axes: "Axes", map: AnyMap | None, label: bool = True) -> None:
-    """Reference views as grey dots, joined by their edges; of mixtures every component's mean, as dark as it weighs."""
+    """Reference views as grey dots, joined by their edges; of mixtures every component's mean, as dark as it weighs; of
+    a topological map its places, joined by their links."""
     if map is None or not len(map):
         return
     from matplotlib.collections import LineCollection
@@ -60,11 +62,13 @@ def draw_map(axes: "Axes", map: AnyMap | None, label: bool = True) -> None:
         colours = faded(REFERENCE, np.clip(map.weights / heaviest, 0.3, 1.0))
         axes.scatter(x, y, s=size, c=colours, linewidths=0, zorder=1.5, label=name)
         return
-    if len(map.edges):
-        axes.add_collection(LineCollection(list(map.poses[map.edges][:, :, :2]), colors=EDGE, linewidths=0.7, zorder=1))
-    size = float(np.clip(3000 / len(map), 1.5, 9))
-    name = f"references ({len(map)})" if label else None
-    axes.scatter(map.poses[:, 0], map.poses[:, 1], s=size, color=REFERENCE, linewidths=0, zorder=1.5, label=name)
+    topological = isinstance(map, TopologicalMap)
+    poses, edges = (map.poses[map.places], map.links) if isinstance(map, TopologicalMap) else (map.poses, map.edges)
+    if len(edges):
+        axes.add_collection(LineCollection(list(poses[edges][:, :, :2]), colors=EDGE, linewidths=0.7, zorder=1))
+    size = float(np.clip(3000 / len(map), 1.5, 25 if topological else 9))
+    name = f"{'places' if topological else 'references'} ({len(map)})" if label else None
+    axes.scatter(poses[:, 0], poses[:, 1], s=size, color=REFERENCE, linewidths=0, zorder=1.5, label=name)
 
 
 def draw_gaussians(

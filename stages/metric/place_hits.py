@@ -1,0 +1,62 @@
+"""How often the most probable place is the right one."""
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline.results import Metrics
+from omninav.stages.geometry.place_graph import links_between
+from omninav.stages.values.belief import PlaceBelief
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.topological_map import TopologicalMap
+
+
+class PlaceHits(Stage):
+    """The share of pictures at which the belief's maximum is at the place whose medoid was taken closest to the truth.
+
+    Goedemé et al. 2007, section 8.3. Under `localisation`, over all logs: `right_rate` of all pictures; `near_rate`:
+    the believed place is the closest or one of its neighbours; `right_after`: of the first, second ... of `updates`
+    updates since the belief began (`begun`: at which pictures it did), as the paper counts; `median_apart_m`: how far
+    the believed place's medoid lies from the truth.
+    """
+
+    updates: Annotated[int, Bounds(ge=1)] = 5
+
+    class Out(Outputs):
+        """`metrics`: the entry `localisation` of metrics.json; absent without ground truth."""
+
+        metrics: Metrics | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        ticks: Sequence[Tick],
+        beliefs: Sequence[PlaceBelief | None],
+        begun: Sequence[PlaceBelief | None],
+        truth: Sequence[Pose | None],
+        map: TopologicalMap,
+    ) -> Out:
+        """The whole run at once."""
+        medoids, apart = map.poses[map.places][:, :2], links_between(map.links, len(map))
+        rows, since = [], 0
+        for belief, begins, true in zip(beliefs, begun, truth, strict=True):
+            since = 1 if begins is not None else since + 1
+            if belief is not None and true is not None:
+                metres = np.hypot(*(medoids - (true.x, true.y)).T)
+                place, closest = int(np.argmax(belief.probabilities)), int(np.argmin(metres))
+                rows.append((since, place == closest, apart[place, closest] <= 1, metres[place]))
+        if not rows:
+            return self.Out()
+        after, right, near, metres_off = (np.array(column) for column in zip(*rows, strict=True))
+        found: dict[str, Any] = {
+            "pictures": len(rows),
+            "right_rate": float(right.mean()),
+            "near_rate": float(near.mean()),
+            "right_after": [
+                float(right[after == k].mean()) if (after == k).any() else None for k in range(1, self.updates + 1)
+            ],
+            "median_apart_m": float(np.median(metres_off)),
+        }
+        return self.Out(metrics=Metrics({"localisation": found}))

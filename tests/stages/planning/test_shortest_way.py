@@ -1,0 +1,129 @@
+"""Ways over a small map with a ring and a dead end, and what happens where they fail."""
+
+import numpy as np
+import pytest
+from made_places import made_map
+
+from omninav.pipeline import Context, Tick
+from omninav.pipeline.problems import BadInput
+from omninav.stages.planning.shortest_way import Itinerary, ShortestWay, places_called, shortest_way, views_along
+from omninav.stages.values.belief import PlaceBelief
+from omninav.stages.values.homing import DrivingStatus, PathProgress
+from omninav.stages.values.topological_map import TopologicalMap
+
+# 0 - 1 - 2 - 3 in a row, 3 and 0 are neighbours by a loop, 4 hangs on 2 (driven from 4 to 2), 5 is on its own
+BETWEEN = {(0, 1): 1, (1, 2): 0, (2, 3): 4, (4, 2): 2}
+NONE = np.zeros((0, 2), np.int64)
+
+
+def a_map() -> TopologicalMap:
+    names = ("hall", "", "kitchen", "", "kitchen", "")
+    return made_map([(0.0, 0.0)] * 6, BETWEEN, [(3, 0)], names)
+
+
+def believed(place: int, share: float = 0.9) -> PlaceBelief:
+    probabilities = np.full(6, (1.0 - share) / 5)
+    probabilities[place] = share
+    return PlaceBelief(probabilities, np.zeros((6, 3)))
+
+
+def drive(
+    stage: ShortestWay, itinerary: Itinerary, place: int, status=None, at: int | None = None, share=0.9, arrived=False
+):
+    ctx = Context("planning")
+    ctx.tick = Tick(index=0, stamp=0, log=0, frame=0, first_of_log=True)
+    progress = None
+    if at is not None:
+        views = int(itinerary.views[-1])
+        progress = PathProgress(itinerary.number, at, views, at, at >= views - 1, False, arrived)
+    doing = None if status is None else DrivingStatus(status, "a chair" if status == "blocked" else "too few matches")
+    return stage.step(ctx, itinerary, believed(place, share), a_map(), doing, progress)
+
+
+def test_the_way_with_the_fewest_links_is_taken():
+    assert shortest_way(a_map(), 0, np.array([3]), "links", NONE).tolist() == [0, 3]
+    assert shortest_way(a_map(), 1, np.array([4]), "links", NONE).tolist() == [1, 2, 4]
+
+
+def test_or_the_one_with_the_fewest_views():
+    assert shortest_way(a_map(), 2, np.array([3]), "links", NONE).tolist() == [2, 3]
+    assert shortest_way(a_map(), 2, np.array([3]), "views", NONE).tolist() == [2, 1, 0, 3]  # 1 + 2 + 1 against 5
+
+
+def test_of_several_places_of_a_name_the_nearest_is_the_goal():
+    goals = places_called("kitchen", a_map())
+    assert goals.tolist() == [2, 4]
+    assert shortest_way(a_map(), 3, goals, "links", NONE).tolist() == [3, 2]
+
+
+def test_a_way_driven_the_other_way_round_shows_its_pictures_backwards():
+    map = a_map()
+    there = views_along(map, np.array([4, 2, 1, 0]))
+    back = views_along(map, np.array([0, 1, 2, 4]))
+    assert there[0].tolist() == [4, 11, 12, 2, 1, 6, 0]
+    assert back[0].tolist() == there[0].tolist()[::-1]
+    assert there[1].tolist() == [1, 4, 5, 7]
+
+
+@pytest.mark.parametrize("goal", ["cellar", 6, "-1", None, ""])
+def test_a_goal_that_is_not_on_the_map_is_refused_with_those_that_are(goal):
+    with pytest.raises(BadInput, match=r"hall, kitchen"):
+        places_called(goal, a_map())
+
+
+def test_it_plans_once_it_is_sure_and_not_again():
+    stage, itinerary = ShortestWay(goal=3, patience=5), Itinerary()
+    first = drive(stage, itinerary, 1, share=0.4)
+    assert first.path is None
+    assert first.way.state == "locating"
+    second = drive(stage, itinerary, 1, share=0.6)
+    assert second.path is not None
+    assert second.way.places.tolist() == [1, 0, 3]
+    assert second.path.names == ("place 1", "on the way, picture 60", "place 0, hall", "place 3")
+    again = drive(stage, itinerary, 0, "driving", at=2)
+    assert again.path is None
+    assert again.way.state == "under way"
+
+
+def test_who_looks_long_enough_goes_by_the_most_probable_place():
+    stage, itinerary = ShortestWay(goal=3, patience=3), Itinerary()
+    planned = [drive(stage, itinerary, 2, share=0.3).path is not None for _ in range(4)]
+    assert planned == [False, False, False, True]
+
+
+def test_a_lost_target_means_a_new_way_from_where_it_is_now_believed():
+    stage, itinerary = ShortestWay(goal=3), Itinerary()
+    drive(stage, itinerary, 1)
+    out = drive(stage, itinerary, 2, "lost", at=1)
+    assert out.path is not None
+    assert out.path.number == 1
+    assert out.way.places.tolist() == [2, 3]
+
+
+def test_a_blocked_link_is_not_tried_again():
+    stage, itinerary = ShortestWay(goal="hall"), Itinerary()
+    assert drive(stage, itinerary, 2).way.places.tolist() == [2, 1, 0]
+    out = drive(stage, itinerary, 1, "blocked", at=2)  # the medoids of 2 and 1 are reached: it is between 1 and 0
+    assert itinerary.closed.tolist() == [[1, 0]]
+    assert out.way.places.tolist() == [1, 2, 3, 0]
+    last = drive(stage, itinerary, 3, "blocked", at=out.path is not None and 7)
+    assert last.way.state == "gave up"
+    assert "2 links were blocked" in last.way.why
+    assert "no way leads from place 3 to hall" in last.way.why
+    assert drive(stage, itinerary, 3, "blocked", at=7).path is None
+
+
+def test_it_arrives_and_stays():
+    stage, itinerary = ShortestWay(goal=0), Itinerary()
+    drive(stage, itinerary, 1)
+    assert drive(stage, itinerary, 0, "arrived", at=2, arrived=True).way.state == "arrived"
+    assert drive(stage, itinerary, 4).way.state == "arrived"
+
+
+def test_after_so_many_ways_it_gives_up_and_says_why():
+    stage, itinerary = ShortestWay(goal=3, tries=2), Itinerary()
+    drive(stage, itinerary, 1)
+    drive(stage, itinerary, 1, "lost", at=0)
+    out = drive(stage, itinerary, 1, "lost", at=0)
+    assert out.way.state == "gave up"
+    assert out.way.why == "2 ways were tried; the last ended because it was lost: too few matches"
