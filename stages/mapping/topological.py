@@ -162,7 +162,7 @@ class TopologicalMapping(Stage):
         colours = np.stack([view.moments.values for view in views]).astype(np.float64)
         ready = [made_ready(view.features, view.columns) for view in views]
         compared = compare_all(ctx, ready, colours, self.colour, matching, measure)
-        out = self._map_of(views, compared, source, known, matching)
+        out = self._map_of(views, compared, source, known, matching, measure)
         return out if rooms is None or source != "truth" else dataclasses.replace(out, map=with_names(out.map, rooms))
 
     def _kept(
@@ -224,6 +224,7 @@ class TopologicalMapping(Stage):
         source: PoseSource,
         known: TopologicalMap | None,
         matching: Matching,
+        measure: Measure,
     ) -> Out:
         distances = compared.distances
         tour, owner = np.array([view.tour for view in views]), np.array([view.owner for view in views])
@@ -254,6 +255,7 @@ class TopologicalMapping(Stage):
         place_of_part = place_clusters.groups(number, np.concatenate([joined, *same]))
         place = place_clusters.renumbered(place_of_part[part])
         made = self._assembled(views, compared, place, tour, source, known, matching, spread)
+        made = dataclasses.replace(made, spread=spread_to_medoids(made, views, place, matching, measure) or spread)
         if self.accepted == "link":
             made = with_loops(made, place[found.medoids[accepted]])
         return self.Out(
@@ -352,6 +354,25 @@ def within_parts(distances: Array, part: Ints) -> float:
     inside = inside[np.isfinite(inside)]
     spread = math.sqrt(float(np.mean(inside**2))) if len(inside) else 0.0
     return spread if spread > 0.0 else 1.0
+
+
+def spread_to_medoids(
+    map: TopologicalMap, views: Sequence[View], place: Ints, matching: Matching, measure: Measure
+) -> float:
+    """Root mean square distance of views to the medoid of their place, as the map keeps it; 0 where there are none.
+
+    That is what a robot measures in the right place: fewer features are kept of a medoid than a view has.
+    """
+    apart = []
+    for number, view in enumerate(map.places):
+        beside = map.views.columns(int(view))
+        kept = made_ready(map.views.features(int(view)), beside if len(beside) else None)
+        for row in np.flatnonzero(place == number).tolist():
+            if views[row].frame != map.frames[view]:
+                here = made_ready(views[row].features, views[row].columns)
+                apart.append(compare(kept, here, matching, measure).distance)
+    known = np.array([distance for distance in apart if math.isfinite(distance)])
+    return math.sqrt(float(np.mean(known**2))) if len(known) else 0.0
 
 
 def driven_ways(distances: Array, place: Ints, tour: Ints, medoids: Ints) -> dict[tuple[int, int], Ints]:

@@ -116,8 +116,8 @@ class TopologicalMap(Value):
     `ways`: the path images of link l, rows `way_starts[l]` to `way_starts[l + 1]`, are views in the order from the
     first to the second place, both medoids excluded: driven one after the other they lead there.
     `frames` (V,): numbers of the views' pictures, counted on from tour to tour. `poses` (V, 3): x, y (m), heading (rad)
-    where they were taken, from `pose_source`: for scoring and drawing only. `spread`: the standard deviation of visual
-    distance within places, what its size means.
+    where they were taken, from `pose_source`: for scoring and drawing only. `spread`: the root mean square
+    visual distance of a place's views to its medoid as it is kept: what a distance in the right place is like.
     """
 
     views: StoredViews

@@ -9,6 +9,7 @@ from made_tour import Landmarks, along, mapped, scattered
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial.distance import squareform
 
+from omninav.pipeline import Context
 from omninav.pipeline.codec import decode, encode
 from omninav.pipeline.problems import BadInput
 from omninav.stages.geometry.place_clusters import (
@@ -21,7 +22,8 @@ from omninav.stages.geometry.place_clusters import (
 )
 from omninav.stages.geometry.visual_distance import Matching, match_patches
 from omninav.stages.mapping.topological import with_names
-from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.match.visual_distance import MatchPlaces
+from omninav.stages.values.local_features import GlobalMoments, LocalFeatures
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.rooms import Rooms
 from omninav.stages.values.topological_map import LOOP, LoopHypotheses, TopologicalMap
@@ -133,6 +135,21 @@ def test_what_looks_alike_by_chance_is_left_apart() -> None:
     own[far[:number]] = own[copied[:number]]
     out = mapped(Landmarks(elsewhere, own), [along(SQUARE, 1.2)])
     assert (gaps(out.hypotheses)[out.hypotheses.accepted] < 5.0).all()
+
+
+def test_the_spread_is_what_a_robot_measures_in_the_right_place(once: tuple[TopologicalMap, LoopHypotheses]) -> None:
+    made, found = once
+    match, context = MatchPlaces(), Context("match")
+    match.setup(context)
+    apart = []
+    for row, pose in enumerate(found.poses):
+        seen = WORLD.seen(Pose(*(float(number) for number in pose)))
+        distances = match.step(
+            context, features=seen, moments=GlobalMoments(np.zeros(3, np.float32)), map=made
+        ).distances
+        if row != made.frames[made.places[found.place[row]]]:
+            apart.append(distances.distances[found.place[row]])
+    assert made.spread == pytest.approx(np.sqrt(np.mean(np.square(apart))), rel=0.01)
 
 
 def test_two_maps_of_one_tour_are_the_same_bytes() -> None:

@@ -1,0 +1,32 @@
+"""topological_nav_map as a user runs it: a map of a furnished house, which grows from a second drive."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+from conftest import DATA, needs_data
+
+HOUSE = DATA / "photoreal-house"
+
+
+@needs_data
+def test_a_house_becomes_places_and_a_second_drive_adds_to_them(omninav, tmp_path: Path):
+    words = ("variant=topological_nav_map", f"log={HOUSE}/tour.mcap", "nodes.source.stride=4")
+    omninav(*words, check=True)
+    first = (tmp_path / "runs" / "latest").resolve()
+    metrics = json.loads((first / "metrics.json").read_text())
+    assert metrics["loops"]["wrong"] == 0
+    assert metrics["loops"]["accepted"] >= 2
+    assert 20 < metrics["map"]["places"] < 60
+    assert metrics["map"]["place_size_bytes"] < 1.68e6 / 59
+    assert metrics["map"]["step_m"]["max"] < 5.0
+    assert "Loop hypotheses and the topological map" in (first / "report.html").read_text()
+
+    again = ("variant=topological_nav_map", f"log={HOUSE}/drive.mcap", f"map={first}/map.omap", "nodes.source.stride=4")
+    omninav(*again, check=True)
+    second = (tmp_path / "runs" / "latest").resolve()
+    grown = json.loads((second / "metrics.json").read_text())
+    assert grown["loops"]["wrong"] == 0
+    assert grown["map"]["places"] >= metrics["map"]["places"]
+    assert grown["map"]["links"] > metrics["map"]["links"]
+    assert np.isfinite(grown["map"]["step_m"]["max"])
