@@ -11,6 +11,7 @@ from typing import Literal
 import numba
 import numpy as np
 import numpy.typing as npt
+from scipy.special import betainc
 
 from .epipolar import decompose, eight_points, five_points, planar_candidates
 from .small_systems import cross, rotated_by, solve, unit
@@ -85,6 +86,27 @@ def relative_pose(
     if found is None:
         return None
     return RelativePose(*found, agreement(*found, first, second, threshold), drawn)
+
+
+def false_alarms(pose: RelativePose, first: npt.ArrayLike, second: npt.ArrayLike, threshold: float) -> float:
+    """How many poses that as many pairs agree on are to be expected among wrong pairs alone: above 1 says nothing.
+
+    How often a wrong pair agrees with the pose is counted on these bearings, each with all others' partners: where many
+    look along the horizon, or along the way, that is often. As many poses are tried as there are samples of two pairs,
+    two solutions and two senses each (Moisan & Stival's a-contrario test, 2004). Infinite below three pairs.
+    """
+    first, second = np.ascontiguousarray(first, np.float64), np.ascontiguousarray(second, np.float64)
+    pairs, agreeing = len(first), int(np.count_nonzero(pose.inliers))
+    if pairs < 3 or agreeing < 3:
+        return math.inf
+    limit = math.sin(threshold) ** 2
+    chance = sum(
+        float(_agree(pose.rotation, pose.translation, first, np.roll(second, shift, axis=0), limit).sum())
+        for shift in range(1, min(pairs, 40))
+    ) / (pairs * (min(pairs, 40) - 1))
+    # At least this many of the other pairs: the tail of a binomial distribution.
+    tail = float(betainc(agreeing - 2, pairs - agreeing + 1, max(chance, 1e-6)))
+    return 2.0 * pairs * (pairs - 1) * tail
 
 
 def _candidates(solver: Solver, first: Array, second: Array, samples: Ints) -> tuple[Array, Array, Array, Ints]:

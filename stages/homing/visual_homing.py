@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry.consensus import Solver, relative_pose
+from omninav.stages.geometry.consensus import Solver, false_alarms, relative_pose
 from omninav.stages.geometry.epipolar import turn_about_vertical, yaw_of
 from omninav.stages.geometry.se2 import compose
 from omninav.stages.geometry.three_point_pose import three_point_pose
@@ -72,13 +72,14 @@ class VisualHoming(Stage):
 
     Goedemé et al. 2007, section 7. At a new target the bearings of features that are seen in both views give the
     relative pose (`solver`; `threshold_deg` is what two bearings may be off together), and the places of the features
-    around the robot, in units of the way to the target. From then on the most trackable points beside them are tracked,
-    lost ones are looked for where they must be, and the robot's pose among them follows from three at a time: a homing
-    vector each tick. Features that are matched with the target view anew take part wherever they are in the map: tracks
-    that have drifted away are noticed, and start again from there. Less than `least` features that agree are no basis:
-    the map is made anew from the matches of that tick, its unit by what was known before, or the target is lost. It is
-    also made anew where `anew` times as many matches agree as when it was made, since more is matched from closer by,
-    unless the target is nearer than `too_near` of what is seen.
+    around the robot, in units of the way to the target. So many must agree that less than `chance` false poses are to
+    be expected on which as many do (`geometry.consensus.false_alarms`). From then on the most trackable points beside
+    them are tracked, lost ones are looked for where they must be, and the robot's pose among them follows from three
+    at a time: a homing vector each tick. Features that are matched with the target view anew take part wherever they
+    are in the map: tracks that have drifted away are noticed, and start again from there. Less than `least` features
+    that agree are no basis: the map is made anew from the matches of that tick, its unit by what was known before, or
+    the target is lost. It is also made anew where `anew` times as many matches agree as when it was made, since more
+    is matched from closer by, unless the target is nearer than `too_near` of what is seen.
 
     `motion` (odometry) is used if it is wired: to begin the search for tracked points, and for metres. `planar`: the
     robot is on a floor. Points with less parallax than `least_parallax_deg` have no known place. `window`, `levels`: of
@@ -91,7 +92,8 @@ class VisualHoming(Stage):
     planar: bool = True
     threshold_deg: Annotated[float, Bounds(gt=0)] = 1.0
     pose_threshold_deg: Annotated[float, Bounds(gt=0)] = 2.0
-    least: Annotated[int, Bounds(ge=4)] = 8
+    least: Annotated[int, Bounds(ge=4)] = 6
+    chance: Annotated[float, Bounds(gt=0)] = 0.01
     anew: Annotated[float, Bounds(ge=1)] = 1.5
     too_near: Annotated[float, Bounds(ge=0)] = 0.1
     least_parallax_deg: Annotated[float, Bounds(ge=0)] = 1.0
@@ -192,6 +194,8 @@ class VisualHoming(Stage):
         inliers = 0 if found is None else int(np.count_nonzero(found.inliers))
         if found is None or inliers < max(self.least, at_least):
             return 0, f"{inliers} of {len(first)} matches with the target view agree, {self.least} are needed"
+        if false_alarms(found, first, second, math.radians(self.threshold_deg)) > self.chance:
+            return 0, f"{inliers} of {len(first)} matches with the target view agree, as they might by chance"
         places = triangulate(first, second, found.rotation, found.translation)
         wide = parallax(first, second, found.rotation) >= math.radians(self.least_parallax_deg)
         known = found.inliers & wide & np.isfinite(places).all(axis=1)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from two_views import angle_deg, two_views, unit
 
-from omninav.stages.geometry.consensus import SAMPLE, Solver, agreement, refined_pose, relative_pose
+from omninav.stages.geometry.consensus import SAMPLE, Solver, agreement, false_alarms, refined_pose, relative_pose
 
 SEEDS = st.integers(0, 10**6)
 
@@ -105,3 +105,23 @@ def test_too_few_pairs_say_nothing() -> None:
         assert relative_pose(first[: size - 1], second[: size - 1], np.random.default_rng(0), solver) is None
     level = np.tile([[1.0, 0.0, 0.0]], (5, 1))
     assert relative_pose(level, level, np.random.default_rng(0)) is None
+
+
+def test_poses_that_wrong_pairs_agree_on_are_told_from_true_ones() -> None:
+    limit, by_chance, true = math.radians(1.0), [], []
+    for seed in range(30):
+        for wrong, alarms in ((1.0, by_chance), (0.5, true)):
+            _, _, first, second = two_views(seed, 24, wrong=wrong, noise_deg=0.2)
+            found = relative_pose(first, second, np.random.default_rng(seed), threshold=limit)
+            assert found is not None
+            alarms.append(false_alarms(found, first, second, limit))
+    assert max(true) < 1e-3
+    assert np.mean(np.array(by_chance) < 1.0) <= 0.2  # expected: once in each problem at the most
+    assert min(by_chance) > 1e-3
+
+
+def test_two_pairs_say_nothing_of_a_pose() -> None:
+    _, _, first, second = two_views(0, 2)
+    found = relative_pose(first, second, np.random.default_rng(0))
+    assert found is not None
+    assert false_alarms(found, first, second, 0.01) == math.inf

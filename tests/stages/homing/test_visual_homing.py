@@ -150,13 +150,13 @@ def test_a_lost_target_says_why() -> None:
     homing = Homing()
     vector = homing.at((4.2, 4.6, 0.4), matches=False)
     assert (vector.state, vector.inliers) == ("lost", 0)
-    assert vector.why == "0 of 0 matches with the target view agree, 8 are needed"
+    assert vector.why == "0 of 0 matches with the target view agree, 6 are needed"
     assert homing.ctx.counts["lost_target"] == 1
     homing.at((4.2, 4.6, 0.4))
     blank = Image(np.full_like(look("mirror", 0.4).pixels, 80))
     vector = homing.at((4.2, 4.6, 0.4), matches=False, picture=blank)
     assert vector.state == "lost"
-    assert vector.why.startswith("0 tracked features agree on where the robot is, 8 are needed; 0 of 0 matches")
+    assert vector.why.startswith("0 tracked features agree on where the robot is, 6 are needed; 0 of 0 matches")
     assert off_deg(vector, (4.2, 4.6, 0.4))[0] < 3.0  # what was known last
     assert homing.at((4.2, 4.6, 0.4)).state == "tracking"  # as soon as it is matched again
 
