@@ -17,10 +17,11 @@ class HomingErrors(Stage):
     """Where a robot ends that goes back to where it stood at the first tick, and what its homing vectors were worth.
 
     Under `homing`: `start_m`, how far away it was put; `arrived` (1 or 0); `end_error_m` and `end_turn_deg`, from the
-    first pose to the last; `time_s` until it arrived; `lost_rate`, the share of ticks in which the target was lost;
-    `direction_error_deg` (median, p90, max over ticks further than `from_m` from the target), between the homing vector
-    and the true way; `inliers`, median; `first`: `direction_error_deg`, `turn_error_deg` and `inliers` of the first
-    vector, None where the target was not found at first.
+    first pose to the last (and `end`, the same as pages that pool runs read it); `time_s` until it arrived;
+    `lost_rate`, the share of ticks in which the target was lost; `direction_error_deg` (median, p90, max over ticks
+    further than `from_m` from the target), between the homing vector and the true way; `inliers`, median; `first`:
+    `direction_error_deg`, `turn_error_deg` and `inliers` of the first vector, None where the target was not found at
+    first.
     """
 
     from_m: Annotated[float, Bounds(ge=0)] = 0.3
@@ -57,6 +58,7 @@ class HomingErrors(Stage):
             "start_m": float(math.hypot(*ways[away, :2])),
             "arrived": int(arrived is not None),
             "end_error_m": float(math.hypot(*ways[-1, :2])),
+            "end": {"error_m": {"mean": float(math.hypot(*ways[-1, :2])), "std": 0.0}, "frames": 1},
             "end_turn_deg": abs(math.degrees(ways[-1, 2])),
             "time_s": None if arrived is None else (ticks[arrived].stamp - ticks[away].stamp) / 1e9,
             "lost_rate": 1.0 - len(found) / len(after),
