@@ -33,7 +33,7 @@ class RotationReducedSift(Stage):
     orientation: Literal["reduced", "own"] = "reduced"
     features: Annotated[int, Bounds(ge=1)] = 300
     largest: Annotated[int, Bounds(ge=1024)] = 76800
-    contrast: Annotated[float, Bounds(ge=0)] = 0.02
+    contrast: Annotated[float, Bounds(ge=0)] = 0.04
     edge: Annotated[float, Bounds(gt=1)] = 10.0
     sigma: Annotated[float, Bounds(gt=0)] = 1.6
     colour_radius: Annotated[float, Bounds(gt=0)] = 3.0

@@ -99,9 +99,9 @@ def _draw_places(axes: "Axes", map: TopologicalMap) -> None:
     between = np.setdiff1d(np.arange(len(poses)), map.places)
     axes.plot(*poses[between].T, ".", color=REFERENCE, markersize=4, zorder=4, label=f"path images ({len(between)})")
     axes.plot(*poses[map.places].T, "o", color=TRUTH, markersize=4.5, zorder=5, label=f"places ({len(map)})")
-    for place, name in enumerate(map.names):
-        if name:
-            axes.annotate(name, poses[map.places[place]], fontsize=6, xytext=(3, 3), textcoords="offset points")
+    for name in dict.fromkeys(name for name in map.names if name):
+        middle = poses[map.places[map.named(name)]].mean(axis=0)
+        axes.annotate(name, middle, fontsize=6, xytext=(4, 4), textcoords="offset points", zorder=6)
 
 
 def _lines(axes: "Axes", lines: list[Array] | Array, colour: str, width: float, label: str) -> None:
