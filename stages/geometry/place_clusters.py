@@ -94,15 +94,16 @@ def between_hypotheses(medoids: Ints, frames: Ints) -> Array:
     return either
 
 
-def path_images(matches: Array, way: Ints, least: int) -> Ints:
+def path_images(matches: Array, way: Ints, least: int, most: int) -> Ints:
     """As few of the views of a way as lead along it: each has `least` matches with the one before, where that can be.
 
-    `way`: views in the order of the drive; the first and the last are given and are not part of the answer.
+    `way`: views in the order of the drive; the first and the last are given and are not part of the answer. No two are
+    more than `most` views apart, however alike they look: along a wall that repeats itself that says nothing.
     """
     chosen: list[int] = []
     at = 0
     while at < len(way) - 1:
-        near = np.flatnonzero(matches[way[at], way[at + 1 :]] >= least)
+        near = np.flatnonzero(matches[way[at], way[at + 1 : at + 1 + most]] >= least)
         at = at + 1 + (int(near[-1]) if len(near) else 0)
         if at < len(way) - 1:
             chosen.append(int(way[at]))

@@ -92,7 +92,7 @@ class TopologicalMapping(Stage):
     but only on one side of the robot.
 
     On the way from place to place path images are kept, each with at least `path_matches` matches with the one before,
-    as homing needs them. Of each view the
+    as homing needs them, and at most `path_pictures` pictures of the drive after it. Of each view the
     `patches` are kept that were found again in most of the pictures around it, and the `columns` heaviest. A map grows
     where `known` is wired: its views take part, its places stay together. Places are called after `rooms`, where these
     are wired and poses are truth: what an owner would tell the robot. Poses are kept for scoring and drawing only:
@@ -103,6 +103,7 @@ class TopologicalMapping(Stage):
     every_s: Annotated[float, Bounds(ge=0)] = 1.0
     place_size: Annotated[float, Bounds(gt=0)] = 0.5
     path_matches: Annotated[int, Bounds(ge=1)] = 20
+    path_pictures: Annotated[int, Bounds(ge=1)] = 5
     colour: Annotated[float, Bounds(gt=0)] = 0.5
     ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
     column_ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
@@ -288,7 +289,7 @@ class TopologicalMapping(Stage):
         ways = {} if known is None else old_ways(known, place)
         for pair, way in driven_ways(distances, place, tour, medoids).items():
             if pair not in ways and pair[::-1] not in ways:
-                ways[pair] = place_clusters.path_images(compared.matches, way, self.path_matches)
+                ways[pair] = place_clusters.path_images(compared.matches, way, self.path_matches, self.path_pictures)
         pairs = sorted(ways)
         used = np.unique(np.concatenate([medoids, *(ways[pair] for pair in pairs)]))
         row = np.full(len(views), -1, np.int64)

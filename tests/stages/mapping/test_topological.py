@@ -93,9 +93,10 @@ def test_a_medoid_is_the_least_far_from_all_others() -> None:
 def test_path_images_are_few_and_each_sees_enough_of_the_one_before() -> None:
     at = np.arange(10)
     matches = 100 - 20 * np.abs(at[:, None] - at[None])
-    assert path_images(matches, at, 40).tolist() == [3, 6]
-    assert path_images(matches, at, 1000).tolist() == list(range(1, 9))
-    assert path_images(matches, at, -100).tolist() == []
+    assert path_images(matches, at, 40, 9).tolist() == [3, 6]
+    assert path_images(matches, at, 1000, 9).tolist() == list(range(1, 9))
+    assert path_images(matches, at, -100, 9).tolist() == []
+    assert path_images(matches, at, -100, 4).tolist() == [4, 8]
 
 
 def test_a_ring_driven_once_is_a_ring_of_places(once: tuple[TopologicalMap, LoopHypotheses]) -> None:
@@ -183,7 +184,7 @@ def test_a_map_grows_from_a_second_tour(once: tuple[TopologicalMap, LoopHypothes
     middle = np.hypot(*(after - (20.0, 20.0)).T).min()
     assert middle < 4.0
     assert grown.frames.max() > known.frames.max()
-    assert (gaps(out.hypotheses)[out.hypotheses.accepted] < 4.0).all()
+    assert (gaps(out.hypotheses)[out.hypotheses.accepted] < 5.0).all()  # a place is that wide
     assert out.hypotheses.accepted.any()
 
 
