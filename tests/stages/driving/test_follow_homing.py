@@ -95,6 +95,14 @@ def test_a_target_close_before_a_wall_can_be_reached() -> None:
     assert drive(vector(0.0, metres=0.2), progress(last=True), scan((-60.0, 60.0, 0.7))).command.speed > 0.0
 
 
+def test_through_a_door_that_is_hardly_wide_enough_it_goes_slowly() -> None:
+    azimuths = scan().azimuths()
+    beside = np.abs(np.sin(azimuths)) > 0.05
+    ranges = np.where(beside, 0.3 / np.maximum(np.abs(np.sin(azimuths)), 1e-9), np.inf)  # walls 0.3 m left and right
+    narrow = Scan(ranges, -math.pi, math.radians(2.0), 0.05, 8.0)
+    assert drive(vector(0.0), progress(), narrow).command.speed == pytest.approx(0.2)
+
+
 def test_a_lost_target_is_followed_a_little_where_metres_are_known_and_then_it_stands() -> None:
     patience = Patience()
     lost = vector(0.0, state="lost", metres=1.0, why="2 of 9 matches agree")
