@@ -13,7 +13,11 @@ Array = npt.NDArray[np.float64]
 
 
 class Pairs(NamedTuple):
-    """Matched rows of a first and a second view, and how far apart they are: each (M,), the nearest first."""
+    """Matched rows of a first and a second view, and how far apart they are: each (M,), the clearest first.
+
+    A match is the clearer the nearer it is in relation to the second nearest of either: more of these are right before
+    the first wrong one comes than of the nearest (measured on pairs in a house and on a campus).
+    """
 
     first: Ints
     second: Ints
@@ -28,7 +32,7 @@ NO_PAIRS = Pairs(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
 
 
 @numba.njit(cache=True, nogil=True)
-def _mutual(squares: Floats, ratio: float, first: Ints, second: Ints, distance: Array) -> int:
+def _mutual(squares: Floats, ratio: float, first: Ints, second: Ints, distance: Array, unclear: Array) -> int:
     rows, columns = squares.shape
     nearest_row = np.zeros(columns, np.int64)
     least = np.full(columns, np.inf, np.float32)
@@ -53,6 +57,8 @@ def _mutual(squares: Floats, ratio: float, first: Ints, second: Ints, distance: 
         d = max(one[i], np.float32(0.0))
         if nearest_row[j] == i and d <= ratio * ratio * two[i] and d <= ratio * ratio * next_least[j]:
             first[found], second[found], distance[found] = i, j, np.sqrt(d)
+            rival = min(two[i], next_least[j])
+            unclear[found] = d / rival if rival > 0.0 else 1.0
             found += 1
     return found
 
@@ -66,13 +72,10 @@ def mutual_nearest(squares: Floats, ratio: float) -> Pairs:
     rows, columns = squares.shape
     if not rows or not columns:
         return NO_PAIRS
-    first, second, distance = np.empty(rows, np.int64), np.empty(rows, np.int64), np.empty(rows)
-    found = _mutual(squares, ratio, first, second, distance)
-    return _nearest_first(first[:found], second[:found], distance[:found])
-
-
-def _nearest_first(first: Ints, second: Ints, distance: Array) -> Pairs:
-    order = np.argsort(distance, kind="stable")
+    first, second = np.empty((2, rows), np.int64)
+    distance, unclear = np.empty((2, rows))
+    found = _mutual(squares, ratio, first, second, distance, unclear)
+    order = np.argsort(unclear[:found], kind="stable")
     return Pairs(first[order], second[order], distance[order])
 
 
@@ -113,8 +116,11 @@ def tree_matches(one: npt.ArrayLike, other: npt.ArrayLike, ratio: float) -> Pair
     first = np.arange(len(a))
     second = nearest[:, 0]
     kept = back[second, 0] == first
-    kept &= (gap[:, 0] <= ratio * gap[:, 1]) & (back_gap[second, 0] <= ratio * back_gap[second, 1])
-    return _nearest_first(first[kept], second[kept].astype(np.int64), gap[kept, 0])
+    rival = np.minimum(gap[:, 1], back_gap[second, 1])
+    kept &= gap[:, 0] <= ratio * rival
+    unclear = np.divide(gap[:, 0], rival, out=np.ones(len(a)), where=rival > 0.0)
+    order = np.flatnonzero(kept)[np.argsort(unclear[kept], kind="stable")]
+    return Pairs(first[order], second[order].astype(np.int64), gap[order, 0])
 
 
 def _two_nearest(stored: Array, asked: Array) -> tuple[Array, Ints]:
