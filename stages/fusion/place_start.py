@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.problems import BadInput
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.pose import Pose
@@ -28,9 +28,9 @@ class PlaceStart(Stage):
 
         belief: PlaceBelief | None = None
 
-    def step(self, ctx: Context, map: TopologicalMap, truth: Pose | None = None) -> Out:
+    def step(self, ctx: Context, tick: Tick, map: TopologicalMap, truth: Pose | None = None) -> Out:
         """Give the first belief."""
-        if not (ctx.tick.first_of_log or (self.anew_after and ctx.tick.index % self.anew_after == 0)):
+        if not (tick.first_of_log or (self.anew_after and tick.index % self.anew_after == 0)):
             return self.Out()
         if not len(map):
             raise BadInput("start: the map has no place; make it from a tour with pictures (tour=...)")

@@ -55,23 +55,17 @@ def test_pictures_without_truth_do_not_count():
 def test_a_robot_may_be_kidnapped_again_and_again():
     stage, begun = PlaceStart(anew_after=3), []
     for index in range(7):
-        ctx = Context("start")
-        ctx.tick = tick(index)
-        begun.append(stage.step(ctx, ROW).belief is not None)
+        begun.append(stage.step(Context("start"), tick(index), ROW).belief is not None)
     assert begun == [True, False, False, True, False, False, True]
 
 
 @pytest.mark.parametrize(("at", "place"), [("truth", 2), ("origin", 0), ((5.5, 0.0, 0.0, 0.1, 0.1), 3)])
 def test_a_start_is_the_place_closest_to_it(at, place):
-    ctx = Context("start")
-    ctx.tick = tick(0)
-    belief = PlaceStart(at=at).step(ctx, ROW, Pose(4.4, 1.0, 0.0)).belief
+    belief = PlaceStart(at=at).step(Context("start"), tick(0), ROW, Pose(4.4, 1.0, 0.0)).belief
     assert belief is not None
     assert belief.probabilities.tolist() == np.eye(4)[place].tolist()
 
 
 def test_a_start_at_the_truth_needs_one():
-    ctx = Context("start")
-    ctx.tick = tick(0)
     with pytest.raises(BadInput, match="start=uniform"):
-        PlaceStart(at="truth").step(ctx, ROW)
+        PlaceStart(at="truth").step(Context("start"), tick(0), ROW)
