@@ -1,0 +1,54 @@
+"""From a map of pictures to a goal, in the small built-in world, as a user runs it."""
+
+import json
+from pathlib import Path
+
+import pytest
+from conftest import DATA, needs_data
+
+from omninav.pipeline.closed_loop import truth_in_the_loop
+
+HOUSE = DATA / "photoreal-house"
+WORDS = ("variant=topological_nav", "world=home_store_demo")
+
+
+def metrics_of(place: Path) -> dict:
+    return json.loads((place / "runs" / "latest" / "metrics.json").read_text())
+
+
+def test_a_robot_that_does_not_know_where_it_is_drives_to_a_place_and_docks_there(omninav, tmp_path: Path):
+    omninav(*WORDS, "goal=3", "nodes.source.seconds=40", check=True)
+    found = metrics_of(tmp_path)["navigation"]
+    assert found["reached"]
+    assert found["collisions"] == 0
+    assert found["end_error_m"] < 0.11  # the paper's homing
+    assert found["path_length_m"] < 2.0 * found["shortest_m"]
+
+
+@pytest.mark.parametrize("goal", ["kitchen", "99"])
+def test_a_goal_that_the_map_does_not_have_is_refused_in_one_line(omninav, tmp_path: Path, goal: str):
+    ended = omninav(*WORDS, f"goal={goal}", "nodes.source.seconds=2")
+    assert ended.returncode != 0
+    assert "goal: the map has no place" in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+def test_nothing_that_steers_the_robot_knows_the_truth():
+    from hydra import compose, initialize_config_module
+
+    from omninav.pipeline.app import complete
+    from omninav.pipeline.run import plan
+
+    with initialize_config_module("omninav.conf", version_base="1.3"):
+        graph = plan(complete(compose("config", overrides=[*WORDS, "goal=3"]))).graph
+    assert list(truth_in_the_loop(graph)) == []
+
+
+@needs_data
+def test_the_house_is_known_by_its_places(omninav, tmp_path: Path):
+    omninav("variant=topological_localisation", f"tour={HOUSE}/tour.mcap", f"log={HOUSE}/drive.mcap", check=True)
+    found = metrics_of(tmp_path)["localisation"]
+    assert found["pictures"] == 130
+    assert found["near_rate"] > 0.7
+    assert found["median_apart_m"] < 1.0
+    assert (tmp_path / "runs" / "latest" / "trajectory.tum").exists()
