@@ -5,7 +5,6 @@ by less than a threshold, meet in front of both cameras (errata 35 and 36). Conv
 """
 
 import math
-from dataclasses import dataclass
 from typing import Literal
 
 import numba
@@ -14,6 +13,7 @@ import numpy.typing as npt
 from scipy.special import betainc
 
 from .epipolar import decompose, eight_points, five_points, planar_candidates
+from .random_samples import AT_ONCE, AgreedPose, samples_needed, samples_of
 from .small_systems import cross, rotated_by, solve, unit
 
 Array = npt.NDArray[np.float64]
@@ -22,21 +22,6 @@ Ints = npt.NDArray[np.int64]
 Solver = Literal["planar", "five_point", "eight_point"]
 SAMPLE: dict[Solver, int] = {"planar": 2, "five_point": 5, "eight_point": 8}
 """Pairs of bearings in a sample."""
-AT_ONCE = 32
-"""Samples that are drawn and solved before it is asked whether they were enough."""
-
-
-@dataclass(frozen=True, eq=False)
-class RelativePose:
-    """Camera 2 seen from camera 1 (X1 = R X2 + t, |t| = 1): `rotation` (3, 3), `translation` (3,).
-
-    `inliers` (N,): which pairs agree with it. `samples`: how many were drawn.
-    """
-
-    rotation: Array
-    translation: Array
-    inliers: Bools
-    samples: int
 
 
 def relative_pose(
@@ -48,7 +33,7 @@ def relative_pose(
     confidence: float = 0.9999,
     most: int = 5000,
     refine: bool = True,
-) -> RelativePose | None:
+) -> AgreedPose | None:
     """Where view 2 was taken, seen from view 1, by what most pairs of unit bearings (N, 3) and (N, 3) agree on.
 
     `threshold` (rad): see `agreement`. Samples are drawn until one without a wrong pair is among them with
@@ -65,7 +50,7 @@ def relative_pose(
     sine = math.sin(threshold)
     found, best, drawn, wanted = None, (0, -math.inf), 0, float(most)
     while drawn < min(wanted, most):
-        samples = np.argsort(rng.random((AT_ONCE, pairs)), axis=1)[:, :size]
+        samples = samples_of(pairs, size, rng)
         rotations, translations, quality, owners = _candidates(solver, first, second, samples)
         drawn += AT_ONCE
         if not len(rotations):
@@ -82,13 +67,13 @@ def relative_pose(
         if refine:
             found = refined_pose(*found, first, second, threshold, solver == "planar")
             agreeing = max(agreeing, np.count_nonzero(agreement(*found, first, second, threshold)))
-        wanted = _enough(agreeing / pairs, size, confidence)
+        wanted = samples_needed(agreeing / pairs, size, confidence)
     if found is None:
         return None
-    return RelativePose(*found, agreement(*found, first, second, threshold), drawn)
+    return AgreedPose(*found, agreement(*found, first, second, threshold), drawn)
 
 
-def false_alarms(pose: RelativePose, first: npt.ArrayLike, second: npt.ArrayLike, threshold: float) -> float:
+def false_alarms(pose: AgreedPose, first: npt.ArrayLike, second: npt.ArrayLike, threshold: float) -> float:
     """How many poses that as many pairs agree on are to be expected among wrong pairs alone: above 1 says nothing.
 
     How often a wrong pair agrees with the pose is counted on these bearings, each with all others' partners: where many
@@ -124,14 +109,6 @@ def _candidates(solver: Solver, first: Array, second: Array, samples: Ints) -> t
     rotations = np.concatenate([rotations for rotations, _ in solved])
     translations = np.concatenate([translations for _, translations in solved])
     return rotations, translations, np.zeros(len(rotations)), np.repeat(np.arange(len(samples)), numbers)
-
-
-def _enough(share: float, size: int, confidence: float) -> float:
-    # Samples after which one is all right with that confidence, where such a share of pairs is.
-    good = share**size
-    if good >= confidence:
-        return 1.0
-    return math.log(1.0 - confidence) / math.log1p(-good) if good > 1e-12 else math.inf
 
 
 def agreement(

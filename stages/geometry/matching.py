@@ -15,20 +15,21 @@ Array = npt.NDArray[np.float64]
 class Pairs(NamedTuple):
     """Matched rows of a first and a second view, and how far apart they are: each (M,), the clearest first.
 
-    A match is the clearer the nearer it is in relation to the second nearest of either: more of these are right before
-    the first wrong one comes than of the nearest (measured on pairs in a house and on a campus).
+    `ratio` (M,): of the distance to that of the second nearest of either, in [0, 1]. A match is the clearer the smaller
+    it is: more are right before the first wrong one comes than of the nearest (experiment topological_nav/matching).
     """
 
     first: Ints
     second: Ints
     distance: Array
+    ratio: Array
 
-    def chosen(self, kept: npt.NDArray[np.bool_]) -> "Pairs":
+    def chosen(self, kept: npt.NDArray[np.bool_] | Ints) -> "Pairs":
         """Some of them."""
-        return Pairs(self.first[kept], self.second[kept], self.distance[kept])
+        return Pairs(self.first[kept], self.second[kept], self.distance[kept], self.ratio[kept])
 
 
-NO_PAIRS = Pairs(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
+NO_PAIRS = Pairs(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -58,7 +59,7 @@ def _mutual(squares: Floats, ratio: float, first: Ints, second: Ints, distance: 
         if nearest_row[j] == i and d <= ratio * ratio * two[i] and d <= ratio * ratio * next_least[j]:
             first[found], second[found], distance[found] = i, j, np.sqrt(d)
             rival = min(two[i], next_least[j])
-            unclear[found] = d / rival if rival > 0.0 else 1.0
+            unclear[found] = np.sqrt(d / rival) if rival > 0.0 else 1.0
             found += 1
     return found
 
@@ -76,7 +77,7 @@ def mutual_nearest(squares: Floats, ratio: float) -> Pairs:
     distance, unclear = np.empty((2, rows))
     found = _mutual(squares, ratio, first, second, distance, unclear)
     order = np.argsort(unclear[:found], kind="stable")
-    return Pairs(first[order], second[order], distance[order])
+    return Pairs(first[order], second[order], distance[order], unclear[order])
 
 
 def squared_distances(one: npt.ArrayLike, other: npt.ArrayLike) -> Floats:
@@ -120,7 +121,7 @@ def tree_matches(one: npt.ArrayLike, other: npt.ArrayLike, ratio: float) -> Pair
     kept &= gap[:, 0] <= ratio * rival
     unclear = np.divide(gap[:, 0], rival, out=np.ones(len(a)), where=rival > 0.0)
     order = np.flatnonzero(kept)[np.argsort(unclear[kept], kind="stable")]
-    return Pairs(first[order], second[order].astype(np.int64), gap[order, 0])
+    return Pairs(first[order], second[order].astype(np.int64), gap[order, 0], unclear[order])
 
 
 def _two_nearest(stored: Array, asked: Array) -> tuple[Array, Ints]:

@@ -6,32 +6,17 @@ samples of three (erratum 38), the largest agreement, refined locally. Bearings 
 """
 
 import math
-from dataclasses import dataclass
 
 import numba
 import numpy as np
 import numpy.typing as npt
 
+from .random_samples import AT_ONCE, AgreedPose, samples_needed, samples_of
 from .small_systems import applied, cross, dot, quartic_roots, rotated_by, solve, unit
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
-AT_ONCE = 32
-"""Samples that are drawn and solved before it is asked whether they were enough."""
-
-
-@dataclass(frozen=True, eq=False)
-class CameraPose:
-    """A camera seen from the frame of the points (X = R Xc + t): `rotation` (3, 3), `translation` (3,).
-
-    `inliers` (N,): which bearings agree with it. `samples`: how many were drawn.
-    """
-
-    rotation: Array
-    translation: Array
-    inliers: Bools
-    samples: int
 
 
 def grunert(bearings: npt.ArrayLike, points: npt.ArrayLike) -> tuple[Array, Array]:
@@ -162,7 +147,7 @@ def three_point_pose(
     most: int = 2000,
     refine: bool = True,
     planar: bool = False,
-) -> CameraPose | None:
+) -> AgreedPose | None:
     """Where the camera is that sees most of the points (N, 3) along its unit bearings (N, 3), within `threshold` (rad).
 
     Samples of three are drawn until one without a wrong point is among them with `confidence`, but at most `most`.
@@ -176,7 +161,7 @@ def three_point_pose(
         return None
     found, best, drawn, wanted = None, (0, -math.inf), 0, float(most)
     while drawn < min(wanted, most):
-        samples = np.argsort(rng.random((AT_ONCE, number)), axis=1)[:, :3]
+        samples = samples_of(number, 3, rng)
         drawn += AT_ONCE
         count, cost, rotation, translation = _search(bearings, points, samples, math.cos(threshold), planar)
         if count == 0 or (count, -cost) <= best:
@@ -185,11 +170,10 @@ def three_point_pose(
         if refine:
             found = refined_camera(rotation, translation, bearings, points, threshold, planar)
             count = max(count, int(np.count_nonzero(sees(*found, bearings, points, threshold))))
-        good = (count / number) ** 3
-        wanted = math.log(1.0 - confidence) / math.log1p(-good) if good < confidence else 1.0
+        wanted = samples_needed(count / number, 3, confidence)
     if found is None:
         return None
-    return CameraPose(*found, sees(*found, bearings, points, threshold), drawn)
+    return AgreedPose(*found, sees(*found, bearings, points, threshold), drawn)
 
 
 def sees(

@@ -1,0 +1,37 @@
+"""What random sampling (RANSAC) needs whatever is estimated: samples, how many of them, and what came of it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+AT_ONCE = 32
+"""Samples that are drawn and solved before it is asked whether they were enough."""
+
+
+@dataclass(frozen=True, eq=False)
+class AgreedPose:
+    """A camera seen from another frame (X = R Xc + t): `rotation` (3, 3), `translation` (3,).
+
+    `inliers` (N,): which of the bearings agree with it. `samples`: how many were drawn.
+    """
+
+    rotation: Array
+    translation: Array
+    inliers: npt.NDArray[np.bool_]
+    samples: int
+
+
+def samples_of(number: int, size: int, rng: np.random.Generator) -> npt.NDArray[np.int64]:
+    """The next `AT_ONCE` samples (AT_ONCE, size) of `number` things, none twice in a sample. Draws from `rng`."""
+    return np.argsort(rng.random((AT_ONCE, number)), axis=1)[:, :size]
+
+
+def samples_needed(share: float, size: int, confidence: float) -> float:
+    """After how many samples one is all right with that confidence, where such a share of the things is right."""
+    good = share**size
+    if good >= confidence:
+        return 1.0
+    return math.log(1.0 - confidence) / math.log1p(-good) if good > 1e-12 else math.inf
