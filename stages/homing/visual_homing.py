@@ -272,9 +272,10 @@ class VisualHoming(Stage):
         memory.points, memory.alive = np.where(alive[:, None], points, memory.points), alive
         steady = np.flatnonzero(kinds == TRACKED)
         memory.looks[steady] = histograms(seen, points[steady], self.patch)
-        lost = owners[agrees[len(tracked) :]]
-        lost = lost[kinds[lost] == LOST]
-        kinds[lost] = MATCHED
+        fresh = agrees[len(tracked) :] & (kinds[owners] == LOST)
+        kinds[owners[fresh]], points[owners[fresh]] = MATCHED, seen.from_original(pixels[matches[fresh]])
+        lost = np.flatnonzero(kinds == LOST)
+        points[lost] = seen.points((memory.corners[lost] - memory.translation) @ memory.rotation)
         memory.depth = float(np.median(np.linalg.norm(memory.anchors - memory.translation, axis=1)))
         return kinds, points, int(np.count_nonzero(found.inliers))
 
@@ -329,5 +330,5 @@ class VisualHoming(Stage):
         kinds: Ints,
         points: Array,
     ) -> Out:
-        tracks = TrackedFeatures(seen.to_original(points), kinds)
+        tracks = TrackedFeatures(seen.to_original(points), kinds, memory.rows)
         return self.Out(vector=self._vector(memory, state, inliers), tracks=tracks)

@@ -60,12 +60,14 @@ class HomingVector(Value):
 class TrackedFeatures(Value):
     """The features of the local map in the present picture, for people to look at.
 
-    `points` (N, 2): columns and rows, pixels of the picture; NaN where not seen. `kinds` (N,): 0 lost, 1 tracked,
-    2 found again, 3 matched anew with the target view.
+    `points` (N, 2): columns and rows, pixels of the picture; of lost ones, where they should be, NaN where that is
+    outside of it. `kinds` (N,): 0 lost, 1 tracked, 2 found again, 3 matched anew with the target view. `rows` (N,):
+    which of the target's features they are.
     """
 
     points: Array
     kinds: npt.NDArray[np.int64]
+    rows: npt.NDArray[np.int64]
 
 
 class PathProgress(Value):

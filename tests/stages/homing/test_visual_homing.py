@@ -34,7 +34,7 @@ def described(kind: str, pose: tuple[float, float, float]) -> LocalFeatures:
 def matched(features: LocalFeatures, other: LocalFeatures) -> Correspondences:
     one, two = features.descriptors.astype(np.float32), other.descriptors.astype(np.float32)
     squares = (one**2).sum(axis=1)[:, None] + (two**2).sum(axis=1)[None] - 2.0 * one @ two.T
-    return Correspondences(*mutual_nearest(squares.astype(np.float32), 0.85))
+    return Correspondences(*mutual_nearest(squares.astype(np.float32), 0.85)[:3])
 
 
 class Homing:
@@ -132,6 +132,22 @@ def test_what_was_covered_is_found_again() -> None:
     assert off_deg(vector, poses[4])[0] < 6.0
     kinds, points = homing.out.tracks.kinds, homing.out.tracks.points
     assert np.isfinite(points[(kinds == 1) | (kinds == 2)]).all()
+
+
+def test_whoever_looks_is_told_where_lost_features_should_be_and_which_of_the_targets_they_are() -> None:
+    homing, poses = Homing(), drive(13)
+    for k, pose in enumerate(poses[:3]):
+        homing.at(pose, matches=k == 0)
+    before = homing.out.tracks
+    covered = look("mirror", poses[3][2], *poses[3][:2]).pixels.copy()
+    cv2.ellipse(covered, (320, 240), (240, 240), 0, 0, 120, (90, 90, 90), -1)
+    homing.at(poses[3], matches=False, picture=Image(covered))
+    tracks = homing.out.tracks
+    assert tracks.rows.tolist() == before.rows.tolist() == homing.memory.rows.tolist()
+    gone = (tracks.kinds == 0) & (before.kinds == 1)
+    moved = np.hypot(*(tracks.points - before.points)[gone].T)
+    assert gone.sum() > 5
+    assert np.nanmedian(moved) < 25.0  # pixels: a step of the drive away from where it was seen last
 
 
 def test_a_map_is_made_anew_where_more_is_matched() -> None:
