@@ -1,9 +1,7 @@
 """Experiments as files: every repetition of every condition, one page, verdicts; killed and continued; failing jobs."""
 
 import json
-import os
 import re
-import signal
 import subprocess
 import sys
 import time
@@ -11,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from background_runs import kill, start
 
 from omninav.pipeline.experiment_run import FramesOfJobs
 
@@ -282,16 +281,12 @@ def test_series_within_runs_drives_as_repetitions_and_times_of_stages(omninav, p
 
 
 def test_a_killed_experiment_goes_on_where_it_was(dice: Finished):
-    command = [sys.executable, "-m", "omninav.pipeline", *MINE, TT1, "nodes.noisy.wait_s=0.02", "runs=killed"]
-    process = subprocess.Popen(
-        command, cwd=dice.place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    )
+    process = start(dice.place, *MINE, TT1, "nodes.noisy.wait_s=0.02", "runs=killed")
     folder = dice.place / "killed/dice_paper"
     while len(results(folder)) < 5:
         assert process.poll() is None
         time.sleep(0.05)
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
+    kill(process)
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("seed_*.json")}
     assert 5 <= len(before) < 12
     dice.go("resume", "killed/dice_paper")

@@ -1,30 +1,15 @@
 """`kill -9` at any moment, then `omninav resume`: the same bytes as the unbroken run."""
 
 import json
-import os
 import random
-import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
+from background_runs import assert_same_bytes, finished, kill, start, wait_for_checkpoint
 from conftest import DATA, needs_data
 
 FILES = ("trajectory.tum", "metrics.json", "map.omap")
-
-
-def start(place: Path, *words: str) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "omninav.pipeline", *words]
-    return subprocess.Popen(
-        command, cwd=place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    )
-
-
-def stop(process: subprocess.Popen[bytes]) -> None:
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
 
 
 @pytest.mark.parametrize("cached", [True, False])
@@ -34,22 +19,18 @@ def test_a_killed_run_resumes_to_the_same_bytes(tmp_path: Path, demo: Path, shar
     cache = f"cache={shared_cache}" if cached else "cache=null"
     process = start(tmp_path, cache, "checkpoint_s=0.05")
     runs = tmp_path / "runs"
-    while not list(runs.glob("*/checkpoints/checkpoint")) and not list(runs.glob("*/checkpoints/*/checkpoint")):
-        time.sleep(0.02)
-        if process.poll() is not None:
-            break
+    wait_for_checkpoint(process, tmp_path)
     kills = 0
     while process.poll() is None and kills < 3:
         time.sleep(moments.uniform(0.0, 4.0))
         if process.poll() is None:
-            stop(process)
+            kill(process)
             kills += 1
             (runs / "latest" / "result.mcap.1.part").write_bytes(b"half")  # as if killed while that file was written
             process = start(tmp_path, "resume", "runs/latest")
     assert kills > 0
     assert process.wait() == 0
-    for name in FILES:
-        assert (runs / "latest" / name).read_bytes() == (demo / name).read_bytes(), name
+    assert_same_bytes(runs / "latest", demo, *FILES)
     assert not (runs / "latest" / "checkpoints").exists()
     assert not list((runs / "latest").glob("*.part"))
 
@@ -67,10 +48,7 @@ def test_a_run_killed_while_views_wait_to_be_learned_or_may_be_taken_back_resume
     """Each view waits for 4 m, some 18 pictures, and what it taught is put right later: at any moment some wait."""
     logs = f"log=[{DATA / 'photoreal-house' / 'tour.mcap'},{DATA / 'photoreal-house' / 'drive.mcap'}]"
     words = ("variant=particle_cml", logs, "nodes.source.stop=90", "cache=null")
-    for place in (tmp_path / "whole", tmp_path / "killed"):
-        place.mkdir()
-    assert start(tmp_path / "whole", *words).wait(timeout=300) == 0
-    whole, killed = (tmp_path / name / "runs" / "latest" for name in ("whole", "killed"))
+    whole, killed = finished(tmp_path / "whole", *words), tmp_path / "killed" / "runs" / "latest"
     counted = json.loads((whole / "manifest.json").read_text())["dropped"]
     assert {"lessons.view_propagated", "mapping.lesson_taken_back"} <= set(counted)
 
@@ -82,10 +60,9 @@ def test_a_run_killed_while_views_wait_to_be_learned_or_may_be_taken_back_resume
             continue
         time.sleep(moments.uniform(0.0, 1.0))
         if process.poll() is None:
-            stop(process)
+            kill(process)
             kills, last = kills + 1, written(killed / "checkpoints" / "checkpoint")
             process = start(tmp_path / "killed", "resume", "runs/latest")
     assert kills > 0
     assert process.wait(timeout=300) == 0
-    for name in (*FILES, "trajectory_0.tum"):
-        assert (killed / name).read_bytes() == (whole / name).read_bytes(), name
+    assert_same_bytes(killed, whole, *FILES, "trajectory_0.tum")

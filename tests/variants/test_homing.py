@@ -1,14 +1,10 @@
 """Homing in a closed loop as a user runs it: whole, and killed on the way."""
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
+from background_runs import assert_same_bytes, finished, killed_and_resumed
 
 from omninav.pipeline.log import LogReader
 
@@ -22,19 +18,9 @@ WORDS = (
 )
 
 
-def start(place: Path, *words: str) -> subprocess.Popen[bytes]:
-    place.mkdir(exist_ok=True)
-    command = [sys.executable, "-m", "omninav.pipeline", *words]
-    return subprocess.Popen(
-        command, cwd=place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    )
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    place = tmp_path_factory.mktemp("homing")
-    assert start(place, *WORDS).wait(timeout=300) == 0
-    return place / "runs" / "latest"
+    return finished(tmp_path_factory.mktemp("homing"), *WORDS)
 
 
 def test_a_robot_that_was_carried_away_comes_back_and_stands_as_before(whole: Path):
@@ -52,15 +38,5 @@ def test_a_robot_that_was_carried_away_comes_back_and_stands_as_before(whole: Pa
 
 
 def test_killed_on_its_way_it_goes_on_to_the_same_bytes(whole: Path, tmp_path: Path):
-    process = start(tmp_path, *WORDS)
-    checkpoint = None
-    while checkpoint is None and process.poll() is None:
-        time.sleep(0.02)
-        checkpoint = next(tmp_path.glob("runs/*/checkpoints/checkpoint"), None)
-    time.sleep(4.0)  # the local map has been made
-    assert process.poll() is None, "it was over before it could be killed"
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
-    assert start(tmp_path, "resume", "runs/latest").wait(timeout=300) == 0
-    for name in ("metrics.json", "result.mcap"):
-        assert (tmp_path / "runs" / "latest" / name).read_bytes() == (whole / name).read_bytes(), name
+    run = killed_and_resumed(tmp_path, *WORDS, after_s=4.0)  # the local map has been made
+    assert_same_bytes(run, whole, "metrics.json", "result.mcap")

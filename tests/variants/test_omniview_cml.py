@@ -1,16 +1,13 @@
 """Concurrent map building with mixtures of Gaussians: stopped anywhere, killed, and as a user runs it."""
 
 import json
-import os
 import random
-import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from background_runs import assert_same_bytes, finished, kill, start, wait_for_checkpoint
 from conftest import DATA, needs_data
 
 from omninav.pipeline.artifact import read_artifact
@@ -84,19 +81,9 @@ WORDS = (
 )
 
 
-def start(place: Path, *words: str) -> subprocess.Popen[bytes]:
-    place.mkdir(exist_ok=True)
-    command = [sys.executable, "-m", "omninav.pipeline", *words]
-    return subprocess.Popen(
-        command, cwd=place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    )
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    place = tmp_path_factory.mktemp("omniview_cml")
-    assert start(place, *WORDS).wait(timeout=300) == 0
-    return place / "runs" / "latest"
+    return finished(tmp_path_factory.mktemp("omniview_cml"), *WORDS)
 
 
 @needs_data
@@ -114,19 +101,16 @@ def test_a_killed_run_resumes_to_the_same_map_and_trajectory(whole: Path, tmp_pa
     moments = random.Random(3)
     process, kills = start(tmp_path, *WORDS), 0
     while process.poll() is None and kills < 3:
-        if next(tmp_path.glob("runs/*/checkpoints/checkpoint"), None) is None:
-            time.sleep(0.02)
-            continue
+        wait_for_checkpoint(process, tmp_path)
         time.sleep(moments.uniform(0.0, 1.0))
         if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+            kill(process)
             kills += 1
             process = start(tmp_path, "resume", "runs/latest")
     assert kills > 0
     assert process.wait(timeout=300) == 0
-    for name in ("map.omap", "trajectory.tum", "trajectory_0.tum", "metrics.json"):
-        assert (tmp_path / "runs" / "latest" / name).read_bytes() == (whole / name).read_bytes(), name
+    run = tmp_path / "runs" / "latest"
+    assert_same_bytes(run, whole, "map.omap", "trajectory.tum", "trajectory_0.tum", "metrics.json")
 
 
 @needs_data
