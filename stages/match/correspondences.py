@@ -28,4 +28,4 @@ class MatchFeatures(Stage):
     def step(self, ctx: Context, features: LocalFeatures, target: LocalFeatures) -> Out:
         """Match two views."""
         pairs = match_patches(features, target, Matching(self.ratio, colour=self.colour, search=self.search))
-        return self.Out(correspondences=Correspondences(*pairs))
+        return self.Out(correspondences=Correspondences(pairs.first, pairs.second, pairs.distance))

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.codec import encode
 from omninav.pipeline.results import Metrics
+from omninav.stages.geometry.dempster_shafer import support
 from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
 
 Array = npt.NDArray[np.float64]
@@ -19,7 +20,8 @@ class LoopLinks(Stage):
     A hypothesis is right where some picture of one of its subclusters was taken within `near_m` of some picture of the
     other. Precision is the share of accepted ones that are right, recall the share of right ones that are accepted;
     None where there are none, or where the map's poses are not truth. `far_in_drive` leaves out those whose views are
-    less than `apart` pictures apart. `step_m`: how far apart neighbouring path images were taken.
+    less than `apart` pictures apart; `at_supports` is what these would be with other thresholds of support. `step_m`:
+    how far apart neighbouring path images were taken.
     """
 
     near_m: Annotated[float, Bounds(gt=0)] = 2.5
@@ -47,16 +49,27 @@ class LoopLinks(Stage):
                               "max": float(steps.max())}  # fmt: skip
         gaps = hypothesis_gaps(hypotheses) if hypotheses.pose_source == "truth" else None
         far = np.abs(np.diff(hypotheses.pairs, axis=1))[:, 0] >= self.apart
+        told = support(hypotheses.masses)
         loops = {
             **counted(hypotheses.accepted, gaps, self.near_m),
             "far_in_drive": counted(hypotheses.accepted[far], None if gaps is None else gaps[far], self.near_m),
+            "at_supports": at_supports(
+                support(hypotheses.masses)[far], None if gaps is None else gaps[far], self.near_m
+            ),
         }
         return self.Out(metrics=Metrics({"map": held, "loops": loops}))
 
 
 def counted(accepted: npt.NDArray[np.bool_], gaps: Array | None, near: float) -> dict[str, float | int | None]:
-    """Numbers of hypotheses, accepted and wrong ones, precision and recall; `gaps` (H,) in metres, None: not known."""
-    known: dict[str, float | int | None] = {"hypotheses": len(accepted), "accepted": int(accepted.sum())}
+    """Numbers of hypotheses, accepted, rejected and wrongly accepted ones, precision and recall.
+
+    `gaps` (H,): metres between the two, None where it is not known.
+    """
+    known: dict[str, float | int | None] = {
+        "hypotheses": len(accepted),
+        "accepted": int(accepted.sum()),
+        "rejected": int((~accepted).sum()),
+    }
     if gaps is None:
         return {**known, "wrong": None, "precision": None, "recall": None}
     right = gaps <= near
@@ -67,6 +80,13 @@ def counted(accepted: npt.NDArray[np.bool_], gaps: Array | None, near: float) ->
         "precision": found / int(accepted.sum()) if accepted.any() else None,
         "recall": found / int(right.sum()) if right.any() else None,
     }
+
+
+def at_supports(support: Array, gaps: Array | None, near: float) -> dict[str, list[float | int | None]]:
+    """What `counted` says of hypotheses with `support` (H,) above each of 0.05, 0.1 … 0.95: a list for each figure."""
+    thresholds = [round(0.05 * k, 2) for k in range(1, 20)]
+    counts = [counted(support > threshold, gaps, near) for threshold in thresholds]
+    return {"support": list(thresholds), **{name: [count[name] for count in counts] for name in counts[0]}}
 
 
 def hypothesis_gaps(found: LoopHypotheses) -> Array:

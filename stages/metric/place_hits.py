@@ -18,8 +18,8 @@ class PlaceHits(Stage):
 
     Goedemé et al. 2007, section 8.3. Under `localisation`, over all logs: `right_rate` of all pictures; `near_rate`:
     the believed place is the closest or one of its neighbours; `right_after`: of the first, second ... of `updates`
-    updates since the belief began (`begun`: at which pictures it did), as the paper counts; `median_apart_m`: how far
-    the believed place's medoid lies from the truth.
+    updates since the belief began (`begun`: at which pictures it did), as the paper counts, and `near_after`;
+    `median_apart_m`: how far the believed place's medoid lies from the truth, and `least_apart_m`, the closest one's.
     """
 
     updates: Annotated[int, Bounds(ge=1)] = 5
@@ -46,17 +46,22 @@ class PlaceHits(Stage):
             if belief is not None and true is not None:
                 metres = np.hypot(*(medoids - (true.x, true.y)).T)
                 place, closest = int(np.argmax(belief.probabilities)), int(np.argmin(metres))
-                rows.append((since, place == closest, apart[place, closest] <= 1, metres[place]))
+                rows.append((since, place == closest, apart[place, closest] <= 1, metres[place], metres[closest]))
         if not rows:
             return self.Out()
-        after, right, near, metres_off = (np.array(column) for column in zip(*rows, strict=True))
+        after, right, near, metres_off, least = (np.array(column) for column in zip(*rows, strict=True))
         found: dict[str, Any] = {
             "pictures": len(rows),
             "right_rate": float(right.mean()),
             "near_rate": float(near.mean()),
-            "right_after": [
-                float(right[after == k].mean()) if (after == k).any() else None for k in range(1, self.updates + 1)
-            ],
+            "right_after": _after(right, after, self.updates),
+            "near_after": _after(near, after, self.updates),
             "median_apart_m": float(np.median(metres_off)),
+            "least_apart_m": float(np.median(least)),
         }
         return self.Out(metrics=Metrics({"localisation": found}))
+
+
+def _after(hits: np.ndarray, after: np.ndarray, updates: int) -> list[float | None]:
+    """The share of hits at the first, second ... update; None where there was none."""
+    return [float(hits[after == k].mean()) if (after == k).any() else None for k in range(1, updates + 1)]

@@ -8,7 +8,7 @@ from made_tour import Landmarks, along, mapped, scattered
 from omninav.pipeline import Context
 from omninav.pipeline.codec import encode
 from omninav.stages.mapping.topological import TopologicalMapping
-from omninav.stages.metric.loop_links import LoopLinks, counted, hypothesis_gaps, path_steps
+from omninav.stages.metric.loop_links import LoopLinks, at_supports, counted, hypothesis_gaps, path_steps
 from omninav.stages.view.loop_hypotheses import ShowLoopHypotheses
 
 CTX = Context("view")
@@ -32,9 +32,18 @@ def test_hypotheses_and_map_are_drawn_the_same_every_time(made: TopologicalMappi
 def test_precision_and_recall_are_shares_of_what_was_accepted_and_of_what_is_right() -> None:
     accepted, gaps = np.array([True, True, True, False, False]), np.array([0.1, 2.0, 9.0, 1.0, 30.0])
     found = counted(accepted, gaps, 2.5)
-    assert found == {"hypotheses": 5, "accepted": 3, "wrong": 1, "precision": 2 / 3, "recall": 2 / 3}
+    right = {"precision": 2 / 3, "recall": 2 / 3}
+    assert found == {"hypotheses": 5, "accepted": 3, "rejected": 2, "wrong": 1} | right
     assert counted(accepted, None, 2.5)["recall"] is None
     assert counted(accepted[:0], gaps[:0], 2.5)["precision"] is None
+
+
+def test_what_another_threshold_of_support_would_accept_is_told() -> None:
+    found = at_supports(np.array([0.9, 0.62, 0.3]), np.array([1.0, 9.0, 2.0]), 2.5)
+    at = {support: k for k, support in enumerate(found["support"])}
+    assert [found["accepted"][at[s]] for s in (0.05, 0.3, 0.6, 0.65, 0.95)] == [3, 2, 2, 1, 0]
+    assert [found["wrong"][at[s]] for s in (0.05, 0.65)] == [1, 0]
+    assert found["precision"][at[0.95]] is None
 
 
 def test_a_map_is_as_large_as_its_file_and_its_steps_are_those_of_its_ways(made: TopologicalMapping.Out) -> None:
