@@ -49,13 +49,11 @@ class LoopLinks(Stage):
                               "max": float(steps.max())}  # fmt: skip
         gaps = hypothesis_gaps(hypotheses) if hypotheses.pose_source == "truth" else None
         far = np.abs(np.diff(hypotheses.pairs, axis=1))[:, 0] >= self.apart
-        told = support(hypotheses.masses)
+        told, near = support(hypotheses.masses), None if gaps is None else gaps[far]
         loops = {
             **counted(hypotheses.accepted, gaps, self.near_m),
-            "far_in_drive": counted(hypotheses.accepted[far], None if gaps is None else gaps[far], self.near_m),
-            "at_supports": at_supports(
-                support(hypotheses.masses)[far], None if gaps is None else gaps[far], self.near_m
-            ),
+            "far_in_drive": counted(hypotheses.accepted[far], near, self.near_m),
+            "at_supports": at_supports(told[far], near, self.near_m),
         }
         return self.Out(metrics=Metrics({"map": held, "loops": loops}))
 
