@@ -1,8 +1,6 @@
 """The shortest way over a topological map to a goal, as pictures to drive along."""
 
-from collections.abc import Sequence
 from dataclasses import field
-from itertools import pairwise
 from typing import Annotated, Literal
 
 import networkx
@@ -111,7 +109,7 @@ class ShortestWay(Stage):
             itinerary.why = f"no way leads from place {place} to {self.goal}{blocked}"
             return None
         ctx.count("ways_planned")
-        views, ends = views_along(map, places)
+        views, ends = map.views_along(places)
         itinerary.number, itinerary.planned, itinerary.waited = itinerary.number + 1, itinerary.planned + 1, 0
         itinerary.places, itinerary.views, itinerary.why = places, ends, ""
         names = tuple(_called(map, int(view)) for view in views)
@@ -149,19 +147,6 @@ def shortest_way(map: TopologicalMap, place: int, goals: Ints, cost: Literal["li
     lengths, ways = networkx.single_source_dijkstra(graph, place, weight="price")
     reached = [(lengths[goal], goal) for goal in goals.tolist() if goal in lengths]
     return np.array(ways[min(reached)[1]] if reached else [], np.int64)
-
-
-def views_along(map: TopologicalMap, places: Ints) -> tuple[Ints, Ints]:
-    """The views to drive to along a way (V,), and how many of them have been driven to at each of its places (K,)."""
-    views, ends = [int(map.places[places[0]])], [1]
-    for one, other in pairwise(places.tolist()):
-        link = map.link(one, other)
-        assert link is not None
-        between: Sequence[int] = map.way(link).tolist()
-        views += between if int(map.links[link, 0]) == one else between[::-1]
-        views.append(int(map.places[other]))
-        ends.append(len(views))
-    return np.array(views, np.int64), np.array(ends, np.int64)
 
 
 def _under_way(itinerary: Itinerary, reached: int) -> Ints:

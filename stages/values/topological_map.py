@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -144,6 +145,22 @@ class TopologicalMap(Value):
         """The link between two places, in whichever order it was driven; None where there is none."""
         found = np.flatnonzero((np.sort(self.links, axis=1) == sorted((one, other))).all(axis=1))
         return int(found[0]) if len(found) else None
+
+    def views_along(self, places: Ints) -> tuple[Ints, Ints]:
+        """The views to drive to along a way (V,), and how many of them have been driven to at each of its places (K,).
+
+        From the medoid of the first of `places` (K,) to that of the last; each must be linked with the next.
+        """
+        views = [int(self.places[place]) for place in places[:1]]
+        ends = [len(views)] * len(views)
+        for one, other in pairwise(places.tolist()):
+            link = self.link(one, other)
+            assert link is not None, f"places {one} and {other} are not linked"
+            between: list[int] = self.way(link).tolist()
+            views += between if int(self.links[link, 0]) == one else between[::-1]
+            views.append(int(self.places[other]))
+            ends.append(len(views))
+        return np.array(views, np.int64), np.array(ends, np.int64)
 
     def named(self, name: str) -> Ints:
         """The places of a name."""

@@ -6,7 +6,7 @@ from made_places import made_map
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.problems import BadInput
-from omninav.stages.planning.shortest_way import Itinerary, ShortestWay, places_called, shortest_way, views_along
+from omninav.stages.planning.shortest_way import Itinerary, ShortestWay, places_called, shortest_way
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.homing import DrivingStatus, PathProgress
 from omninav.stages.values.topological_map import TopologicalMap
@@ -58,8 +58,8 @@ def test_of_several_places_of_a_name_the_nearest_is_the_goal():
 
 def test_a_way_driven_the_other_way_round_shows_its_pictures_backwards():
     map = a_map()
-    there = views_along(map, np.array([4, 2, 1, 0]))
-    back = views_along(map, np.array([0, 1, 2, 4]))
+    there = map.views_along(np.array([4, 2, 1, 0]))
+    back = map.views_along(np.array([0, 1, 2, 4]))
     assert there[0].tolist() == [4, 11, 12, 2, 1, 6, 0]
     assert back[0].tolist() == there[0].tolist()[::-1]
     assert there[1].tolist() == [1, 4, 5, 7]
