@@ -107,6 +107,22 @@ def mahalanobis_matches(one: Floats, other: Floats, ratio: float) -> Pairs:
     return mutual_nearest(squared_distances(one / sigma, other / sigma), ratio)
 
 
+def one_way_matches(one: npt.ArrayLike, other: npt.ArrayLike, ratio: float) -> Pairs:
+    """For each of the rows (N, D) the nearest of (M, D), where it is by `ratio` nearer than the second nearest (Lowe).
+
+    Several may have the same partner. With a single row to choose from there is no second nearest: no pair.
+    """
+    squares = np.maximum(squared_distances(one, other), np.float32(0.0)).astype(np.float64)
+    if not len(squares) or squares.shape[1] < 2:
+        return NO_PAIRS
+    nearest = squares.argmin(axis=1)
+    two = np.sqrt(np.partition(squares, 1, axis=1)[:, :2])
+    ratios = np.divide(two[:, 0], two[:, 1], out=np.ones(len(two)), where=two[:, 1] > 0.0)
+    kept = np.flatnonzero(ratios <= ratio)
+    order = kept[np.argsort(ratios[kept], kind="stable")]
+    return Pairs(order, nearest[order].astype(np.int64), two[order, 0], ratios[order])
+
+
 def tree_matches(one: npt.ArrayLike, other: npt.ArrayLike, ratio: float) -> Pairs:
     """The pairs of `mutual_nearest` by a kd-tree over each view: exact, and quicker only for few elements D."""
     a, b = np.asarray(one, np.float64), np.asarray(other, np.float64)
