@@ -293,8 +293,10 @@ class ExperimentRun:
         if source is None or "world" not in source.parameters or source.parameters.get("log") is not None:
             return
         world = cell.config["world"]
-        events = config["nodes"][source.name].get("events") or []
-        identity = json.dumps([world, route, day, events], sort_keys=True)
+        node = config["nodes"][source.name]
+        events = node.get("events") or []
+        driven = {"world": world, "route": route, "day": day, "events": events}
+        identity = json.dumps(driven, sort_keys=True)
         if identity not in self._drives:
             self._drives[identity] = source.stage.inputs_digest() or digest_text(identity)
         digest = self._drives[identity]
@@ -304,15 +306,12 @@ class ExperimentRun:
             made = self.compose(["variant=simulate"])
             place = Path(str(cell.config.get("cache") or self.folder)).resolve() / "logs"
             folder = place / re.sub("[^A-Za-z0-9]+", "_", name)
-            for node in made["nodes"].values():
-                if isinstance(node, dict) and "world" in node:
-                    node |= {"world": world, "route": route, "day": day, "events": events}
-                    node["log"] = f"{folder}.part/drive.mcap"
+            for drives in made["nodes"].values():
+                if isinstance(drives, dict) and "world" in drives:
+                    drives |= {**driven, "log": f"{folder}.part/drive.mcap"}
             self.logs[digest] = Log(name, made, folder)
-        node = config["nodes"][source.name]
-        config["nodes"][source.name] = {
-            name: value for name, value in node.items() if name not in ("world", "route", "day", "events")
-        } | {"log": str(self.logs[digest].file)}
+        kept = {name: value for name, value in node.items() if name not in driven}
+        config["nodes"][source.name] = {**kept, "log": str(self.logs[digest].file)}
 
     # maps
 

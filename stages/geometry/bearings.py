@@ -28,16 +28,23 @@ def unit_vectors(azimuths: npt.ArrayLike, elevations: npt.ArrayLike) -> Array:
     return np.stack(parts, axis=-1).astype(np.float64)
 
 
+def span_of(top: float | None, bottom: float | None, rows: int, columns: int) -> tuple[float, float]:
+    """Elevations (rad) of the upper and lower edge of a panorama: where they are not known, as of square pixels.
+
+    The horizon is taken for the middle then: azimuths are right, elevations a guess.
+    """
+    if top is None or bottom is None:
+        return math.pi * rows / columns, -math.pi * rows / columns
+    return top, bottom
+
+
 def panorama_bearings(points: Array, shape: tuple[int, ...], top: float | None, bottom: float | None) -> Array:
     """Bearings (N, 3) of points (N, 2), columns and rows, in a `Panorama` of `shape` (rows, columns, …).
 
-    Rows are equal steps of elevation from `top` to `bottom` (rad, of the edges). Where these are not known, pixels are
-    taken for square and the horizon for the middle: azimuths are right then, elevations a guess.
+    Rows are equal steps of elevation from `top` to `bottom` (rad, of the edges; see `span_of` where they are None).
     """
     rows, columns = shape[:2]
-    if top is None or bottom is None:
-        top = math.pi * rows / columns
-        bottom = -top
+    top, bottom = span_of(top, bottom, rows, columns)
     azimuths = math.pi - 2.0 * math.pi * (points[..., 0] + 0.5) / columns
     return unit_vectors(azimuths, top + (bottom - top) * (points[..., 1] + 0.5) / rows)
 
@@ -45,8 +52,8 @@ def panorama_bearings(points: Array, shape: tuple[int, ...], top: float | None, 
 def camera_bearings(points: Array, camera: Camera) -> Array:
     """Bearings (N, 3) of points (N, 2), columns and rows (pixels), in a camera's picture; NaN where it shows nothing.
 
-    A strip or donut without known elevations has square pixels and its horizon in the middle, as in
-    `panorama_bearings`. Raises BadInput for a donut whose ring is not known.
+    A strip or donut without known elevations has square pixels and its horizon in the middle, as in `span_of`. Raises
+    BadInput for a donut whose ring is not known.
     """
     u, v = points[..., 0], points[..., 1]
     match camera:
@@ -70,9 +77,7 @@ def camera_bearings(points: Array, camera: Camera) -> Array:
             if isinstance(camera, Cylindrical) and top is not None and bottom is not None:
                 level, lowest = math.tan(top), math.tan(bottom)
                 return unit_vectors(azimuths, np.arctan(level + (lowest - level) * share))
-            if top is None or bottom is None:
-                top = math.pi * camera.height_px / camera.width
-                bottom = -top
+            top, bottom = span_of(top, bottom, camera.height_px, camera.width)
             return unit_vectors(azimuths, top + (bottom - top) * share)
         case Donut(centre_x=float(x), centre_y=float(y), inner_radius_px=float(inner), outer_radius_px=float(outer)):
             sign = 1.0 if camera.sense == "clockwise" else -1.0

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from omninav.pipeline.problems import BadInput
 from omninav.stages.values.camera import Camera, Cylindrical, Equirectangular, Fisheye, HyperbolicMirror
 
+from .bearings import span_of
 from .catadioptric import project
 
 Array = npt.NDArray[np.float64]
@@ -64,9 +65,7 @@ def panorama_points(rays: Array, shape: tuple[int, ...], top: float | None, bott
     The inverse of `bearings.panorama_bearings`.
     """
     rows, columns = shape[:2]
-    if top is None or bottom is None:
-        top = math.pi * rows / columns
-        bottom = -top
+    top, bottom = span_of(top, bottom, rows, columns)
     azimuth = np.arctan2(rays[..., 1], rays[..., 0])
     elevation = np.arctan2(rays[..., 2], np.hypot(rays[..., 0], rays[..., 1]))
     share = (elevation - top) / (bottom - top)

@@ -6,6 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
+from omninav.stages.geometry.epipolar import turn_about_vertical
 from omninav.stages.values.two_views import BearingPairs, RelativeView
 
 
@@ -52,8 +53,7 @@ class TwoViews(Source):
         posed.problems += 1
         if self.planar:
             turn, along = rng.uniform(-math.pi, math.pi, 2)
-            cos, sin = math.cos(turn), math.sin(turn)
-            rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+            rotation = turn_about_vertical(turn)
             translation = np.array([math.cos(along), math.sin(along), 0.0])
         else:
             rotation, translation = _any_rotation(rng), self._directions(rng, 1, 90.0)[0]
