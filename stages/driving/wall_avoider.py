@@ -54,10 +54,19 @@ class WallAvoider(Stage):
         memory.ranges = heard
         free = free_ahead(ranges, scan.azimuths(), self.radius, self.margin)
         roomier = roomier_side(ranges, scan.azimuths())
-        if free > self.slow_at:
-            memory.side = 0
-            return self.Out(command=Command(self.speed, 0.5 * self.turning * math.tanh(roomier)))
-        if memory.side == 0:
-            memory.side = 1 if roomier >= 0.0 else -1
-        share = max(0.0, (free - self.stop_at) / (self.slow_at - self.stop_at))
-        return self.Out(command=Command(self.speed * share, memory.side * self.turning * (1.0 - 0.5 * share)))
+        room = (free - self.stop_at) / (self.slow_at - self.stop_at)
+        speed, turning, memory.side = wandering(room, roomier, memory.side)
+        return self.Out(command=Command(self.speed * speed, self.turning * turning))
+
+
+def wandering(room: float, roomier: float, side: int) -> tuple[float, float, int]:
+    """Shares of the greatest speed and turning with which to wander, and the side to which it turns away.
+
+    `room`: the free way ahead, 0 where it must stop, 1 where it need not turn yet. `roomier`: see `roomier_side`.
+    `side`: the one of the tick before, 1 left, -1 right, 0 undecided.
+    """
+    if room > 1.0:
+        return 1.0, 0.5 * math.tanh(roomier), 0
+    side = side or (1 if roomier >= 0.0 else -1)
+    share = max(0.0, room)
+    return share, side * (1.0 - 0.5 * share), side

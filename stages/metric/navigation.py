@@ -23,8 +23,8 @@ class Navigation(Stage):
     `reached`: the robot said that it has arrived, within `within_m` of where the medoid of the way's last place was
     taken; `end_error_m`: how far from there it ended. `collisions`; `path_length_m`: driven; `shortest_m`: from where
     it began along the pictures of the map, the shortest way that it could have known; `time_s`: until it said that it
-    has arrived, else all of it. `ways`: how many it planned; `state` and `why`: what it last said. Truth is used to
-    score alone.
+    has arrived or given up, else all of it. `ways`: how many it planned; `state` and `why`: what it last said. Truth is
+    used to score alone.
     """
 
     within_m: Annotated[float, Bounds(gt=0)] = 0.5
@@ -49,7 +49,8 @@ class Navigation(Stage):
         if not said or not spots:
             return self.Out()
         last = said[-1]
-        arrived = next((k for k, way in enumerate(ways) if way is not None and way.state == "arrived"), len(ticks) - 1)
+        ends = (k for k, way in enumerate(ways) if way is not None and way.state in ("arrived", "gave up"))
+        ended = next(ends, len(ticks) - 1)
         tally = next((each for each in reversed(tallies) if each is not None), None)
         goal = int(last.places[-1]) if len(last.places) else None
         apart = math.inf
@@ -61,7 +62,7 @@ class Navigation(Stage):
             "end_error_m": apart if math.isfinite(apart) else None,
             "path_length_m": float(sum(math.dist(one, other) for one, other in pairwise(spots))),
             "shortest_m": None if goal is None else shortest_metres(map, spots[0], goal),
-            "time_s": (ticks[arrived].stamp - ticks[0].stamp) / 1e9,
+            "time_s": (ticks[ended].stamp - ticks[0].stamp) / 1e9,
             "ways": last.number + 1,
             "goal": goal,
             "state": last.state,

@@ -1,15 +1,17 @@
-"""What a planner knows of the driving before there is any."""
+"""What is known of the way and the driving before there is any."""
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.homing import DrivingStatus, PathProgress
+from omninav.stages.values.planned_way import PlannedWay
 
 
 class BeforeDriving(Stage):
-    """No status and no progress: what there was before the first tick."""
+    """No way, no status and no progress: what there was before the first tick."""
 
     class Out(Outputs):
         status: DrivingStatus | None = None
         progress: PathProgress | None = None
+        way: PlannedWay | None = None
 
     def step(self, ctx: Context) -> Out:
         """Nothing."""

@@ -14,6 +14,7 @@ from omninav.stages.values.homing import DrivingStatus, ImagePath, PathProgress
 from omninav.stages.values.planned_way import PlannedWay
 from omninav.stages.values.topological_map import TopologicalMap
 
+Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
@@ -22,17 +23,23 @@ def _no_place() -> Ints:
 
 
 class Itinerary(State):
-    """The way so far: its number and places, how many views of it lead to each place, ways planned, ticks waited, links
-    that were found blocked (B, 2), and how it ended."""
+    """The way so far: its number and places, how many views of it lead to each place, ways planned, ticks waited.
+
+    `failed` (F, 2): the links on which ways have failed, a place with itself for its own medoid, with which a way
+    begins; `times` (F,): how often. `why`: the last reason, `blocked`: the last one for which it was blocked; `ended`:
+    how it ended, "" if it has not.
+    """
 
     number: int = -1
     places: Ints = field(default_factory=_no_place)
     views: Ints = field(default_factory=_no_place)
     planned: int = 0
     waited: int = 0
-    closed: Ints = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    failed: Ints = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    times: Ints = field(default_factory=_no_place)
     ended: str = ""
     why: str = ""
+    blocked: str = ""
 
 
 class ShortestWay(Stage):
@@ -43,16 +50,21 @@ class ShortestWay(Stage):
     number or name (of several of that name the nearest). `cost`: a link counts one (`links`, the paper's) or as many as
     views have to be driven to (`views`).
 
-    It plans once the robot is `sure` where it is, by the belief's share, or has looked for `patience` ticks; and again
-    where the robot has lost its target, or found its way blocked: then without the link it was on. After `tries` ways,
-    or where no way is left, it gives up and says why. Raises BadInput for a goal that the map does not have.
+    It plans once the robot is `sure` where it is, by the belief's share, for `calm` ticks, or has looked for `patience`
+    ticks; and again where the robot has lost its target, or found its way blocked. Ways without the link on which that
+    happened are then preferred, and one that has failed `again` times is closed. Where it is a place's own medoid
+    that the robot did not come to, it is half as likely to be there, and the next way from there begins behind it.
+    After `tries` ways, or where no way is left, it gives up: it says why, and gives an empty path, so that the robot
+    stands. Raises BadInput for a goal that the map does not have.
     """
 
     goal: str | int | None = None
     cost: Literal["links", "views"] = "links"
     sure: Annotated[float, Bounds(gt=0, le=1)] = 0.5
+    calm: Annotated[int, Bounds(ge=0)] = 5
     patience: Annotated[int, Bounds(ge=1)] = 25
-    tries: Annotated[int, Bounds(ge=1)] = 10
+    again: Annotated[int, Bounds(ge=1)] = 3
+    tries: Annotated[int, Bounds(ge=1)] = 20
 
     class Out(Outputs):
         """`path`: the views, in the tick in which they are planned. `way`: through which places, at every tick."""
@@ -71,45 +83,61 @@ class ShortestWay(Stage):
     ) -> Out:
         """Plan where there is reason to; `status` and `progress` are those of the tick before."""
         goals = places_called(self.goal, map)
-        if not itinerary.ended and (reason := self._reason(itinerary, status, progress)):
-            itinerary.why, itinerary.waited = reason, itinerary.waited + 1
-            if belief.probabilities.max() >= self.sure or itinerary.waited > self.patience:
-                path = self._plan(ctx, itinerary, int(np.argmax(belief.probabilities)), goals, map)
-                return self.Out(path=path, way=_way(itinerary))
-        return self.Out(way=_way(itinerary))
+        if itinerary.ended or not self._must_plan(itinerary, belief, status, progress):
+            return self.Out(way=_way(itinerary))
+        if itinerary.number >= 0 and progress is not None and status is not None:
+            _remember(itinerary, progress.at)
+            itinerary.blocked = status.why if status.state == "blocked" else itinerary.blocked
+        path = self._plan(ctx, itinerary, belief.probabilities, goals, map)
+        return self.Out(path=path, way=_way(itinerary))
 
-    def _reason(self, itinerary: Itinerary, status: DrivingStatus | None, progress: PathProgress | None) -> str:
+    def _must_plan(
+        self, itinerary: Itinerary, belief: PlaceBelief, status: DrivingStatus | None, progress: PathProgress | None
+    ) -> bool:
         if itinerary.number < 0:
-            return "it has no way yet"
-        if progress is None or progress.path != itinerary.number:  # the way has not reached who drives it
-            return ""
-        if progress.arrived:
+            itinerary.why = "it has no way yet"
+        elif progress is None or progress.path != itinerary.number:  # the way has not reached who drives it
+            return False
+        elif progress.arrived:
             itinerary.ended, itinerary.why = "arrived", ""
-        elif itinerary.waited and status is not None and status.state in ("lost", "blocked"):
-            return itinerary.why
-        elif status is not None and status.state in ("lost", "blocked"):
-            if status.state == "blocked":
-                itinerary.closed = np.vstack([itinerary.closed, _under_way(itinerary, progress.at)])
-            return f"{status.state}: {status.why}"
+            return False
+        elif status is None or status.state not in ("lost", "blocked"):
+            itinerary.waited, itinerary.why = 0, ""
+            if progress.at > 0:  # it was right about where it is
+                _forget_medoids(itinerary)
+            return False
         else:
-            itinerary.waited = 0
-        return ""
+            itinerary.why = f"{status.state}: {status.why}"
+        itinerary.waited += 1
+        sure = belief.probabilities.max() >= self.sure and itinerary.waited > self.calm
+        return bool(sure) or itinerary.waited > self.patience
 
     def _plan(
-        self, ctx: Context, itinerary: Itinerary, place: int, goals: Ints, map: TopologicalMap
-    ) -> ImagePath | None:
+        self,
+        ctx: Context,
+        itinerary: Itinerary,
+        probabilities: npt.NDArray[np.float64],
+        goals: Ints,
+        map: TopologicalMap,
+    ) -> ImagePath:
+        place, missed = _likeliest(probabilities, itinerary)
+        places = shortest_way(map, place, goals, self.cost, itinerary.failed, itinerary.times, self.again)
+        last = f"the last way ended because it was {itinerary.why}"
+        if itinerary.blocked and not itinerary.why.startswith("blocked"):
+            last = f"it was blocked: {itinerary.blocked}; {last}"
         if itinerary.planned >= self.tries:
-            itinerary.ended = "gave up"
-            itinerary.why = f"{self.tries} ways were tried; the last ended because it was {itinerary.why}"
-            return None
-        places = shortest_way(map, place, goals, self.cost, itinerary.closed)
+            return _given_up(itinerary, f"{self.tries} ways were tried; {last}")
         if not len(places):
-            itinerary.ended = "gave up"
-            blocked = f", and {len(itinerary.closed)} links were blocked" if len(itinerary.closed) else ""
-            itinerary.why = f"no way leads from place {place} to {self.goal}{blocked}"
-            return None
+            closed = [
+                pair for pair, times in zip(itinerary.failed, itinerary.times, strict=True) if times >= self.again
+            ]
+            shut = ", ".join(f"{one} to {other}" for one, other in closed if one != other)
+            why = f" but what could not be driven {self.again} times, from place {shut}; {last}" if shut else ""
+            return _given_up(itinerary, f"no way leads from place {place} to {self.goal}{why}")
         ctx.count("ways_planned")
         views, ends = map.views_along(places)
+        if missed % 2 and len(places) > 1:
+            views, ends = views[1:], ends - 1
         itinerary.number, itinerary.planned, itinerary.waited = itinerary.number + 1, itinerary.planned + 1, 0
         itinerary.places, itinerary.views, itinerary.why = places, ends, ""
         names = tuple(_called(map, int(view)) for view in views)
@@ -131,17 +159,27 @@ def places_called(goal: str | int | None, map: TopologicalMap) -> Ints:
     raise BadInput(f"goal: {what}; type goal={example} or a number below {len(map)} ({known})")
 
 
-def shortest_way(map: TopologicalMap, place: int, goals: Ints, cost: Literal["links", "views"], closed: Ints) -> Ints:
+def shortest_way(
+    map: TopologicalMap,
+    place: int,
+    goals: Ints,
+    cost: Literal["links", "views"],
+    failed: Ints,
+    times: Ints,
+    again: int,
+) -> Ints:
     """The places from `place` to the nearest of `goals` (G,), both included: (K,); none where no way is left.
 
-    `closed` (B, 2): pairs of places between which there is no way today. Equally short ways: that of lower numbers.
+    `failed` (F, 2): pairs of places between which it has failed to go, `times` (F,) often: any way around them is
+    preferred, and those that failed `again` times are closed. Equally short ways: that of lower numbers.
     """
     graph = networkx.Graph()
     graph.add_nodes_from(range(len(map)))
-    shut = {frozenset(pair) for pair in closed.tolist()}
+    failures = {frozenset(pair): number for pair, number in zip(failed.tolist(), times.tolist(), strict=True)}
     for link, (one, other) in enumerate(map.links.tolist()):
-        if one != other and frozenset((one, other)) not in shut:
-            price = 1 if cost == "links" else 1 + len(map.way(link))
+        missed = failures.get(frozenset((one, other)), 0)
+        if one != other and missed < again:
+            price = (1 if cost == "links" else 1 + len(map.way(link))) + missed * len(map.views)
             known = graph.edges[one, other]["price"] if graph.has_edge(one, other) else price
             graph.add_edge(one, other, price=min(price, known))
     lengths, ways = networkx.single_source_dijkstra(graph, place, weight="price")
@@ -149,11 +187,34 @@ def shortest_way(map: TopologicalMap, place: int, goals: Ints, cost: Literal["li
     return np.array(ways[min(reached)[1]] if reached else [], np.int64)
 
 
-def _under_way(itinerary: Itinerary, reached: int) -> Ints:
-    """The link that the robot is on when it has reached so many views, as one row; none on its way to the first."""
+def _likeliest(probabilities: Array, itinerary: Itinerary) -> tuple[int, int]:
+    """Where the robot most probably is, and how often it did not come to the medoid there."""
+    missed = np.zeros(len(probabilities), np.int64)
+    own = itinerary.failed[:, 0] == itinerary.failed[:, 1]
+    missed[itinerary.failed[own, 0]] = itinerary.times[own]
+    place = int(np.argmax(probabilities * 0.5**missed))
+    return place, int(missed[place])
+
+
+def _remember(itinerary: Itinerary, reached: int) -> None:
+    """That the way failed behind so many of its views: on which link."""
     leg = int(np.searchsorted(itinerary.views, reached, side="right"))
-    inside = 0 < leg < len(itinerary.places)
-    return itinerary.places[leg - 1 : leg + 1].reshape(1, 2) if inside else np.zeros((0, 2), np.int64)
+    pair = itinerary.places[[max(leg - 1, 0), min(leg, len(itinerary.places) - 1)]]
+    same = (np.sort(itinerary.failed, axis=1) == np.sort(pair)).all(axis=1)
+    if same.any():
+        itinerary.times = itinerary.times + same
+    else:
+        itinerary.failed, itinerary.times = np.vstack([itinerary.failed, pair]), np.append(itinerary.times, 1)
+
+
+def _forget_medoids(itinerary: Itinerary) -> None:
+    links = itinerary.failed[:, 0] != itinerary.failed[:, 1]
+    itinerary.failed, itinerary.times = itinerary.failed[links], itinerary.times[links]
+
+
+def _given_up(itinerary: Itinerary, why: str) -> ImagePath:
+    itinerary.ended, itinerary.why = "gave up", why
+    return ImagePath(itinerary.number + 1, (), ())
 
 
 def _called(map: TopologicalMap, view: int) -> str:
@@ -166,6 +227,6 @@ def _way(itinerary: Itinerary) -> PlannedWay:
     state: Literal["locating", "under way", "arrived", "gave up"] = "under way"
     if itinerary.ended:
         state = "arrived" if itinerary.ended == "arrived" else "gave up"
-    elif itinerary.number < 0 or itinerary.waited:
+    elif itinerary.number < 0 or itinerary.waited > 0:
         state = "locating"
     return PlannedWay(itinerary.places, state, itinerary.number, itinerary.why)

@@ -1,6 +1,6 @@
 """How well each place of a topological map explains the view."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -19,10 +19,15 @@ class PlaceLikelihood(Stage):
     Goedemé et al. 2007, section 5.3, equation 14: P(z | x) falls as exp(-diss^2 / sigma^2). `spread` is sigma; null:
     the standard deviation of visual distance that the map was measured to have within its places. No place is less
     likely than `least` times one that looks the same: views are blocked, and one that shows nothing known says nothing.
+
+    `tail`: `heavy` is 1 / (1 + diss^2 / sigma^2) instead. Away from all places, as a robot is that was carried to
+    somewhere, every distance is many sigma, and by a Gaussian all are as unlikely as what has nothing in common; yet
+    the place with the least of them is the right one.
     """
 
     spread: Annotated[float, Bounds(gt=0)] | None = None
     least: Annotated[float, Bounds(gt=0, le=1)] = 0.01
+    tail: Literal["gaussian", "heavy"] = "gaussian"
 
     class Out(Outputs):
         """One value per place."""
@@ -32,9 +37,13 @@ class PlaceLikelihood(Stage):
     def step(self, ctx: Context, distances: VisualDistances, map: TopologicalMap) -> Out:
         """Weigh all places."""
         sigma = map.spread if self.spread is None else self.spread
-        return self.Out(likelihood=Likelihood(place_likelihoods(distances.distances, sigma, self.least)))
+        values = place_likelihoods(distances.distances, sigma, self.least, self.tail)
+        return self.Out(likelihood=Likelihood(values))
 
 
-def place_likelihoods(distances: Array, sigma: float, least: float) -> Array:
-    """exp(-(d / sigma)^2) of visual distances (P,), inf for nothing in common, lifted to [least, 1]."""
-    return least + (1.0 - least) * np.exp(-np.square(distances / max(sigma, 1e-9)))
+def place_likelihoods(
+    distances: Array, sigma: float, least: float, tail: Literal["gaussian", "heavy"] = "gaussian"
+) -> Array:
+    """Of visual distances (P,), inf for nothing in common, lifted to [least, 1]: exp(-(d / sigma)^2), or as `tail`."""
+    squares = np.square(distances / max(sigma, 1e-9))
+    return least + (1.0 - least) * (np.exp(-squares) if tail == "gaussian" else 1.0 / (1.0 + squares))

@@ -24,6 +24,7 @@ from omninav.stages.values.camera import Camera
 from omninav.stages.values.command import Command
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.image import Image
+from omninav.stages.values.planned_way import PlannedWay
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
 
@@ -45,7 +46,7 @@ class Simulation(State):
     """The robot as it is: its state (see `robot`; empty before the first tick), odometry pose, ticks made.
 
     `track` (N, 4): time (s) and pose at the last ticks; people who keep it company follow it. `crowd` (P, 5): where
-    everybody is.
+    everybody is. `ended`: ticks since its way has.
     """
 
     robot: F64 = field(default_factory=_nowhere)
@@ -53,6 +54,7 @@ class Simulation(State):
     crowd: F64 = field(default_factory=lambda: np.zeros((0, 5)))
     odometry: F64 = field(default_factory=lambda: np.zeros(3))
     ticks: int = 0
+    ended: int = 0
 
 
 class ClosedLoop(Source):
@@ -61,7 +63,8 @@ class ClosedLoop(Source):
     It starts at rest where the world's `route` starts, or at `start` (x, y in metres, heading in radians), and goes on
     for `seconds`, `rate` ticks each. The command of the tick before holds until this tick. `motion` is what its wheels
     say, absent at the first tick. Noise is drawn from the run's seed, goods and textures from the world's. Without a
-    command it brakes. Pictures are blurred as in a log (`world.sensor.shutter`), by the motion at their tick: nobody
+    command it brakes. A `way` that has ended, since the robot has arrived or given up, ends the drive `rest` seconds
+    later. Pictures are blurred as in a log (`world.sensor.shutter`), by the motion at their tick: nobody
     knows the next command. A picture that is lost or late on its way (`world.delivery`) is absent, and counted.
     """
 
@@ -71,6 +74,7 @@ class ClosedLoop(Source):
     start: tuple[float, float, float] | None = None
     seconds: Annotated[float, Bounds(gt=0)] = 60.0
     rate: Annotated[float, Bounds(ge=1)] = 5.0
+    rest: Annotated[float, Bounds(ge=0)] = 1.0
     events: tuple[Event, ...] = ()
 
     class Out(Outputs):
@@ -106,9 +110,12 @@ class ClosedLoop(Source):
         """Ticks in all."""
         return int(self.seconds * self.rate)
 
-    def step(self, ctx: Context, simulation: Simulation, command: Command | None = None) -> Out | None:
-        """Drive on under the last command, then perceive; None when the time is over."""
-        if simulation.ticks >= int(self.seconds * self.rate):
+    def step(
+        self, ctx: Context, simulation: Simulation, command: Command | None = None, way: PlannedWay | None = None
+    ) -> Out | None:
+        """Drive on under the last command, then perceive; None when the time, or the way, is over."""
+        simulation.ended += way is not None and way.state in ("arrived", "gave up")
+        if simulation.ticks >= int(self.seconds * self.rate) or simulation.ended > self.rest * self.rate:
             return None
         motion = None
         if simulation.ticks == 0:

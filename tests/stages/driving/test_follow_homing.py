@@ -91,6 +91,44 @@ def test_a_blocked_way_stops_it_at_once_and_is_said_when_it_stays_so() -> None:
     assert drive(vector(0.0), progress(), scan(), patience).command.speed == 0.4
 
 
+def test_before_a_closed_door_it_goes_from_side_to_side_only_for_so_long() -> None:
+    # The target lies 1 m ahead, behind a wall that is free to the left and to the right: a way to everywhere but there.
+    patience, wall = Patience(), scan((-50.0, 50.0, 0.5))
+    said = [drive(vector(0.0, metres=1.0), progress(), wall, patience, detour=20) for _ in range(23)]
+    assert {out.status.state for out in said[:21]} == {"driving"}
+    assert all(out.command.turning for out in said[:21])
+    assert (said[-1].status.state, said[-1].command.speed, said[-1].command.turning) == ("blocked", 0.0, 0.0)
+    assert said[-1].status.why == "something stands in the way, and going around it for 20 ticks led no closer"
+    another = drive(HomingVector(1, 0.0, 0.0, 1.0, 1.0, 0.3, 1.0, 20, "new"), progress(), wall, patience, detour=20)
+    assert another.status.state == "driving"
+
+
+def test_who_comes_closer_on_the_way_around_is_not_blocked() -> None:
+    patience, wall = Patience(), scan((-50.0, 50.0, 0.5))
+    ratios = 0.95 ** np.arange(40)
+    said = [drive(vector(0.0, ratio, metres=ratio), progress(), wall, patience, detour=10) for ratio in ratios]
+    assert {out.status.state for out in said} == {"driving"}
+
+
+def test_neither_may_it_turn_and_turn_in_the_open_for_ever() -> None:
+    patience = Patience()
+    said = [drive(vector(3.0), progress(), scan(), patience, idle=30) for _ in range(33)]
+    assert [out.status.state for out in said] == ["driving"] * 31 + ["blocked"] * 2
+    assert said[-1].status.why == "30 ticks have led no closer"
+
+
+def test_who_is_lost_for_long_wanders_until_the_target_is_seen() -> None:
+    patience = Patience()
+    lost = vector(state="lost", why="2 of 9 matches agree")
+    said = [drive(lost, progress(), scan((-20.0, 0.0, 0.6)), patience, restless=5) for _ in range(7)]
+    assert [(out.command.speed, out.command.turning) for out in said[:5]] == [(0.0, 0.0)] * 5
+    assert said[-1].command.turning > 0.0  # away from what stands ahead, a little to the right
+    assert (said[-1].status.state, said[-1].status.why) == ("lost", "it looks about: 2 of 9 matches agree")
+    assert drive(vector(), progress(), scan(), patience).status.state == "driving"
+    blind = [drive(lost, progress(), None, patience, restless=5) for _ in range(7)]
+    assert blind[-1].command.turning == 0.0
+
+
 def test_a_target_close_before_a_wall_can_be_reached() -> None:
     assert drive(vector(0.0, metres=0.2), progress(last=True), scan((-60.0, 60.0, 0.7))).command.speed > 0.0
 

@@ -50,6 +50,13 @@ def test_likelihood_is_a_gaussian_of_visual_distance_that_never_falls_to_nothing
     assert values == pytest.approx([1.0, 0.01 + 0.99 * math.exp(-1), 0.01])
 
 
+def test_with_a_heavy_tail_the_least_unlike_of_unlike_places_is_still_the_likeliest():
+    far = np.array([10.0, 20.0, math.inf])  # in units of sigma
+    assert place_likelihoods(far, 1.0, 0.001) == pytest.approx([0.001] * 3)
+    heavy = place_likelihoods(far, 1.0, 0.001, "heavy")
+    assert heavy == pytest.approx([0.001 + 0.999 / 101, 0.001 + 0.999 / 401, 0.001])
+
+
 @given(st.integers(1, 12), st.integers(0, 2**32 - 1), st.floats(0.0, 1.0))
 def test_a_step_of_bayes_leaves_a_belief_that_sums_to_one(places, seed, anywhere):
     rng = np.random.default_rng(seed)

@@ -13,7 +13,7 @@ from omninav.stages.values.topological_map import TopologicalMap
 
 # 0 - 1 - 2 - 3 in a row, 3 and 0 are neighbours by a loop, 4 hangs on 2 (driven from 4 to 2), 5 is on its own
 BETWEEN = {(0, 1): 1, (1, 2): 0, (2, 3): 4, (4, 2): 2}
-NONE = np.zeros((0, 2), np.int64)
+OPEN = {"failed": np.zeros((0, 2), np.int64), "times": np.zeros(0, np.int64), "again": 3}
 
 
 def a_map() -> TopologicalMap:
@@ -27,33 +27,35 @@ def believed(place: int, share: float = 0.9) -> PlaceBelief:
     return PlaceBelief(probabilities, np.zeros((6, 3)))
 
 
+def under_way(itinerary: Itinerary, at: int, arrived: bool = False) -> PathProgress:
+    views = int(itinerary.views[-1])
+    return PathProgress(itinerary.number, at, views, at, at >= views - 1, False, arrived)
+
+
 def drive(
     stage: ShortestWay, itinerary: Itinerary, place: int, status=None, at: int | None = None, share=0.9, arrived=False
 ):
     ctx = Context("planning")
     ctx.tick = Tick(index=0, stamp=0, log=0, frame=0, first_of_log=True)
-    progress = None
-    if at is not None:
-        views = int(itinerary.views[-1])
-        progress = PathProgress(itinerary.number, at, views, at, at >= views - 1, False, arrived)
+    progress = None if at is None else under_way(itinerary, at, arrived)
     doing = None if status is None else DrivingStatus(status, "a chair" if status == "blocked" else "too few matches")
     return stage.step(ctx, itinerary, believed(place, share), a_map(), doing, progress)
 
 
 def test_the_way_with_the_fewest_links_is_taken():
-    assert shortest_way(a_map(), 0, np.array([3]), "links", NONE).tolist() == [0, 3]
-    assert shortest_way(a_map(), 1, np.array([4]), "links", NONE).tolist() == [1, 2, 4]
+    assert shortest_way(a_map(), 0, np.array([3]), "links", **OPEN).tolist() == [0, 3]
+    assert shortest_way(a_map(), 1, np.array([4]), "links", **OPEN).tolist() == [1, 2, 4]
 
 
 def test_or_the_one_with_the_fewest_views():
-    assert shortest_way(a_map(), 2, np.array([3]), "links", NONE).tolist() == [2, 3]
-    assert shortest_way(a_map(), 2, np.array([3]), "views", NONE).tolist() == [2, 1, 0, 3]  # 1 + 2 + 1 against 5
+    assert shortest_way(a_map(), 2, np.array([3]), "links", **OPEN).tolist() == [2, 3]
+    assert shortest_way(a_map(), 2, np.array([3]), "views", **OPEN).tolist() == [2, 1, 0, 3]  # 1 + 2 + 1 against 5
 
 
 def test_of_several_places_of_a_name_the_nearest_is_the_goal():
     goals = places_called("kitchen", a_map())
     assert goals.tolist() == [2, 4]
-    assert shortest_way(a_map(), 3, goals, "links", NONE).tolist() == [3, 2]
+    assert shortest_way(a_map(), 3, goals, "links", **OPEN).tolist() == [3, 2]
 
 
 def test_a_way_driven_the_other_way_round_shows_its_pictures_backwards():
@@ -72,7 +74,7 @@ def test_a_goal_that_is_not_on_the_map_is_refused_with_those_that_are(goal):
 
 
 def test_it_plans_once_it_is_sure_and_not_again():
-    stage, itinerary = ShortestWay(goal=3, patience=5), Itinerary()
+    stage, itinerary = ShortestWay(goal=3, calm=1, patience=5), Itinerary()
     first = drive(stage, itinerary, 1, share=0.4)
     assert first.path is None
     assert first.way.state == "locating"
@@ -85,6 +87,11 @@ def test_it_plans_once_it_is_sure_and_not_again():
     assert again.way.state == "under way"
 
 
+def test_even_if_it_is_sure_it_looks_for_a_moment():
+    stage, itinerary = ShortestWay(goal=3, calm=3), Itinerary()
+    assert [drive(stage, itinerary, 1).path is not None for _ in range(4)] == [False, False, False, True]
+
+
 def test_who_looks_long_enough_goes_by_the_most_probable_place():
     stage, itinerary = ShortestWay(goal=3, patience=3), Itinerary()
     planned = [drive(stage, itinerary, 2, share=0.3).path is not None for _ in range(4)]
@@ -92,7 +99,7 @@ def test_who_looks_long_enough_goes_by_the_most_probable_place():
 
 
 def test_a_lost_target_means_a_new_way_from_where_it_is_now_believed():
-    stage, itinerary = ShortestWay(goal=3), Itinerary()
+    stage, itinerary = ShortestWay(goal=3, calm=0), Itinerary()
     drive(stage, itinerary, 1)
     out = drive(stage, itinerary, 2, "lost", at=1)
     assert out.path is not None
@@ -100,30 +107,86 @@ def test_a_lost_target_means_a_new_way_from_where_it_is_now_believed():
     assert out.way.places.tolist() == [2, 3]
 
 
-def test_a_blocked_link_is_not_tried_again():
-    stage, itinerary = ShortestWay(goal="hall"), Itinerary()
+def test_a_target_that_is_seen_again_in_time_leaves_the_way_as_it_is():
+    stage, itinerary = ShortestWay(goal=3, calm=2), Itinerary()
+    for _ in range(3):
+        drive(stage, itinerary, 1)
+    waiting = drive(stage, itinerary, 1, "lost", at=1)
+    assert (waiting.way.state, waiting.way.why) == ("locating", "lost: too few matches")
+    going = drive(stage, itinerary, 1, "driving", at=1)
+    assert (going.path, going.way.state, going.way.number, going.way.why) == (None, "under way", 0, "")
+
+
+def test_around_a_link_that_failed_there_may_be_another_way():
+    stage, itinerary = ShortestWay(goal="hall", calm=0), Itinerary()
     assert drive(stage, itinerary, 2).way.places.tolist() == [2, 1, 0]
     out = drive(stage, itinerary, 1, "blocked", at=2)  # the medoids of 2 and 1 are reached: it is between 1 and 0
-    assert itinerary.closed.tolist() == [[1, 0]]
+    assert itinerary.failed.tolist() == [[1, 0]]
     assert out.way.places.tolist() == [1, 2, 3, 0]
-    last = drive(stage, itinerary, 3, "blocked", at=out.path is not None and 7)
+
+
+def test_where_no_other_way_is_left_it_tries_some_times_and_then_gives_up_and_stands():
+    stage, itinerary = ShortestWay(goal=4, calm=0, again=3), Itinerary()
+    tried = [drive(stage, itinerary, 2).way.places.tolist()]
+    for _ in range(2):
+        tried.append(drive(stage, itinerary, 2, "blocked", at=1).way.places.tolist())
+    assert tried == [[2, 4]] * 3
+    last = drive(stage, itinerary, 2, "blocked", at=1)
     assert last.way.state == "gave up"
-    assert "2 links were blocked" in last.way.why
-    assert "no way leads from place 3 to hall" in last.way.why
-    assert drive(stage, itinerary, 3, "blocked", at=7).path is None
+    assert last.way.why == (
+        "no way leads from place 2 to 4 but what could not be driven 3 times, from place 2 to 4; "
+        "the last way ended because it was blocked: a chair"
+    )
+    assert last.path is not None
+    assert not last.path.views  # there is nothing to drive to any more
+    assert drive(stage, itinerary, 2, "blocked", at=1).path is None
+
+
+def test_a_medoid_that_was_not_seen_makes_its_place_less_likely_and_the_way_from_there_begin_behind_it():
+    stage, itinerary = ShortestWay(goal=3, calm=0), Itinerary()
+    drive(stage, itinerary, 1)
+    out = drive(stage, itinerary, 1, "lost", at=0)
+    assert itinerary.failed.tolist() == [[1, 1]]
+    assert out.path is not None
+    assert out.path.names == ("on the way, picture 60", "place 0, hall", "place 3")
+    assert out.way.places.tolist() == [1, 0, 3]
+    drive(stage, itinerary, 1, "blocked", at=0)  # the picture that it began with
+    assert itinerary.failed.tolist() == [[1, 1], [1, 0]]
+    doubtful = PlaceBelief(np.array([0.1, 0.5, 0.3, 0.0, 0.1, 0.0]), np.zeros((6, 3)))
+    itinerary.times = np.array([1, 1])
+    found = stage.step(
+        Context("planning"), itinerary, doubtful, a_map(), DrivingStatus("lost"), under_way(itinerary, 0)
+    )
+    assert found.way.places.tolist() == [2, 3]  # 0.3 against half of 0.5
+
+
+def test_a_medoid_counts_for_nothing_once_a_way_has_been_found_right():
+    stage, itinerary = ShortestWay(goal=3, calm=0), Itinerary()
+    drive(stage, itinerary, 1)
+    drive(stage, itinerary, 1, "lost", at=0)
+    drive(stage, itinerary, 1, "driving", at=1)
+    assert not len(itinerary.failed)
+
+
+def test_that_it_was_blocked_is_said_though_in_the_end_it_was_lost():
+    stage, itinerary = ShortestWay(goal=4, calm=0, again=2), Itinerary()
+    drive(stage, itinerary, 2)
+    drive(stage, itinerary, 2, "blocked", at=1)
+    last = drive(stage, itinerary, 2, "lost", at=1)
+    assert last.way.why.endswith("it was blocked: a chair; the last way ended because it was lost: too few matches")
 
 
 def test_it_arrives_and_stays():
-    stage, itinerary = ShortestWay(goal=0), Itinerary()
+    stage, itinerary = ShortestWay(goal=0, calm=0), Itinerary()
     drive(stage, itinerary, 1)
     assert drive(stage, itinerary, 0, "arrived", at=2, arrived=True).way.state == "arrived"
     assert drive(stage, itinerary, 4).way.state == "arrived"
 
 
 def test_after_so_many_ways_it_gives_up_and_says_why():
-    stage, itinerary = ShortestWay(goal=3, tries=2), Itinerary()
+    stage, itinerary = ShortestWay(goal=3, calm=0, tries=2), Itinerary()
     drive(stage, itinerary, 1)
     drive(stage, itinerary, 1, "lost", at=0)
     out = drive(stage, itinerary, 1, "lost", at=0)
     assert out.way.state == "gave up"
-    assert out.way.why == "2 ways were tried; the last ended because it was lost: too few matches"
+    assert out.way.why == "2 ways were tried; the last way ended because it was lost: too few matches"

@@ -20,6 +20,7 @@ from omninav.stages.simulator.world import World
 from omninav.stages.source.closed_loop import ClosedLoop, Simulation
 from omninav.stages.source.recording import UnreadableRecording
 from omninav.stages.values.command import Command
+from omninav.stages.values.planned_way import PlannedWay
 from omninav.stages.values.scan import Scan
 
 SMALL = MirrorCamera(
@@ -57,6 +58,14 @@ def test_it_starts_where_the_route_starts_and_ends_when_the_time_is_over():
     assert [out.tick.first_of_log for out in ticks] == [True, False, False, False, False]
     assert np.diff([out.tick.stamp for out in ticks]).tolist() == [200_000_000] * 4
     assert vars(ticks[-1].truth) == vars(ticks[0].truth)  # nobody told it to move
+
+
+@pytest.mark.parametrize("state", ["arrived", "gave up"])
+def test_a_way_that_has_ended_ends_the_drive_a_moment_later(state):
+    loop = Loop(seconds=20.0, rest=1.0)
+    ways = [None, *[PlannedWay(np.array([3]), "under way", 0)] * 5, *[PlannedWay(np.array([3]), state, 0)] * 9]
+    outs = [loop.source.step(loop.ctx, loop.state, None, way) for way in ways]
+    assert [out is not None for out in outs] == [True] * 11 + [False] * 4
 
 
 def test_it_obeys_and_its_wheels_say_how_far_it_came():
