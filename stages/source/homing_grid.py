@@ -1,0 +1,170 @@
+"""Views all around a target, one by one: what homing makes of each is a field of vectors."""
+
+import math
+from typing import Annotated, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
+from omninav.pipeline.files import digest_text
+from omninav.stages.simulator.cameras import camera_of, camera_rays
+from omninav.stages.simulator.config import WorldConfig
+from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.depth import first_hits
+from omninav.stages.simulator.renderer import render
+from omninav.stages.simulator.world import World
+from omninav.stages.values.camera import Camera
+from omninav.stages.values.image import Image, Pixels
+from omninav.stages.values.pose import Pose
+
+from .opening import open_recording
+from .recording import Recording, UnreadableRecording
+from .simulated import simulation_digest
+
+Array = npt.NDArray[np.float64]
+
+
+class Placed(State):
+    """How many views there have been."""
+
+    views: int = 0
+
+
+class Views(Protocol):
+    """Pictures and where they were taken: `poses` (N, 3), the target's first."""
+
+    camera: Camera
+    poses: Array
+
+    def image(self, row: int) -> Pixels | None:
+        """The picture of a row."""
+
+
+class HomingGrid(Source):
+    """The target's view first, then views from a grid of points around it, `spacing` m apart and within `reach` m.
+
+    Goedemé et al. 2007, section 8.4.1. In a simulated `place` as it stands on `day` they are rendered where a robot has
+    room and from where nothing between hides the target's spot, each with a heading drawn at random; people are not
+    there. In a recorded `log` with true poses the target is the picture taken closest to x and y of `target`, and the
+    views are all others within `reach`, as they were taken.
+    """
+
+    log: str | None = None
+    place: WorldConfig = DEMO
+    day: Annotated[int, Bounds(ge=0)] = 0
+    target: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    spacing: Annotated[float, Bounds(gt=0)] = 1.0
+    reach: Annotated[float, Bounds(gt=0)] = 8.0
+
+    class Out(Outputs):
+        """One tick a second; the first is the target's."""
+
+        tick: Tick
+        image: Image
+        camera: Camera
+        truth: Pose
+
+    def setup(self, ctx: Context) -> None:
+        """Build the world, or open the log, and choose the points."""
+        if self.log is None:
+            self._views: Views = RenderedViews(self.place, self.day, self.target, self.spacing, self.reach, ctx.rng)
+        else:
+            self._views = RecordedViews(open_recording(self.log), self.target, self.reach)
+
+    def inputs_digest(self) -> str | None:
+        """sha256 over the world and the code that simulates it, or over the log."""
+        known = simulation_digest(self.place) if self.log is None else open_recording(self.log).digest()
+        return digest_text("homing grid", known)
+
+    def length(self) -> int | None:
+        """Views in all."""
+        return len(self._views.poses)
+
+    def step(self, ctx: Context, placed: Placed) -> Out | None:
+        """The next view that can be read; None when there were enough."""
+        while placed.views < len(self._views.poses):
+            row = placed.views
+            placed.views += 1
+            pixels = self._views.image(row)
+            if pixels is not None:
+                return self.Out(
+                    tick=Tick(index=row, stamp=row * 10**9, frame=row, first_of_log=row == 0),
+                    image=Image(pixels),
+                    camera=self._views.camera,
+                    truth=Pose(*(float(number) for number in self._views.poses[row])),
+                )
+            ctx.count("undecodable_image")
+        return None
+
+
+class RenderedViews:
+    """Views of a simulated world."""
+
+    def __init__(
+        self,
+        config: WorldConfig,
+        day: int,
+        target: tuple[float, float, float],
+        spacing: float,
+        reach: float,
+        rng: np.random.Generator,
+    ) -> None:
+        world = World(config, day)
+        if not world.is_free([target[:2]], config.robot.radius)[0]:
+            raise UnreadableRecording(
+                f"target: no room for the robot at {target[0]:g}, {target[1]:g} of world '{config.name}'; choose "
+                "another place on the floor plan (nodes.source.target)"
+            )
+        points = grid_around(target, spacing, reach)
+        points = points[world.is_free(points, config.robot.radius)]
+        seen = [in_sight(world, target, (float(x), float(y))) for x, y in points]
+        points = points[np.array(seen, np.bool_)]
+        headings = rng.uniform(-math.pi, math.pi, len(points))
+        self.poses = np.concatenate([[target], np.column_stack([points, headings])])
+        self.camera = camera_of(config.camera)
+        self._config, self._scene = config, world.scene
+        self._rays = camera_rays(self.camera, config.sensor.vignetting, config.robot.radius)
+
+    def image(self, row: int) -> Pixels | None:
+        """Rendered now, with the camera's noise."""
+        sensor = self._config.sensor
+        height = self._config.camera.height
+        return render(self._scene, self._rays, self.poses[row], height, sensor.exposure, sensor.noise, key=row)
+
+
+class RecordedViews:
+    """Views of a log, around that which was taken closest to a point."""
+
+    def __init__(self, recording: Recording, target: tuple[float, float, float], reach: float) -> None:
+        if recording.truth is None or not np.isfinite(recording.truth).all(axis=1).any():
+            raise UnreadableRecording(f"{recording.name}: without true poses there is no target; use another log")
+        metres = np.hypot(*(recording.truth[:, :2] - target[:2]).T)
+        middle = int(np.nanargmin(metres))
+        metres = np.hypot(*(recording.truth[:, :2] - recording.truth[middle, :2]).T)
+        others = np.flatnonzero((metres <= reach) & (metres > 0.0))
+        self._rows = np.concatenate([[middle], others])
+        self.poses = recording.truth[self._rows]
+        self.camera, self._recording = recording.camera, recording
+
+    def image(self, row: int) -> Pixels | None:
+        """As it was taken."""
+        return self._recording.image(int(self._rows[row]))
+
+
+def grid_around(target: tuple[float, float, float], spacing: float, reach: float) -> Array:
+    """Points (N, 2) `spacing` m apart in x and y around a target, without itself, at most `reach` m away."""
+    steps = spacing * np.arange(-math.floor(reach / spacing), math.floor(reach / spacing) + 1)
+    y, x = np.meshgrid(steps, steps, indexing="ij")
+    metres = np.hypot(x, y).ravel()
+    near = (metres <= reach + 1e-9) & (metres > 0.0)
+    return np.column_stack([x.ravel()[near] + target[0], y.ravel()[near] + target[1]])
+
+
+def in_sight(world: World, one: tuple[float, ...], other: tuple[float, ...]) -> bool:
+    """Whether no body stands between two points at the height of the camera."""
+    height = world.config.camera.height
+    away = np.array([other[0] - one[0], other[1] - one[1], 0.0])
+    metres = float(np.linalg.norm(away))
+    hit = first_hits(world.boxes, world.config.height, (one[0], one[1], height), away[None] / metres)
+    return bool(hit[0] > metres)

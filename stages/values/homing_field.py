@@ -1,0 +1,28 @@
+"""Homing vectors from many points towards one target."""
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Value
+
+Array = npt.NDArray[np.float64]
+
+
+class HomingField(Value):
+    """Where views were taken, and where homing would go from each.
+
+    `target` (3,) and `poses` (N, 3): m, m, rad on the map. `directions` (N,): of the homing vectors on the map (rad);
+    `errors` (N,): how far (rad) they miss the target's direction. Both NaN where the target was not found. `inliers`
+    (N,): features that agree.
+    """
+
+    target: Array
+    poses: Array
+    directions: Array
+    errors: Array
+    inliers: npt.NDArray[np.int64]
+
+    @property
+    def metres(self) -> Array:
+        """How far away the target is: (N,)."""
+        return np.asarray(np.hypot(*(self.poses[:, :2] - self.target[:2]).T))

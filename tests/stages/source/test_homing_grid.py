@@ -1,0 +1,72 @@
+"""Views around a target, of a simulated world and of a log."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.stages.simulator.config import MirrorCamera
+from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.world import World
+from omninav.stages.source.homing_grid import HomingGrid, Placed, grid_around, in_sight
+from omninav.stages.source.recording import UnreadableRecording
+
+SMALL = MirrorCamera(
+    width=160, height_px=120, focal=124.25, centre=(79.5, 59.5), inner_radius_px=8.5, outer_radius_px=59.5
+)
+WORLD = replace(DEMO, camera=SMALL)
+START = WORLD.routes["drive"].waypoints[0]
+ANTWORLD = Path(__file__).resolve().parents[4] / "shared/data/antworld-rendered/grid_200mm"
+
+
+def ticks(source: HomingGrid, seed: int = 0) -> list[HomingGrid.Out]:
+    ctx, placed = Context("source", np.random.default_rng(seed)), Placed()
+    source.setup(ctx)
+    found = []
+    while (out := source.step(ctx, placed)) is not None:
+        found.append(out)
+    assert len(found) == source.length()
+    return found
+
+
+def test_a_grid_is_round_and_leaves_its_middle_out() -> None:
+    points = grid_around((3.0, 1.0, 0.0), 1.0, 2.0)
+    assert len(points) == 12  # of the 5 x 5 around it those within 2 m
+    assert np.hypot(*(points - (3.0, 1.0)).T).max() == 2.0
+    assert (points == (3.0, 1.0)).all(axis=1).sum() == 0
+
+
+def test_the_target_is_first_and_all_others_stand_in_free_places_that_it_is_seen_from() -> None:
+    found = ticks(HomingGrid(place=WORLD, target=(*START, 0.3), reach=3.0))
+    assert (found[0].truth.x, found[0].truth.y, found[0].truth.heading) == (*START, 0.3)
+    assert [out.tick.first_of_log for out in found] == [True] + [False] * (len(found) - 1)
+    world, spots = World(WORLD, 0), np.array([(out.truth.x, out.truth.y) for out in found])
+    assert len(found) > 5
+    assert world.is_free(spots, WORLD.robot.radius).all()
+    assert all(in_sight(world, START, tuple(spot)) for spot in spots[1:])
+    assert len({round(out.truth.heading, 6) for out in found}) == len(found)  # each looks another way
+    assert found[0].image.pixels.shape == (120, 160, 3)
+
+
+def test_the_same_seed_gives_the_same_views() -> None:
+    one, other, third = (ticks(HomingGrid(place=WORLD, target=(*START, 0.3), reach=1.0), seed) for seed in (0, 0, 1))
+    assert (one[1].image.pixels == other[1].image.pixels).all()
+    assert one[1].truth.heading != third[1].truth.heading
+
+
+def test_a_target_without_room_is_refused() -> None:
+    wall = (0.0, 0.0, 0.0)
+    with pytest.raises(UnreadableRecording, match="no room for the robot at 0, 0"):
+        HomingGrid(place=WORLD, target=wall).setup(Context("source", np.random.default_rng(0)))
+
+
+@pytest.mark.skipif(not ANTWORLD.exists(), reason="shared/data/antworld-rendered is not there")
+def test_of_a_log_the_target_is_the_picture_taken_closest() -> None:
+    source = HomingGrid(log=f"antworld:{ANTWORLD}", target=(5.9, 4.5, 0.0), reach=0.5)
+    found = ticks(source)
+    assert math.hypot(found[0].truth.x - 5.9, found[0].truth.y - 4.5) < 0.15
+    metres = [math.hypot(out.truth.x - found[0].truth.x, out.truth.y - found[0].truth.y) for out in found[1:]]
+    assert 0.0 < min(metres) <= max(metres) <= 0.5
