@@ -53,7 +53,7 @@ def _draw(field: HomingField, plan: FloorPlan | None) -> bytes:
         at, length = field.poses[found], _spacing(field.poses)
         way = 0.85 * length * np.stack([np.cos(field.directions), np.sin(field.directions)], axis=-1)[found]
         arrows = axes.quiver(*(at[:, :2] - way / 2).T, *way.T, np.clip(np.degrees(field.errors[found]), 0.0, 90.0),
-                             cmap="viridis_r", angles="xy", scale_units="xy", scale=1.0, width=0.004,
+                             cmap="viridis", angles="xy", scale_units="xy", scale=1.0, width=0.004,
                              clim=(0.0, 90.0), zorder=3)  # fmt: skip
         drawn.canvas.colorbar(arrows, ax=axes, label="error of the direction (degrees)", shrink=0.7)
         axes.plot(*field.poses[~found, :2].T, "x", color=ODOMETRY, markersize=4, zorder=3)
