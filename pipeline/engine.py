@@ -97,7 +97,8 @@ class Call:
             if instead is not None and values.get(instead) is not None:
                 value = values[instead]
             if value is None and not optional:
-                self.ctx.counts[self.skips] += 1
+                if self.node.lifetime != "before":  # there it is a choice, and nothing has been lost
+                    self.ctx.counts[self.skips] += 1
                 self.times.append(math.nan)
                 for _, origin in self.outputs:
                     values[origin] = None
