@@ -66,7 +66,7 @@ class FollowHoming(Stage):
     patience: Annotated[int, Bounds(ge=1)] = 10
     detour: Annotated[int, Bounds(ge=1)] = 50
     idle: Annotated[int, Bounds(ge=1)] = 150
-    restless: Annotated[int, Bounds(ge=1)] = 50
+    restless: Annotated[int, Bounds(ge=1)] = 25
 
     class Out(Outputs):
         command: Command

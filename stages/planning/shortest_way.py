@@ -13,6 +13,7 @@ from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.homing import DrivingStatus, ImagePath, PathProgress
 from omninav.stages.values.planned_way import PlannedWay
 from omninav.stages.values.topological_map import TopologicalMap
+from omninav.stages.values.visual_distance import VisualDistances
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -47,18 +48,20 @@ class ShortestWay(Stage):
 
     Goedemé et al. 2007, section 6 (Dijkstra's algorithm): the medoid of the place where the robot is believed to be,
     the path images of each link, and the medoids between them; the goal's medoid is where it stops. `goal`: a place's
-    number or name (of several of that name the nearest). `cost`: a link counts one (`links`, the paper's) or as many as
-    views have to be driven to (`views`).
+    number or name (of several of that name the nearest), or a picture: the place with the least visual distance to
+    it, which may be `alike` at most. `cost`: a link counts one (`links`, the paper's) or as many as views have to be
+    driven to (`views`).
 
     It plans once the robot is `sure` where it is, by the belief's share, for `calm` ticks, or has looked for `patience`
     ticks; and again where the robot has lost its target, or found its way blocked. Ways without the link on which that
     happened are then preferred, and one that has failed `again` times is closed. Where it is a place's own medoid
     that the robot did not come to, it is half as likely to be there, and the next way from there begins behind it.
     After `tries` ways, or where no way is left, it gives up: it says why, and gives an empty path, so that the robot
-    stands. Raises BadInput for a goal that the map does not have.
+    stands. Raises BadInput for a goal that the map does not have, and for a picture of no place in it.
     """
 
     goal: str | int | None = None
+    alike: Annotated[float, Bounds(gt=0)] = 0.5
     cost: Literal["links", "views"] = "links"
     sure: Annotated[float, Bounds(gt=0, le=1)] = 0.5
     calm: Annotated[int, Bounds(ge=0)] = 5
@@ -78,11 +81,16 @@ class ShortestWay(Stage):
         itinerary: Itinerary,
         belief: PlaceBelief,
         map: TopologicalMap,
+        picture: VisualDistances | None = None,
         status: DrivingStatus | None = None,
         progress: PathProgress | None = None,
     ) -> Out:
-        """Plan where there is reason to; `status` and `progress` are those of the tick before."""
-        goals = places_called(self.goal, map)
+        """Plan where there is reason to; `status` and `progress` are those of the tick before.
+
+        `picture`: how far the goal's picture is from each place, where the goal is one.
+        """
+        pictured = None if picture is None else place_pictured(self.goal, picture, self.alike, map)
+        goals = places_called(self.goal, map) if pictured is None else pictured
         if itinerary.ended or not self._must_plan(itinerary, belief, status, progress):
             return self.Out(way=_way(itinerary))
         if itinerary.number >= 0 and progress is not None and status is not None:
@@ -157,6 +165,21 @@ def places_called(goal: str | int | None, map: TopologicalMap) -> Ints:
     what = f"the map has no place '{text}'" if text else "no goal is named"
     example = names[0] if names else "0"
     raise BadInput(f"goal: {what}; type goal={example} or a number below {len(map)} ({known})")
+
+
+def place_pictured(goal: str | int | None, picture: VisualDistances, alike: float, map: TopologicalMap) -> Ints:
+    """The place that a picture is of, by its visual distances. Raises BadInput where the nearest is not `alike`."""
+    nearest = int(np.argmin(picture.distances))
+    apart = float(picture.distances[nearest])
+    if apart <= alike:
+        return np.array([nearest], np.int64)
+    name = f", {map.names[nearest]}" if map.names[nearest] else ""
+    so = f"the nearest is place {nearest}{name}, at a visual distance of {apart:.2f}, where {alike:g} is allowed"
+    if np.isinf(apart):
+        so = "it has too little in common with any"
+    raise BadInput(
+        f"goal: {goal} is of no place of the map: {so}; give a picture from closer to where the map was made"
+    )
 
 
 def shortest_way(

@@ -25,6 +25,22 @@ def test_a_robot_that_does_not_know_where_it_is_drives_to_a_place_and_docks_ther
     assert found["path_length_m"] < 2.0 * found["shortest_m"]
 
 
+def test_a_picture_taken_elsewhere_on_the_floor_is_a_goal(omninav, tmp_path: Path):
+    omninav("variant=wander", "nodes.source.start=[4.2,4.0,0.5]", "nodes.source.seconds=0.2", check=True)
+    (tmp_path / "runs" / "latest" / "picture.png").rename(tmp_path / "there.png")
+    omninav(*WORDS, "goal=there.png", "nodes.source.seconds=3", check=True)
+    found = metrics_of(tmp_path)["navigation"]
+    assert found["state"] == "under way"
+    assert found["goal"] == 12  # its medoid was taken 0.65 m from there
+
+
+def test_a_goal_that_is_no_file_is_refused_before_anything_runs(omninav, tmp_path: Path):
+    ended = omninav(*WORDS, "goal=elsewhere.png", "nodes.source.seconds=2")
+    assert ended.returncode != 0
+    assert "goal: there is no file elsewhere.png" in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
 @pytest.mark.parametrize("goal", ["kitchen", "99"])
 def test_a_goal_that_the_map_does_not_have_is_refused_in_one_line(omninav, tmp_path: Path, goal: str):
     ended = omninav(*WORDS, f"goal={goal}", "nodes.source.seconds=2")

@@ -6,10 +6,11 @@ from made_places import made_map
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.problems import BadInput
-from omninav.stages.planning.shortest_way import Itinerary, ShortestWay, places_called, shortest_way
+from omninav.stages.planning.shortest_way import Itinerary, ShortestWay, place_pictured, places_called, shortest_way
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.homing import DrivingStatus, PathProgress
 from omninav.stages.values.topological_map import TopologicalMap
+from omninav.stages.values.visual_distance import VisualDistances
 
 # 0 - 1 - 2 - 3 in a row, 3 and 0 are neighbours by a loop, 4 hangs on 2 (driven from 4 to 2), 5 is on its own
 BETWEEN = {(0, 1): 1, (1, 2): 0, (2, 3): 4, (4, 2): 2}
@@ -39,7 +40,7 @@ def drive(
     ctx.tick = Tick(index=0, stamp=0, log=0, frame=0, first_of_log=True)
     progress = None if at is None else under_way(itinerary, at, arrived)
     doing = None if status is None else DrivingStatus(status, "a chair" if status == "blocked" else "too few matches")
-    return stage.step(ctx, itinerary, believed(place, share), a_map(), doing, progress)
+    return stage.step(ctx, itinerary, believed(place, share), a_map(), None, doing, progress)
 
 
 def test_the_way_with_the_fewest_links_is_taken():
@@ -71,6 +72,24 @@ def test_a_way_driven_the_other_way_round_shows_its_pictures_backwards():
 def test_a_goal_that_is_not_on_the_map_is_refused_with_those_that_are(goal):
     with pytest.raises(BadInput, match=r"hall, kitchen"):
         places_called(goal, a_map())
+
+
+def distances(*values: float) -> VisualDistances:
+    return VisualDistances(np.array(values), np.zeros(len(values)), np.zeros(len(values), np.int64))
+
+
+def test_a_picture_is_of_the_place_that_looks_most_like_it():
+    stage = ShortestWay(goal="there.png", calm=0)
+    told = distances(0.4, np.inf, 0.2, 0.3, 0.5, np.inf)
+    out = stage.step(Context("planning"), Itinerary(), believed(0), a_map(), told)
+    assert out.way.places.tolist() == [0, 1, 2]
+
+
+def test_a_picture_of_no_place_is_refused_with_the_nearest():
+    with pytest.raises(BadInput, match=r"there\.png is of no place .* place 4, kitchen, at a visual distance of 0\.70"):
+        place_pictured("there.png", distances(0.9, np.inf, np.inf, np.inf, 0.7, np.inf), 0.5, a_map())
+    with pytest.raises(BadInput, match="too little in common with any"):
+        place_pictured("there.png", distances(*[np.inf] * 6), 0.5, a_map())
 
 
 def test_it_plans_once_it_is_sure_and_not_again():
@@ -155,7 +174,7 @@ def test_a_medoid_that_was_not_seen_makes_its_place_less_likely_and_the_way_from
     doubtful = PlaceBelief(np.array([0.1, 0.5, 0.3, 0.0, 0.1, 0.0]), np.zeros((6, 3)))
     itinerary.times = np.array([1, 1])
     found = stage.step(
-        Context("planning"), itinerary, doubtful, a_map(), DrivingStatus("lost"), under_way(itinerary, 0)
+        Context("planning"), itinerary, doubtful, a_map(), None, DrivingStatus("lost"), under_way(itinerary, 0)
     )
     assert found.way.places.tolist() == [2, 3]  # 0.3 against half of 0.5
 

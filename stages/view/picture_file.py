@@ -1,0 +1,39 @@
+"""A picture as the robot's camera took it, as a file: a goal to drive to, or something to look at."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import cv2
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline.files import write_whole
+from omninav.stages.values.image import Image
+
+
+class PictureAt(Stage):
+    """The picture of frame `frame` of each log."""
+
+    frame: Annotated[int, Bounds(ge=0)] = 0
+
+    class Out(Outputs):
+        """`image`: absent at all other frames."""
+
+        image: Image | None = None
+
+    def step(self, ctx: Context, tick: Tick, image: Image) -> Out:
+        """One frame."""
+        return self.Out(image=image if tick.frame == self.frame else None)
+
+
+class PictureFile(Stage):
+    """Writes the first of the pictures that it is given as `picture.png` into the run's folder, pixel by pixel."""
+
+    class Out(Outputs):
+        pass
+
+    def step(self, ctx: Context, images: Sequence[Image]) -> Out:
+        """Write it, if there is one."""
+        if images and ctx.folder is not None:
+            _, encoded = cv2.imencode(".png", images[0].pixels)
+            write_whole(ctx.folder / "picture.png", encoded.tobytes())
+        return self.Out()
