@@ -47,10 +47,11 @@ class HomingGrid(Source):
     Goedemé et al. 2007, section 8.4.1. In a simulated `place` as it stands on `day` they are rendered where a robot has
     room and from where nothing between hides the target's spot, each with a heading drawn at random; people are not
     there. In a recorded `log` with true poses the target is the picture taken closest to x and y of `target`, and the
-    views are all others within `reach`, as they were taken.
+    views are all others within `reach`, as they were taken; `camera`: a camera.yaml in place of its own.
     """
 
     log: str | None = None
+    camera: str | None = None
     place: WorldConfig = DEMO
     day: Annotated[int, Bounds(ge=0)] = 0
     target: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -70,11 +71,13 @@ class HomingGrid(Source):
         if self.log is None:
             self._views: Views = RenderedViews(self.place, self.day, self.target, self.spacing, self.reach, ctx.rng)
         else:
-            self._views = RecordedViews(open_recording(self.log), self.target, self.reach)
+            self._views = RecordedViews(open_recording(self.log, camera=self.camera), self.target, self.reach)
 
     def inputs_digest(self) -> str | None:
         """sha256 over the world and the code that simulates it, or over the log."""
-        known = simulation_digest(self.place) if self.log is None else open_recording(self.log).digest()
+        known = (
+            simulation_digest(self.place) if self.log is None else open_recording(self.log, camera=self.camera).digest()
+        )
         return digest_text("homing grid", known)
 
     def length(self) -> int | None:
