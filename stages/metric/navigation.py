@@ -23,8 +23,10 @@ class Navigation(Stage):
     `reached`: the robot said that it has arrived, within `within_m` of where the medoid of the way's last place was
     taken; `end_error_m`: how far from there it ended. `collisions`; `path_length_m`: driven; `shortest_m`: from where
     it began along the pictures of the map, the shortest way that it could have known; `time_s`: until it said that it
-    has arrived or given up, else all of it. `ways`: how many it planned; `state` and `why`: what it last said. Truth is
-    used to score alone.
+    has arrived or given up, else all of it. `ways`: how many it planned; `state` and `why`: what it last said.
+    `reached_rate` and `clean_rate` (without a collision): 1 or 0, for means over drives. Of drives that reached their
+    goal alone: `detour`, the way driven over the shortest; `pace`, seconds for a metre of the shortest;
+    `reached_error_m`, how far from the place it ended. Truth is used to score alone.
     """
 
     within_m: Annotated[float, Bounds(gt=0)] = 0.5
@@ -56,8 +58,11 @@ class Navigation(Stage):
         apart = math.inf
         if goal is not None:
             apart = math.dist(spots[-1], map.poses[map.places[goal]][:2])
+        reached = last.state == "arrived" and apart <= self.within_m
         found: dict[str, Any] = {
-            "reached": last.state == "arrived" and apart <= self.within_m,
+            "reached": reached,
+            "reached_rate": float(reached),
+            "clean_rate": float(reached and (tally is None or tally.collisions == 0)),
             "collisions": None if tally is None else tally.collisions,
             "end_error_m": apart if math.isfinite(apart) else None,
             "path_length_m": float(sum(math.dist(one, other) for one, other in pairwise(spots))),
@@ -68,6 +73,11 @@ class Navigation(Stage):
             "state": last.state,
             "why": last.why,
         }
+        if reached:
+            found["reached_error_m"] = apart
+            if found["shortest_m"]:
+                found["detour"] = found["path_length_m"] / found["shortest_m"]
+                found["pace"] = found["time_s"] / found["shortest_m"]
         return self.Out(metrics=Metrics({"navigation": found}))
 
 

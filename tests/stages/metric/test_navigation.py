@@ -32,6 +32,8 @@ def test_a_drive_along_the_map_has_its_length_and_ends_when_it_says_so():
     assert found["path_length_m"] == pytest.approx(7.2)
     assert found["shortest_m"] == pytest.approx(7.0)
     assert found["time_s"] == 2.0
+    assert (found["reached_rate"], found["clean_rate"]) == (1.0, 1.0)
+    assert (found["detour"], found["pace"]) == pytest.approx((7.2 / 7.0, 2.0 / 7.0))
     assert (found["goal"], found["ways"], found["collisions"]) == (2, 1, 0)
 
 
@@ -41,7 +43,18 @@ def test_a_drive_along_the_map_has_its_length_and_ends_when_it_says_so():
 def test_who_stands_elsewhere_or_does_not_know_that_it_is_there_has_not_reached_it(last, state):
     found = ended([(0.0, 0.0), last], ["under way", state])
     assert not found["reached"]
+    assert (found["reached_rate"], found["clean_rate"]) == (0.0, 0.0)
+    assert "detour" not in found
     assert found["why"] == ("tired" if state == "gave up" else "")
+
+
+def test_who_bumped_into_something_reached_it_but_not_cleanly():
+    found = ended([(0.0, 0.0), (3.0, 4.0)], ["under way", "arrived"], collisions=1)
+    assert (found["reached_rate"], found["clean_rate"]) == (1.0, 0.0)
+
+
+def test_the_time_of_a_drive_ends_when_it_gives_up():
+    assert ended([(0.0, 0.0)] * 4, ["under way", "gave up", "gave up", "gave up"])["time_s"] == 1.0
 
 
 def test_the_shortest_way_begins_at_the_closest_view():
