@@ -8,7 +8,7 @@ import platform
 import shutil
 import subprocess
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -33,13 +33,17 @@ log = logging.getLogger("omninav")
 
 @dataclass(frozen=True)
 class ArtifactPlan:
-    """Where an artifact comes from: a file, or a graph whose output `origin` is taken."""
+    """Where an artifact comes from: a file, or a graph whose output `origin` is taken.
+
+    `graph` is the part of the `whole` that this output depends on.
+    """
 
     name: str
     file: Path | None = None
     graph: Graph | None = None
     origin: str = ""
     variant: str = ""
+    whole: Graph | None = None
 
 
 @dataclass(frozen=True)
@@ -110,13 +114,18 @@ def plan(config: Mapping[str, Any]) -> Plan:
 def without_absent(config: Mapping[str, Any]) -> Mapping[str, Any]:
     """A configuration without its artifacts that are `optional` and not given, and without the wires from them.
 
-    A port that cannot do without its wire is then a problem like every missing wire.
+    One that comes `with` another is given wherever that one is made. A port that cannot do without its wire is then a
+    problem like every missing wire.
     """
     specs = config.get("artifacts") or {}
     absent = {
         f"{ARTIFACTS}.{name}"
         for name, spec in specs.items()
-        if isinstance(spec, Mapping) and spec.get("optional") and spec.get("file") is None and spec.get("log") is None
+        if isinstance(spec, Mapping)
+        and spec.get("optional")
+        and spec.get("file") is None
+        and spec.get("log") is None
+        and not _is_made(specs.get(spec.get("with")))
     }
     if not absent:
         return config
@@ -128,6 +137,10 @@ def without_absent(config: Mapping[str, Any]) -> Mapping[str, Any]:
         for node, ports in (config.get("wires") or {}).items()
     }
     return {**config, "artifacts": kept, "wires": wires}
+
+
+def _is_made(spec: Any) -> bool:
+    return isinstance(spec, Mapping) and spec.get("variant") is not None and spec.get("file") is None
 
 
 def _origin(wire: Any) -> Any:
@@ -165,7 +178,7 @@ def _plan_artifact(name: str, spec: Any) -> ArtifactPlan:
         raise ProblemsFound(
             [Problem(f"{where}.from", f"there is no output '{origin}'", suggest(origin, outputs, "outputs"))]
         )
-    return ArtifactPlan(name, graph=graph.leading_to([origin]), origin=origin, variant=str(spec.get("variant")))
+    return ArtifactPlan(name, None, graph.leading_to([origin]), origin, str(spec.get("variant")), graph)
 
 
 def stages_of(graph: Graph) -> dict[str, Any]:
@@ -282,7 +295,8 @@ def _execute(run: Run, planned: Plan, progress: Any) -> dict[str, Any]:
     artifacts: dict[str, Value] = {}
     made: dict[str, Any] = {}
     for artifact in planned.artifacts:
-        artifacts[artifact.name], made[artifact.name] = obtain(run, artifact, seed, cache, every_s, progress)
+        beside = _of_one_run(artifact, planned.artifacts)
+        artifacts[artifact.name], made[artifact.name] = obtain(run, artifact, seed, cache, every_s, progress, beside)
     run.manifest["artifacts"] = made
     run.save()
     identity = _identity(planned.graph, seed, *(fact["sha256"] for fact in made.values()))
@@ -312,10 +326,28 @@ def _execute(run: Run, planned: Plan, progress: Any) -> dict[str, Any]:
     return _finish(run, planned, engine, front)
 
 
+def _of_one_run(artifact: ArtifactPlan, artifacts: Sequence[ArtifactPlan]) -> list[ArtifactPlan]:
+    """The other artifacts that are outputs of the same graph: one run makes them all."""
+    if artifact.whole is None:
+        return []
+    same = artifact.whole.digest()
+    others = [other for other in artifacts if other is not artifact and other.whole is not None]
+    return [other for other in others if other.whole is not None and other.whole.digest() == same]
+
+
 def obtain(
-    run: Run, artifact: ArtifactPlan, seed: int, cache: Cache | None, every_s: float, progress: Any
+    run: Run,
+    artifact: ArtifactPlan,
+    seed: int,
+    cache: Cache | None,
+    every_s: float,
+    progress: Any,
+    beside: Sequence[ArtifactPlan] = (),
 ) -> tuple[Value, dict[str, Any]]:
-    """The artifact's value, from its file, the cache or its graph's run, with what the manifest says of it."""
+    """The artifact's value, from its file, the cache or its graph's run, with what the manifest says of it.
+
+    Where its graph has to run, what else that gives (`beside`) is put into the cache too.
+    """
     target = run.folder / f"{artifact.name}.omap"
     if artifact.file is not None:
         value = read_artifact(artifact.file)
@@ -325,15 +357,18 @@ def obtain(
     graph = artifact.graph
     assert graph is not None
     place = cache or Cache(run.memory / "artifacts")
-    key = digest_text("artifact", graph.digest(), artifact.origin, *digests_of(graph).values())
+    key = _key(artifact)
     with place.lock(key):
         found = next((path for k in (key, seeded(key, seed)) if (path := place.path(k, ".omap")).exists()), None)
         said = "found: the same graph over the same log had made it before"
         if found is None:
             said = "made: code, parameters or log are new to the cache"
-            value, header, drew = _make(run, artifact, graph, seed, cache, every_s, progress)
-            found = place.path(seeded(key, seed) if drew else key, ".omap")
-            write_artifact(found, value, header)
+            for each, value, header, drew in _make(run, [artifact, *beside], seed, cache, every_s, progress):
+                own = _key(each)
+                path = place.path(seeded(own, seed) if drew else own, ".omap")
+                write_artifact(path, value, header)
+                found = found or path  # the first is the one that is wanted
+        assert found is not None
     value = read_artifact(found)
     shutil.copyfile(found, target)
     facts = read_header(found)["facts"]
@@ -346,9 +381,18 @@ def obtain(
     }
 
 
+def _key(artifact: ArtifactPlan) -> str:
+    assert artifact.graph is not None
+    return digest_text("artifact", artifact.graph.digest(), artifact.origin, *digests_of(artifact.graph).values())
+
+
 def _make(
-    run: Run, artifact: ArtifactPlan, graph: Graph, seed: int, cache: Cache | None, every_s: float, progress: Any
-) -> tuple[Value, dict[str, Any], bool]:
+    run: Run, wanted: Sequence[ArtifactPlan], seed: int, cache: Cache | None, every_s: float, progress: Any
+) -> Iterator[tuple[ArtifactPlan, Value, dict[str, Any], bool]]:
+    """Run the graph of some artifacts; of each that it gave: value, header, and whether random numbers decided it."""
+    artifact, origins = wanted[0], [each.origin for each in wanted]
+    graph = artifact.graph if len(wanted) == 1 or artifact.whole is None else artifact.whole.leading_to(origins)
+    assert graph is not None
     memory = run.memory / artifact.name
     with cached_front(graph, cache, seed) as front:
         identity = _identity(graph, seed)
@@ -358,25 +402,28 @@ def _make(
             seed,
             None,
             memory,
-            [artifact.origin],
+            origins,
             identity,
             every_s,
             usable(front),
             _stepper(progress, artifact.variant),
         )
-        value = engine.run()[artifact.origin]
+        values = engine.run()
         keep_front(engine, front, cache, seed)
-    if not isinstance(value, Value):
+    if not isinstance(values[artifact.origin], Value):
         raise BadInput(
             f"'{artifact.variant}' ran to its end and gave no {artifact.name}: was there anything usable in its log?"
         )
-    drew = any(call.ctx.drew for call in engine.calls.values())
-    return value, _provenance(graph, engine, artifact.variant), drew
+    for each in wanted:
+        value = values[each.origin]
+        if isinstance(value, Value) and each.graph is not None:
+            drew = any(engine.calls[name].ctx.drew for name in each.graph.nodes)
+            yield each, value, _provenance(each.graph, engine, each.variant), drew
 
 
 def _provenance(graph: Graph, engine: Engine, variant: str) -> dict[str, Any]:
     """How an artifact was made, for its file's header: what was dropped and stated, the variant, and its stages."""
-    return {**notes_of(engine), "variant": variant, "stages": stages_of(graph)}
+    return {**notes_of(engine, graph.nodes), "variant": variant, "stages": stages_of(graph)}
 
 
 def usable(front: CachedFront | None) -> CachedFront | None:
@@ -393,11 +440,13 @@ def keep_front(engine: Engine, front: CachedFront | None, cache: Cache | None, s
         keep(front, cache, seed, spool.path, {name: engine.calls[name].ctx.notes() for name in names})
 
 
-def notes_of(engine: Engine) -> dict[str, Any]:
-    """What the stages counted and stated, as the manifest holds it."""
+def notes_of(engine: Engine, only: Container[str] | None = None) -> dict[str, Any]:
+    """What the stages, or only these, counted and stated, as the manifest holds it."""
     dropped: dict[str, Any] = {}
     facts: dict[str, Any] = {}
     for name, call in engine.calls.items():
+        if only is not None and name not in only:
+            continue
         for kind, number in call.ctx.counts.items():
             dropped[kind if "." in kind else f"{name}.{kind}"] = {
                 "count": number,
