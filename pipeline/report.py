@@ -60,6 +60,7 @@ def write_report(
             "caption": figure.caption,
             "media_type": figure.media_type,
             "base64": base64.b64encode(figure.content).decode(),
+            "per_second": figure.per_second if figure.media_type.startswith("video/") else None,
         }
         for figure in sorted(figures, key=lambda figure: (figure.order, figure.name))
     ]

@@ -15,9 +15,10 @@ class Metrics(Value):
 
 
 class Figure(Value):
-    """A picture for the report. `content`: PNG or SVG bytes; `caption`: what it shows and what to look for.
+    """A picture for the report. `content`: PNG, JPEG or SVG bytes; `caption`: what it shows and what to look for.
 
-    `name` is its file name without suffix; pictures are shown in the order of `order`, then of their names.
+    `name` is its file name without suffix; pictures are shown in the order of `order`, then of their names. A film is
+    one too (`media_type` video/mp4): `per_second`, its frames in a second, lets the reader step through it.
     """
 
     name: str
@@ -26,6 +27,7 @@ class Figure(Value):
     content: bytes
     media_type: str = "image/png"
     order: int = 50
+    per_second: float | None = None
 
 
 class Table(Value):

@@ -1,15 +1,17 @@
-"""Small pictures of a map's references, for people: the map itself holds none."""
+"""Small pictures of a map's references or views, for people: the map itself holds none."""
 
 from collections.abc import Sequence
 from typing import Annotated
 
-import cv2
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Value
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick, Value
+from omninav.stages.geometry.small_picture import small_picture
 from omninav.stages.values.album import Album
-from omninav.stages.values.image import Panorama, Pixels, Windows
+from omninav.stages.values.camera import Camera
+from omninav.stages.values.image import Image, Panorama, Windows
 from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.topological_map import TopologicalMap
 
 
 class ReferencePictures(Value):
@@ -45,15 +47,8 @@ class ReferenceSnapshot(Stage):
         seen = list(panorama.pixels) if isinstance(panorama, Windows) else [panorama.pixels]
         new = len(map) - album.references
         album.references = len(map)
-        return self.Out(pictures=ReferencePictures(tuple(self._small(pixels) for pixels in seen[:new])))
-
-    def _small(self, pixels: Pixels) -> bytes:
-        small: cv2.typing.MatLike = pixels
-        if pixels.shape[1] > self.columns:
-            size = (self.columns, max(1, round(pixels.shape[0] * self.columns / pixels.shape[1])))
-            small = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
-        _, jpeg = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, self.quality])
-        return jpeg.tobytes()
+        jpegs = (small_picture(pixels, None, self.columns).jpeg(self.quality) for pixels in seen[:new])
+        return self.Out(pictures=ReferencePictures(tuple(jpegs)))
 
 
 class CollectAlbum(Stage):
@@ -66,6 +61,53 @@ class CollectAlbum(Stage):
 
     def step(self, ctx: Context, pictures: Sequence[ReferencePictures]) -> Out:
         """The whole tour at once."""
-        jpegs = [jpeg for some in pictures for jpeg in some.jpegs]
-        ends = np.cumsum([0, *(len(jpeg) for jpeg in jpegs)], dtype=np.int64)
-        return self.Out(album=Album(np.frombuffer(b"".join(jpegs), np.uint8), ends))
+        return self.Out(album=bound([jpeg for some in pictures for jpeg in some.jpegs]))
+
+
+class TourSnapshot(Stage):
+    """Encodes every picture of a tour: JPEG, at most `columns` wide; of a mirror's or a lens's picture the disc.
+
+    Which of them a map keeps is only known at its end.
+    """
+
+    columns: Annotated[int, Bounds(ge=16)] = 240
+    quality: Annotated[int, Bounds(ge=1, le=100)] = 75
+
+    class Out(Outputs):
+        """One picture."""
+
+        pictures: ReferencePictures
+
+    def step(self, ctx: Context, picture: Image | Panorama, camera: Camera | None = None) -> Out:
+        """One tick."""
+        jpeg = small_picture(picture.pixels, camera, self.columns).jpeg(self.quality)
+        return self.Out(pictures=ReferencePictures((jpeg,)))
+
+
+class ViewAlbum(Stage):
+    """Binds the pictures of a topological map's views into an album; those of a `known` map's views are not known."""
+
+    class Out(Outputs):
+        """A picture per view of the map."""
+
+        album: Album
+
+    def step(
+        self,
+        ctx: Context,
+        ticks: Sequence[Tick],
+        pictures: Sequence[ReferencePictures | None],
+        map: TopologicalMap,
+        known: TopologicalMap | None = None,
+    ) -> Out:
+        """The whole tour at once; `ticks` are counted on from the known map's frames."""
+        first = 0 if known is None or not len(known.frames) else 1 + int(known.frames.max())
+        rows = (map.frames - first).tolist()
+        found = [pictures[row] if row >= 0 else None for row in rows]
+        return self.Out(album=bound([b"" if some is None else some.jpegs[0] for some in found]))
+
+
+def bound(jpegs: Sequence[bytes]) -> Album:
+    """Pictures as an album; an empty one stands for a picture that is not known."""
+    ends = np.cumsum([0, *(len(jpeg) for jpeg in jpegs)], dtype=np.int64)
+    return Album(np.frombuffer(b"".join(jpegs), np.uint8), ends)

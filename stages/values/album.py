@@ -14,7 +14,8 @@ from .image import Pixels
 class Album(Value):
     """A small picture of each reference of a map, in the map's order, for people to look at.
 
-    `jpegs`: their JPEG bytes one after the other; picture n lies from `ends[n]` to `ends[n + 1]`.
+    `jpegs`: their JPEG bytes one after the other; picture n lies from `ends[n]` to `ends[n + 1]`, nowhere where it is
+    not known.
     """
 
     jpegs: npt.NDArray[np.uint8]

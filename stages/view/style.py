@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Picture",
+    "broken_at_jumps",
     "draw_gaussians",
     "draw_grid",
     "draw_map",
@@ -155,6 +156,12 @@ def extent_of(*points: Array, margin: float = 0.06) -> tuple[float, float, float
     low, high = together.min(axis=0), together.max(axis=0)
     pad = margin * float((high - low).max()) + 0.25
     return float(low[0] - pad), float(high[0] + pad), float(low[1] - pad), float(high[1] + pad)
+
+
+def broken_at_jumps(path: Array, metres: float = 1.0) -> Array:
+    """A path (N, 2 or more) as x and y, with a row of NaN wherever it jumps farther: nobody drove there."""
+    jumps = np.flatnonzero(np.hypot(*np.diff(path[:, :2], axis=0).T) > metres) + 1
+    return np.insert(path[:, :2], jumps, np.nan, axis=0)
 
 
 def fitting_height(extent: tuple[float, float, float, float] | None, width: float, low: float, high: float) -> float:

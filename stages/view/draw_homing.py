@@ -1,0 +1,114 @@
+"""How what homing tells is drawn into pictures: features by what became of them, and the vector over the floor."""
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.values.homing import HomingVector
+from omninav.stages.values.image import Pixels
+
+from .homing_snapshot import HomingGlance, Points
+
+Colour = tuple[int, int, int]
+LOST, TRACKED, AGAIN, MATCHED = range(4)
+NAMES = {TRACKED: "tracked", AGAIN: "found again", MATCHED: "matched anew", LOST: "lost"}
+"""Kinds of features, in the order of legends."""
+BRIGHT: dict[int, Colour] = {
+    LOST: (0, 94, 255),
+    TRACKED: (255, 200, 60),
+    AGAIN: (60, 235, 250),
+    MATCHED: (110, 235, 90),
+}
+"""Blue-green-red, of Okabe & Ito's hues, brighter: they are drawn over photographs."""
+UNUSED: Colour = (225, 225, 225)
+VECTOR: Colour = (0, 159, 255)
+DARK: Colour = (25, 25, 25)
+FINE = 4
+"""Bits of a pixel's fraction that OpenCV draws with."""
+
+
+def hexadecimal(colour: Colour) -> str:
+    """A colour as matplotlib takes it."""
+    blue, green, red = colour
+    return f"#{red:02x}{green:02x}{blue:02x}"
+
+
+def is_known(vector: HomingVector) -> bool:
+    """Whether a homing vector says anything: of a target that was never found it does not."""
+    return vector.state != "lost" or vector.metres is not None or vector.direction != 0.0
+
+
+def robots_view(pixels: Pixels, glance: HomingGlance) -> Pixels:
+    """The robot's picture with the features that it follows, and where it wants to go. As large as `pixels`."""
+    drawn, scale = pixels.copy(), pixels.shape[1] / glance.size[0]
+    _features(drawn, glance.points * scale, glance.kinds)
+    way = glance.way[np.isfinite(glance.way).all(axis=1)] * scale
+    if glance.vector is not None and len(way) > 1 and is_known(glance.vector):
+        lost = glance.vector.state == "lost"
+        colour = BRIGHT[LOST] if lost else VECTOR
+        for shade, thick in ((DARK, 6), (colour, 3)):
+            polyline(drawn, way, shade, thick)
+            arrow_head(drawn, way[-1], way[-1] - way[max(0, len(way) - 4)], shade, 11.0 if thick == 3 else 14.0)
+    return drawn
+
+
+def targets_view(pixels: Pixels | None, glance: HomingGlance, size: tuple[int, int]) -> Pixels:
+    """The view that it goes to, with the same features in the same colours; the others light. Without its picture grey.
+
+    `size`: columns and rows.
+    """
+    columns, rows = size
+    drawn = np.full((rows, columns, 3), 90, np.uint8)
+    if pixels is not None:
+        drawn = np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), np.uint8)
+    scale = columns / glance.size[0]
+    unused = glance.target_kinds < 0
+    for x, y in _finite(glance.target_points[unused]) * scale:
+        disc(drawn, (x, y), 1.5, UNUSED)
+    _features(drawn, glance.target_points[~unused] * scale, glance.target_kinds[~unused])
+    return drawn
+
+
+def _features(drawn: Pixels, points: Points, kinds: npt.NDArray[np.int8]) -> None:
+    for kind in (LOST, MATCHED, AGAIN, TRACKED):
+        for x, y in _finite(points[kinds == kind]):
+            if kind == LOST:
+                for one, other in (((-3, -3), (3, 3)), ((-3, 3), (3, -3))):
+                    line = np.array([(x + one[0], y + one[1]), (x + other[0], y + other[1])])
+                    polyline(drawn, line, BRIGHT[kind], 1)
+            else:
+                disc(drawn, (x, y), 4.0, DARK)
+                disc(drawn, (x, y), 3.0, BRIGHT[kind])
+
+
+def _finite(points: Points) -> Points:
+    kept: Points = points[np.isfinite(points).all(axis=1)]
+    return kept
+
+
+def fixed(points: npt.ArrayLike) -> npt.NDArray[np.int32]:
+    """Points in OpenCV's fixed-point pixels."""
+    whole: npt.NDArray[np.int32] = np.round(np.asarray(points, np.float64) * 2**FINE).astype(np.int32)
+    return whole
+
+
+def polyline(drawn: Pixels, points: npt.ArrayLike, colour: Colour, thickness: int) -> None:
+    """A smooth line through points (N, 2)."""
+    cv2.polylines(drawn, [fixed(points).reshape(-1, 1, 2)], False, colour, thickness, cv2.LINE_AA, FINE)
+
+
+def disc(drawn: Pixels, centre: tuple[float, float], radius: float, colour: Colour, thickness: int = -1) -> None:
+    """A smooth disc, or a ring."""
+    x, y = fixed(centre).tolist()
+    cv2.circle(drawn, (x, y), round(radius * 2**FINE), colour, thickness, cv2.LINE_AA, FINE)
+
+
+def arrow_head(drawn: Pixels, tip: Points, along: Points, colour: Colour, size: float) -> None:
+    """A triangle that points along a direction."""
+    length = float(np.hypot(*along))
+    if length == 0.0:
+        return
+    ahead = np.asarray(along, np.float64) / length * size
+    side = np.array([-ahead[1], ahead[0]]) * 0.55
+    corners = [tip + 0.4 * ahead, tip - 0.6 * ahead + side, tip - 0.6 * ahead - side]
+    cv2.fillPoly(drawn, [fixed(corners)], colour, cv2.LINE_AA, FINE)
