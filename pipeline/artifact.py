@@ -22,7 +22,12 @@ _HEADER, _REST, _SUM = "header.json", "rest.npy", "sha256:"
 
 
 def write_artifact(path: Path, value: Value, facts: dict[str, Any] | None = None) -> None:
-    """Write a value as one file: an uncompressed zip of `.npy` arrays with a JSON header, its sha256 as comment.
+    """Write a value as one file, as `artifact_bytes` gives it."""
+    write_whole(path, artifact_bytes(value, facts))
+
+
+def artifact_bytes(value: Value, facts: dict[str, Any] | None = None) -> bytes:
+    """A value as the content of a file: a deflated zip of `.npy` arrays with a JSON header, its sha256 as comment.
 
     `numpy.load` opens it. The header names the value's type, each field's array with its own sha256, and `facts`
     about how it was made. Top-level array fields are arrays of the file; everything else is encoded in one more.
@@ -38,14 +43,16 @@ def write_artifact(path: Path, value: Value, facts: dict[str, Any] | None = None
         "arrays": {name: hashlib.sha256(np.ascontiguousarray(a).tobytes()).hexdigest() for name, a in arrays.items()},
     }
     buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
+    with zipfile.ZipFile(buffer, "w") as archive:
         archive.writestr(zipfile.ZipInfo(_HEADER), json.dumps(header, indent=1, sort_keys=True))
         for name, content in sorted(arrays.items()):
-            with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w") as file:
+            entry = zipfile.ZipInfo(f"{name}.npy")
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            with archive.open(entry, "w") as file:
                 np.lib.format.write_array(file, np.ascontiguousarray(content), allow_pickle=False)
         archive.comment = b" " * (len(_SUM) + 64)
     whole = buffer.getvalue()[: -len(archive.comment)]
-    write_whole(path, whole + _SUM.encode() + hashlib.sha256(whole).hexdigest().encode())
+    return whole + _SUM.encode() + hashlib.sha256(whole).hexdigest().encode()
 
 
 def read_header(path: Path) -> dict[str, Any]:

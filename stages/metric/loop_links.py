@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.codec import encode
+from omninav.pipeline.artifact import artifact_bytes
 from omninav.pipeline.results import Metrics
 from omninav.stages.geometry.dempster_shafer import support
 from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
@@ -21,7 +21,8 @@ class LoopLinks(Stage):
     other. Precision is the share of accepted ones that are right, recall the share of right ones that are accepted;
     None where there are none, or where the map's poses are not truth. `far_in_drive` leaves out those whose views are
     less than `apart` pictures apart; `at_supports` is what these would be with other thresholds of support. `step_m`:
-    how far apart neighbouring path images were taken.
+    how far apart neighbouring path images were taken. `size_bytes`: of the map's file, but for what it says of
+    its making.
     """
 
     near_m: Annotated[float, Bounds(gt=0)] = 2.5
@@ -34,7 +35,7 @@ class LoopLinks(Stage):
 
     def step(self, ctx: Context, hypotheses: LoopHypotheses, map: TopologicalMap) -> Out:
         """The map and what it was made of."""
-        size = len(encode(map))
+        size = len(artifact_bytes(map))
         held: dict[str, Any] = {
             "size_bytes": size,
             "places": len(map),

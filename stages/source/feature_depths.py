@@ -8,11 +8,12 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.epipolar import turn_about_vertical
 from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.demo import DEMO
-from omninav.stages.simulator.depth import first_hits
 from omninav.stages.simulator.world import World
 from omninav.stages.values.depths import Depths
 from omninav.stages.values.local_features import ColumnSegments, LocalFeatures
 from omninav.stages.values.pose import Pose
+
+from .first_hits import first_hits
 
 
 class FeatureDepths(Stage):

@@ -1,12 +1,14 @@
 """The making of a topological map, drawn and measured."""
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
 from made_tour import Landmarks, along, mapped, scattered
 
 from omninav.pipeline import Context
-from omninav.pipeline.codec import encode
+from omninav.pipeline.artifact import write_artifact
 from omninav.stages.mapping.topological import TopologicalMapping
 from omninav.stages.metric.loop_links import LoopLinks, at_supports, counted, hypothesis_gaps, path_steps
 from omninav.stages.view.loop_hypotheses import ShowLoopHypotheses
@@ -46,9 +48,12 @@ def test_what_another_threshold_of_support_would_accept_is_told() -> None:
     assert found["precision"][at[0.95]] is None
 
 
-def test_a_map_is_as_large_as_its_file_and_its_steps_are_those_of_its_ways(made: TopologicalMapping.Out) -> None:
+def test_a_map_is_as_large_as_its_file_and_its_steps_are_those_of_its_ways(
+    made: TopologicalMapping.Out, tmp_path: Path
+) -> None:
+    write_artifact(tmp_path / "map.omap", made.map)
     values = LoopLinks().step(CTX, made.hypotheses, made.map).metrics.values
-    assert values["map"]["size_bytes"] == len(encode(made.map))
+    assert values["map"]["size_bytes"] == (tmp_path / "map.omap").stat().st_size
     assert values["map"]["places"] == len(made.map)
     assert values["loops"]["hypotheses"] == len(hypothesis_gaps(made.hypotheses))
     one, other = made.map.links[0]

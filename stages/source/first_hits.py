@@ -7,7 +7,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from .bodies import Box, box_array
+from omninav.stages.simulator.bodies import Box, box_array
 
 F64 = npt.NDArray[np.float64]
 
