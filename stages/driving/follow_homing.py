@@ -22,7 +22,8 @@ class Patience(State):
     """For how many ticks in a row the target has been lost, and for how many there has been no way through.
 
     `target`: the one it goes to; `closest`: the least ratio of the way to it that was left; ticks since then in all
-    (`since`), and those in which something stood in the straight way (`around`). `side`: see `wandering`.
+    (`since`), those in which something stood in the straight way (`around`), and those for which it has stood because
+    of that (`stood`). `side`: see `wandering`.
     """
 
     lost: int = 0
@@ -31,6 +32,7 @@ class Patience(State):
     closest: float = math.inf
     since: int = 0
     around: int = 0
+    stood: int = 0
     side: int = 0
 
 
@@ -47,10 +49,11 @@ class FollowHoming(Stage):
     of the margin, at half the speed. Less than `stop_at` m free straight ahead, or than what is left of the way, stop
     it. Where no direction is free for `patience` ticks it stands and is `blocked`; so it is where it has gone around
     something for `detour` ticks, or about for `idle` ticks, and came no closer to the target (by a tenth of what was
-    left): what stands in the way may be a closed door. A lost target: it goes on to where it was believed for
+    left): what stands in the way may be a closed door. If nobody gives it another target it tries again after `detour`
+    ticks. A lost target: it goes on to where it was believed for
     `patience` ticks, and only where metres are known; then it stands and is `lost`. Both say why on `status`, for
     whoever re-localises and plans anew. Nothing may be known where it stands: lost for `restless` ticks in a row, it
-    wanders until it sees where to go.
+    wanders until it sees where to go; null: it stands.
     """
 
     speed: Annotated[float, Bounds(gt=0)] = 0.4
@@ -66,7 +69,7 @@ class FollowHoming(Stage):
     patience: Annotated[int, Bounds(ge=1)] = 10
     detour: Annotated[int, Bounds(ge=1)] = 50
     idle: Annotated[int, Bounds(ge=1)] = 150
-    restless: Annotated[int, Bounds(ge=1)] = 25
+    restless: Annotated[int, Bounds(ge=1)] | None = None
 
     class Out(Outputs):
         command: Command
@@ -87,7 +90,7 @@ class FollowHoming(Stage):
             return self._stand("waiting", "there is no target")
         patience.lost = patience.lost + 1 if vector.state == "lost" else 0
         if vector.state == "lost" and (patience.lost > self.patience or vector.metres is None):
-            if scan is not None and patience.lost > self.restless:
+            if scan is not None and self.restless is not None and patience.lost > self.restless:
                 ctx.count("wandered_lost")
                 return self._wander(patience, scan, vector.why)
             ctx.count("stood_lost")
@@ -129,12 +132,15 @@ class FollowHoming(Stage):
         """Why it will not come closer to the target than it has been, "" as long as it may."""
         if vector.number != patience.target:
             patience.target, patience.closest = vector.number, math.inf
+        if patience.stood >= self.detour:
+            patience.closest = math.inf
         if vector.ratio < 0.9 * patience.closest:
-            patience.closest, patience.since, patience.around = vector.ratio, 0, 0
+            patience.closest, patience.since, patience.around, patience.stood = vector.ratio, 0, 0, 0
         elif vector.state != "lost":
             left = self.room if vector.metres is None else min(self.room, vector.metres)
             in_the_way = free_ahead(ranges, around - vector.direction, self.radius, 0.2 * self.margin) < left
             patience.since, patience.around = patience.since + 1, patience.around + in_the_way
+        patience.stood += patience.around > self.detour or patience.since > self.idle
         if patience.around > self.detour:
             return f"something stands in the way, and going around it for {self.detour} ticks led no closer"
         return f"{self.idle} ticks have led no closer" if patience.since > self.idle else ""

@@ -110,6 +110,13 @@ def test_who_comes_closer_on_the_way_around_is_not_blocked() -> None:
     assert {out.status.state for out in said} == {"driving"}
 
 
+def test_if_nothing_else_is_planned_it_tries_again_after_a_while() -> None:
+    patience, wall = Patience(), scan((-50.0, 50.0, 0.5))
+    said = [drive(vector(0.0, metres=1.0), progress(), wall, patience, detour=20) for _ in range(80)]
+    states = [out.status.state for out in said]
+    assert states == ["driving"] * 21 + ["blocked"] * 20 + ["driving"] * 21 + ["blocked"] * 18
+
+
 def test_neither_may_it_turn_and_turn_in_the_open_for_ever() -> None:
     patience = Patience()
     said = [drive(vector(3.0), progress(), scan(), patience, idle=30) for _ in range(33)]
@@ -125,6 +132,8 @@ def test_who_is_lost_for_long_wanders_until_the_target_is_seen() -> None:
     assert said[-1].command.turning > 0.0  # away from what stands ahead, a little to the right
     assert (said[-1].status.state, said[-1].status.why) == ("lost", "it looks about: 2 of 9 matches agree")
     assert drive(vector(), progress(), scan(), patience).status.state == "driving"
+    patient = [drive(lost, progress(), scan(), patience) for _ in range(60)]
+    assert {(out.command.speed, out.command.turning) for out in patient} == {(0.0, 0.0)}
     blind = [drive(lost, progress(), None, patience, restless=5) for _ in range(7)]
     assert blind[-1].command.turning == 0.0
 
