@@ -31,7 +31,7 @@ def wait_for_checkpoint(process: subprocess.Popen[bytes], place: Path) -> None:
 
 def finished(place: Path, *words: str) -> Path:
     """The folder of a run that was left to end."""
-    assert start(place, *words).wait(timeout=300) == 0
+    assert start(place, *words).wait(timeout=900) == 0
     return place / "runs" / "latest"
 
 
