@@ -46,6 +46,7 @@ def made_map(
         way_starts=np.cumsum([0, *(len(way) for way in ways)]),
         ways=np.array([view for way in ways for view in way], np.int64),
         frames=np.arange(len(owner)) * 10,
+        orders=np.arange(len(owner)),
         poses=poses,
         pose_source="truth",
         spread=1.0,

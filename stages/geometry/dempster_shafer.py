@@ -60,6 +60,11 @@ def plausibility(mass: Array) -> Array:
     return whole
 
 
+def unknown(mass: Array) -> Array:
+    """How much says nothing: m(H or not H), the ignorance."""
+    return mass[..., 2]
+
+
 def similarity_of(distance: npt.ArrayLike, spread: float, form: str = "ratio") -> Array:
     """A visual distance as a similarity in [0, 1], which may be a mass (erratum 28).
 

@@ -1,5 +1,6 @@
 """Places along a drive, by visual distance alone: clusters, their parts along the drive, and what stands for them."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -94,17 +95,19 @@ def between_hypotheses(medoids: Ints, frames: Ints) -> Array:
     return either
 
 
-def path_images(matches: Array, way: Ints, least: int, most: int) -> Ints:
+def path_images(matches: Callable[[int, int], int], way: Ints, least: int, most: int) -> Ints:
     """As few of the views of a way as lead along it: each has `least` matches with the one before, where that can be.
 
-    `way`: views in the order of the drive; the first and the last are given and are not part of the answer. No two are
-    more than `most` views apart, however alike they look: along a wall that repeats itself that says nothing.
+    `matches`: of one view with another one further along. `way`: views in the order of the drive; the first and the
+    last are given and are not part of the answer. No two are more than `most` views apart, however alike they look:
+    along a wall that repeats itself that says nothing.
     """
+    views = way.tolist()
     chosen: list[int] = []
     at = 0
-    while at < len(way) - 1:
-        near = np.flatnonzero(matches[way[at], way[at + 1 : at + 1 + most]] >= least)
-        at = at + 1 + (int(near[-1]) if len(near) else 0)
-        if at < len(way) - 1:
-            chosen.append(int(way[at]))
+    while at < len(views) - 1:
+        ahead = range(min(at + most, len(views) - 1), at, -1)
+        at = next((view for view in ahead if matches(views[at], views[view]) >= least), at + 1)
+        if at < len(views) - 1:
+            chosen.append(views[at])
     return np.array(chosen, np.int64)

@@ -114,8 +114,12 @@ def local_distance(angles: Array, first: int, second: int, by: Measure) -> tuple
     return features / number * apart / (2.0 * math.pi), turn
 
 
-def compare(one: Ready, other: Ready, matching: Matching, measure: Measure) -> Compared:
-    """Two views by their local features, of whichever kinds both have."""
+def compare(one: Ready, other: Ready, matching: Matching, measure: Measure, part: bool = False) -> Compared:
+    """Two views by their local features, of whichever kinds both have.
+
+    `part`: of the first view only a part is known, what a map keeps of it. The second is then counted as if it had
+    as many features: what of that part is seen again is what can be asked.
+    """
     angles, first, second = [np.empty(0)], 0, 0
     if one.patches is not None and other.patches is not None:
         pairs = _matched(one, other, matching)
@@ -126,6 +130,7 @@ def compare(one: Ready, other: Ready, matching: Matching, measure: Measure) -> C
         angles.append(other.columns.azimuths[pairs.second] - one.columns.azimuths[pairs.first])
         first, second = first + len(one.columns), second + len(other.columns)
     apart = np.concatenate(angles)
+    second = first if part else second
     distance, turn = local_distance(apart, first, second, measure)
     # what is seen further left stands in a view that was turned to the right
     return Compared(distance, -turn, len(apart), (first + second) / 2.0)

@@ -33,46 +33,62 @@ Bools = npt.NDArray[np.bool_]
 
 
 class View(NamedTuple):
-    """A picture of a tour, or one that a known map keeps (`owner`: its place there)."""
+    """A picture of a tour, or one that a known map keeps (`owner`: its place there).
+
+    `frame`: its number among all pictures; `order`: among those that take part, with a gap from tour to tour.
+    """
 
     features: LocalFeatures
     columns: ColumnSegments | None
     moments: GlobalMoments
     pose: tuple[float, float, float]
     frame: int
+    order: int
     tour: int
     owner: int = -1
 
 
+class Kept(NamedTuple):
+    """What a map keeps of a view."""
+
+    features: LocalFeatures
+    columns: ColumnSegments
+
+
 class AllCompared(NamedTuple):
-    """Every two of N views compared, each (N, N): visual `distances`, `matches`, and their `shares` of all features."""
+    """Every two of N views compared, each (N, N): visual `distances`, and the `shares` of features that match."""
 
     distances: Array
-    matches: Array
     shares: Array
 
 
 def compare_all(
-    ctx: Context, views: Sequence[Ready], moments: Array, colour: float, matching: Matching, measure: Measure
+    ctx: Context,
+    views: Sequence[Ready],
+    known: int,
+    moments: Array,
+    colour: float,
+    matching: Matching,
+    measure: Measure,
 ) -> AllCompared:
     """Combined visual distances of views: inf where their colours lie further apart than `colour`.
 
-    Goedeme et al. 2007, section 4.2.3: local features are only compared where global ones leave it open.
+    Goedeme et al. 2007, section 4.2.3: local features are only compared where global ones leave it open. The first
+    `known` of them are what a map keeps of its views.
     """
     number = len(views)
     distances = np.full((number, number), math.inf)
-    matches, shares = np.zeros((2, number, number))
+    shares = np.zeros((number, number))
     near = colours_apart(moments[:, None], moments[None]) <= colour
     for one in range(number):
         ctx.progress(one, number)
         distances[one, one], shares[one, one] = 0.0, 1.0
         for other in range(one + 1, number):
             if near[one, other]:
-                found = compare(views[one], views[other], matching, measure)
+                found = compare(views[one], views[other], matching, measure, part=one < known <= other)
                 distances[one, other] = distances[other, one] = found.distance
-                matches[one, other] = matches[other, one] = found.matches
                 shares[one, other] = shares[other, one] = found.matches / max(found.of, 1.0)
-    return AllCompared(distances, matches, shares)
+    return AllCompared(distances, shares)
 
 
 class TopologicalMapping(Stage):
@@ -82,8 +98,9 @@ class TopologicalMapping(Stage):
     distance (equations 3 and 4, erratum 27) is at most `place_size` all among each other make a cluster; its parts
     along the drive are subclusters, each two of one cluster a hypothesis: they are one place. It starts with the visual
     similarity (`similarity`, erratum 28; scaled by the root mean square distance within subclusters) of the two views
-    that stand for them, and an `ignorance`; neighbours within `reach` pictures of the drive add evidence in one pass
-    (erratum 31). It is accepted where its support exceeds `support`, and its subclusters become one place; with
+    that stand for them, and an `ignorance`; neighbours within `reach` pictures of the drive, of those that take part,
+    add evidence in one pass (erratum 31). It is accepted where its support exceeds `support` and some neighbour has
+    spoken: of an isolated one nothing can be decided (section 4.4.3). Its subclusters become one place; with
     `accepted: link` they stay two, joined by a link.
 
     The views that stand for two subclusters are those that look most alike; `between: medoids` takes the paper's
@@ -91,13 +108,13 @@ class TopologicalMapping(Stage):
     features match they do not look alike: a wall that repeats itself matches exactly, so that its angles say nothing,
     but only on one side of the robot.
 
-    On the way from place to place path images are kept, each with at least `path_matches` matches with the one before,
-    as homing needs them, and at most `path_pictures` pictures of the drive after it. Of each view the
-    `patches` are kept that were found again in most of the pictures around it, and the `columns` heaviest. A map grows
-    where `known` is wired: its views take part, its places stay together. Places are called after `rooms`, where these
-    are wired and poses are truth: what an owner would tell the robot. Poses are kept for scoring and drawing only:
-    the tour's truth, without it (`supervised: auto`) its odometry. Raises BadInput where `supervised: truth` finds
-    none, where no picture shows anything, or where known and new poses are not of one source.
+    Of each view the `patches` are kept that were found again in most of the pictures around it, and the `columns`
+    heaviest. On the way from place to place path images are kept: at least `path_matches` of what is kept of each is
+    seen from the one before, as homing needs it, and they are at most `path_pictures` pictures of the drive apart. A
+    map grows where `known` is wired: its views take part by what is kept of them, its places stay together. Places are
+    called after `rooms`, where these are wired and poses are truth: what an owner would tell the robot. Poses are kept
+    for scoring and drawing only: the tour's truth, without it (`supervised: auto`) its odometry. Raises BadInput where
+    `supervised: truth` finds none, where no picture shows anything, or where known and new poses are not of one source.
     """
 
     every_s: Annotated[float, Bounds(ge=0)] = 1.0
@@ -147,14 +164,17 @@ class TopologicalMapping(Stage):
         poses = truth if source == "truth" else odometry
         views = self._views(known)
         first = 1 + max((view.frame for view in views), default=-1)
-        for row in kept:
+        order = max((view.order for view in views), default=-1)
+        for place, row in enumerate(kept):
+            fresh = place == 0 or ticks[kept[place - 1]].log != ticks[row].log
+            order += math.ceil(self.reach) + 1 if fresh else 1  # tours do not follow each other on the floor
             pose = poses[row] if row < len(poses) else None
             at = (math.nan,) * 3 if pose is None else (pose.x, pose.y, pose.heading)
             seen, whole = features[row], moments[row]
             assert seen is not None
             assert whole is not None
             beside = columns[row] if row < len(columns) else None
-            views.append(View(seen, beside, whole, at, first + row, 1 + ticks[row].log))
+            views.append(View(seen, beside, whole, at, first + row, order, 1 + ticks[row].log))
         if not views:
             raise BadInput("mapping: no picture of the tour shows anything; use another tour")
         ctx.doing(f"comparing {len(views)} views")
@@ -162,7 +182,8 @@ class TopologicalMapping(Stage):
         measure = Measure(self.least_matches, math.radians(self.least_angle_deg))
         colours = np.stack([view.moments.values for view in views]).astype(np.float64)
         ready = [made_ready(view.features, view.columns) for view in views]
-        compared = compare_all(ctx, ready, colours, self.colour, matching, measure)
+        old = sum(view.owner >= 0 for view in views)
+        compared = compare_all(ctx, ready, old, colours, self.colour, matching, measure)
         out = self._map_of(views, compared, source, known, matching, measure)
         return out if rooms is None or source != "truth" else dataclasses.replace(out, map=with_names(out.map, rooms))
 
@@ -212,6 +233,7 @@ class TopologicalMapping(Stage):
                     known.views.global_moments(view),
                     (x, y, heading),
                     int(known.frames[view]),
+                    int(known.orders[view]),
                     0,
                     int(known.owner[view]),
                 )
@@ -229,7 +251,7 @@ class TopologicalMapping(Stage):
     ) -> Out:
         distances = compared.distances
         tour, owner = np.array([view.tour for view in views]), np.array([view.owner for view in views])
-        frames = np.array([view.frame for view in views])
+        orders = np.array([view.order for view in views])
         poses = np.array([view.pose for view in views])
         cluster = place_clusters.complete_linkage(distances, self.place_size)
         part = self._parts(cluster, tour, owner)
@@ -246,16 +268,16 @@ class TopologicalMapping(Stage):
         enough = compared.shares[found.medoids[:, 0], found.medoids[:, 1]] >= self.least_share
         alike = dempster_shafer.similarity_of(np.where(enough, apart, math.inf), spread, self.similarity)
         initial = dempster_shafer.masses(alike, 1.0 - self.ignorance)
-        # tours do not follow each other on the floor
-        along = frames + tour * math.ceil(self.reach + 1.0)
-        told = dempster_shafer.gather(initial, place_clusters.between_hypotheses(found.medoids, along), self.reach)
-        accepted = dempster_shafer.support(told) > self.support
+        told = dempster_shafer.gather(initial, place_clusters.between_hypotheses(found.medoids, orders), self.reach)
+        heard = dempster_shafer.unknown(told) < dempster_shafer.unknown(initial)
+        accepted = (dempster_shafer.support(told) > self.support) & heard
         same = [np.column_stack([np.flatnonzero(old == place)[:-1], np.flatnonzero(old == place)[1:]]) for place in
                 range(int(old.max(initial=-1)) + 1)]  # fmt: skip
         joined = found.pairs[accepted] if self.accepted == "merge" else found.pairs[:0]
         place_of_part = place_clusters.groups(number, np.concatenate([joined, *same]))
         place = place_clusters.renumbered(place_of_part[part])
-        made = self._assembled(views, compared, place, tour, source, known, matching, spread)
+        few = [self._few(views, view, matching) for view in range(len(views))]
+        made = self._assembled(views, few, distances, place, tour, source, known, matching, spread)
         made = dataclasses.replace(made, spread=spread_to_medoids(made, views, place, matching, measure) or spread)
         if self.accepted == "link":
             made = with_loops(made, place[found.medoids[accepted]])
@@ -276,7 +298,8 @@ class TopologicalMapping(Stage):
     def _assembled(
         self,
         views: list[View],
-        compared: AllCompared,
+        few: list[Kept],
+        distances: Array,
         place: Ints,
         tour: Ints,
         source: PoseSource,
@@ -284,51 +307,58 @@ class TopologicalMapping(Stage):
         matching: Matching,
         spread: float,
     ) -> TopologicalMap:
-        number, distances = int(place.max()) + 1, compared.distances
+        def seen_from(view: int, other: int) -> int:
+            return len(match_patches(views[view].features, few[other].features, matching).first)
+
+        number = int(place.max()) + 1
         medoids = np.array([place_clusters.medoid(distances, np.flatnonzero(place == p)) for p in range(number)])
         ways = {} if known is None else old_ways(known, place)
         for pair, way in driven_ways(distances, place, tour, medoids).items():
             if pair not in ways and pair[::-1] not in ways:
-                ways[pair] = place_clusters.path_images(compared.matches, way, self.path_matches, self.path_pictures)
+                ways[pair] = (
+                    place_clusters.path_images(seen_from, way, self.path_matches, self.path_pictures),
+                    DRIVEN,
+                )
         pairs = sorted(ways)
-        used = np.unique(np.concatenate([medoids, *(ways[pair] for pair in pairs)]))
+        images = [ways[pair][0] for pair in pairs]
+        used = np.unique(np.concatenate([medoids, *images]))
         row = np.full(len(views), -1, np.int64)
         row[used] = np.arange(len(used))
-        chosen = [self._few(views, int(view), tour, matching) for view in used]
-        columns = [views[view].columns for view in used]
         names = [""] * number
         if known is not None:
             for view, own in enumerate(known.owner):
                 names[place[view]] = names[place[view]] or known.names[own]
         return TopologicalMap(
             views=stored(
-                chosen,
-                [no_columns() if c is None else c.chosen(slice(0, self.columns)) for c in columns],
+                [few[view].features for view in used],
+                [few[view].columns for view in used],
                 [views[view].moments for view in used],
             ),
             places=row[medoids],
             owner=place[used],
             names=tuple(names),
             links=np.array(pairs, np.int64).reshape(-1, 2),
-            kinds=np.full(len(pairs), DRIVEN, np.int8),
-            way_starts=np.cumsum([0, *(len(ways[pair]) for pair in pairs)], dtype=np.int64),
-            ways=row[np.concatenate([np.empty(0, np.int64), *(ways[pair] for pair in pairs)])],
+            kinds=np.array([ways[pair][1] for pair in pairs], np.int8),
+            way_starts=np.cumsum([0, *(len(way) for way in images)], dtype=np.int64),
+            ways=row[np.concatenate([np.empty(0, np.int64), *images])],
             frames=np.array([views[view].frame for view in used], np.int64),
+            orders=np.array([views[view].order for view in used], np.int64),
             poses=np.array([views[view].pose for view in used]),
             pose_source=source,
             spread=spread,
         )
 
-    def _few(self, views: list[View], view: int, tour: Ints, matching: Matching) -> LocalFeatures:
+    def _few(self, views: list[View], view: int, matching: Matching) -> Kept:
         """The patches that were found again in most of the pictures around; of equals the strongest."""
-        features = views[view].features
-        if len(features) <= self.patches:
-            return features
-        seen = np.zeros(len(features))
+        whole = views[view]
+        columns = no_columns() if whole.columns is None else whole.columns.chosen(slice(0, self.columns))
+        if len(whole.features) <= self.patches:
+            return Kept(whole.features, columns)
+        seen = np.zeros(len(whole.features))
         for other in range(max(0, view - self.around), min(len(views), view + self.around + 1)):
-            if other != view and tour[other] == tour[view]:
-                seen[match_patches(features, views[other].features, matching).first] += 1.0
-        return features.chosen(np.sort(np.argsort(-seen, kind="stable")[: self.patches]))
+            if other != view and views[other].tour == whole.tour:
+                seen[match_patches(whole.features, views[other].features, matching).first] += 1.0
+        return Kept(whole.features.chosen(np.sort(np.argsort(-seen, kind="stable")[: self.patches])), columns)
 
 
 def no_columns() -> ColumnSegments:
@@ -408,13 +438,13 @@ def driven_ways(distances: Array, place: Ints, tour: Ints, medoids: Ints) -> dic
     return {pair: way for pair, (_, _, way) in best.items()}
 
 
-def old_ways(known: TopologicalMap, place: Ints) -> dict[tuple[int, int], Ints]:
-    """A known map's ways between what its places have become. Its views are the first of all."""
-    ways: dict[tuple[int, int], Ints] = {}
+def old_ways(known: TopologicalMap, place: Ints) -> dict[tuple[int, int], tuple[Ints, int]]:
+    """A known map's ways between what its places have become, and their kinds. Its views are the first of all."""
+    ways: dict[tuple[int, int], tuple[Ints, int]] = {}
     for link, (one, other) in enumerate(known.links):
         pair = int(place[known.places[one]]), int(place[known.places[other]])
         if pair[0] != pair[1] and pair not in ways and pair[::-1] not in ways:
-            ways[pair] = known.way(link)
+            ways[pair] = known.way(link), int(known.kinds[link])
     return ways
 
 

@@ -20,7 +20,8 @@ class LoopLinks(Stage):
     A hypothesis is right where some picture of one of its subclusters was taken within `near_m` of some picture of the
     other. Precision is the share of accepted ones that are right, recall the share of right ones that are accepted;
     None where there are none, or where the map's poses are not truth. `far_in_drive` leaves out those whose views are
-    less than `apart` pictures apart; `at_supports` is what these would be with other thresholds of support. `step_m`:
+    less than `apart` pictures apart; `merged`, of these: counts as accepted what became one place, be it through third
+    ones. `at_supports` is what they would be with other thresholds of support. `step_m`:
     how far apart neighbouring path images were taken. `size_bytes`: of the map's file, but for what it says of
     its making.
     """
@@ -50,10 +51,12 @@ class LoopLinks(Stage):
                               "max": float(steps.max())}  # fmt: skip
         gaps = hypothesis_gaps(hypotheses) if hypotheses.pose_source == "truth" else None
         far = np.abs(np.diff(hypotheses.pairs, axis=1))[:, 0] >= self.apart
+        one, other = hypotheses.place[hypotheses.pairs].T
         told, near = support(hypotheses.masses), None if gaps is None else gaps[far]
         loops = {
             **counted(hypotheses.accepted, gaps, self.near_m),
             "far_in_drive": counted(hypotheses.accepted[far], near, self.near_m),
+            "merged": counted((one == other)[far], near, self.near_m),
             "at_supports": at_supports(told[far], near, self.near_m),
         }
         return self.Out(metrics=Metrics({"map": held, "loops": loops}))

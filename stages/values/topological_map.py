@@ -116,9 +116,10 @@ class TopologicalMap(Value):
     `links` (L, 2): neighbouring places, in the order in which they were driven through. `kinds` (L,): DRIVEN or LOOP.
     `ways`: the path images of link l, rows `way_starts[l]` to `way_starts[l + 1]`, are views in the order from the
     first to the second place, both medoids excluded: driven one after the other they lead there.
-    `frames` (V,): numbers of the views' pictures, counted on from tour to tour. `poses` (V, 3): x, y (m), heading (rad)
-    where they were taken, from `pose_source`: for scoring and drawing only. `spread`: the root mean square
-    visual distance of a place's views to its medoid as it is kept: what a distance in the right place is like.
+    `frames` (V,): numbers of the views' pictures, counted on from tour to tour; `orders` (V,): among those that took
+    part, with a gap from tour to tour. `poses` (V, 3): x, y (m), heading (rad) where they were taken, from
+    `pose_source`: for scoring and drawing only. `spread`: the root mean square visual distance of a place's views to
+    its medoid as it is kept: what a distance in the right place is like.
     """
 
     views: StoredViews
@@ -130,6 +131,7 @@ class TopologicalMap(Value):
     way_starts: Ints
     ways: Ints
     frames: Ints
+    orders: Ints
     poses: Array
     pose_source: PoseSource
     spread: float

@@ -12,6 +12,7 @@ from scipy.spatial.distance import squareform
 from omninav.pipeline import Context
 from omninav.pipeline.codec import decode, encode
 from omninav.pipeline.problems import BadInput
+from omninav.stages.geometry.dempster_shafer import support
 from omninav.stages.geometry.place_clusters import (
     between_hypotheses,
     complete_linkage,
@@ -92,7 +93,10 @@ def test_a_medoid_is_the_least_far_from_all_others() -> None:
 
 def test_path_images_are_few_and_each_sees_enough_of_the_one_before() -> None:
     at = np.arange(10)
-    matches = 100 - 20 * np.abs(at[:, None] - at[None])
+
+    def matches(one: int, other: int) -> int:
+        return 100 - 20 * abs(one - other)
+
     assert path_images(matches, at, 40, 9).tolist() == [3, 6]
     assert path_images(matches, at, 1000, 9).tolist() == list(range(1, 9))
     assert path_images(matches, at, -100, 9).tolist() == []
@@ -202,6 +206,31 @@ def test_accepted_places_can_stay_two_with_a_link(twice: tuple[TopologicalMap, L
     loop = int(np.flatnonzero(linked.kinds == LOOP)[0])
     assert len(linked.way(loop)) == 0
     assert linked.link(*linked.links[loop][::-1]) == loop
+
+
+def test_a_second_tour_is_recognised_by_the_few_features_that_a_map_keeps() -> None:
+    world = Landmarks(scattered(40.0, 40.0, 2800))
+    tour = along([(8.0, 8.0), (32.0, 8.0), (32.0, 20.0)], 1.6)
+    aside = [Pose(pose.x + 0.2, pose.y + 0.2, pose.heading) for pose in tour]
+    assert min(len(world.seen(pose)) for pose in tour) > 2 * 80  # of which 80 are kept
+    known = mapped(world, [tour]).map
+    found = mapped(world, [aside], known=known).hypotheses
+    across = np.diff(found.tour[found.pairs], axis=1)[:, 0] != 0
+    assert across.sum() >= 5
+    assert found.accepted[across].mean() > 0.8
+
+
+def test_the_reach_of_evidence_is_counted_in_pictures_that_take_part() -> None:
+    every = mapped(WORLD, [along(SQUARE + SQUARE[1:], 1.2)]).hypotheses
+    second = mapped(WORLD, [along(SQUARE + SQUARE[1:], 0.6)], every_s=2.0).hypotheses
+    assert len(every.masses) > 5
+    assert second.masses == pytest.approx(every.masses)
+
+
+def test_an_isolated_hypothesis_is_not_accepted_however_alike_its_views_are() -> None:
+    found = mapped(WORLD, [along(SQUARE + SQUARE[1:], 1.2)], reach=0.1).hypotheses
+    assert (support(found.masses) > 0.5).any()
+    assert not found.accepted.any()
 
 
 def test_pictures_closer_together_than_asked_are_passed_over() -> None:
