@@ -70,15 +70,15 @@ def targets_view(pixels: Pixels | None, glance: HomingGlance, size: tuple[int, i
 
 
 def _features(drawn: Pixels, points: Points, kinds: npt.NDArray[np.int8]) -> None:
+    size = float(np.clip(drawn.shape[1] / 120, 1.8, 3.5))
     for kind in (LOST, MATCHED, AGAIN, TRACKED):
         for x, y in _finite(points[kinds == kind]):
             if kind == LOST:
-                for one, other in (((-3, -3), (3, 3)), ((-3, 3), (3, -3))):
-                    line = np.array([(x + one[0], y + one[1]), (x + other[0], y + other[1])])
-                    polyline(drawn, line, BRIGHT[kind], 1)
+                for side in (-size, size):
+                    polyline(drawn, [(x - size, y - side), (x + size, y + side)], BRIGHT[kind], 1)
             else:
-                disc(drawn, (x, y), 4.0, DARK)
-                disc(drawn, (x, y), 3.0, BRIGHT[kind])
+                disc(drawn, (x, y), size + 1.0, DARK)
+                disc(drawn, (x, y), size, BRIGHT[kind])
 
 
 def _finite(points: Points) -> Points:

@@ -23,6 +23,7 @@ __all__ = [
     "draw_map",
     "draw_plan",
     "draw_pose",
+    "draw_ways",
     "extent_of",
     "faded",
     "fitting_height",
@@ -50,7 +51,7 @@ def plan_axes(axes: "Axes", extent: tuple[float, float, float, float] | None = N
 
 def draw_map(axes: "Axes", map: AnyMap | None, label: bool = True) -> None:
     """Reference views as grey dots, joined by their edges; of mixtures every component's mean, as dark as it weighs; of
-    a topological map its places, joined by their links."""
+    a topological map its places, joined along the pictures between them."""
     if map is None or not len(map):
         return
     from matplotlib.collections import LineCollection
@@ -64,12 +65,23 @@ def draw_map(axes: "Axes", map: AnyMap | None, label: bool = True) -> None:
         axes.scatter(x, y, s=size, c=colours, linewidths=0, zorder=1.5, label=name)
         return
     topological = isinstance(map, TopologicalMap)
-    poses, edges = (map.poses[map.places], map.links) if isinstance(map, TopologicalMap) else (map.poses, map.edges)
+    poses, edges = (map.poses[map.places], map.links[:0]) if isinstance(map, TopologicalMap) else (map.poses, map.edges)
+    if isinstance(map, TopologicalMap):
+        draw_ways(axes, map)
     if len(edges):
         axes.add_collection(LineCollection(list(poses[edges][:, :, :2]), colors=EDGE, linewidths=0.7, zorder=1))
     size = float(np.clip(3000 / len(map), 1.5, 25 if topological else 9))
     name = f"{'places' if topological else 'references'} ({len(map)})" if label else None
     axes.scatter(poses[:, 0], poses[:, 1], s=size, color=REFERENCE, linewidths=0, zorder=1.5, label=name)
+
+
+def draw_ways(axes: "Axes", map: TopologicalMap) -> None:
+    """The links of a topological map, each along the pictures between its two places."""
+    from matplotlib.collections import LineCollection
+
+    poses = map.poses[:, :2]
+    ways = [poses[[map.places[a], *map.way(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
+    axes.add_collection(LineCollection(ways, colors=REFERENCE, linewidths=0.7, zorder=1))
 
 
 def draw_gaussians(
