@@ -121,12 +121,7 @@ class ShortestWay(Stage):
         return bool(sure) or itinerary.waited > self.patience
 
     def _plan(
-        self,
-        ctx: Context,
-        itinerary: Itinerary,
-        probabilities: npt.NDArray[np.float64],
-        goals: Ints,
-        map: TopologicalMap,
+        self, ctx: Context, itinerary: Itinerary, probabilities: Array, goals: Ints, map: TopologicalMap
     ) -> ImagePath:
         place, missed = _likeliest(probabilities, itinerary)
         places = shortest_way(map, place, goals, self.cost, itinerary.failed, itinerary.times, self.again)
@@ -136,9 +131,7 @@ class ShortestWay(Stage):
         if itinerary.planned >= self.tries:
             return _given_up(itinerary, f"{self.tries} ways were tried; {last}")
         if not len(places):
-            closed = [
-                pair for pair, times in zip(itinerary.failed, itinerary.times, strict=True) if times >= self.again
-            ]
+            closed = itinerary.failed[itinerary.times >= self.again].tolist()
             shut = ", ".join(f"{one} to {other}" for one, other in closed if one != other)
             why = f" but what could not be driven {self.again} times, from place {shut}; {last}" if shut else ""
             return _given_up(itinerary, f"no way leads from place {place} to {self.goal}{why}")
