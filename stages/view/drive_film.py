@@ -98,7 +98,7 @@ class DriveFilm(Stage):
     """
 
     per_second: Annotated[float, Bounds(gt=0)] = 8.0
-    frames: Annotated[int, Bounds(ge=1)] = 200
+    frames: Annotated[int, Bounds(ge=1)] = 120
     after_s: Annotated[float, Bounds(ge=0)] = 1.5
     around_m: Annotated[float, Bounds(gt=0)] = 2.5
 
@@ -338,7 +338,7 @@ def _said(scene: Scene) -> list[tuple[str, Colour]]:
         place = int(np.argmax(scene.belief.probabilities))
         lines.append((f"believed: place {place}, {100 * float(scene.belief.probabilities[place]):.0f} %", DARK))
     if scene.way is not None:
-        goal = f" to place {int(scene.way.places[-1])}" if len(scene.way.places) else ""
+        goal = f", goal: place {int(scene.way.places[-1])}" if len(scene.way.places) else ""
         lines.append((f"{scene.way.state}{goal}", DARK))
     if scene.progress is not None:
         lines.append((f"views reached: {scene.progress.at} of {scene.progress.of}", DARK))
@@ -346,7 +346,7 @@ def _said(scene: Scene) -> list[tuple[str, Colour]]:
         lines.append((f"driving: {scene.status.state}", DARK))
     vector, kinds = scene.glance.vector, scene.glance.kinds
     if vector is not None:
-        far = f"{100 * vector.ratio:.0f} % of the way left" if vector.metres is None else f"{vector.metres:.2f} m away"
+        far = f"{100 * vector.ratio:.0f} % left" if vector.metres is None else f"{vector.metres:.2f} m away"
         lines.append(("homing: the target is lost" if vector.state == "lost" else f"homing: {far}", DARK))
         counted = [f"{int(np.count_nonzero(kinds == kind))} {name}" for kind, name in NAMES.items()]
         lines += [(", ".join(counted[:2]), QUIET), (", ".join(counted[2:]), QUIET)]

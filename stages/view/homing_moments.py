@@ -165,7 +165,7 @@ def _draw_floor(axes: "Axes", moment: Moment, plan: FloorPlan | None) -> None:
     said = (
         "the target is lost"
         if vector.state == "lost"
-        else f"{far}, turn {math.degrees(vector.turn) + 0.0:.0f}°\n{counted}"
+        else f"{far}, turn {round(math.degrees(vector.turn))}°\n{counted}"
     )
     axes.set_title(said, fontsize=8.5)
 

@@ -11,6 +11,7 @@ from omninav.stages.values.drives import Array, Drive, drives, known
 from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.map_places import AnyMap, map_poses
 from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.topological_map import TopologicalMap
 
 from .style import ESTIMATE, MARK, ODOMETRY, TRUTH, draw_grid, draw_map, extent_of, fitting_height, picture, plan_axes
 
@@ -66,7 +67,12 @@ def _caption(drive: Drive, map: AnyMap | None) -> str:
     if drive.odometry_alone() is not None:
         anchor = "starts at the first true pose" if drive.has_truth else "is laid through the last estimate"
         words.append(f"Odometry alone {anchor}.")
-    if map is not None and len(map):
+    if isinstance(map, TopologicalMap) and len(map):
+        words.append(
+            f"Grey: {len(map)} places at their medoids, joined along the pictures between them, all poses taken from "
+            f"{map.pose_source}: the estimate is the most probable place's, turned as the view is."
+        )
+    elif map is not None and len(map):
         words.append(f"Grey: {len(map)} reference views, their poses taken from {map.pose_source}.")
     return " ".join(words).replace(" ;", ";")
 

@@ -1,5 +1,6 @@
 """Homing in a closed loop as a user runs it: whole, and killed on the way."""
 
+import base64
 import json
 from pathlib import Path
 
@@ -15,6 +16,7 @@ WORDS = (
     "events=[{at: 0.5, to: [4.0, 4.2, 1.5]}]",
     "checkpoint_s=0.1",
     "cache=null",
+    "nodes.film.frames=8",
 )
 
 
@@ -37,6 +39,14 @@ def test_a_robot_that_was_carried_away_comes_back_and_stands_as_before(whole: Pa
     assert 0.3 < max(commands) <= 0.4
 
 
+def test_the_report_shows_what_it_followed_and_the_drive_as_a_film(whole: Path):
+    page = (whole / "report.html").read_text()
+    assert 'id="homing_moments"' in page
+    film = base64.b64encode((whole / "drive.mp4").read_bytes()).decode()
+    assert f'src="data:video/mp4;base64,{film}"' in page
+    assert 'data-per-second="8.0"' in page
+
+
 def test_killed_on_its_way_it_goes_on_to_the_same_bytes(whole: Path, tmp_path: Path):
     run = killed_and_resumed(tmp_path, *WORDS, after_s=4.0)  # the local map has been made
-    assert_same_bytes(run, whole, "metrics.json", "result.mcap")
+    assert_same_bytes(run, whole, "metrics.json", "result.mcap", "drive.mp4")
