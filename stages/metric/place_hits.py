@@ -19,7 +19,9 @@ class PlaceHits(Stage):
     Goedemé et al. 2007, section 8.3. Under `localisation`, over all logs: `right_rate` of all pictures; `near_rate`:
     the believed place is the closest or one of its neighbours; `right_after`: of the first, second ... of `updates`
     updates since the belief began (`begun`: at which pictures it did), as the paper counts, and `near_after`;
-    `median_apart_m`: how far the believed place's medoid lies from the truth, and `least_apart_m`, the closest one's.
+    `within_after`: the believed place has the closest medoid, or the closest of all images that the map keeps (where a
+    place is long, its medoid lies far from its ends). `median_apart_m`: how far the believed place's medoid lies from
+    the truth, and `least_apart_m`, the closest one's.
     """
 
     updates: Annotated[int, Bounds(ge=1)] = 5
@@ -40,22 +42,26 @@ class PlaceHits(Stage):
     ) -> Out:
         """The whole run at once."""
         medoids, apart = map.poses[map.places][:, :2], links_between(map.links, len(map))
+        images = map.poses[:, :2]
         rows, since = [], 0
         for belief, begins, true in zip(beliefs, begun, truth, strict=True):
             since = 1 if begins is not None else since + 1
             if belief is not None and true is not None:
                 metres = np.hypot(*(medoids - (true.x, true.y)).T)
                 place, closest = int(np.argmax(belief.probabilities)), int(np.argmin(metres))
-                rows.append((since, place == closest, apart[place, closest] <= 1, metres[place], metres[closest]))
+                owner = int(map.owner[np.argmin(np.hypot(*(images - (true.x, true.y)).T))])
+                right, near = place == closest, apart[place, closest] <= 1
+                rows.append((since, right, near, right or place == owner, metres[place], metres[closest]))
         if not rows:
             return self.Out()
-        after, right, near, metres_off, least = (np.array(column) for column in zip(*rows, strict=True))
+        after, rights, nears, within, metres_off, least = (np.array(column) for column in zip(*rows, strict=True))
         found: dict[str, Any] = {
             "pictures": len(rows),
-            "right_rate": float(right.mean()),
-            "near_rate": float(near.mean()),
-            "right_after": _after(right, after, self.updates),
-            "near_after": _after(near, after, self.updates),
+            "right_rate": float(rights.mean()),
+            "near_rate": float(nears.mean()),
+            "right_after": _after(rights, after, self.updates),
+            "near_after": _after(nears, after, self.updates),
+            "within_after": _after(within, after, self.updates),
             "median_apart_m": float(np.median(metres_off)),
             "least_apart_m": float(np.median(least)),
         }

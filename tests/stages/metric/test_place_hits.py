@@ -1,5 +1,7 @@
 """How often the believed place is the right one, on a drive along four places."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from made_places import made_map
@@ -45,6 +47,18 @@ def test_a_hit_is_the_place_whose_medoid_was_taken_closest_and_a_near_one_its_ne
 def test_updates_are_counted_from_where_the_belief_began():
     found = hits([3, 0, 0, 0, 3], [0.0] * 5, {0, 3}).values["localisation"]
     assert found["right_after"] == [0.5, 0.5, 1.0]
+
+
+def test_a_long_place_is_right_where_one_of_its_images_was_taken_closest():
+    made = made_map([(0.0, 0.0), (2.0, 0.0)], {(0, 1): 1})
+    poses = made.poses.copy()
+    poses[2, 0] = 1.2  # the path image on the way, which belongs to the first place
+    long = dataclasses.replace(made, poses=poses)
+    beliefs = [PlaceBelief(np.eye(2)[0], long.poses[:2])]
+    out = PlaceHits(updates=1).step(Context("hits"), [tick(0)], beliefs, beliefs, [Pose(1.25, 0.0, 0.0)], long)
+    found = out.metrics.values["localisation"]
+    assert found["right_after"] == [0.0]
+    assert found["within_after"] == [1.0]
 
 
 def test_pictures_without_truth_do_not_count():
