@@ -11,6 +11,7 @@ from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.planned_way import PlannedWay
 from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.view.believed_places import BESIDE, RIGHT, WRONG, BelievedPlaces, judged
 from omninav.stages.view.drive_over_plan import DriveOverPlan, planned_ways
 from omninav.stages.view.place_belief_over_time import PlaceBeliefOverTime, binned, with_neighbours
 from omninav.stages.view.style import broken_at_jumps
@@ -89,3 +90,18 @@ def test_of_a_long_drive_the_most_that_was_believed_is_kept():
     assert fewer.shape == (100, 2)
     assert fewer[77].tolist() == [0.0, 0.9]
     assert binned(shares, 5000) is shares
+
+
+def test_a_believed_place_is_the_nearest_or_beside_it_or_another():
+    path = np.array([(1.1, 1.0), (1.1, 1.0), (1.1, 1.0), (3.9, 3.8)])
+    assert judged(path, np.array([0, 1, 2, 2]), MAP).tolist() == [RIGHT, BESIDE, WRONG, RIGHT]
+
+
+def test_pictures_are_joined_with_the_places_believed():
+    stage = BelievedPlaces()
+    figure = stage.step(CTX, TICKS, believed(), TRUTH, MAP).figure
+    wrong = stage.step(CTX, TICKS, believed(), TRUTH[::-1], MAP).figure
+    assert figure.content == stage.step(CTX, TICKS, believed(), TRUTH, MAP).figure.content
+    assert green(figure) > 2 * green(wrong)
+    assert "green, 100 % of the pictures" in figure.caption
+    assert stage.step(CTX, TICKS, believed(), [None] * 20, MAP).figure is None
