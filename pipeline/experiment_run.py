@@ -292,6 +292,8 @@ class ExperimentRun:
         source = graph.source
         if source is None or "world" not in source.parameters or source.parameters.get("log") is not None:
             return
+        if "log" not in source.signature.parameters:  # a closed loop: nobody knows where it will drive
+            return
         world = cell.config["world"]
         node = config["nodes"][source.name]
         events = node.get("events") or []
