@@ -63,7 +63,7 @@ class ShowLoopHypotheses(Stage):
 
 def _draw(found: LoopHypotheses, map: TopologicalMap, plan: FloorPlan | None) -> bytes:
     extent = extent_of(found.poses, margin=0.08)
-    with picture(11.0, fitting_height(extent, 5.5, 3.0, 8.5) + 0.4) as drawn:
+    with picture(11.0, fitting_height(extent, 4.9, 2.6, 8.5)) as drawn:
         left, right = drawn.canvas.subplots(1, 2)
         for axes in (left, right):
             draw_plan(axes, plan)
@@ -72,7 +72,11 @@ def _draw(found: LoopHypotheses, map: TopologicalMap, plan: FloorPlan | None) ->
             (~found.accepted, ODOMETRY, "rejected", 0.8),
             (found.accepted, MARK, "accepted", 1.4),
         ):
-            _lines(left, found.poses[found.pairs[kept]][:, :, :2], colour, width, f"{name} ({int(kept.sum())})")
+            ends = found.poses[found.pairs[kept]][:, :, :2]
+            _lines(left, ends, colour, width, f"{name} ({int(kept.sum())})")
+            left.plot(
+                *ends.reshape(-1, 2).T, ".", color=colour, markersize=4, zorder=3
+            )  # pairs at one spot have no line
         _draw_places(right, map)
         for axes in (left, right):
             plan_axes(axes, extent)
