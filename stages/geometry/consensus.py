@@ -48,7 +48,7 @@ def relative_pose(
     if pairs < size:
         return None
     sine = math.sin(threshold)
-    found, best, drawn, wanted = None, (0, -math.inf), 0, float(most)
+    found, agreed, best, drawn, wanted = None, 0, (0, -math.inf), 0, float(most)
     while drawn < min(wanted, most):
         samples = samples_of(pairs, size, rng)
         rotations, translations, quality, owners = _candidates(solver, first, second, samples)
@@ -62,12 +62,14 @@ def relative_pose(
         if (counts[k], worth[k]) <= best:
             continue
         best = int(counts[k]), float(worth[k])
-        found = rotations[k], senses[k] * translations[k]
-        agreeing = counts[k]
+        pose, agreeing = (rotations[k], senses[k] * translations[k]), int(counts[k])
         if refine:
-            found = refined_pose(*found, first, second, threshold, solver == "planar")
-            agreeing = max(agreeing, np.count_nonzero(agreement(*found, first, second, threshold)))
-        wanted = samples_needed(agreeing / pairs, size, confidence)
+            refined = refined_pose(*pose, first, second, threshold, solver == "planar")
+            number = int(np.count_nonzero(agreement(*refined, first, second, threshold)))
+            pose, agreeing = (refined, number) if number >= agreeing else (pose, agreeing)
+        if agreeing >= agreed:  # a sample that more agree with need not be the better one once both are refined
+            found, agreed = pose, agreeing
+        wanted = samples_needed(agreed / pairs, size, confidence)
     if found is None:
         return None
     return AgreedPose(*found, agreement(*found, first, second, threshold), drawn)

@@ -159,18 +159,21 @@ def three_point_pose(
     number = len(bearings)
     if number < 3:
         return None
-    found, best, drawn, wanted = None, (0, -math.inf), 0, float(most)
+    found, agreed, best, drawn, wanted = None, 0, (0, -math.inf), 0, float(most)
     while drawn < min(wanted, most):
         samples = samples_of(number, 3, rng)
         drawn += AT_ONCE
         count, cost, rotation, translation = _search(bearings, points, samples, math.cos(threshold), planar)
         if count == 0 or (count, -cost) <= best:
             continue
-        best, found = (count, -cost), (rotation, translation)
+        best, pose = (count, -cost), (rotation, translation)
         if refine:
-            found = refined_camera(rotation, translation, bearings, points, threshold, planar)
-            count = max(count, int(np.count_nonzero(sees(*found, bearings, points, threshold))))
-        wanted = samples_needed(count / number, 3, confidence)
+            refined = refined_camera(*pose, bearings, points, threshold, planar)
+            seen = int(np.count_nonzero(sees(*refined, bearings, points, threshold)))
+            pose, count = (refined, seen) if seen >= count else (pose, count)
+        if count >= agreed:  # a sample that more agree with need not be the better one once both are refined
+            found, agreed = pose, count
+        wanted = samples_needed(agreed / number, 3, confidence)
     if found is None:
         return None
     return AgreedPose(*found, sees(*found, bearings, points, threshold), drawn)
