@@ -185,6 +185,21 @@ TT1 = "~experiment.sweep.tour.TT2"
 """Half of the conditions."""
 
 
+CLOSED_LOOP = """\
+# @package experiment
+name: about
+title: Wandering about
+about: As the command line does it.
+variant: wander
+repetitions: 1
+common: world=home_store_demo nodes.source.seconds=0.4
+sweep: {day: {first: day=0}}
+drives: {here: "nodes.source.start=[4.2,4.0,0.5]", there: "nodes.source.start=[5.0,5.0,0.5]"}
+measures: {way: {title: Way (m), of: [drive.distance_m]}}
+page: {rows: [], columns: day}
+"""
+
+
 @dataclass
 class Finished:
     """The whole experiment, run once for several tests; `go` runs a command in its folder."""
@@ -278,6 +293,15 @@ def test_series_within_runs_drives_as_repetitions_and_times_of_stages(omninav, p
     assert all(f"({name})" in page for name in pictures)
     assert (folder / "laps.html").read_text().count("data:image/png") == 4
     assert len(results(folder)) == 3 * 2 * 3
+
+
+def test_a_closed_loop_drives_for_itself(omninav, tmp_path: Path):
+    (tmp_path / "mine/experiment").mkdir(parents=True)
+    (tmp_path / "mine/experiment/about.yaml").write_text(CLOSED_LOOP)
+    omninav("--config-dir", "mine", "+experiment=about", "cache=null", check=True)
+    folder = tmp_path / "runs/about_paper"
+    assert len(results(folder)) == 2
+    assert not (folder / "logs").exists()
 
 
 def test_a_killed_experiment_goes_on_where_it_was(dice: Finished):
