@@ -20,7 +20,7 @@ from .graph import Graph
 from .problems import BadInput, Problem, ProblemsFound, suggest
 from .progress import Progress
 from .repetitions import artifact_key, condition_key, finished, known_digests
-from .run import LIBRARIES, Plan, git_commit, plan, version
+from .run import LIBRARIES, Plan, git_commit, plan, version, without_companions
 from .verdicts import Results, key_of
 
 Compose = Callable[[Sequence[str]], dict[str, Any]]
@@ -206,7 +206,7 @@ class ExperimentRun:
                 try:
                     if cell.words not in composed:
                         composed[cell.words] = self.compose(cell.words)
-                    cell.config = json.loads(json.dumps(composed[cell.words], default=str))
+                    cell.config = dict(without_companions(json.loads(json.dumps(composed[cell.words], default=str))))
                     cell.planned = plan(cell.config)
                 except ProblemsFound as found:
                     problems += [Problem(f"{cell.name}: {p.where}", p.what, p.hint) for p in found.problems]

@@ -8,7 +8,7 @@ import platform
 import shutil
 import subprocess
 import traceback
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -127,8 +127,20 @@ def without_absent(config: Mapping[str, Any]) -> Mapping[str, Any]:
         and spec.get("log") is None
         and not _is_made(specs.get(spec.get("with")))
     }
+    return _without(config, absent)
+
+
+def without_companions(config: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A configuration without the artifacts that come `with` others: they are for pictures, which not all runs need."""
+    specs = config.get("artifacts") or {}
+    beside = {f"{ARTIFACTS}.{name}" for name, spec in specs.items() if isinstance(spec, Mapping) and spec.get("with")}
+    return _without(config, beside)
+
+
+def _without(config: Mapping[str, Any], absent: Collection[str]) -> Mapping[str, Any]:
     if not absent:
         return config
+    specs = config.get("artifacts") or {}
     kept = {name: spec for name, spec in specs.items() if f"{ARTIFACTS}.{name}" not in absent}
     wires = {
         node: {port: wire for port, wire in ports.items() if _origin(wire) not in absent}

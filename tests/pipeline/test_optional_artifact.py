@@ -8,7 +8,7 @@ import pytest
 import toys
 from omninav.pipeline.artifact import write_artifact
 from omninav.pipeline.problems import ProblemsFound
-from omninav.pipeline.run import execute, plan, start
+from omninav.pipeline.run import execute, plan, start, without_companions
 
 
 def configuration(port: str, file: Path | None) -> dict[str, Any]:
@@ -86,3 +86,11 @@ def test_what_comes_with_a_map_is_not_there_where_the_map_is_from_a_file(tmp_pat
     write_artifact(tmp_path / "known.omap", toys.Number(3.0))
     config["artifacts"]["map"] = {"variant": "toy", "file": str(tmp_path / "known.omap"), "from": "twice.number"}
     assert [artifact.name for artifact in plan(config).artifacts] == ["map"]
+
+
+def test_repetitions_do_without_what_comes_with_a_map(tmp_path: Path) -> None:
+    config = without_companions(two_of_one_graph(tmp_path))
+    planned = plan(config)
+    assert [artifact.name for artifact in planned.artifacts] == ["map"]
+    assert [wire.to_port for wire in planned.graph.wires] == ["number"]
+    assert without_companions(config) is config
