@@ -67,11 +67,10 @@ class RotationReducedSift(Stage):
         sizes = np.array([point.size for point in found], np.float32)
         colours = disc_colours(pixels, seen, points, self.colour_radius * sizes)
         points = read.original(points - (seam, 0))
-        return self.Out(
-            features=LocalFeatures(
-                read.bearings(points), points, descriptors.astype(np.uint8), colours, sizes * np.float32(read.scale)
-            )
-        )
+        sizes *= np.float32(read.scale)
+        features = LocalFeatures(read.bearings(points), points, descriptors.astype(np.uint8), colours, sizes)
+        shown = np.isfinite(features.bearings).all(axis=1)  # beyond the mirror's edge there is nothing to see
+        return self.Out(features=features.chosen(np.flatnonzero(shown)))
 
     def _strongest(self, found: list[cv2.KeyPoint], read: ReadPicture, seam: int) -> list[cv2.KeyPoint]:
         if not found:

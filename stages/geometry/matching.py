@@ -56,7 +56,7 @@ def _mutual(squares: Floats, ratio: float, first: Ints, second: Ints, distance: 
     for i in range(rows):
         j = nearest[i]
         d = max(one[i], np.float32(0.0))
-        if nearest_row[j] == i and d <= ratio * ratio * two[i] and d <= ratio * ratio * next_least[j]:
+        if nearest_row[j] == i and d < ratio * ratio * two[i] and d < ratio * ratio * next_least[j]:
             first[found], second[found], distance[found] = i, j, np.sqrt(d)
             rival = min(two[i], next_least[j])
             unclear[found] = np.sqrt(d / rival) if rival > 0.0 else 1.0
@@ -134,7 +134,7 @@ def tree_matches(one: npt.ArrayLike, other: npt.ArrayLike, ratio: float) -> Pair
     second = nearest[:, 0]
     kept = back[second, 0] == first
     rival = np.minimum(gap[:, 1], back_gap[second, 1])
-    kept &= gap[:, 0] <= ratio * rival
+    kept &= gap[:, 0] < ratio * rival
     unclear = np.divide(gap[:, 0], rival, out=np.ones(len(a)), where=rival > 0.0)
     order = np.flatnonzero(kept)[np.argsort(unclear[kept], kind="stable")]
     return Pairs(first[order], second[order].astype(np.int64), gap[order, 0], unclear[order])

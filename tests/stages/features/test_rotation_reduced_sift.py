@@ -1,5 +1,6 @@
 """Patches of a turned robot's views, on the mirror image and on the panorama."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -9,6 +10,7 @@ from turned_robot import CAMERA, both_kinds, look, wrapped
 from omninav.pipeline import Context
 from omninav.pipeline.problems import BadInput
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
+from omninav.stages.geometry.bearings import camera_bearings
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import LocalFeatures
 
@@ -59,6 +61,17 @@ def test_of_a_turned_camera_the_bearings_are_the_robots() -> None:
     radius = np.hypot(*level.T)
     assert radius.min() > CAMERA.inner_radius_px
     assert radius.max() < CAMERA.outer_radius_px
+
+
+def test_beyond_the_mirrors_edge_there_is_nothing_to_see() -> None:
+    noise = np.random.default_rng(0).integers(0, 255, (480, 640, 3)).astype(np.uint8)
+    larger = dataclasses.replace(CAMERA, focal_x=300.0, focal_y=300.0, outer_radius_px=400.0)  # than the mirror is
+    assert np.isnan(camera_bearings(np.array([[638.0, 2.0]]), larger)).all()
+    stage, context = RotationReducedSift(), Context("features")
+    stage.setup(context)
+    features = stage.step(context, picture=Image(noise), camera=larger).features
+    assert len(features) > 50
+    assert np.isfinite(features.bearings).all()
 
 
 def test_patches_across_a_panoramas_seam_are_found_once() -> None:

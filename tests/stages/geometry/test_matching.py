@@ -27,7 +27,7 @@ def by_hand(squares: np.ndarray, ratio: float) -> set[tuple[int, int]]:
         j = int(row.argmin())
         column = squares[:, j]
         others = [*np.delete(row, j), *np.delete(column, i)]
-        if column.argmin() == i and (not others or row[j] <= ratio**2 * min(others)):
+        if column.argmin() == i and (not others or row[j] < ratio**2 * min(others)):
             found.add((i, j))
     return found
 
@@ -59,6 +59,13 @@ def test_a_kd_tree_finds_the_same_pairs() -> None:
     assert (tree.first == all_of.first).all()
     assert (tree.second == all_of.second).all()
     assert len(tree_matches(a, b[:0], 0.8).first) == 0
+
+
+def test_who_has_two_partners_that_look_the_same_has_none() -> None:
+    one = np.array([[1.0, 2.0], [5.0, 5.0]], np.float32)
+    other = np.array([[1.0, 2.0], [1.0, 2.0], [5.0, 5.5]], np.float32)
+    for found in (mutual_nearest(squared_distances(one, other), 0.8), tree_matches(one, other, 0.8)):
+        assert list(zip(found.first.tolist(), found.second.tolist(), strict=True)) == [(1, 2)]
 
 
 def test_elements_count_by_their_spread_and_one_that_never_varies_not_at_all() -> None:
