@@ -70,7 +70,7 @@ def test_beyond_the_mirrors_edge_there_is_nothing_to_see() -> None:
     stage, context = RotationReducedSift(), Context("features")
     stage.setup(context)
     features = stage.step(context, picture=Image(noise), camera=larger).features
-    assert len(features) > 50
+    assert len(features) > 10
     assert np.isfinite(features.bearings).all()
 
 
