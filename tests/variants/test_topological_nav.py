@@ -1,28 +1,44 @@
 """From a map of pictures to a goal, in the small built-in world, as a user runs it."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
+from background_runs import assert_same_bytes, finished, killed_and_resumed
 from conftest import DATA, needs_data
 
+from omninav.pipeline.artifact import read_artifact
 from omninav.pipeline.closed_loop import truth_in_the_loop
+from omninav.stages.values.topological_map import TopologicalMap
 
 HOUSE = DATA / "photoreal-house"
 WORDS = ("variant=topological_nav", "world=home_store_demo")
+KILLED = ("nodes.source.seconds=40", "checkpoint_s=0.5", "~nodes.film", "~wires.film")
 
 
 def metrics_of(place: Path) -> dict:
     return json.loads((place / "runs" / "latest" / "metrics.json").read_text())
 
 
-def test_a_robot_that_does_not_know_where_it_is_drives_to_a_place_and_docks_there(omninav, tmp_path: Path):
-    omninav(*WORDS, "goal=3", "nodes.source.seconds=40", check=True)
-    found = metrics_of(tmp_path)["navigation"]
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, shared_cache: Path) -> Path:
+    return finished(tmp_path_factory.mktemp("navigation"), *WORDS, "goal=3", *KILLED, f"cache={shared_cache}")
+
+
+def test_a_robot_that_does_not_know_where_it_is_drives_to_a_place_and_docks_there(whole: Path):
+    metrics = json.loads((whole / "metrics.json").read_text())
+    found = metrics["navigation"]
     assert found["reached"]
     assert found["collisions"] == 0
     assert found["end_error_m"] < 0.11  # the paper's homing
     assert found["path_length_m"] < 2.0 * found["shortest_m"]
+    assert metrics["frames"] <= 5 * (found["time_s"] + 1.4)  # the drive is over when the way is
+
+
+def test_killed_on_its_way_it_goes_on_to_the_same_bytes(whole: Path, tmp_path: Path, shared_cache: Path):
+    run = killed_and_resumed(tmp_path, *WORDS, "goal=3", *KILLED, f"cache={shared_cache}", after_s=4.0)
+    assert_same_bytes(run, whole, "metrics.json", "result.mcap", "trajectory.tum")
 
 
 def test_a_picture_taken_elsewhere_on_the_floor_is_a_goal(omninav, tmp_path: Path):
@@ -31,7 +47,9 @@ def test_a_picture_taken_elsewhere_on_the_floor_is_a_goal(omninav, tmp_path: Pat
     omninav(*WORDS, "goal=there.png", "nodes.source.seconds=3", check=True)
     found = metrics_of(tmp_path)["navigation"]
     assert found["state"] == "under way"
-    assert found["goal"] == 12  # its medoid was taken 0.65 m from there
+    map = read_artifact(tmp_path / "runs" / "latest" / "map.omap")
+    assert isinstance(map, TopologicalMap)
+    assert math.dist(map.poses[map.places[found["goal"]]][:2], (4.2, 4.0)) < 1.0
 
 
 def test_a_goal_that_is_no_file_is_refused_before_anything_runs(omninav, tmp_path: Path):
