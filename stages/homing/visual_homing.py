@@ -26,6 +26,7 @@ from .working_picture import WorkingPicture, working_picture
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
+Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 LOST, TRACKED, AGAIN, MATCHED = range(4)
 """Kinds of `TrackedFeatures`."""
@@ -209,8 +210,8 @@ class VisualHoming(Stage):
             memory.rows = rows[far]
         if memory.mapped:  # the new unit by the old map
             left = memory.rotation.T @ (memory.goal_translation - memory.translation)
-            memory.unit *= max(float(np.hypot(left[0], left[1])), 1e-3)
-            memory.metres *= max(float(np.hypot(left[0], left[1])), 1e-3)
+            shrunk = max(float(np.hypot(left[0], left[1])), 1e-3)
+            memory.unit, memory.metres = memory.unit * shrunk, memory.metres * shrunk
         else:
             memory.metres = 0.0
         strength = trackability(seen)
@@ -250,8 +251,7 @@ class VisualHoming(Stage):
         # What is matched with the target view anew stands beside the tracks, at its own place.
         place = {int(row): n for n, row in enumerate(memory.rows)}
         anew = [(n, place[int(row)]) for n, row in enumerate(rows) if int(row) in place]
-        matches, owners = (np.array(column, np.int64) for column in zip(*anew, strict=True)) if anew else ([], [])
-        matches, owners = np.asarray(matches, np.int64), np.asarray(owners, np.int64)
+        matches, owners = np.array(anew, np.int64).reshape(-1, 2).T
         tracked = np.flatnonzero(kinds == TRACKED)
         rays = np.concatenate([seen.bearings(points[tracked]), first[matches]])
         places = np.concatenate([memory.corners[tracked], memory.anchors[owners]])
@@ -259,34 +259,50 @@ class VisualHoming(Stage):
         limit = math.radians(self.pose_threshold_deg)
         found = three_point_pose(rays[usable], places[usable], ctx.rng, limit, planar=self.planar)
         memory.picture = seen.grey
-        if found is None or np.count_nonzero(found.inliers) < self.least:
-            memory.alive = np.zeros(len(memory.alive), np.bool_)
-            return kinds, points, 0 if found is None else int(np.count_nonzero(found.inliers))
-        memory.rotation, memory.translation = found.rotation, found.translation
         agrees = np.zeros(len(rays), np.bool_)
-        agrees[usable] = found.inliers
+        if found is not None:
+            agrees[usable] = found.inliers
+        inliers = len(np.unique(np.append(tracked, owners)[agrees]))  # who is tracked and matched is one feature
+        if found is None or inliers < self.least:
+            memory.alive = np.zeros(len(memory.alive), np.bool_)
+            return kinds, points, inliers
+        memory.rotation, memory.translation = found.rotation, found.translation
         kinds[tracked[~agrees[: len(tracked)]]] = LOST
         self._learn_metres(memory)
-        self._find_lost(memory, seen, kinds, points)
+        strength = trackability(seen)
+        self._find_lost(memory, seen, strength, kinds, points)
         alive = (kinds == TRACKED) | (kinds == AGAIN)
         memory.points, memory.alive = np.where(alive[:, None], points, memory.points), alive
-        steady = np.flatnonzero(kinds == TRACKED)
-        memory.looks[steady] = histograms(seen, points[steady], self.patch)
         fresh = agrees[len(tracked) :] & (kinds[owners] == LOST)
         kinds[owners[fresh]], points[owners[fresh]] = MATCHED, seen.from_original(pixels[matches[fresh]])
+        self._start_again(memory, seen, strength, np.unique(owners[fresh]))
+        steady = np.flatnonzero(memory.alive & (kinds != AGAIN))
+        memory.looks[steady] = histograms(seen, memory.points[steady], self.patch)
         lost = np.flatnonzero(kinds == LOST)
         points[lost] = seen.points((memory.corners[lost] - memory.translation) @ memory.rotation)
         memory.depth = float(np.median(np.linalg.norm(memory.anchors - memory.translation, axis=1)))
-        return kinds, points, int(np.count_nonzero(found.inliers))
+        return kinds, points, inliers
 
-    def _find_lost(self, memory: Memory, seen: WorkingPicture, kinds: Ints, points: Array) -> None:
+    def _start_again(self, memory: Memory, seen: WorkingPicture, strength: Floats, rows: Ints) -> None:
+        """Features that were matched anew are tracked again: at the best point near to where theirs must be."""
+        expected = seen.points((memory.corners[rows] - memory.translation) @ memory.rotation)
+        rows, expected = rows[seen.inside(expected, 2.0)], expected[seen.inside(expected, 2.0)]
+        corners = best_nearby(strength, seen, expected, self.anchor_reach)
+        rays = seen.bearings(corners)
+        usable = np.isfinite(rays).all(axis=1) & seen.inside(corners, 2.0)
+        rows, corners, rays = rows[usable], corners[usable], rays[usable]
+        away = np.linalg.norm(memory.corners[rows] - memory.translation, axis=1)
+        memory.corners[rows] = memory.translation + (away[:, None] * rays) @ memory.rotation.T
+        memory.points[rows], memory.alive[rows] = corners, True
+
+    def _find_lost(self, memory: Memory, seen: WorkingPicture, strength: Floats, kinds: Ints, points: Array) -> None:
         expected = seen.points((memory.corners - memory.translation) @ memory.rotation)
         lost = np.flatnonzero((kinds == LOST) & seen.inside(expected, 2.0))
         if not len(lost):
             return
         again, who = find_again(
             seen,
-            trackability(seen),
+            strength,
             expected[lost],
             memory.looks[lost],
             self.reach,
