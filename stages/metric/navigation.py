@@ -26,7 +26,8 @@ class Navigation(Stage):
     has arrived or given up, else all of it. `ways`: how many it planned; `state` and `why`: what it last said.
     `reached_rate` and `clean_rate` (without a collision): 1 or 0, for means over drives. Of drives that reached their
     goal alone: `detour`, the way driven over the shortest; `pace`, seconds for a metre of the shortest;
-    `reached_error_m`, how far from the place it ended. Truth is used to score alone.
+    `reached_error_m`, how far from the place it ended. Truth is used to score alone; of a map whose poses are not truth
+    nothing is said that needs them.
     """
 
     within_m: Annotated[float, Bounds(gt=0)] = 0.5
@@ -55,29 +56,32 @@ class Navigation(Stage):
         ended = next(ends, len(ticks) - 1)
         tally = next((each for each in reversed(tallies) if each is not None), None)
         goal = int(last.places[-1]) if len(last.places) else None
-        apart = math.inf
-        if goal is not None:
+        apart = shortest = None
+        if goal is not None and map.pose_source == "truth":
             apart = math.dist(spots[-1], map.poses[map.places[goal]][:2])
-        reached = last.state == "arrived" and apart <= self.within_m
+            shortest = shortest_metres(map, spots[0], goal)
         found: dict[str, Any] = {
-            "reached": reached,
-            "reached_rate": float(reached),
-            "clean_rate": float(reached and (tally is None or tally.collisions == 0)),
             "collisions": None if tally is None else tally.collisions,
-            "end_error_m": apart if math.isfinite(apart) else None,
-            "path_length_m": float(sum(math.dist(one, other) for one, other in pairwise(spots))),
-            "shortest_m": None if goal is None else shortest_metres(map, spots[0], goal),
+            "end_error_m": apart,
+            "path_length_m": None if tally is None else tally.distance,
+            "shortest_m": shortest,
             "time_s": (ticks[ended].stamp - ticks[0].stamp) / 1e9,
             "ways": last.number + 1,
             "goal": goal,
             "state": last.state,
             "why": last.why,
         }
-        if reached:
-            found["reached_error_m"] = apart
-            if found["shortest_m"]:
-                found["detour"] = found["path_length_m"] / found["shortest_m"]
-                found["pace"] = found["time_s"] / found["shortest_m"]
+        if map.pose_source == "truth":
+            reached = last.state == "arrived" and apart is not None and apart <= self.within_m
+            found |= {"reached": reached, "reached_rate": float(reached)}
+            if tally is not None:
+                found["clean_rate"] = float(reached and tally.collisions == 0)
+            if reached:
+                found["reached_error_m"] = apart
+            if reached and shortest:
+                found["pace"] = found["time_s"] / shortest
+                if tally is not None:
+                    found["detour"] = tally.distance / shortest
         return self.Out(metrics=Metrics({"navigation": found}))
 
 

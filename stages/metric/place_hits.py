@@ -27,7 +27,7 @@ class PlaceHits(Stage):
     updates: Annotated[int, Bounds(ge=1)] = 5
 
     class Out(Outputs):
-        """`metrics`: the entry `localisation` of metrics.json; absent without ground truth."""
+        """`metrics`: the entry `localisation` of metrics.json; absent where poses or the map's are not ground truth."""
 
         metrics: Metrics | None = None
 
@@ -43,6 +43,8 @@ class PlaceHits(Stage):
         """The whole run at once."""
         medoids, apart = map.poses[map.places][:, :2], links_between(map.links, len(map))
         images = map.poses[:, :2]
+        if map.pose_source != "truth":
+            return self.Out()
         rows, since = [], 0
         for belief, begins, true in zip(beliefs, begun, truth, strict=True):
             since = 1 if begins is not None else since + 1

@@ -1,5 +1,7 @@
 """What became of a drive to a goal, on a corner of two legs."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from made_places import made_map
@@ -15,18 +17,18 @@ CORNER = made_map([(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (9.0, 9.0)], {(0, 1): 0, 
 PLACES = np.array([0, 1, 2])
 
 
-def ended(spots, states, collisions=0):
+def ended(spots, states, collisions=0, driven=0.0, map=CORNER):
     ways = [PlannedWay(PLACES, state, 0, "tired" if state == "gave up" else "") for state in states]
     ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(len(spots))]
     truth = [Pose(x, y, 0.0) for x, y in spots]
-    tallies = [DriveTally(collisions, 0.0)] * len(spots)
-    metrics = Navigation().step(Context("navigation"), ticks, ways, truth, tallies, CORNER).metrics
+    tallies = [DriveTally(collisions, driven)] * len(spots)
+    metrics = Navigation().step(Context("navigation"), ticks, ways, truth, tallies, map).metrics
     return metrics.values["navigation"]
 
 
 def test_a_drive_along_the_map_has_its_length_and_ends_when_it_says_so():
     spots = [(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (3.0, 3.8)]
-    found = ended(spots, ["under way", "under way", "arrived", "arrived"])
+    found = ended(spots, ["under way", "under way", "arrived", "arrived"], driven=7.2)
     assert found["reached"]
     assert found["end_error_m"] == pytest.approx(0.2)
     assert found["path_length_m"] == pytest.approx(7.2)
@@ -51,6 +53,14 @@ def test_who_stands_elsewhere_or_does_not_know_that_it_is_there_has_not_reached_
 def test_who_bumped_into_something_reached_it_but_not_cleanly():
     found = ended([(0.0, 0.0), (3.0, 4.0)], ["under way", "arrived"], collisions=1)
     assert (found["reached_rate"], found["clean_rate"]) == (1.0, 0.0)
+
+
+def test_of_a_map_of_odometry_it_is_not_said_where_its_places_are():
+    odometry = dataclasses.replace(CORNER, pose_source="odometry")
+    found = ended([(0.0, 0.0), (3.0, 4.0)], ["under way", "arrived"], driven=5.0, map=odometry)
+    assert "reached" not in found
+    assert (found["end_error_m"], found["shortest_m"]) == (None, None)
+    assert (found["path_length_m"], found["state"]) == (5.0, "arrived")
 
 
 def test_the_time_of_a_drive_ends_when_it_gives_up():
