@@ -48,7 +48,7 @@ def relative_pose(
     if pairs < size:
         return None
     sine = math.sin(threshold)
-    found, agreed, best, drawn, wanted = None, 0, (0, -math.inf), 0, float(most)
+    found, least, best, drawn, wanted = None, math.inf, (0, -math.inf), 0, float(most)
     while drawn < min(wanted, most):
         samples = samples_of(pairs, size, rng)
         rotations, translations, quality, owners = _candidates(solver, first, second, samples)
@@ -62,14 +62,15 @@ def relative_pose(
         if (counts[k], worth[k]) <= best:
             continue
         best = int(counts[k]), float(worth[k])
-        pose, agreeing = (rotations[k], senses[k] * translations[k]), int(counts[k])
+        pose = rotations[k], senses[k] * translations[k]
         if refine:
-            refined = refined_pose(*pose, first, second, threshold, solver == "planar")
-            number = int(np.count_nonzero(agreement(*refined, first, second, threshold)))
-            pose, agreeing = (refined, number) if number >= agreeing else (pose, agreeing)
-        if agreeing >= agreed:  # a sample that more agree with need not be the better one once both are refined
-            found, agreed = pose, agreeing
-        wanted = samples_needed(agreed / pairs, size, confidence)
+            pose = refined_pose(*pose, first, second, threshold, solver == "planar")
+        # A sample that more agree with need not be the better one once both are refined.
+        cost = _tukey(*pose, first, second, sine * sine)
+        if cost < least:
+            found, least = pose, cost
+            agreeing = int(np.count_nonzero(agreement(*found, first, second, threshold)))
+            wanted = samples_needed(max(agreeing, best[0]) / pairs, size, confidence)
     if found is None:
         return None
     return AgreedPose(*found, agreement(*found, first, second, threshold), drawn)

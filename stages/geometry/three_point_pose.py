@@ -159,7 +159,7 @@ def three_point_pose(
     number = len(bearings)
     if number < 3:
         return None
-    found, agreed, best, drawn, wanted = None, 0, (0, -math.inf), 0, float(most)
+    found, least, best, drawn, wanted = None, math.inf, (0, -math.inf), 0, float(most)
     while drawn < min(wanted, most):
         samples = samples_of(number, 3, rng)
         drawn += AT_ONCE
@@ -168,12 +168,13 @@ def three_point_pose(
             continue
         best, pose = (count, -cost), (rotation, translation)
         if refine:
-            refined = refined_camera(*pose, bearings, points, threshold, planar)
-            seen = int(np.count_nonzero(sees(*refined, bearings, points, threshold)))
-            pose, count = (refined, seen) if seen >= count else (pose, count)
-        if count >= agreed:  # a sample that more agree with need not be the better one once both are refined
-            found, agreed = pose, count
-        wanted = samples_needed(agreed / number, 3, confidence)
+            pose = refined_camera(*pose, bearings, points, threshold, planar)
+        # A sample that more agree with need not be the better one once both are refined.
+        cost = _tukey(*pose, bearings, points, 1.0 - math.cos(threshold))
+        if cost < least:
+            found, least = pose, cost
+            count = max(count, int(np.count_nonzero(sees(*found, bearings, points, threshold))))
+            wanted = samples_needed(count / number, 3, confidence)
     if found is None:
         return None
     return AgreedPose(*found, sees(*found, bearings, points, threshold), drawn)
