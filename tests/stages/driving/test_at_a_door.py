@@ -52,12 +52,13 @@ def test_through_an_open_door_it_comes_to_its_target():
     assert seen.tally.collisions == 0
 
 
-def test_before_a_closed_door_it_stands_in_the_end_and_says_that_it_is_blocked():
-    done = drive(day=1, ticks=160)
+def test_before_a_closed_door_it_stands_and_says_that_it_is_blocked_and_tries_again_where_nobody_sends_it_elsewhere():
+    done = drive(day=1, ticks=200)
     states = [told.status.state for _, told in done]
     first = states.index("blocked")
     assert 50 < first < 150  # the way there, and ten seconds from side to side
-    assert set(states[first:]) == {"blocked"}
+    assert set(states[first : first + 50]) == {"blocked"}
+    assert states[first + 50] == "driving"
     seen, told = done[-1]
     assert (told.command.speed, told.command.turning) == (0.0, 0.0)
     assert "something stands in the way" in told.status.why
