@@ -20,6 +20,7 @@ from omninav.stages.geometry.visual_distance import (
     made_ready,
     match_patches,
 )
+from omninav.stages.values.drives import pose_row
 from omninav.stages.values.local_features import ColumnSegments, GlobalMoments, LocalFeatures
 from omninav.stages.values.pose import Pose, PoseSource
 from omninav.stages.values.rooms import Rooms
@@ -168,8 +169,7 @@ class TopologicalMapping(Stage):
         for place, row in enumerate(kept):
             fresh = place == 0 or ticks[kept[place - 1]].log != ticks[row].log
             order += math.ceil(self.reach) + 1 if fresh else 1  # tours do not follow each other on the floor
-            pose = poses[row] if row < len(poses) else None
-            at = (math.nan,) * 3 if pose is None else (pose.x, pose.y, pose.heading)
+            at = pose_row(poses[row] if row < len(poses) else None)
             seen, whole = features[row], moments[row]
             assert seen is not None
             assert whole is not None

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.results import Metrics
 from omninav.stages.geometry.se2 import between, wrap
+from omninav.stages.values.drives import pose_rows
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.homing_field import HomingField
 from omninav.stages.values.pose import Pose
@@ -38,7 +39,7 @@ class HomingFieldErrors(Stage):
 
     def step(self, ctx: Context, truth: Sequence[Pose | None], vectors: Sequence[HomingVector | None]) -> Out:
         """The whole run at once."""
-        poses = np.array([(math.nan,) * 3 if pose is None else (pose.x, pose.y, pose.heading) for pose in truth])
+        poses = pose_rows(truth)
         rows = [row for row in range(1, len(poses)) if np.isfinite(poses[[0, row]]).all()]
         if not rows:
             return self.Out()
@@ -56,8 +57,7 @@ class HomingFieldErrors(Stage):
 
 def field_of(poses: Array, rows: Sequence[int], vectors: Sequence[HomingVector | None]) -> HomingField:
     """The field over poses (N, 3) of `rows`, towards the first of all."""
-    found = [vector is not None and vector.state != "lost" for vector in vectors]
-    told = np.array([vector.direction if ok else math.nan for ok, vector in zip(found, vectors, strict=True)])  # type: ignore[union-attr]
+    told = np.array([math.nan if vector is None or vector.state == "lost" else vector.direction for vector in vectors])
     ways = between(poses[list(rows)], poses[0])
     return HomingField(
         poses[0],

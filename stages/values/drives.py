@@ -94,10 +94,10 @@ def drives(
             (
                 tick.frame,
                 tick.stamp,
-                _row(estimate.pose if estimate else None),
+                pose_row(estimate.pose if estimate else None),
                 np.full((3, 3), np.nan) if estimate is None else estimate.covariance,
-                _row(estimate.mean if estimate else None),
-                _row(true),
+                pose_row(estimate.mean if estimate else None),
+                pose_row(true),
                 (np.nan,) * 3 if moved is None else (moved.x, moved.y, moved.turn),
             )
         )
@@ -119,5 +119,11 @@ def drives(
     return found
 
 
-def _row(pose: Pose | None) -> tuple[float, float, float]:
+def pose_row(pose: Pose | None) -> tuple[float, float, float]:
+    """A pose as x, y (m), heading (rad); NaN where there is none."""
     return (np.nan,) * 3 if pose is None else (pose.x, pose.y, pose.heading)
+
+
+def pose_rows(poses: Sequence[Pose | None]) -> Array:
+    """Poses as rows (N, 3) of x, y (m), heading (rad); NaN where there is none."""
+    return np.array([pose_row(pose) for pose in poses], dtype=np.float64).reshape(-1, 3)

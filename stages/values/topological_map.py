@@ -139,6 +139,11 @@ class TopologicalMap(Value):
     def __len__(self) -> int:
         return len(self.places)
 
+    def nearest_places(self, spots: Array) -> Ints:
+        """Of spots (N, 2 or more) in the frame of `poses`, m: the place whose medoid was taken closest (N,)."""
+        gaps = spots[:, None, :2] - self.poses[self.places][None, :, :2]
+        return np.asarray(np.hypot(gaps[..., 0], gaps[..., 1]).argmin(axis=1), np.int64)
+
     def way(self, link: int) -> Ints:
         """The path images of a link, from its first place to its second: views."""
         return self.ways[self.way_starts[link] : self.way_starts[link + 1]]

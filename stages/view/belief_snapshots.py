@@ -10,7 +10,7 @@ from omninav.pipeline.results import Figure
 from omninav.stages.geometry.gaussians import moments
 from omninav.stages.geometry.particles import weighted_moments
 from omninav.stages.values.belief import GaussianMixture, Particles, PlaceBelief, PoseEstimate
-from omninav.stages.values.drives import Array
+from omninav.stages.values.drives import Array, pose_rows
 from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.map_places import AnyMap, map_poses
 from omninav.stages.values.pose import Pose
@@ -72,7 +72,7 @@ class BeliefSnapshots(Stage):
             if belief is not None:
                 seconds = (last[row].stamp - last[rows[0]].stamp) / 1e9
                 panels.append(
-                    (last[row].frame, seconds, belief, _row(estimate.pose if estimate else None), _row(truth[row]))
+                    (last[row].frame, seconds, belief, *pose_rows([estimate.pose if estimate else None, truth[row]]))
                 )
         if not panels:
             return self.Out()
@@ -87,10 +87,6 @@ class BeliefSnapshots(Stage):
                 order=30,
             )
         )
-
-
-def _row(pose: Pose | None) -> Array:
-    return np.full(3, np.nan) if pose is None else np.array([pose.x, pose.y, pose.heading])
 
 
 def _draw(

@@ -81,8 +81,7 @@ class BelievedPlaces(Stage):
 
 def judged(path: Array, believed: npt.NDArray[np.int64], map: TopologicalMap) -> npt.NDArray[np.int64]:
     """Of each picture, taken at (N, 2): whether the believed place (N,) is the nearest, one beside it, or another."""
-    medoids, apart = map.poses[map.places][:, :2], links_between(map.links, len(map))
-    nearest = np.argmin(np.hypot(*(path[:, None] - medoids[None]).transpose(2, 0, 1)), axis=1)
+    nearest, apart = map.nearest_places(path), links_between(map.links, len(map))
     return np.where(believed == nearest, RIGHT, np.where(apart[believed, nearest] <= 1, BESIDE, WRONG))
 
 

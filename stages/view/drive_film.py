@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple, overload
 
 import cv2
 import numpy as np
@@ -14,6 +14,7 @@ from omninav.pipeline.files import write_whole
 from omninav.pipeline.results import Figure
 from omninav.stages.values.album import Album, decoded
 from omninav.stages.values.belief import PlaceBelief
+from omninav.stages.values.drives import pose_rows
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing import DrivingStatus, PathProgress
 from omninav.stages.values.image import Pixels
@@ -39,7 +40,7 @@ from .film import encoded
 from .homing_snapshot import HomingGlance
 from .moments import spread_out
 from .style import broken_at_jumps
-from .target_pictures import picture_of, target_view
+from .target_pictures import target_of
 
 if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont
@@ -122,7 +123,7 @@ class DriveFilm(Stage):
         album: Album | None = None,
     ) -> Out:
         """The whole run at once."""
-        path = np.array([(np.nan,) * 3 if pose is None else (pose.x, pose.y, pose.heading) for pose in truth])
+        path = pose_rows(truth)
         stamps = np.array([tick.stamp for tick in ticks])
         last = _last_tick(list(statuses), None if ways is None else list(ways), stamps, round(1e9 * self.after_s))
         there = [row for row, glance in enumerate(glances) if glance is not None and row <= last]
@@ -132,11 +133,10 @@ class DriveFilm(Stage):
         for row in (there[n] for n in spread_out(len(there), self.frames)):
             glance, way = glances[row], None if ways is None else ways[row]
             assert glance is not None
-            view = target_view(progress[row], way, map)
-            goal = np.full(3, np.nan)
-            if view is not None and glance.vector is not None:
-                goal = path[0] if map is None else map.poses[view]
-            seconds, shown = (int(stamps[row]) - int(stamps[0])) / 1e9, picture_of(view, album)
+            goal, shown = target_of(progress[row], way, map, path[0], album)
+            if glance.vector is None:
+                goal = np.full(3, np.nan)
+            seconds = (int(stamps[row]) - int(stamps[0])) / 1e9
             belief = None if beliefs is None else beliefs[row]
             scenes.append(
                 Scene(row, seconds, glance, shown, path[row], goal, belief, way, progress[row], statuses[row])
@@ -215,12 +215,16 @@ class Frames(Sequence[Pixels]):
     def __len__(self) -> int:
         return len(self.scenes)
 
-    def __getitem__(self, index):  # type: ignore[no-untyped-def]
-        """One frame: (rows, columns, 3)."""
+    @overload
+    def __getitem__(self, index: int) -> Pixels: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Pixels]: ...
+
+    def __getitem__(self, index: int | slice) -> Pixels | list[Pixels]:
+        """One frame, or some: (rows, columns, 3)."""
         if isinstance(index, slice):
-            return [self[n] for n in range(*index.indices(len(self)))]
-        if not -len(self) <= index < len(self):
-            raise IndexError(index)
+            return [self._drawn(scene) for scene in self.scenes[index]]
         return self._drawn(self.scenes[index])
 
     def _drawn(self, scene: Scene) -> Pixels:

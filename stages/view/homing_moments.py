@@ -9,7 +9,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.results import Figure
 from omninav.stages.values.album import Album, decoded
-from omninav.stages.values.drives import Array
+from omninav.stages.values.drives import Array, pose_rows
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing import HomingVector, PathProgress
 from omninav.stages.values.image import Pixels
@@ -21,7 +21,7 @@ from .draw_homing import BRIGHT, LOST, NAMES, VECTOR, hexadecimal, is_known, rob
 from .homing_snapshot import HomingGlance
 from .moments import spread_out
 from .style import ESTIMATE, MARK, ODOMETRY, TRUTH, broken_at_jumps, draw_plan, draw_pose, picture, plan_axes
-from .target_pictures import picture_of, target_view
+from .target_pictures import target_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -71,19 +71,15 @@ class HomingMoments(Stage):
         plan: FloorPlan | None = None,
     ) -> Out:
         """The whole run at once."""
-        path = np.array([(np.nan,) * 3 if pose is None else (pose.x, pose.y, pose.heading) for pose in truth])
+        path = pose_rows(truth)
         told = [(row, g) for row, g in enumerate(glances) if g is not None and g.vector is not None]
         if not told:
             return self.Out()
         found = []
         for row, glance in (told[n] for n in chosen([g for _, g in told], self.moments)):
             assert glance.vector is not None
-            view = target_view(progress[row], None if ways is None else ways[row], map)
-            goal = np.full(3, np.nan)
-            if view is not None:
-                goal = path[0] if map is None else map.poses[view]
+            goal, shown = target_of(progress[row], None if ways is None else ways[row], map, path[0], album)
             seconds = (ticks[row].stamp - ticks[0].stamp) / 1e9
-            shown = picture_of(view, album)
             found.append(
                 Moment(ticks[row].frame, seconds, glance, glance.vector, shown, path[row], goal, path[: row + 1])
             )

@@ -7,8 +7,10 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage, Tick
 from omninav.pipeline.results import Figure
+from omninav.stages.geometry.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
-from omninav.stages.values.drives import Array
+from omninav.stages.values.drives import Array, pose_rows
+from omninav.stages.values.drives import known as poses_known
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.topological_map import TopologicalMap
 
@@ -42,14 +44,12 @@ class PlaceBeliefOverTime(Stage):
         rows = [row for row, tick in enumerate(ticks) if tick.log == ticks[-1].log]
         seconds = np.array([ticks[row].stamp - ticks[rows[0]].stamp for row in rows]) / 1e9
         shares = np.full((len(rows), len(map)), np.nan)
-        nearest = np.full(len(rows), -1)
-        medoids = map.poses[map.places][:, :2]
         for k, row in enumerate(rows):
-            belief, true = beliefs[row], truth[row]
+            belief = beliefs[row]
             if belief is not None:
                 shares[k] = belief.probabilities
-            if true is not None:
-                nearest[k] = int(np.argmin(np.hypot(*(medoids - (true.x, true.y)).T)))
+        path = pose_rows([truth[row] for row in rows])
+        nearest = np.where(poses_known(path), map.nearest_places(np.nan_to_num(path)), -1)
         if not np.isfinite(shares).any():
             return self.Out()
         known = nearest >= 0
@@ -74,8 +74,7 @@ class PlaceBeliefOverTime(Stage):
 
 def with_neighbours(shares: Array, nearest: npt.NDArray[np.int64], map: TopologicalMap) -> tuple[Array, Array]:
     """Of each tick the belief in a place (N,), and in it with all places that are linked with it; NaN where unknown."""
-    linked = np.eye(len(map), dtype=np.bool_)
-    linked[map.links[:, 0], map.links[:, 1]] = linked[map.links[:, 1], map.links[:, 0]] = True
+    linked = links_between(map.links, len(map)) <= 1
     alone = np.where(nearest >= 0, shares[np.arange(len(shares)), nearest], np.nan)
     return alone, np.where(nearest >= 0, (shares * linked[nearest]).sum(axis=1), np.nan)
 

@@ -8,6 +8,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.results import Figure
 from omninav.stages.geometry.se2 import wrap
+from omninav.stages.values.drives import pose_rows
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
 
@@ -55,7 +56,7 @@ class SimilarityHeatMap(Stage):
 
 
 def _draw(panels: Sequence[tuple[Tick, Peaks, Pose | None]], map: ReferenceGraph) -> bytes:
-    truths = np.array([[p.x, p.y, p.heading] if p else [np.nan] * 3 for _, _, p in panels])
+    truths = pose_rows([pose for _, _, pose in panels])
     extent = extent_of(map.poses, truths)
     columns = len(panels)
     arrow = 0.1 * (extent[1] - extent[0] + extent[3] - extent[2]) / 2 if extent else 1.0

@@ -6,6 +6,7 @@ import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.album import Album, decoded
+from omninav.stages.values.drives import Array
 from omninav.stages.values.homing import PathProgress
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.planned_way import PlannedWay
@@ -41,6 +42,19 @@ def target_view(progress: PathProgress | None, way: PlannedWay | None, map: Topo
         return None
     views, _ = map.views_along(way.places)
     return int(views[at]) if at < len(views) else None
+
+
+def target_of(
+    progress: PathProgress | None, way: PlannedWay | None, map: TopologicalMap | None, start: Array, album: Album | None
+) -> tuple[Array, Pixels | None]:
+    """Where the view that the robot goes to was taken (3,), NaN where it is not known, and its picture.
+
+    Without a map that is where the run began, `start` (3,).
+    """
+    view = target_view(progress, way, map)
+    if view is None:
+        return np.full(3, np.nan), None
+    return start if map is None else map.poses[view], picture_of(view, album)
 
 
 def picture_of(view: int | None, album: Album | None) -> Pixels | None:
