@@ -67,6 +67,10 @@ class Memory(State):
     metres: float = 0.0
     depth: float = 0.0
 
+    def expected(self, seen: WorkingPicture, rows: Ints | slice = slice(None)) -> Array:
+        """Where the tracked points of `rows` must be in a picture taken where the robot is: (N, 2)."""
+        return seen.points((self.corners[rows] - self.translation) @ self.rotation)
+
 
 class VisualHoming(Stage):
     """Where a target view was taken, seen from the robot: at first from two views, then by a local map while it drives.
@@ -242,7 +246,7 @@ class VisualHoming(Stage):
     ) -> tuple[Ints, Array, int]:
         """Track, find again, and place the robot in the local map; gives kinds, points, and how many agree."""
         kinds, points = np.full(len(memory.rows), LOST), np.full((len(memory.rows), 2), np.nan)
-        expected = seen.points((memory.corners - memory.translation) @ memory.rotation)
+        expected = memory.expected(seen)
         if memory.picture.shape == seen.grey.shape:
             old = np.flatnonzero(memory.alive)
             guesses = np.where(np.isfinite(expected[old]), expected[old], memory.points[old])
@@ -279,14 +283,15 @@ class VisualHoming(Stage):
         steady = np.flatnonzero(memory.alive & (kinds != AGAIN))
         memory.looks[steady] = histograms(seen, memory.points[steady], self.patch)
         lost = np.flatnonzero(kinds == LOST)
-        points[lost] = seen.points((memory.corners[lost] - memory.translation) @ memory.rotation)
+        points[lost] = memory.expected(seen, lost)
         memory.depth = float(np.median(np.linalg.norm(memory.anchors - memory.translation, axis=1)))
         return kinds, points, inliers
 
     def _start_again(self, memory: Memory, seen: WorkingPicture, strength: Floats, rows: Ints) -> None:
         """Features that were matched anew are tracked again: at the best point near to where theirs must be."""
-        expected = seen.points((memory.corners[rows] - memory.translation) @ memory.rotation)
-        rows, expected = rows[seen.inside(expected, 2.0)], expected[seen.inside(expected, 2.0)]
+        expected = memory.expected(seen, rows)
+        inside = seen.inside(expected, 2.0)
+        rows, expected = rows[inside], expected[inside]
         corners = best_nearby(strength, seen, expected, self.anchor_reach)
         rays = seen.bearings(corners)
         usable = np.isfinite(rays).all(axis=1) & seen.inside(corners, 2.0)
@@ -296,7 +301,7 @@ class VisualHoming(Stage):
         memory.points[rows], memory.alive[rows] = corners, True
 
     def _find_lost(self, memory: Memory, seen: WorkingPicture, strength: Floats, kinds: Ints, points: Array) -> None:
-        expected = seen.points((memory.corners - memory.translation) @ memory.rotation)
+        expected = memory.expected(seen)
         lost = np.flatnonzero((kinds == LOST) & seen.inside(expected, 2.0))
         if not len(lost):
             return
