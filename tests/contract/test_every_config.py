@@ -35,7 +35,8 @@ def test_its_first_line_is_its_package_and_its_second_says_what_it_is(path: Path
     package, said = head(path)
     role = group(path)
     content = yaml.safe_load(path.read_text()) or {}
-    wanted = "_global_" if role in ("variant", "results", "ablation") or "nodes" in content else None
+    graph = "nodes" in content or "wires" in content
+    wanted = "_global_" if role in ("variant", "results", "ablation") or graph else None
     of_a_stage = "_target_" in content
     packages = [wanted] if wanted else [f"nodes.{role}"] if of_a_stage else [role, f"world.{role}"]
     assert package in [f"# @package {name}" for name in packages]
