@@ -9,6 +9,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.results import Metrics
 from omninav.stages.geometry.se2 import between, wrap
+from omninav.stages.values.drives import pose_rows
 from omninav.stages.values.homing import HomingVector, PathProgress
 from omninav.stages.values.pose import Pose
 
@@ -40,20 +41,19 @@ class HomingErrors(Stage):
         progress: Sequence[PathProgress | None],
     ) -> Out:
         """The whole run at once."""
-        poses = np.array([(np.nan,) * 3 if p is None else (p.x, p.y, p.heading) for p in truth])
+        poses = pose_rows(truth)
         if not len(poses) or not np.isfinite(poses).all():
             return self.Out()
-        seen = [k for k, vector in enumerate(vectors) if vector is not None]
         ways = between(poses, poses[0])
         away = int(np.argmax(np.hypot(ways[:, 0], ways[:, 1])))  # where it was carried to, or drove to
-        after = [k for k in seen if k >= away]
+        after = {k: vector for k, vector in enumerate(vectors) if k >= away and vector is not None}
         if not after:
             return self.Out()
-        found = [k for k in after if vectors[k].state != "lost"]  # type: ignore[union-attr]
-        off = {k: _off(vectors[k], ways[k]) for k in found}  # type: ignore[arg-type]
-        far = [off[k][0] for k in found if math.hypot(*ways[k, :2]) > self.from_m]
+        found = {k: vector for k, vector in after.items() if vector.state != "lost"}
+        off = {k: _off(vector, ways[k]) for k, vector in found.items()}
+        far = [off[k][0] for k in off if math.hypot(*ways[k, :2]) > self.from_m]
         arrived = next((k for k, at in enumerate(progress) if at is not None and at.arrived and k > away), None)
-        first = after[0] if after[0] in off else None
+        first = min(after)
         values = {
             "start_m": float(math.hypot(*ways[away, :2])),
             "arrived": int(arrived is not None),
@@ -67,11 +67,11 @@ class HomingErrors(Stage):
                 "p90": float(np.percentile(far, 90)) if far else None,
                 "max": float(np.max(far)) if far else None,
             },
-            "inliers": float(np.median([vectors[k].inliers for k in found])) if found else None,  # type: ignore[union-attr]
+            "inliers": float(np.median([vector.inliers for vector in found.values()])) if found else None,
             "first": {
-                "direction_error_deg": off[first][0] if first is not None else None,
-                "turn_error_deg": off[first][1] if first is not None else None,
-                "inliers": vectors[after[0]].inliers,  # type: ignore[union-attr]
+                "direction_error_deg": off[first][0] if first in off else None,
+                "turn_error_deg": off[first][1] if first in off else None,
+                "inliers": after[first].inliers,
             },
         }
         return self.Out(metrics=Metrics({"homing": values}))

@@ -1,5 +1,7 @@
 """Right matches before the first wrong one, of made-up pictures whose points are known."""
 
+from typing import Literal
+
 import numpy as np
 import pytest
 
@@ -27,17 +29,21 @@ def seen(x: float, swapped: bool = False) -> tuple[LocalFeatures, Depths]:
     return LocalFeatures(away / metres[:, None], *nothing), Depths(metres, np.zeros((0, 2)))
 
 
-def judged(swapped: bool, **how: object) -> dict[str, float]:
+Search = Literal["both_ways", "one_way"]
+Best = Literal["clearest", "nearest"]
+
+
+def judged(swapped: bool, search: Search = "both_ways", best: Best = "clearest") -> dict[str, float]:
     poses = [Pose(x, 0.0, 0.0) for x in (0.0, 0.4, 1.0)]
     views = [seen(0.0), seen(0.4), seen(1.0, swapped)]
-    stage = FirstMatches(apart_m=(1.0,), **how)  # type: ignore[arg-type]
+    stage = FirstMatches(apart_m=(1.0,), search=search, best=best)
     out = stage.step(Context("m"), poses, [view for view, _ in views], (), [depths for _, depths in views])
     return dict(out.metrics.values["matches"]["apart"][0])
 
 
 @pytest.mark.parametrize("search", ["both_ways", "one_way"])
 @pytest.mark.parametrize("best", ["clearest", "nearest"])
-def test_without_a_wrong_match_all_are_counted(search: str, best: str) -> None:
+def test_without_a_wrong_match_all_are_counted(search: Search, best: Best) -> None:
     found = judged(False, search=search, best=best)
     assert (found["pairs"], found["first_right"], found["right"], found["right_share"]) == (1, 40.0, 40.0, 1.0)
 

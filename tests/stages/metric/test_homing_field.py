@@ -1,6 +1,7 @@
 """Errors of homing vectors by distance, of made-up vectors."""
 
 import math
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -18,8 +19,8 @@ CTX = Context("m")
 POSES = [Pose(0.0, 0.0, 0.4), Pose(0.5, 0.0, math.pi), Pose(0.0, 1.5, 0.0), Pose(0.0, -1.6, 0.0)]
 
 
-def vector(direction: float, turn: float, state: str = "new") -> HomingVector:
-    return HomingVector(1, direction, turn, 1.0, 1.0, 1.0, None, 20, state)  # type: ignore[arg-type]
+def vector(direction: float, turn: float, state: Literal["new", "lost"] = "new") -> HomingVector:
+    return HomingVector(1, direction, turn, 1.0, 1.0, 1.0, None, 20, state)
 
 
 def judged() -> HomingFieldErrors.Out:

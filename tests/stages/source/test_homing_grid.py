@@ -2,10 +2,10 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import DATA, needs_data
 
 from omninav.pipeline import Context
 from omninav.stages.simulator.config import MirrorCamera
@@ -19,7 +19,7 @@ SMALL = MirrorCamera(
 )
 WORLD = replace(DEMO, camera=SMALL)
 START = WORLD.routes["drive"].waypoints[0]
-ANTWORLD = Path(__file__).resolve().parents[4] / "shared/data/antworld-rendered/grid_200mm"
+ANTWORLD = DATA / "antworld-rendered" / "grid_200mm"
 
 
 def ticks(source: HomingGrid, seed: int = 0) -> list[HomingGrid.Out]:
@@ -63,7 +63,7 @@ def test_a_target_without_room_is_refused() -> None:
         HomingGrid(place=WORLD, target=wall).setup(Context("source", np.random.default_rng(0)))
 
 
-@pytest.mark.skipif(not ANTWORLD.exists(), reason="shared/data/antworld-rendered is not there")
+@needs_data
 def test_of_a_log_the_target_is_the_picture_taken_closest() -> None:
     source = HomingGrid(log=f"antworld:{ANTWORLD}", target=(5.9, 4.5, 0.0), reach=0.5)
     found = ticks(source)
