@@ -20,11 +20,13 @@ class PlaceHits(Stage):
     the believed place is the closest or one of its neighbours; `right_after`: of the first, second ... of `updates`
     updates since the belief began (`begun`: at which pictures it did), as the paper counts, and `near_after`;
     `within_after`: the believed place has the closest medoid, or the closest of all images that the map keeps (where a
-    place is long, its medoid lies far from its ends). `median_apart_m`: how far the believed place's medoid lies from
-    the truth, and `least_apart_m`, the closest one's.
+    place is long, its medoid lies far from its ends); `beside_after`: its medoid is at most `beside_m` further away
+    than the closest (where the tour came by twice, two medoids may lie side by side). `median_apart_m`: how far the
+    believed place's medoid lies from the truth, and `least_apart_m`, the closest one's.
     """
 
     updates: Annotated[int, Bounds(ge=1)] = 5
+    beside_m: Annotated[float, Bounds(ge=0)] = 0.5
 
     class Out(Outputs):
         """`metrics`: the entry `localisation` of metrics.json; absent where poses or the map's are not ground truth."""
@@ -64,6 +66,7 @@ class PlaceHits(Stage):
             "right_after": _after(rights, after, self.updates),
             "near_after": _after(nears, after, self.updates),
             "within_after": _after(within, after, self.updates),
+            "beside_after": _after(metres_off - least <= self.beside_m, after, self.updates),
             "median_apart_m": float(np.median(metres_off)),
             "least_apart_m": float(np.median(least)),
         }

@@ -14,20 +14,21 @@ Array = npt.NDArray[np.float64]
 
 
 class PlaceLikelihood(Stage):
-    """A Gaussian of the visual distance between the present view and each place's.
+    """A falling function of the visual distance between the present view and each place's.
 
-    Goedemé et al. 2007, section 5.3, equation 14: P(z | x) falls as exp(-diss^2 / sigma^2). `spread` is sigma; null:
-    the standard deviation of visual distance that the map was measured to have within its places. No place is less
-    likely than `least` times one that looks the same: views are blocked, and one that shows nothing known says nothing.
+    Goedemé et al. 2007, section 5.3, equation 14, with `tail: gaussian`: P(z | x) falls as exp(-diss^2 / sigma^2).
+    `spread` is sigma; null: the standard deviation of visual distance that the map was measured to have within its
+    places. No place is less likely than `least` times one that looks the same: views are blocked, and one that shows
+    nothing known says nothing.
 
-    `tail`: `heavy` is 1 / (1 + diss^2 / sigma^2) instead. Away from all places, as a robot is that was carried to
-    somewhere, every distance is many sigma, and by a Gaussian all are as unlikely as what has nothing in common; yet
-    the place with the least of them is the right one.
+    `tail: heavy` is 1 / (1 + diss^2 / sigma^2) instead. Beside the way of the tour, or where things have changed, every
+    distance is many sigma, and by a Gaussian all are as unlikely as what has nothing in common; yet the place with the
+    least of them is the right one.
     """
 
     spread: Annotated[float, Bounds(gt=0)] | None = None
-    least: Annotated[float, Bounds(gt=0, le=1)] = 0.01
-    tail: Literal["gaussian", "heavy"] = "gaussian"
+    least: Annotated[float, Bounds(gt=0, le=1)] = 0.001
+    tail: Literal["gaussian", "heavy"] = "heavy"
 
     class Out(Outputs):
         """One value per place."""
@@ -42,7 +43,7 @@ class PlaceLikelihood(Stage):
 
 
 def place_likelihoods(
-    distances: Array, sigma: float, least: float, tail: Literal["gaussian", "heavy"] = "gaussian"
+    distances: Array, sigma: float, least: float, tail: Literal["gaussian", "heavy"]
 ) -> Array:
     """Of visual distances (P,), inf for nothing in common, lifted to [least, 1]: exp(-(d / sigma)^2), or as `tail`."""
     squares = np.square(distances / max(sigma, 1e-9))

@@ -46,13 +46,13 @@ def test_a_map_of_one_place_stays_there():
 
 
 def test_likelihood_is_a_gaussian_of_visual_distance_that_never_falls_to_nothing():
-    values = place_likelihoods(np.array([0.0, 0.5, math.inf]), 0.5, 0.01)
+    values = place_likelihoods(np.array([0.0, 0.5, math.inf]), 0.5, 0.01, "gaussian")
     assert values == pytest.approx([1.0, 0.01 + 0.99 * math.exp(-1), 0.01])
 
 
 def test_with_a_heavy_tail_the_least_unlike_of_unlike_places_is_still_the_likeliest():
     far = np.array([10.0, 20.0, math.inf])  # in units of sigma
-    assert place_likelihoods(far, 1.0, 0.001) == pytest.approx([0.001] * 3)
+    assert place_likelihoods(far, 1.0, 0.001, "gaussian") == pytest.approx([0.001] * 3)
     heavy = place_likelihoods(far, 1.0, 0.001, "heavy")
     assert heavy == pytest.approx([0.001 + 0.999 / 101, 0.001 + 0.999 / 401, 0.001])
 
@@ -62,7 +62,7 @@ def test_a_step_of_bayes_leaves_a_belief_that_sums_to_one(places, seed, anywhere
     rng = np.random.default_rng(seed)
     chances = transitions(links_between(rng.integers(0, places, (places, 2)), places), None, anywhere)
     before = rng.dirichlet(np.ones(places))
-    after = (before @ chances) * place_likelihoods(rng.exponential(1.0, places), 1.0, 0.01)
+    after = (before @ chances) * place_likelihoods(rng.exponential(1.0, places), 1.0, 0.01, "gaussian")
     assert (before @ chances).sum() == pytest.approx(1.0)
     assert (after / after.sum()).sum() == pytest.approx(1.0)
     assert (after > 0).sum() >= (before > 0).sum() * (anywhere < 1.0)

@@ -61,6 +61,12 @@ def test_a_long_place_is_right_where_one_of_its_images_was_taken_closest():
     assert found["within_after"] == [1.0]
 
 
+def test_a_medoid_hardly_further_than_the_closest_counts_as_beside_it():
+    apart = hits([0, 0, 1], [1.2, 1.3, 1.3], {0, 1, 2}).values["localisation"]  # medoids are at 0 and 2 m
+    assert apart["right_after"][0] == pytest.approx(1 / 3)
+    assert apart["beside_after"][0] == pytest.approx(2 / 3)  # 0.4 m further, and 0.6 m
+
+
 def test_pictures_without_truth_do_not_count():
     assert hits([0, 1], [None, 2.0], {0}).values["localisation"]["pictures"] == 1
     assert hits([0], [None], {0}) is None
