@@ -42,9 +42,7 @@ class PlaceLikelihood(Stage):
         return self.Out(likelihood=Likelihood(values))
 
 
-def place_likelihoods(
-    distances: Array, sigma: float, least: float, tail: Literal["gaussian", "heavy"]
-) -> Array:
+def place_likelihoods(distances: Array, sigma: float, least: float, tail: Literal["gaussian", "heavy"]) -> Array:
     """Of visual distances (P,), inf for nothing in common, lifted to [least, 1]: exp(-(d / sigma)^2), or as `tail`."""
     squares = np.square(distances / max(sigma, 1e-9))
     return least + (1.0 - least) * (np.exp(-squares) if tail == "gaussian" else 1.0 / (1.0 + squares))
