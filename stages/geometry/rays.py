@@ -53,8 +53,8 @@ def pixels_of_rays(camera: Camera, rays: Array) -> tuple[Array, Array]:
             return strip_columns(camera, azimuth), _in_strip(camera, share)
         case _:
             raise BadInput(
-                f"camera: no elevations are known for the rows of a {type(camera).__name__} picture, so that no window "
-                "can be cut from it; give its model in camera.yaml (projection: hyperbolic, fisheye, equirectangular, "
+                f"camera: no elevations are known for the rows of a {type(camera).__name__} picture, nor where in it "
+                "a direction is seen; give its model in camera.yaml (projection: hyperbolic, fisheye, equirectangular, "
                 "or cylindrical with elevation_top and elevation_bottom), or use unwarp=by_camera"
             )
 

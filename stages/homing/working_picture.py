@@ -70,9 +70,14 @@ class WorkingPicture(NamedTuple):
 
 
 def working_picture(picture: Image | Panorama, camera: Camera | None, largest: int) -> WorkingPicture:
-    """Make a picture ready; one of more than `largest` pixels is made smaller. Raises BadInput for want of a camera."""
-    if isinstance(picture, Image) and camera is None:
-        raise BadInput("homing: a camera's picture without its camera; wire it: wires.homing.camera=source.camera")
+    """Make a picture ready; one of more than `largest` pixels is made smaller.
+
+    Raises BadInput for want of a camera, or of its elevations.
+    """
+    if isinstance(picture, Image):
+        if camera is None:
+            raise BadInput("homing: a camera's picture without its camera; wire it: wires.homing.camera=source.camera")
+        pixels_of_rays(camera, np.empty((0, 3)))  # now, and not once something is tracked
     grey = cast(Grey, cv2.cvtColor(picture.pixels, cv2.COLOR_BGR2GRAY))
     rows, columns = grey.shape
     size = columns, rows

@@ -15,6 +15,7 @@ from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.matching import mutual_nearest
 from omninav.stages.geometry.se2 import between
 from omninav.stages.homing.visual_homing import Memory, VisualHoming
+from omninav.stages.values.camera import Donut
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.homing import HomingTarget, HomingVector
 from omninav.stages.values.image import Image, Panorama
@@ -200,6 +201,9 @@ def test_what_is_not_wired_is_said() -> None:
     homing = Homing()
     with pytest.raises(BadInput, match=r"wires\.homing\.camera=source\.camera"):
         homing.stage.step(homing.ctx, homing.memory, look("mirror", 0.4), homing.target)
+    donut = Donut(320, 240, 159.5, 119.5, 17.0, 119.0)
+    with pytest.raises(BadInput, match=r"no elevations are known .* give its model in camera\.yaml"):
+        homing.stage.step(homing.ctx, homing.memory, look("mirror", 0.4), homing.target, camera=donut)
     alien = Correspondences(np.array([9999]), np.array([0]), np.zeros(1))
     with pytest.raises(BadInput, match="correspondences that are not those of the present features"):
         homing.stage.step(
