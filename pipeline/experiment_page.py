@@ -43,6 +43,7 @@ def write_page(run: "ExperimentRun") -> Path:
         write_whole(folder / drawing["file"], drawing.pop("content"))
     first = run.cells[0].words
     common = [word for word in first if all(word in cell.words for cell in run.cells)]
+    conditions = [_condition(cell, common) for cell in run.cells]
     said: dict[str, Any] = {
         "experiment": experiment,
         "profile": run.profile,
@@ -51,7 +52,8 @@ def write_page(run: "ExperimentRun") -> Path:
         "tables": [_table(experiment, results, name) for name in experiment.measures],
         "remarks": [_remark(run, number) for number in range(len(experiment.remarks))],
         "logs": [(log.name, _facts(log.facts)) for log in run.logs.values()],
-        "conditions": [_condition(cell, common) for cell in run.cells],
+        "conditions": conditions,
+        "run_columns": [name for name in conditions[0]["run"] if any(row["run"][name] for row in conditions)],
         "common_words": common,
         "made": _made(folder),
         "marks": MARKS,
@@ -226,10 +228,12 @@ def _condition(cell: Any, common: Sequence[str]) -> dict[str, Any]:
         "name": cell.name,
         "own_words": shlex.join(word for word in cell.words if word not in common),
         "done": f"{len(cell.results)}/{len(cell.seeds)}",
-        "frames": "" if frames is None else str(frames),
-        "length": "" if length is None else f"{length:.0f}",
-        "spacing": "" if not length or not frames else f"{length / frames:.2f}",
-        "references": str(map_size.get("references", "")),
+        "run": {
+            "frames": "" if frames is None else str(frames),
+            "length (m)": "" if length is None else f"{length:.0f}",
+            "spacing (m)": "" if not length or not frames else f"{length / frames:.2f}",
+            "references": str(map_size.get("references", "")),
+        },
         "error": cell.error,
     }
 
