@@ -28,8 +28,8 @@ def shared_cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def omninav(tmp_path: Path, shared_cache: Path) -> Command:
-    """Runs `omninav …` in an empty folder; runs share one cache so that the small world is rendered once."""
+def omninav(tmp_path: Path) -> Command:
+    """Runs `omninav …` in an empty folder."""
 
     def run(*words: str, check: bool = False, **environment: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "omninav.pipeline", *words]

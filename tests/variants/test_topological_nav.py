@@ -2,6 +2,7 @@
 
 import json
 import math
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,12 @@ def whole(tmp_path_factory: pytest.TempPathFactory, shared_cache: Path) -> Path:
     return finished(tmp_path_factory.mktemp("navigation"), *WORDS, "goal=3", *KILLED, f"cache={shared_cache}")
 
 
+@pytest.fixture
+def navigate(omninav, shared_cache: Path):
+    """Runs the variant in the small world, whose map is made once."""
+    return partial(omninav, *WORDS, f"cache={shared_cache}")
+
+
 def test_a_robot_that_does_not_know_where_it_is_drives_to_a_place_and_docks_there(whole: Path):
     metrics = json.loads((whole / "metrics.json").read_text())
     found = metrics["navigation"]
@@ -41,10 +48,10 @@ def test_killed_on_its_way_it_goes_on_to_the_same_bytes(whole: Path, tmp_path: P
     assert_same_bytes(run, whole, "metrics.json", "result.mcap", "trajectory.tum")
 
 
-def test_a_picture_taken_elsewhere_on_the_floor_is_a_goal(omninav, tmp_path: Path):
+def test_a_picture_taken_elsewhere_on_the_floor_is_a_goal(omninav, navigate, tmp_path: Path):
     omninav("variant=wander", "nodes.source.start=[4.2,4.0,0.5]", "nodes.source.seconds=0.2", check=True)
     (tmp_path / "runs" / "latest" / "picture.png").rename(tmp_path / "there.png")
-    omninav(*WORDS, "goal=there.png", "nodes.source.seconds=3", check=True)
+    navigate("goal=there.png", "nodes.source.seconds=3", check=True)
     found = metrics_of(tmp_path)["navigation"]
     assert found["state"] == "under way"
     map = read_artifact(tmp_path / "runs" / "latest" / "map.omap")
@@ -52,16 +59,16 @@ def test_a_picture_taken_elsewhere_on_the_floor_is_a_goal(omninav, tmp_path: Pat
     assert math.dist(map.poses[map.places[found["goal"]]][:2], (4.2, 4.0)) < 1.0
 
 
-def test_a_goal_that_is_no_file_is_refused_before_anything_runs(omninav, tmp_path: Path):
-    ended = omninav(*WORDS, "goal=elsewhere.png", "nodes.source.seconds=2")
+def test_a_goal_that_is_no_file_is_refused_before_anything_runs(navigate, tmp_path: Path):
+    ended = navigate("goal=elsewhere.png", "nodes.source.seconds=2")
     assert ended.returncode != 0
     assert "goal: there is no file elsewhere.png" in ended.stderr
     assert "Traceback" not in ended.stderr
 
 
 @pytest.mark.parametrize("goal", ["kitchen", "99"])
-def test_a_goal_that_the_map_does_not_have_is_refused_in_one_line(omninav, tmp_path: Path, goal: str):
-    ended = omninav(*WORDS, f"goal={goal}", "nodes.source.seconds=2")
+def test_a_goal_that_the_map_does_not_have_is_refused_in_one_line(navigate, tmp_path: Path, goal: str):
+    ended = navigate(f"goal={goal}", "nodes.source.seconds=2")
     assert ended.returncode != 0
     assert "goal: the map has no place" in ended.stderr
     assert "Traceback" not in ended.stderr
