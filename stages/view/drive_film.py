@@ -239,7 +239,7 @@ class Frames(Sequence[Pixels]):
             frame[top : top + rows, :columns] = targets_view(scene.target, scene.glance, self.target)
             words.append((4, high + GAP - 2, f"going to: {scene.glance.target or 'the view'}", DARK))
         strip = self.target == self.view
-        left, first = (4, top + self.target[1] + 4) if strip else (self.target[0] + 12, high + GAP - 2)
+        left, first = (4, top + self.target[1] + 4) if strip else (self.target[0] + 12, top - 2)
         words += [(left, first + n * LINE, text, colour) for n, (text, colour) in enumerate(_said(scene))]
         self._draw_whole(frame, scene)
         self._draw_around(frame, scene)
