@@ -84,7 +84,10 @@ class VisualHoming(Stage):
     are in the map: tracks that have drifted away are noticed, and start again from there. Less than `least` features
     that agree are no basis: the map is made anew from the matches of that tick, its unit by what was known before, or
     the target is lost. It is also made anew where `anew` times as many matches agree as when it was made, since more
-    is matched from closer by, unless the target is nearer than `too_near` of what is seen.
+    is matched from closer by, unless the target is nearer than `too_near` of what is seen. A map that is wrong shows
+    where it says that the target is reached: within `near` of what is seen the two views must be alike. Where most
+    features that are matched are more than `stray_deg` off after the turn, and few of them agree with the map, it is
+    thrown away.
 
     `motion` (odometry) is used if it is wired: to begin the search for tracked points, and for metres. `planar`: the
     robot is on a floor. Points with less parallax than `least_parallax_deg` have no known place. `window`, `levels`: of
@@ -101,6 +104,8 @@ class VisualHoming(Stage):
     chance: Annotated[float, Bounds(gt=0)] = 0.01
     anew: Annotated[float, Bounds(ge=1)] = 1.5
     too_near: Annotated[float, Bounds(ge=0)] = 0.1
+    near: Annotated[float, Bounds(ge=0)] = 0.05
+    stray_deg: Annotated[float, Bounds(gt=0)] = 10.0
     least_parallax_deg: Annotated[float, Bounds(ge=0)] = 1.0
     anchor_reach: Annotated[int, Bounds(ge=0)] = 3
     window: Annotated[int, Bounds(ge=3)] = 15
@@ -145,7 +150,10 @@ class VisualHoming(Stage):
                 more, _ = self._begin(ctx, memory, seen, *matched, at_least=round(self.anew * memory.made_of))
                 if more:
                     return self._out(memory, seen, "new", more, np.full(len(memory.rows), TRACKED), memory.points)
-            if inliers >= self.least:
+            if inliers >= self.least and self._contradicted(memory, matched[0], matched[2], inliers):
+                ctx.count("false_map")
+                memory.mapped, memory.unit = False, 1.0
+            elif inliers >= self.least:
                 return self._out(memory, seen, "tracking", inliers, kinds, points)
             why = f"{inliers} tracked features agree on where the robot is, {self.least} are needed"
         made, said = self._begin(ctx, memory, seen, *matched)
@@ -180,6 +188,15 @@ class VisualHoming(Stage):
         # Closer to the target more is matched with it; at the target the baseline is too short.
         left = math.hypot(*(memory.goal_translation - memory.translation)[:2])
         return matches > self.anew * memory.made_of and left > self.too_near * memory.depth
+
+    def _contradicted(self, memory: Memory, first: Array, second: Array, inliers: int) -> bool:
+        # At the target what is matched with it stands where the target view has it, but for the turn.
+        left = math.hypot(*(memory.goal_translation - memory.translation)[:2])
+        if left > self.near * memory.depth or inliers > len(first) / 3:
+            return False
+        turned = second @ (memory.rotation.T @ memory.goal_rotation).T
+        off = np.linalg.norm(turned - first, axis=1)
+        return bool(np.count_nonzero(off < 2.0 * math.sin(math.radians(self.stray_deg) / 2.0)) < len(first) / 2)
 
     def _begin(
         self,

@@ -118,6 +118,20 @@ def test_nearness_tells_a_view_that_hardly_differs_from_the_first_tick_on() -> N
     assert Homing().at((4.0, 4.2, 1.4)).nearness > 0.1
 
 
+def test_a_map_that_says_the_target_is_reached_where_views_differ_is_thrown_away() -> None:
+    homing, pose = Homing(), (4.0, 4.2, -0.5)
+    homing.at(pose)
+    memory = homing.memory
+    few = np.flatnonzero(memory.alive)[:8]  # a false map is one on which few agree by chance
+    for name in ("rows", "anchors", "corners", "points", "alive", "looks"):
+        setattr(memory, name, getattr(memory, name)[few])
+    memory.goal_translation = memory.translation + 0.01 * memory.depth
+    vector = homing.at(pose)
+    assert homing.ctx.counts["false_map"] == 1
+    assert (vector.state, vector.ratio) == ("new", pytest.approx(1.0))
+    assert off_deg(vector, pose)[0] < 3.0
+
+
 def test_what_was_covered_is_found_again() -> None:
     homing, poses = Homing(), drive(13)
     for k, pose in enumerate(poses[:3]):
