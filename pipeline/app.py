@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .experiment_run import ExperimentRun
+    from .problems import Problem
 
 CONF = "omninav.conf"
 OUTCOMES = "OMNINAV_OUTCOMES"
+INPUTS = ("log", "tour", "map", "grid", "goal")
+"""Settings that name what a run is of; a variant reads some of them."""
 """Names the file in which the jobs of a sweep, also those in other processes, leave their exit codes."""
 
 HELP = """\
@@ -373,6 +376,11 @@ def complete(config: Any, variants: Callable[[str], Any] | None = None) -> dict[
         "events",
         "splices",
     }
+    if unread := list(_unread(config)):
+        raise ProblemsFound(unread)
+    for key in INPUTS:
+        if isinstance(config.get(key), str) and Path(config[key]).is_file():
+            config[key] = _past_links(config[key])
     try:
         plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
         for name, spec in (plain.get("artifacts") or {}).items():
@@ -382,8 +390,7 @@ def complete(config: Any, variants: Callable[[str], Any] | None = None) -> dict[
                 if spec.get("log") is not None:
                     hint = f"leave one of them away: {name}=FILE uses a saved one, tour=LOG makes one"
                     raise ProblemsFound([Problem(str(name), "both a file and a log to make it from are given", hint)])
-                # a link like runs/latest will soon point elsewhere
-                plain["artifacts"][name]["file"] = str(Path(str(spec["file"])).resolve())
+                plain["artifacts"][name]["file"] = _past_links(str(spec["file"]))
                 continue
             if spec.get("log") is not None and plain.get("log") is None:
                 raise ProblemsFound([Problem("log", "a tour is given, but no log to localise", "type log=LOG")])
@@ -409,6 +416,28 @@ def complete(config: Any, variants: Callable[[str], Any] | None = None) -> dict[
         where = getattr(error, "full_key", None) or "config"
         raise ProblemsFound([Problem(str(where), str(error).split("\n")[0])]) from None
     return plain
+
+
+def _past_links(file: str) -> str:
+    """A file's own path where it is named by way of a link: one like runs/latest will soon point elsewhere."""
+    path = Path(file)
+    return file if path.resolve() == path.absolute() else str(path.resolve())
+
+
+def _unread(config: Any) -> "Iterator[Problem]":
+    """What is given to this variant and read by nothing in it: its figures would be of something else."""
+    from omegaconf import OmegaConf
+
+    from .problems import Problem
+
+    graph = "".join(OmegaConf.to_yaml(config[part]) for part in ("nodes", "artifacts"))
+    read = [key for key in INPUTS if f"${{{key}}}" in graph or f"${{oc.select:{key}," in graph]
+    for key in INPUTS:
+        if config.get(key) is not None and key not in read:
+            what = f"nothing in variant={config.get('variant')} reads it"
+            yield Problem(
+                key, what, f"leave {key}=… away; it reads {', '.join(read) or 'none of ' + ', '.join(INPUTS)}"
+            )
 
 
 @contextmanager

@@ -2,9 +2,11 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 STATISTICS = ("mean", "std", "median", "p90", "p95", "max", "rmse")
+BAD_SHARES = ("loss_rate", "lost_rate", "new_after_first_lap_rate")
+"""Shares of which less is better; of others, more."""
 FIRST = ("position_error_m", "heading_error_deg", "loss_rate", "converged_after_frames", "frames")
 """Quantities that every run may have, in the order in which they are shown; others follow by name."""
 
@@ -54,11 +56,13 @@ class Measure:
         return f"{self.name} ({self.unit})" if self.unit else self.name
 
     @property
-    def lower_is_better(self) -> bool:
-        """Whether a smaller number is a better one: errors, losses, sizes, times."""
+    def better(self) -> Literal["lower", "higher"] | None:
+        """Which numbers are better ones: small errors, losses, sizes and times, large shares of what went well."""
         parts = self.path.split(".")
         last = parts[-2] if parts[-1] in STATISTICS else parts[-1]
-        return "error" in last or last.endswith(("_rate", "_bytes", "_ms", "after_frames"))
+        if last.endswith("_rate") and last not in BAD_SHARES:
+            return "higher"
+        return "lower" if "error" in last or last.endswith(("_rate", "_bytes", "_ms", "after_frames")) else None
 
 
 def leaves(metrics: Mapping[str, Any], place: tuple[str, ...] = ()) -> Iterator[Leaf]:

@@ -273,12 +273,14 @@ def _link(folder: Path, file: Path) -> str:
 
 
 def _best(path: str, runs: Sequence[Mapping[str, Measure]]) -> set[int]:
-    """Which runs have the smallest number, where small is good; none where all have the same."""
-    numbers = {n: run[path].value for n, run in enumerate(runs) if path in run and run[path].lower_is_better}
+    """Which runs have the best number, where it is known which is; none where all have the same."""
+    better = next((run[path].better for run in runs if path in run), None)
+    numbers = {n: run[path].value for n, run in enumerate(runs) if path in run and better}
     known = {n: float(value) for n, value in numbers.items() if isinstance(value, int | float)}
     if len(set(known.values())) < 2:
         return set()
-    return {number for number, value in known.items() if value == min(known.values())}
+    best = min(known.values()) if better == "lower" else max(known.values())
+    return {number for number, value in known.items() if value == best}
 
 
 # tables for the terminal

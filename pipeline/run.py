@@ -213,7 +213,7 @@ def unlike(name: str, made_by: Mapping[str, Any], graph: Graph, alike: Sequence[
         then, now = made_by.get(node), present.get(node)
         if then is None or now is None:
             continue
-        again = f"or learn the {name} anew (tour=LOG instead of {name}=FILE)"
+        again = "or leave map=FILE away, and it is learned anew"
         before, after = (spec["_target_"].replace(":", ".").rpartition(".")[2] for spec in (then, now))
         if before != after:
             what = f"it was made with {before} as '{node}', and this run has {after}"

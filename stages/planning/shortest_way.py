@@ -1,5 +1,6 @@
 """The shortest way over a topological map to a goal, as pictures to drive along."""
 
+import shlex
 from dataclasses import field
 from typing import Annotated, Literal
 
@@ -8,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.problems import BadInput, nearest
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.homing import DrivingStatus, ImagePath, PathProgress
 from omninav.stages.values.planned_way import PlannedWay
@@ -135,7 +136,6 @@ class ShortestWay(Stage):
             shut = ", ".join(f"{one} to {other}" for one, other in closed if one != other)
             why = f" but what could not be driven {self.again} times, from place {shut}; {last}" if shut else ""
             return _given_up(itinerary, f"no way leads from place {place} to {self.goal}{why}")
-        ctx.count("ways_planned")
         views, ends = map.views_along(places)
         if missed % 2 and len(places) > 1:
             views, ends = views[1:], ends - 1
@@ -156,8 +156,8 @@ def places_called(goal: str | int | None, map: TopologicalMap) -> Ints:
     names = sorted({name for name in map.names if name})
     known = f"its names are {', '.join(names)}" if names else "its places have no names"
     what = f"the map has no place '{text}'" if text else "no goal is named"
-    example = names[0] if names else "0"
-    raise BadInput(f"goal: {what}; type goal={example} or a number below {len(map)} ({known})")
+    example = shlex.quote(f"goal={nearest(text, names) or names[0]}") if names else "goal=0"
+    raise BadInput(f"goal: {what}; type {example} or a number below {len(map)} ({known})")
 
 
 def place_pictured(goal: str | int | None, picture: VisualDistances, alike: float, map: TopologicalMap) -> Ints:

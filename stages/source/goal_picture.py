@@ -22,7 +22,8 @@ class GoalPicture(Stage):
     """The picture that a goal names, with the camera that it was taken with: the robot's own.
 
     A `goal` that ends like an image file is one; any other names a place, and there is no picture. Raises BadInput
-    where there is no such file, where it is no image, and where it has another size than the robot's camera takes.
+    where none is named, where there is no such file, where it is no image, and where it has another size than the
+    robot's camera takes: before anything runs, as far as can be.
     """
 
     goal: str | int | None = None
@@ -53,6 +54,8 @@ class GoalPicture(Stage):
         return self.Out(image=Image(pixels), camera=camera)
 
     def _file(self) -> Path | None:
+        if self.goal is None or not str(self.goal).strip():
+            raise BadInput("goal: no goal is named; type goal=PLACE, its name or number, or goal=PICTURE.png")
         if not str(self.goal or "").lower().endswith(SUFFIXES):
             return None
         file = Path(str(self.goal))

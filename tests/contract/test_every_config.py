@@ -38,7 +38,8 @@ def test_its_first_line_is_its_package_and_its_second_says_what_it_is(path: Path
     graph = "nodes" in content or "wires" in content
     wanted = "_global_" if role in ("variant", "results", "ablation") or graph else None
     of_a_stage = "_target_" in content
-    packages = [wanted] if wanted else [f"nodes.{role}"] if of_a_stage else [role, f"world.{role}"]
+    of_the_world = f"world.{role.removeprefix('world_')}"
+    packages = [wanted] if wanted else [f"nodes.{role}"] if of_a_stage else [role, of_the_world]
     assert package in [f"# @package {name}" for name in packages]
     assert re.match(r"# .{10,}\.  omninav \S", said), said
 
@@ -87,3 +88,9 @@ def test_every_group_is_listed_before_the_variant():
     folders = {path.name for path in CONF.iterdir() if path.is_dir() and any(path.glob("*.yaml"))}
     assert folders - {"recording"} <= set(groups)
     assert OmegaConf.load(CONF / "config.yaml").nodes == {}
+
+
+def test_no_group_hides_a_setting() -> None:
+    settings = set(yaml.safe_load((CONF / "config.yaml").read_text()))
+    groups = {path.name for path in CONF.iterdir() if path.is_dir()}
+    assert settings & groups == {"variant"}  # which the variant's own file sets

@@ -224,6 +224,14 @@ def test_a_comparison_marks_the_best_and_shows_differing_settings():
     assert not any("m.k" in line for line in lines)
 
 
+def test_of_shares_of_what_went_well_the_largest_is_best():
+    reached = [{"navigation": {"reached_rate": share, "end_error_m": 2.0 - share}} for share in (1.0, 0.0)]
+    runs = [{"name": f"runs/{n}", "metrics": m, "config": {}, "manifest": {}} for n, m in enumerate(reached)]
+    lines = printed(compare_table(runs)).splitlines()
+    for what, best in (("eached rate", "100 *"), ("nd error", "1.00 *")):
+        assert best in next(line for line in lines if what in line)
+
+
 def test_runs_with_long_names_stand_under_letters_that_are_explained():
     names = [f"runs/2026-01-0{day}_10-00-00_omniview_mcl" for day in (1, 2, 3)]
     said = printed(compare_table([{"name": n, "metrics": METRICS, "config": {}, "manifest": {}} for n in names]))

@@ -50,8 +50,7 @@ def test_killed_on_its_way_it_goes_on_to_the_same_bytes(whole: Path, tmp_path: P
 
 def test_a_picture_taken_elsewhere_on_the_floor_is_a_goal(omninav, navigate, tmp_path: Path):
     omninav("variant=wander", "nodes.source.start=[4.2,4.0,0.5]", "nodes.source.seconds=0.2", check=True)
-    (tmp_path / "runs" / "latest" / "picture.png").rename(tmp_path / "there.png")
-    navigate("goal=there.png", "nodes.source.seconds=3", check=True)
+    navigate("goal=runs/latest/picture.png", "nodes.source.seconds=3", check=True)
     found = metrics_of(tmp_path)["navigation"]
     assert found["state"] == "under way"
     map = read_artifact(tmp_path / "runs" / "latest" / "map.omap")
@@ -72,6 +71,19 @@ def test_a_goal_that_the_map_does_not_have_is_refused_in_one_line(navigate, tmp_
     assert ended.returncode != 0
     assert "goal: the map has no place" in ended.stderr
     assert "Traceback" not in ended.stderr
+
+
+def test_what_nothing_reads_is_refused(omninav):
+    ended = omninav("check", "variant=homing", "goal=kitchen", "tour=tour.mcap")
+    assert ended.returncode != 0
+    for key in ("tour", "goal"):
+        assert f"{key}: nothing in variant=homing reads it" in ended.stderr
+
+
+def test_without_a_goal_it_is_said_before_anything_runs(omninav):
+    ended = omninav("check", *WORDS)
+    assert ended.returncode != 0
+    assert "no goal is named; type goal=PLACE" in ended.stderr
 
 
 def test_nothing_that_steers_the_robot_knows_the_truth():

@@ -74,6 +74,14 @@ def test_a_goal_that_is_not_on_the_map_is_refused_with_those_that_are(goal):
         places_called(goal, a_map())
 
 
+def test_a_name_that_is_nearly_one_of_the_map_is_offered_as_it_must_be_typed():
+    named = made_map([(0.0, 0.0), (1.0, 0.0)], {(0, 1): 0}, names=["copy room", "kitchen"])
+    with pytest.raises(BadInput, match=r"no place 'copyroom'; type 'goal=copy room' or a number below 2"):
+        places_called("copyroom", named)
+    with pytest.raises(BadInput, match="type goal=kitchen or"):
+        places_called("kitchn", named)
+
+
 def distances(*values: float) -> VisualDistances:
     return VisualDistances(np.array(values), np.zeros(len(values)), np.zeros(len(values), np.int64))
 

@@ -28,7 +28,13 @@ def test_a_picture_that_was_written_is_read_again_pixel_by_pixel_with_the_robots
     assert stage.inputs_digest() is not None
 
 
-@pytest.mark.parametrize("goal", [None, 3, "3", "kitchen", "png"])
+@pytest.mark.parametrize("goal", [None, " "])
+def test_without_a_goal_nothing_runs(goal):
+    with pytest.raises(BadInput, match="no goal is named; type goal=PLACE"):
+        GoalPicture(goal=goal, world=WORLD).inputs_digest()
+
+
+@pytest.mark.parametrize("goal", [3, "3", "kitchen", "png"])
 def test_a_place_is_no_picture(goal):
     stage = GoalPicture(goal=goal, world=WORLD)
     assert stage.step(Context("goal_picture")).image is None
