@@ -25,6 +25,20 @@ SWEEP_COLUMNS = (
     "loss_rate",
     "converged_after_frames",
 )
+HEADLINES = (
+    "navigation.state",
+    "navigation.end_error_m",
+    "navigation.time_s",
+    "homing.arrived",
+    "homing.end_error_m",
+    "homing.time_s",
+    "localisation.right_rate",
+    "localisation.near_rate",
+    "map.places",
+    "loops.far_in_drive.precision",
+    "loops.far_in_drive.recall",
+)
+"""What one looks for first where a run has it."""
 WIDEST_NAME = 24
 """Of a run at the head of a column, in characters."""
 BESIDE = ("mean_pose.", "odometry_alone.after_convergence.")
@@ -127,7 +141,7 @@ def _tiles(metrics: Mapping[str, Any], timing: Mapping[str, Any]) -> Rows:
     wanted = [f"{prefix}position_error_m.median", f"{prefix}position_error_m.p90", f"{prefix}heading_error_deg.median"]
     tiles = [
         {"name": known[path].name, "value": known[path].text, "unit": known[path].unit}
-        for path in [*wanted, "loss_rate", "converged_after_frames"]
+        for path in [*HEADLINES, *wanted, "loss_rate", "converged_after_frames"]
         if path in known
     ]
     for tile in tiles:

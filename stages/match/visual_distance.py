@@ -64,6 +64,8 @@ class MatchPlaces(Stage):
         for place in np.flatnonzero(near):
             found = compare(self._places[place], here, matching, measure)
             distances[place], turns[place], matches[place] = found.distance, found.turn, found.matches
+        if not np.isfinite(distances).any():
+            ctx.count("nothing_in_common", detail="match: a picture that has too little in common with every place")
         return self.Out(distances=VisualDistances(distances, turns, matches))
 
     def _ready(self, map: TopologicalMap, view: int) -> Ready:

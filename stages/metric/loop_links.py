@@ -9,6 +9,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.artifact import artifact_bytes
 from omninav.pipeline.results import Metrics
 from omninav.stages.geometry.dempster_shafer import support
+from omninav.stages.geometry.place_graph import links_between
 from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
 
 Array = npt.NDArray[np.float64]
@@ -21,7 +22,8 @@ class LoopLinks(Stage):
     other. Precision is the share of accepted ones that are right, recall the share of right ones that are accepted;
     None where there are none, or where the map's poses are not truth. `far_in_drive` leaves out those whose views are
     less than `apart` pictures apart; `merged`, of these: counts as accepted what became one place, be it through third
-    ones. `at_supports` is what they would be with other thresholds of support. `step_m`:
+    ones. `parts`: between which no way leads; more than one where a map was added to from a tour that it does not
+    know. `at_supports` is what they would be with other thresholds of support. `step_m`:
     how far apart neighbouring path images were taken. `size_bytes`: of the map's file, but for what it says of
     its making.
     """
@@ -41,6 +43,7 @@ class LoopLinks(Stage):
             "size_bytes": size,
             "places": len(map),
             "links": len(map.links),
+            "parts": parts_of(map),
             "views": len(map.views),
             "place_size_bytes": size / len(map) if len(map) else None,
             "pose_source": map.pose_source,
@@ -60,6 +63,12 @@ class LoopLinks(Stage):
             "at_supports": at_supports(told[far], near, self.near_m),
         }
         return self.Out(metrics=Metrics({"map": held, "loops": loops}))
+
+
+def parts_of(map: TopologicalMap) -> int:
+    """Into how many parts a map falls between which no link leads."""
+    apart = np.isfinite(links_between(map.links, len(map)))
+    return len(np.unique(apart, axis=0)) if len(map) else 0
 
 
 def counted(accepted: npt.NDArray[np.bool_], gaps: Array | None, near: float) -> dict[str, float | int | None]:

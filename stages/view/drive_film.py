@@ -158,7 +158,7 @@ class DriveFilm(Stage):
                 "and the homing vector over the floor; below it the view that it goes to. Right: the plan with its "
                 "true path (blue), the places as large as they are believed (pink) and the way planned (green); below "
                 "it the floor around the robot, with the vector as an arrow and a ring where the target view was truly "
-                "taken.",
+                "taken; the bar is a metre.",
                 content=film.content,
                 media_type=film.media_type,
                 order=3,

@@ -51,10 +51,11 @@ class ShowLoopHypotheses(Stage):
             figure=Figure(
                 name="loop_hypotheses",
                 title="Loop hypotheses and the topological map",
-                caption=f"Left: a tour of {len(hypotheses.poses)} pictures, where each was taken (from "
-                f"{hypotheses.pose_source}); {accepted} of {number} hypotheses that two views show one place were "
-                f"accepted, the others rejected. Right: {len(map)} places at their medoids, {len(map.links)} links, "
-                f"and the path images between them: {len(map.views)} views in all. It was made from pictures alone.",
+                caption=f"Left: the {len(hypotheses.poses)} pictures of the tour that took part, where each was taken "
+                f"(from {hypotheses.pose_source}); {accepted} of {number} hypotheses that two views show one place "
+                f"were accepted, the others rejected. Right: {len(map)} places at their medoids, {len(map.links)} "
+                f"links, and the path images between them: {len(map.views)} views in all. It was made from pictures "
+                "alone.",
                 content=_draw(hypotheses, map, plan),
                 order=9,
             )
@@ -80,7 +81,10 @@ def _draw(found: LoopHypotheses, map: TopologicalMap, plan: FloorPlan | None) ->
         _draw_places(right, map)
         for axes in (left, right):
             plan_axes(axes, extent)
-            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3, fontsize="small", frameon=False)
+            axes.legend(
+                loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=4, fontsize=7, frameon=False,
+                columnspacing=1.0, handletextpad=0.4,
+            )  # fmt: skip
     return drawn.content
 
 

@@ -36,12 +36,12 @@ class PanoramaStrip(Stage):
         pictures = [(tick.frame, decoded(shot.jpeg)) for tick, shot in chosen]
         headings = chosen[0][1].headings
         shown = (
-            "Windows as the features stage gets them, from the left to the right: where each looks stands below it."
+            "Windows cut from its pictures, from the left to the right: where each looks stands below it."
             if len(headings) > 1
-            else "The camera's picture as the features stage gets it."
+            else "The camera's pictures."
             if headings
-            else "Panoramas as the features stage gets them: forward (0°) in the middle, left of the robot "
-            "(+90°) on the left, both edges straight behind."
+            else "Its pictures as panoramas: forward (0°) in the middle, left of the robot (+90°) on the left, both "
+            "edges straight behind."
         )
         return self.Out(
             figure=Figure(

@@ -5,12 +5,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from made_places import made_map
 from made_tour import Landmarks, along, mapped, scattered
 
 from omninav.pipeline import Context
 from omninav.pipeline.artifact import write_artifact
 from omninav.stages.mapping.topological import TopologicalMapping
-from omninav.stages.metric.loop_links import LoopLinks, at_supports, counted, hypothesis_gaps, path_steps
+from omninav.stages.metric.loop_links import LoopLinks, at_supports, counted, hypothesis_gaps, parts_of, path_steps
 from omninav.stages.view.loop_hypotheses import ShowLoopHypotheses
 
 CTX = Context("view")
@@ -70,3 +71,9 @@ def test_without_truth_nothing_is_said_of_right_and_wrong() -> None:
     values = LoopLinks().step(CTX, out.hypotheses, out.map).metrics.values
     assert values["loops"]["precision"] is None
     assert values["map"]["pose_source"] == "odometry"
+
+
+def test_parts_are_those_that_no_link_joins() -> None:
+    spots = [(float(x), 0.0) for x in range(5)]
+    assert parts_of(made_map(spots, {(0, 1): 0, (1, 2): 0, (3, 4): 1})) == 2
+    assert parts_of(made_map(spots, {(0, 1): 0, (1, 2): 0, (2, 3): 0, (4, 3): 1})) == 1
