@@ -378,9 +378,10 @@ def complete(config: Any, variants: Callable[[str], Any] | None = None) -> dict[
     }
     if unread := list(_unread(config)):
         raise ProblemsFound(unread)
-    for key in INPUTS:
-        if isinstance(config.get(key), str) and Path(config[key]).is_file():
-            config[key] = _past_links(config[key])
+    for key in INPUTS:  # what lies among the runs may be named by way of their link
+        file, runs = config.get(key), Path(str(config.get("runs", "runs"))).resolve()
+        if isinstance(file, str) and Path(file).is_file() and Path(file).resolve().is_relative_to(runs):
+            config[key] = _past_links(file)
     try:
         plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
         for name, spec in (plain.get("artifacts") or {}).items():
