@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from .problems import Problem
 
 CONF = "omninav.conf"
-OUTCOMES = "OMNINAV_OUTCOMES"
 INPUTS = ("log", "tour", "map", "grid", "goal")
 """Settings that name what a run is of; a variant reads some of them."""
+OUTCOMES = "OMNINAV_OUTCOMES"
 """Names the file in which the jobs of a sweep, also those in other processes, leave their exit codes."""
 
 HELP = """\
@@ -378,8 +378,9 @@ def complete(config: Any, variants: Callable[[str], Any] | None = None) -> dict[
     }
     if unread := list(_unread(config)):
         raise ProblemsFound(unread)
+    runs = Path(str(config.get("runs", "runs"))).resolve()
     for key in INPUTS:  # what lies among the runs may be named by way of their link
-        file, runs = config.get(key), Path(str(config.get("runs", "runs"))).resolve()
+        file = config.get(key)
         if isinstance(file, str) and Path(file).is_file() and Path(file).resolve().is_relative_to(runs):
             config[key] = _past_links(file)
     try:

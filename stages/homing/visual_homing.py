@@ -67,6 +67,10 @@ class Memory(State):
     metres: float = 0.0
     depth: float = 0.0
 
+    def left(self) -> float:
+        """How far it is over the floor to the target, in the map's unit."""
+        return math.hypot(*(self.goal_translation - self.translation)[:2])
+
     def expected(self, seen: WorkingPicture, rows: Ints | slice = slice(None)) -> Array:
         """Where the tracked points of `rows` must be in a picture taken where the robot is: (N, 2)."""
         return seen.points((self.corners[rows] - self.translation) @ self.rotation)
@@ -186,13 +190,11 @@ class VisualHoming(Stage):
 
     def _could_be_better(self, memory: Memory, matches: int) -> bool:
         # Closer to the target more is matched with it; at the target the baseline is too short.
-        left = math.hypot(*(memory.goal_translation - memory.translation)[:2])
-        return matches > self.anew * memory.made_of and left > self.too_near * memory.depth
+        return matches > self.anew * memory.made_of and memory.left() > self.too_near * memory.depth
 
     def _contradicted(self, memory: Memory, first: Array, second: Array, inliers: int) -> bool:
         # At the target what is matched with it stands where the target view has it, but for the turn.
-        left = math.hypot(*(memory.goal_translation - memory.translation)[:2])
-        if left > self.near * memory.depth or inliers > len(first) / 3:
+        if memory.left() > self.near * memory.depth or inliers > len(first) / 3:
             return False
         turned = second @ (memory.rotation.T @ memory.goal_rotation).T
         off = np.linalg.norm(turned - first, axis=1)

@@ -2,6 +2,7 @@
 
 from typing import Annotated, Any
 
+import networkx
 import numpy as np
 import numpy.typing as npt
 
@@ -9,7 +10,6 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.artifact import artifact_bytes
 from omninav.pipeline.results import Metrics
 from omninav.stages.geometry.dempster_shafer import support
-from omninav.stages.geometry.place_graph import links_between
 from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
 
 Array = npt.NDArray[np.float64]
@@ -67,8 +67,9 @@ class LoopLinks(Stage):
 
 def parts_of(map: TopologicalMap) -> int:
     """Into how many parts a map falls between which no link leads."""
-    apart = np.isfinite(links_between(map.links, len(map)))
-    return len(np.unique(apart, axis=0)) if len(map) else 0
+    graph = networkx.Graph(map.links.tolist())
+    graph.add_nodes_from(range(len(map)))
+    return int(networkx.number_connected_components(graph))
 
 
 def counted(accepted: npt.NDArray[np.bool_], gaps: Array | None, near: float) -> dict[str, float | int | None]:
