@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
-from omninav.stages.geometry.se2 import between, compose, wrap
-from omninav.stages.geometry.spectra import packed
+from omninav.stages.geometry.appearance.spectra import packed
+from omninav.stages.geometry.plane.se2 import between, compose, wrap
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.views import Coefficients, Spectrum, WholeView
 
@@ -124,15 +124,15 @@ def graph_on_field(variant: str, source: dict[str, Any], limit: float | None = N
     """
     from hydra import compose, initialize_config_module
 
-    from omninav.pipeline.app import complete
-    from omninav.pipeline.run import plan
+    from omninav.pipeline.cli.main import complete
+    from omninav.pipeline.run.run import plan
 
     with initialize_config_module("omninav.conf", version_base="1.3"):
         config = complete(compose("config", overrides=[f"variant={variant}", *words]))
     nodes, wires = config["nodes"], config["wires"]
     nodes["source"] = {"_target_": "benchmarks.changing_field.ChangingField", **source}
     if limit is not None:
-        nodes["limit"], wires["limit"] = {"_target_": "omninav.stages.limit.fixed.FixedLimit"}, {}
+        nodes["limit"], wires["limit"] = {"_target_": "omninav.stages.mapping.fixed_threshold.FixedLimit"}, {}
         nodes["limit"]["distance"] = limit
     kept = {"source", "limit", "match", "sensor", "first_belief", "motion", "fusion", "state", "lessons", "mapping"}
     kept = {name for name in kept | {"empty_map", "estimate"} if nodes.get(name)}

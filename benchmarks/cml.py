@@ -56,8 +56,8 @@ def step_ms(variant: str, references: int) -> float:
 
 def stage_ms(variant: str, references: int) -> dict[str, np.ndarray]:
     """Milliseconds of CPU time that each stage takes in each step."""
-    from omninav.pipeline.artifact import write_artifact
-    from omninav.pipeline.engine import Engine
+    from omninav.pipeline.engine.artifact import write_artifact
+    from omninav.pipeline.engine.engine import Engine
     from omninav.stages.values.view_mixtures import ViewMixtures
 
     kind = KINDS[variant]
@@ -87,7 +87,7 @@ def stage_ms(variant: str, references: int) -> dict[str, np.ndarray]:
 
 def drawn(times: dict[str, dict[int, float]]) -> bytes:
     """Milliseconds a step over the references, one line a variant, with the limit."""
-    from omninav.pipeline.picture import picture
+    from omninav.pipeline.report.plot_style import picture
 
     with picture(6.4, 3.6) as canvas:
         axes = canvas.canvas.add_subplot()

@@ -4,8 +4,8 @@ import os
 import time
 
 from omninav.pipeline import Context, Outputs, Source, Stage, State, Tick, Value
-from omninav.pipeline.engine import Engine
-from omninav.pipeline.graph import build
+from omninav.pipeline.engine.engine import Engine
+from omninav.pipeline.graph.graph import build
 
 from .table import Row, medians
 

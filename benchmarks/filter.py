@@ -4,13 +4,13 @@ import numpy as np
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
-from omninav.stages.geometry.particles import systematic
+from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.sensor.near_references import NearReferences
 from omninav.stages.values.belief import Particles
+from omninav.stages.values.length_scale import Reach
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
-from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
 from .table import Row, medians

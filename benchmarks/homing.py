@@ -10,9 +10,9 @@ import poselib
 
 from omninav.pipeline import Context
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
-from omninav.stages.geometry.consensus import relative_pose
-from omninav.stages.geometry.epipolar import planar_two_points
-from omninav.stages.geometry.three_point_pose import grunert, three_point_pose
+from omninav.stages.geometry.two_views.absolute_pose import grunert, three_point_pose
+from omninav.stages.geometry.two_views.epipolar import planar_two_points
+from omninav.stages.geometry.two_views.relative_pose_ransac import relative_pose
 from omninav.stages.homing.visual_homing import Memory, VisualHoming
 from omninav.stages.match.correspondences import MatchFeatures
 from omninav.stages.simulator.cameras import camera_of, camera_rays

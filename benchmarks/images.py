@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 
 from omninav.pipeline import Context
+from omninav.stages.camera.models import HyperbolicMirror
 from omninav.stages.features.hsv_histogram import HsvHistogram
-from omninav.stages.geometry.segments import selective_similarity
+from omninav.stages.geometry.appearance.segments import selective_similarity
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.unwarp.hyperbolic import HyperbolicUnwarp
 from omninav.stages.values.belief import Particles
-from omninav.stages.values.camera import HyperbolicMirror
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Image
 from omninav.stages.values.maps import ReferenceGraph

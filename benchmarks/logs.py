@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from omninav.pipeline.log import LogWriter, read_messages
+from omninav.pipeline.mcap.log import LogWriter, read_messages
 
 from .table import Row, medians
 

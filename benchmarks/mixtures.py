@@ -5,7 +5,7 @@ from scipy.stats import multivariate_normal
 
 from omninav.pipeline import Context
 from omninav.stages.fusion.covariance_intersection import CovarianceIntersection, fused
-from omninav.stages.geometry.gaussians import density, merged
+from omninav.stages.geometry.probability.gaussians import density, merged
 from omninav.stages.motion.gaussian import GaussianMotion
 from omninav.stages.sensor.superposition import Superposition
 from omninav.stages.values.belief import GaussianMixture

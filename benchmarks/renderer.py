@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 
-from omninav.pipeline.ports import convert
+from omninav.pipeline.graph.ports import convert
 from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.config import CylinderCamera, MirrorCamera, WorldConfig
 from omninav.stages.simulator.people import Track

@@ -7,7 +7,7 @@ import numpy as np
 
 from omninav.pipeline import Context
 from omninav.stages.features.haar_integral import HaarIntegral
-from omninav.stages.geometry.rotation_means import Kernel, padded
+from omninav.stages.geometry.appearance.haar_integrals import Kernel, padded
 from omninav.stages.match.retrieval import Retrieval
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Windows

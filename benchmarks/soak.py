@@ -32,8 +32,8 @@ def main() -> int:
     import numpy as np
 
     from benchmarks.changing_field import graph_on_field
-    from omninav.pipeline.engine import Engine
-    from omninav.stages.metric.view_map_size import stored_bytes
+    from omninav.pipeline.engine.engine import Engine
+    from omninav.stages.metrics.view_map_size import stored_bytes
 
     steps = int(sys.argv[1]) if len(sys.argv) > 1 else 100_000
     variant = sys.argv[2] if len(sys.argv) > 2 else "omniview_cml"

@@ -7,17 +7,17 @@ import cv2
 import numpy as np
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.codec import encode
-from omninav.stages.features.column_segments import FindColumnSegments
+from omninav.pipeline.engine.codec import encode
+from omninav.stages.camera.models import HyperbolicMirror
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
-from omninav.stages.geometry.visual_distance import Matching, match_columns, match_patches
+from omninav.stages.features.vertical_segments import FindColumnSegments
+from omninav.stages.geometry.appearance.visual_distance import Matching, match_columns, match_patches
 from omninav.stages.mapping.topological import TopologicalMapping
 from omninav.stages.match.visual_distance import MatchPlaces
 from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.world import World
-from omninav.stages.values.camera import HyperbolicMirror
 from omninav.stages.values.image import Image, Pixels
 from omninav.stages.values.local_features import GlobalMoments, LocalFeatures
 from omninav.stages.values.pose import Pose

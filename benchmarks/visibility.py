@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context
-from omninav.stages.areas.line_of_sight import axes_of, visibility_areas
+from omninav.stages.sensor.line_of_sight import axes_of, visibility_areas
 from omninav.stages.sensor.visibility import FADED, Visibility, looks_at, seen_from
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.grid import FREE, OCCUPIED, FreeSpace, OccupancyGrid

@@ -1,6 +1,24 @@
-"""omninav.pipeline: stages, graphs and runs. It knows nothing of robots, cameras or maps."""
+"""The framework: stages, graphs, runs and experiments. It knows no robot; that is what `omninav.stages` adds."""
 
-from .stage import Bounds, Context, Outputs, Source, Stage, State, Truth
-from .value import Tick, Value
+from .graph.problems import BadInput, Problem, ProblemsFound
+from .graph.results import Figure, Metrics, Table
+from .graph.stage import Bounds, Context, Outputs, Source, Stage, State, Truth
+from .graph.value import Tick, Value
 
-__all__ = ["Bounds", "Context", "Outputs", "Source", "Stage", "State", "Tick", "Truth", "Value"]
+__all__ = [
+    "BadInput",
+    "Bounds",
+    "Context",
+    "Figure",
+    "Metrics",
+    "Outputs",
+    "Problem",
+    "ProblemsFound",
+    "Source",
+    "Stage",
+    "State",
+    "Table",
+    "Tick",
+    "Truth",
+    "Value",
+]

@@ -3,8 +3,8 @@
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Source, Stage, State, Tick
-from omninav.stages.geometry.odometry_motion import turn_go_turn
-from omninav.stages.geometry.se2 import between
+from omninav.stages.geometry.plane.odometry_motion import turn_go_turn
+from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import UncertainMotion
 from omninav.stages.values.views import Coefficients, ViewLimit

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omninav.pipeline import Tick
-from omninav.stages.geometry.se2 import between
+from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.belief import GaussianMixture, Particles, PoseEstimate
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion, Pose

@@ -10,7 +10,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, Stage, State, Tick, Truth, Value
 from omninav.pipeline.files import write_whole
-from omninav.pipeline.results import Metrics
+from omninav.pipeline.graph.results import Metrics
 
 
 class Number(Value):

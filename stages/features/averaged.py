@@ -8,7 +8,7 @@ from omninav.pipeline import Bounds, Context, Stage
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.views import Coefficients
 
-from .strip import AveragedStrip
+from .averaged_strip import AveragedStrip
 
 
 class AveragedView(AveragedStrip, Stage):

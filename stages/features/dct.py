@@ -9,7 +9,7 @@ from omninav.pipeline import Bounds, Context, Stage
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.views import Coefficients
 
-from .strip import AveragedStrip
+from .averaged_strip import AveragedStrip
 
 Array = npt.NDArray[np.float64]
 FloatArray = npt.NDArray[np.float32]

@@ -6,11 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.spectra import packed
+from omninav.stages.geometry.appearance.spectra import packed
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.views import Spectrum
 
-from .strip import Channels, Contrast, averaged_strip
+from .averaged_strip import Channels, Contrast, averaged_strip
 
 FloatArray = npt.NDArray[np.float32]
 Complex = npt.NDArray[np.complex128]

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.problems import BadInput
-from omninav.pipeline.results import Metrics
-from omninav.stages.geometry.rotation_means import AngularWeights, Kernel, padded
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.results import Metrics
+from omninav.stages.geometry.appearance.haar_integrals import AngularWeights, Kernel, padded
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels, Windows
 

@@ -3,12 +3,12 @@
 import numpy as np
 
 from omninav.pipeline import Context, Stage
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.projection import Projection
 from omninav.stages.values.views import Coefficients
 
-from .strip import AveragedStrip, turned_copies
+from .averaged_strip import AveragedStrip, turned_copies
 
 
 class PrincipalComponents(AveragedStrip, Stage):

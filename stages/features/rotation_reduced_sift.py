@@ -7,12 +7,12 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.values.camera import Camera
+from omninav.stages.camera.models import Camera
 from omninav.stages.values.image import Image, Panorama, Pixels
 from omninav.stages.values.local_features import LocalFeatures
 
 from .colour_moments import disc_colours
-from .picture import ReadPicture, read_picture
+from .prepared_image import ReadPicture, read_picture
 
 Array = npt.NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.gaussians import density, drawn
-from omninav.stages.geometry.particles import systematic
+from omninav.stages.geometry.probability.gaussians import density, drawn
+from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.pose import UncertainMotion
 

@@ -3,9 +3,9 @@
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.geometry.gaussians import density
-from omninav.stages.geometry.odometry_motion import moved
-from omninav.stages.geometry.particles import systematic
+from omninav.stages.geometry.plane.odometry_motion import moved
+from omninav.stages.geometry.probability.gaussians import density
+from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.pose import UncertainMotion
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
-from omninav.stages.geometry.se2 import wrap
+from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import SinglePose
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose

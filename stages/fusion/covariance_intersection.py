@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.gaussians import apart, intersect_into, inverse_into, merged, squared_distance
+from omninav.stages.geometry.probability.gaussians import apart, intersect_into, inverse_into, merged, squared_distance
 from omninav.stages.values.belief import GaussianMixture
 
 Array = npt.NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from scipy.special import ndtri
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.particles import effective_size, occupied_cells, systematic
+from omninav.stages.geometry.probability.particles import effective_size, occupied_cells, systematic
 from omninav.stages.values.belief import Likelihood, Particles
 
 Array = npt.NDArray[np.float64]

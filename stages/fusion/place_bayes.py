@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
-from omninav.stages.geometry.se2 import wrap
+from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import Likelihood, PlaceBelief
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances

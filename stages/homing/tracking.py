@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from .working_picture import Grey, WorkingPicture
+from .working_image import Grey, WorkingPicture
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]

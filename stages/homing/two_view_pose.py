@@ -4,7 +4,7 @@ import math
 from typing import Annotated
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.consensus import Solver, relative_pose
+from omninav.stages.geometry.two_views.relative_pose_ransac import Solver, relative_pose
 from omninav.stages.values.two_views import BearingPairs, RelativeView
 
 

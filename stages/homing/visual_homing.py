@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry.consensus import Solver, false_alarms, relative_pose
-from omninav.stages.geometry.epipolar import turn_about_vertical, yaw_of
-from omninav.stages.geometry.se2 import compose
-from omninav.stages.geometry.three_point_pose import three_point_pose
-from omninav.stages.geometry.triangulation import parallax, triangulate
-from omninav.stages.values.camera import Camera
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.models import Camera
+from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.geometry.two_views.absolute_pose import three_point_pose
+from omninav.stages.geometry.two_views.epipolar import turn_about_vertical, yaw_of
+from omninav.stages.geometry.two_views.relative_pose_ransac import Solver, false_alarms, relative_pose
+from omninav.stages.geometry.two_views.triangulation import parallax, triangulate
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.homing import HomingTarget, HomingVector, TrackedFeatures
 from omninav.stages.values.image import Image, Panorama
@@ -22,7 +22,7 @@ from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Motion
 
 from .tracking import LEVELS, best_nearby, find_again, histograms, track, trackability
-from .working_picture import WorkingPicture, working_picture
+from .working_image import WorkingPicture, working_picture
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]

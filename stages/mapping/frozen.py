@@ -1,7 +1,7 @@
 """A map of views that is used and not changed."""
 
 from omninav.pipeline import Context, Outputs, Stage
-from omninav.stages.values.lesson import Lessons
+from omninav.stages.values.map_update import Lessons
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import ViewLimit
 

@@ -8,16 +8,16 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.gaussians import merged
-from omninav.stages.geometry.se2 import wrap
-from omninav.stages.geometry.view_similarity import similarity
+from omninav.stages.geometry.appearance.view_similarity import similarity
+from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.geometry.probability.gaussians import merged
 from omninav.stages.values.belief import GaussianMixture
-from omninav.stages.values.lesson import Lesson, Lessons
+from omninav.stages.values.map_update import Lesson, Lessons
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import ViewLimit
 
-from .before_limit import BeforeLimit, due
-from .taught import Taught, taught_by
+from .applied_update import Taught, taught_by
+from .before_threshold import BeforeLimit, due
 from .view_cap import within_cap
 from .view_events import view_event
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.stages.geometry.se2 import wrap
+from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
 from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph, kind_of
 from omninav.stages.values.pose import Pose

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose, PoseSource
 

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.stages.geometry.segments import similarity_at
+from omninav.stages.geometry.appearance.segments import similarity_at
 from omninav.stages.values.features import SegmentFeatures
 from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph, kind_of, within
 from omninav.stages.values.pose import Pose

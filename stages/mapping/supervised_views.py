@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.projection import Projection
 from omninav.stages.values.view_mixtures import ViewMixtures

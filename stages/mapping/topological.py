@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
-from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry import dempster_shafer, place_clusters
-from omninav.stages.geometry.visual_distance import (
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.appearance import place_clusters
+from omninav.stages.geometry.appearance.visual_distance import (
     Matching,
     Measure,
     Ready,
@@ -20,6 +20,7 @@ from omninav.stages.geometry.visual_distance import (
     made_ready,
     match_patches,
 )
+from omninav.stages.geometry.probability import dempster_shafer
 from omninav.stages.values.drives import pose_row
 from omninav.stages.values.local_features import ColumnSegments, GlobalMoments, LocalFeatures
 from omninav.stages.values.pose import Pose, PoseSource

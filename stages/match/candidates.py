@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures
+from omninav.stages.values.length_scale import Reach
 from omninav.stages.values.maps import ReferenceGraph, kind_of
-from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
 Array = npt.NDArray[np.float64]

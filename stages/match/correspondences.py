@@ -3,7 +3,7 @@
 from typing import Annotated, Literal
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.visual_distance import Matching, match_patches
+from omninav.stages.geometry.appearance.visual_distance import Matching, match_patches
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.local_features import LocalFeatures
 

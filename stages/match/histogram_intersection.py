@@ -1,11 +1,11 @@
 """Similarity as the mean intersection of the segments' histograms."""
 
 from omninav.pipeline import Context, Stage
-from omninav.stages.geometry.segments import similarities
+from omninav.stages.geometry.appearance.segments import similarities
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentHistograms
+from omninav.stages.values.length_scale import Reach
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
 from .candidates import NearBelief, check_alike

@@ -1,11 +1,11 @@
 """Similarity by the Euclidean distance of whole views."""
 
 from omninav.pipeline import Context, Stage
-from omninav.stages.geometry.segments import euclidean_similarities
+from omninav.stages.geometry.appearance.segments import euclidean_similarities
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures
+from omninav.stages.values.length_scale import Reach
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
 from .candidates import NearBelief, check_alike

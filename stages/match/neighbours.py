@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.view_similarity import Shape, similarity
+from omninav.stages.geometry.appearance.view_similarity import Shape, similarity
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Neighbours, ViewLimit, WholeView
 

@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Stage
-from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry.se2 import wrap
-from omninav.stages.geometry.segments import LANES, turned_views
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.appearance.segments import LANES, turned_views
+from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentHistograms
+from omninav.stages.values.length_scale import Reach
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Answers, Similarities
 
 from .candidates import NearBelief, check_alike

@@ -3,11 +3,11 @@
 from typing import Annotated, Literal
 
 from omninav.pipeline import Bounds, Context, Stage
-from omninav.stages.geometry.segments import EXPONENTS, LARGEST_COLOUR_DISTANCE, similarities
+from omninav.stages.geometry.appearance.segments import EXPONENTS, LARGEST_COLOUR_DISTANCE, similarities
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures
+from omninav.stages.values.length_scale import Reach
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
 from .candidates import NearBelief, check_alike

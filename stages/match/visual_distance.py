@@ -6,8 +6,15 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry.visual_distance import Matching, Measure, Ready, colours_apart, compare, made_ready
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.appearance.visual_distance import (
+    Matching,
+    Measure,
+    Ready,
+    colours_apart,
+    compare,
+    made_ready,
+)
 from omninav.stages.values.local_features import ColumnSegments, GlobalMoments, LocalFeatures
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances

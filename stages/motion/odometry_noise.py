@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from omninav.pipeline import Bounds
-from omninav.stages.geometry.odometry_motion import turn_go_turn
-from omninav.stages.geometry.se2 import wrap
+from omninav.stages.geometry.plane.odometry_motion import turn_go_turn
+from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.pose import Motion, UncertainMotion
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.place_graph import links_between
+from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.topological_map import TopologicalMap
 

@@ -1,7 +1,7 @@
 """Moves particles by odometry: turn, go, turn, each with its own noise."""
 
 from omninav.pipeline import Context, Outputs, Stage
-from omninav.stages.geometry.odometry_motion import moved
+from omninav.stages.geometry.plane.odometry_motion import moved
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.pose import Motion, UncertainMotion
 

@@ -2,7 +2,7 @@
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.homing import DrivingStatus, PathProgress
-from omninav.stages.values.planned_way import PlannedWay
+from omninav.stages.values.planned_route import PlannedWay
 
 
 class BeforeDriving(Stage):

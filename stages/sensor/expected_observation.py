@@ -7,14 +7,14 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry.nearby import NearestCells
-from omninav.stages.geometry.segments import LARGEST_COLOUR_DISTANCE, penalties, sorting_network
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.appearance.segments import LARGEST_COLOUR_DISTANCE, penalties, sorting_network
+from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
+from omninav.stages.values.length_scale import Reach
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
-from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
 from .near_references import Array, Floats, Ints, NearReferences

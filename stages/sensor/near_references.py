@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.evidence import best_headings, contrast_power, fresh_share
-from omninav.stages.geometry.nearby import NearestCells, nearest_cells
-from omninav.stages.geometry.se2 import wrap
+from omninav.stages.geometry.plane.nearest_cells import NearestCells, nearest_cells
+from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.geometry.probability.evidence import best_headings, contrast_power, fresh_share
 from omninav.stages.values.belief import Likelihood, Particles
+from omninav.stages.values.length_scale import Reach
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
-from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
 Array = npt.NDArray[np.float64]

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage
-from omninav.stages.geometry.se2 import wrap
+from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Neighbours, ViewLimit

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.geometry.catadioptric import back_project
-from omninav.stages.values.camera import Camera, Cylindrical, Equirectangular, HyperbolicMirror, Perspective
+from omninav.stages.camera.catadioptric import back_project
+from omninav.stages.camera.models import Camera, Cylindrical, Equirectangular, HyperbolicMirror, Perspective
 
 from .config import CameraConfig, CylinderCamera, EquirectangularCamera, MirrorCamera, Sensor
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.geometry.odometry_noise import disturbed
-from omninav.stages.geometry.se2 import between, chain, wrap
+from omninav.stages.geometry.plane.odometry_noise import disturbed
+from omninav.stages.geometry.plane.se2 import between, chain, wrap
 
 from .config import OdometryNoise
 

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.geometry.se2 import compose
+from omninav.stages.geometry.plane.se2 import compose
 
 from .config import Event, Robot
 from .obstacles import Obstacles, gather, nearest

@@ -7,7 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
-from omninav.stages.geometry.se2 import between, compose
+from omninav.stages.camera.models import Camera
+from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator import tours
 from omninav.stages.simulator.cameras import camera_of, camera_rays, shutter_times
 from omninav.stages.simulator.config import Event, WorldConfig
@@ -18,18 +20,15 @@ from omninav.stages.simulator.people import Person, Track
 from omninav.stages.simulator.ranges import measure, round_bodies
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.robot import COLLISIONS, WAY, around, at_rest, limits, put_down, reach, steer
+from omninav.stages.simulator.simulated_recording import EPOCH, refuse_no_room, ring_scan, simulation_digest
 from omninav.stages.simulator.streams import stream
 from omninav.stages.simulator.world import World
-from omninav.stages.values.camera import Camera
 from omninav.stages.values.command import Command
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.image import Image
-from omninav.stages.values.planned_way import PlannedWay
+from omninav.stages.values.planned_route import PlannedWay
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
-
-from .recording import UnreadableRecording
-from .simulated import EPOCH, refuse_no_room, ring_scan, simulation_digest
 
 F64 = npt.NDArray[np.float64]
 

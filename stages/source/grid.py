@@ -11,16 +11,15 @@ from scipy.spatial import KDTree
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.files import digest_file
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.recordings.occupancy_grid import coarser, read_occupancy
 from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.occupancy import occupancy
 from omninav.stages.simulator.world import World
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid
+from omninav.stages.values.length_scale import Reach
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.reach import Reach
-
-from .occupancy_grid import coarser, read_occupancy
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

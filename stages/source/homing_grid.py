@@ -8,19 +8,18 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
 from omninav.pipeline.files import digest_text
+from omninav.stages.camera.models import Camera
+from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.recording import Recording, UnreadableRecording
 from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.first_hits import first_hits
 from omninav.stages.simulator.renderer import render
+from omninav.stages.simulator.simulated_recording import simulation_digest
 from omninav.stages.simulator.world import World
-from omninav.stages.values.camera import Camera
 from omninav.stages.values.image import Image, Pixels
 from omninav.stages.values.pose import Pose
-
-from .first_hits import first_hits
-from .opening import open_recording
-from .recording import Recording, UnreadableRecording
-from .simulated import simulation_digest
 
 Array = npt.NDArray[np.float64]
 

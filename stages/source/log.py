@@ -9,18 +9,17 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
-from omninav.stages.geometry.se2 import between, compose
+from omninav.stages.camera.models import Camera
+from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.recordings.cuts import Splice, as_if_driven, check_splices, crossed, spliced_frames
+from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.recording import Recording, UnreadableRecording
+from omninav.stages.recordings.topics import Topics
 from omninav.stages.simulator.config import Event, WorldConfig
 from omninav.stages.simulator.demo import DEMO
-from omninav.stages.values.camera import Camera
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
-
-from .opening import open_recording
-from .recording import Recording, UnreadableRecording
-from .splice import Splice, as_if_driven, check_splices, crossed, spliced_frames
-from .topics import Topics
 
 Array = npt.NDArray[np.float64]
 
@@ -168,7 +167,10 @@ class LogSource(Source):
         names = (self.log,) if isinstance(self.log, str) or self.log is None else self.log
         recordings: list[Recording]
         if self.log is None and self.route is not None:
-            from .simulated import SimulatedRecording, in_order  # brings the compiler, which a log does not need
+            from omninav.stages.simulator.simulated_recording import (  # brings the compiler, which a log does not need
+                SimulatedRecording,
+                in_order,
+            )
 
             days = in_order(self.day)
             recordings = [SimulatedRecording(self.world, self.route, day, self.events) for day in days]

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
-from omninav.stages.geometry.epipolar import turn_about_vertical
+from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 from omninav.stages.values.two_views import BearingPairs, RelativeView
 
 

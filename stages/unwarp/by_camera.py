@@ -2,8 +2,8 @@
 
 import math
 
-from omninav.pipeline.problems import BadInput
-from omninav.stages.values.camera import Camera, Cylindrical, Donut, Equirectangular, Fisheye, HyperbolicMirror
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.models import Camera, Cylindrical, Donut, Equirectangular, Fisheye, HyperbolicMirror
 
 from .donut import donut_table
 from .equirectangular import equirectangular_table

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.stages.values.camera import Camera, Donut
+from omninav.stages.camera.models import Camera, Donut
 from omninav.stages.values.image import Image, Panorama, Pixels
 
 from .table import LastTable, Table, fixed_point, other_camera, polar

@@ -6,9 +6,9 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds
-from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry.rays import strip_columns
-from omninav.stages.values.camera import Camera, Equirectangular
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.models import Camera, Equirectangular
+from omninav.stages.camera.rays import strip_columns
 from omninav.stages.values.image import column_azimuths
 
 from .table import Table, TableUnwarp, fixed_point, other_camera

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from omninav.stages.values.camera import Camera, Fisheye
+from omninav.stages.camera.models import Camera, Fisheye
 
 from .table import Table, TableUnwarp, fixed_point, other_camera, polar
 

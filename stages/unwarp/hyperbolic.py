@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry.catadioptric import back_project, project
-from omninav.stages.values.camera import Camera, HyperbolicMirror
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.catadioptric import back_project, project
+from omninav.stages.camera.models import Camera, HyperbolicMirror
 from omninav.stages.values.image import column_azimuths
 
 from .table import Table, TableUnwarp, fixed_point, other_camera

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from omninav.stages.geometry.rays import strip_columns
-from omninav.stages.values.camera import Camera, Cylindrical
+from omninav.stages.camera.models import Camera, Cylindrical
+from omninav.stages.camera.rays import strip_columns
 from omninav.stages.values.image import column_azimuths
 
 from .table import Table, TableUnwarp, fixed_point, other_camera

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.problems import BadInput
-from omninav.stages.values.camera import Camera, Sense
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.models import Camera, Sense
 from omninav.stages.values.image import Image, Panorama, Pixels, column_azimuths
 
 Array = npt.NDArray[np.float64]

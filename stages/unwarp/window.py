@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry.rays import pixels_of_rays
-from omninav.stages.geometry.se2 import wrap
-from omninav.stages.values.camera import Camera, Perspective
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.models import Camera, Perspective
+from omninav.stages.camera.rays import pixels_of_rays
+from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.image import Image, Pixels, Windows
 
 from .table import Table, fixed_point

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
-from omninav.stages.geometry.particles import heaviest_mode, weighted_mean
+from omninav.stages.geometry.probability.particles import heaviest_mode, weighted_mean
 
 from .pose import Pose
 

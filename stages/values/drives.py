@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Tick
-from omninav.stages.geometry.se2 import between, chain, compose
+from omninav.stages.geometry.plane.se2 import between, chain, compose
 
 from .belief import PoseEstimate
 from .pose import Motion, Pose

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from omninav.pipeline import Value
 
 from .features import SegmentFeatures, SegmentHistograms
-from .growing import GrowingArrays
+from .growable_arrays import GrowingArrays
 from .pose import Pose, PoseSource
 
 FeatureKind = Literal["histograms", "colours"]

@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
 
-from .growing import GrowingArrays
+from .growable_arrays import GrowingArrays
 from .pose import PoseSource
 from .views import ViewLimit, WholeView
 

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
-from omninav.stages.geometry.spectra import best_turns, spectral_distances
-from omninav.stages.geometry.turned_vectors import turned_distances, turns_of_nearest
+from omninav.stages.geometry.appearance.rotated_distances import turned_distances, turns_of_nearest
+from omninav.stages.geometry.appearance.spectra import best_turns, spectral_distances
 
 Array = npt.NDArray[np.float64]
 FloatArray = npt.NDArray[np.float32]

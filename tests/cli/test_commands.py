@@ -293,7 +293,7 @@ def test_the_trajectory_is_in_tum_format_with_ascending_header_stamps(demo: Path
 
 
 def test_who_lifts_the_robot_on_its_drive_does_not_lift_it_on_its_tour():
-    from omninav.pipeline.app import _composed, complete
+    from omninav.pipeline.cli.main import _composed, complete
 
     with _composed(["events=[{at: 30.0, turn: 1.5}]"]) as config:
         plain = complete(config)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from background_runs import kill, start
 
-from omninav.pipeline.experiment_run import FramesOfJobs
+from omninav.pipeline.experiment.runner import FramesOfJobs
 
 STAGES = '''
 import time
@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from omninav.pipeline import Context, Outputs, Source, Stage, State, Tick, Value
-from omninav.pipeline.results import Metrics
+from omninav.pipeline.graph.results import Metrics
 
 
 class Number(Value):

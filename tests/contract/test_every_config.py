@@ -9,11 +9,11 @@ import yaml
 from hydra import compose, initialize_config_module
 from omegaconf import OmegaConf
 
-from omninav.pipeline.app import complete
-from omninav.pipeline.catalog import resolve
-from omninav.pipeline.experiment import read_experiment
-from omninav.pipeline.run import plan
-from omninav.pipeline.stage import signature
+from omninav.pipeline.cli.main import complete
+from omninav.pipeline.experiment.specification import read_experiment
+from omninav.pipeline.graph.registry import resolve
+from omninav.pipeline.graph.stage import signature
+from omninav.pipeline.run.run import plan
 
 CONF = Path(__file__).resolve().parents[2] / "conf"
 FILES = [

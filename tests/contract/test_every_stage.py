@@ -7,11 +7,11 @@ import pytest
 import yaml
 
 from omninav.pipeline import Tick, Value
-from omninav.pipeline.catalog import Entry, built_in, resolve
-from omninav.pipeline.codec import decode, encode
-from omninav.pipeline.ports import convert
-from omninav.pipeline.stage import signature
-from omninav.pipeline.value import VALUE_TYPES
+from omninav.pipeline.engine.codec import decode, encode
+from omninav.pipeline.graph.ports import convert
+from omninav.pipeline.graph.registry import Entry, built_in, resolve
+from omninav.pipeline.graph.stage import signature
+from omninav.pipeline.graph.value import VALUE_TYPES
 
 ENTRIES = list(built_in())
 by_name = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.target.rpartition(".")[2])

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import toys
-from omninav.pipeline.catalog import UnknownStage, entries, plugins, resolve
+from omninav.pipeline.graph.registry import UnknownStage, entries, plugins, resolve
 
 STAGE = """
 from omninav.pipeline import Context, Outputs, Stage

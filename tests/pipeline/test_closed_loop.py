@@ -3,11 +3,11 @@
 import pytest
 
 import toys
-from omninav.pipeline.closed_loop import steering, truth_readers
-from omninav.pipeline.draw import mermaid
-from omninav.pipeline.graph import build
-from omninav.pipeline.problems import ProblemsFound
-from omninav.pipeline.stage import signature
+from omninav.pipeline.graph.graph import build
+from omninav.pipeline.graph.ground_truth import steering, truth_readers
+from omninav.pipeline.graph.problems import ProblemsFound
+from omninav.pipeline.graph.stage import signature
+from omninav.pipeline.report.graph_drawing import mermaid
 
 NODES = {"source": "Steered", "stop": "Constant", "driving": "Scale", "scored": "Scale", "all": "Collected"}
 WIRES = {

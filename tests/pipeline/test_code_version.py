@@ -35,9 +35,7 @@ FILES = {
 
 
 def version(place: Path) -> str:
-    code = (
-        "import pack.stage as s; from omninav.pipeline.code_version import code_version; print(code_version(s.Twice))"
-    )
+    code = "import pack.stage as s; from omninav.pipeline.graph.code_version import code_version; print(code_version(s.Twice))"
     tests = str(Path(__file__).parents[1])
     environment = {"PYTHONPATH": f"{place}:{tests}", "PATH": "/usr/bin:/bin", "PYTHONDONTWRITEBYTECODE": "1"}
     return subprocess.run(

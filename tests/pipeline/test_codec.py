@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 import toys
-from omninav.pipeline.artifact import read_artifact, read_header, write_artifact
-from omninav.pipeline.codec import BadEncoding, decode, encode, seal, unseal
-from omninav.pipeline.problems import BadInput
-from omninav.pipeline.spool import Spool
+from omninav.pipeline.engine.artifact import read_artifact, read_header, write_artifact
+from omninav.pipeline.engine.codec import BadEncoding, decode, encode, seal, unseal
+from omninav.pipeline.engine.disk_sequence import Spool
+from omninav.pipeline.graph.problems import BadInput
 
 plain = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text() | st.binary(),

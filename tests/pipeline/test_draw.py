@@ -3,9 +3,9 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
-from omninav.pipeline.draw import mermaid, svg
-from omninav.pipeline.graph import Graph, Node, Wire
-from omninav.pipeline.stage import Parameter, Port, Signature, Stage
+from omninav.pipeline.graph.graph import Graph, Node, Wire
+from omninav.pipeline.graph.stage import Parameter, Port, Signature, Stage
+from omninav.pipeline.report.graph_drawing import mermaid, svg
 
 
 def graph(nodes: dict[str, tuple[str, str]], wires: list[str], **more: Wire) -> Graph:

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from omninav.pipeline import Context
-from omninav.pipeline.artifact import Cache
-from omninav.pipeline.engine import Engine, StageFailed
-from omninav.pipeline.front import cached_front, front_nodes, keep
-from omninav.pipeline.graph import Graph, build
+from omninav.pipeline.engine.artifact import Cache
+from omninav.pipeline.engine.engine import Engine, StageFailed
+from omninav.pipeline.engine.prefix import cached_front, front_nodes, keep
+from omninav.pipeline.graph.graph import Graph, build
 
 
 def graph_of(nodes: dict, wires: dict) -> Graph:
@@ -175,7 +175,7 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_result(tmp_path: Path, at: i
 
 
 def test_a_checkpoint_of_another_run_is_refused(tmp_path: Path):
-    from omninav.pipeline.problems import BadInput
+    from omninav.pipeline.graph.problems import BadInput
 
     graph = graph_of(SUM, SUM_WIRES)
     Engine(graph, {}, 0, tmp_path, tmp_path / "memory", identity="one").run()

@@ -3,8 +3,8 @@
 import pytest
 
 import toys
-from omninav.pipeline.graph import build
-from omninav.pipeline.problems import ProblemsFound
+from omninav.pipeline.graph.graph import build
+from omninav.pipeline.graph.problems import ProblemsFound
 
 
 def config(nodes: dict, wires: dict | None = None) -> dict:

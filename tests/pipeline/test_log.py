@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from omninav.pipeline.log import MAGIC, BadMessage, LogError, LogReader, LogWriter, make_message, read_messages
+from omninav.pipeline.mcap.log import MAGIC, BadMessage, LogError, LogReader, LogWriter, make_message, read_messages
 
 POSE = "geometry_msgs/msg/PoseStamped"
 COUNT = 60
@@ -289,7 +289,7 @@ def test_every_compression_is_read_whole_and_cut_inside_a_chunk(tmp_path: Path, 
 
 
 def make_text(number: int) -> memoryview:
-    from omninav.pipeline.log import standard_types
+    from omninav.pipeline.mcap.log import standard_types
 
     noise = "".join(chr(letter) for letter in np.random.default_rng(number).integers(33, 127, 200))
     return standard_types().serialize_cdr(make_message("std_msgs/msg/String", {"data": noise}), "std_msgs/msg/String")

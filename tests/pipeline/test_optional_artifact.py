@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 import toys
-from omninav.pipeline.artifact import write_artifact
-from omninav.pipeline.problems import ProblemsFound
-from omninav.pipeline.run import execute, plan, start, without_companions
+from omninav.pipeline.engine.artifact import write_artifact
+from omninav.pipeline.graph.problems import ProblemsFound
+from omninav.pipeline.run.run import execute, plan, start, without_companions
 
 
 def configuration(port: str, file: Path | None) -> dict[str, Any]:

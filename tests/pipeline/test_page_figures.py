@@ -2,7 +2,7 @@
 
 import pytest
 
-from omninav.pipeline.experiment_page import number
+from omninav.pipeline.experiment.page import number
 
 
 @pytest.mark.parametrize(

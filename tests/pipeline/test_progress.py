@@ -1,7 +1,7 @@
 import io
 import json
 
-from omninav.pipeline.progress import Progress, live_line
+from omninav.pipeline.report.progress import Progress, live_line
 
 
 class Clock:

@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
-from omninav.pipeline.artifact import Cache
+from omninav.pipeline.engine.artifact import Cache
+from omninav.pipeline.experiment.repetition import finished
 from omninav.pipeline.files import digest_text, write_whole
-from omninav.pipeline.repetitions import finished
 
 
 def kept(path: Path, key: str, seed: int) -> None:

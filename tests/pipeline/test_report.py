@@ -7,15 +7,15 @@ from html.parser import HTMLParser
 import pytest
 from rich.console import Console
 
-from omninav.pipeline.measures import digits, measures, shown, title, unit
-from omninav.pipeline.report import (
+from omninav.pipeline.graph.results import Figure, Table
+from omninav.pipeline.report.quantities import digits, measures, shown, title, unit
+from omninav.pipeline.report.report import (
     compare_table,
     differing_settings,
     results_table,
     write_report,
     write_sweep_page,
 )
-from omninav.pipeline.results import Figure, Table
 
 ERRORS = {"mean": 0.5, "median": 0.073, "p90": 0.81, "max": 12.34}
 METRICS = {

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from omninav.pipeline import run as runs
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.run.run import run as runs
 
 CONFIG: dict[str, Any] = {
     "variant": "toy",

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from omninav.pipeline.artifact import Cache
-from omninav.pipeline.front import following
-from omninav.pipeline.graph import Graph, build
-from omninav.pipeline.repetitions import _once
-from omninav.pipeline.run import results_of
+from omninav.pipeline.engine.artifact import Cache
+from omninav.pipeline.engine.prefix import following
+from omninav.pipeline.experiment.repetition import _once
+from omninav.pipeline.graph.graph import Graph, build
+from omninav.pipeline.run.run import results_of
 from toys import Ledger
 
 SEEDS = (0, 1, 2)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omninav.pipeline.series import at, figure_at, pooled_deviation, series_at, taken
+from omninav.pipeline.experiment.series import at, figure_at, pooled_deviation, series_at, taken
 
 RESULT = {
     "error_m": {"mean": 2.0},

@@ -5,9 +5,9 @@ from array import array
 
 import pytest
 
-from omninav.pipeline.engine import Engine
-from omninav.pipeline.graph import build
-from omninav.pipeline.run import stage_times
+from omninav.pipeline.engine.engine import Engine
+from omninav.pipeline.graph.graph import build
+from omninav.pipeline.run.run import stage_times
 
 
 @pytest.fixture

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from omninav.pipeline.experiment import read_experiment
-from omninav.pipeline.problems import ProblemsFound
-from omninav.pipeline.verdicts import Verdict, bootstrap_interval, judge, key_of, pooled
+from omninav.pipeline.experiment.specification import read_experiment
+from omninav.pipeline.experiment.verdicts import Verdict, bootstrap_interval, judge, key_of, pooled
+from omninav.pipeline.graph.problems import ProblemsFound
 
 
 def held(claim: dict[str, object], **errors: list[float]) -> bool | None:

@@ -10,14 +10,14 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.fusion.agreement import Agreement
-from omninav.stages.fusion.growing_start import ParticlesInMap
-from omninav.stages.geometry.se2 import between, wrap
-from omninav.stages.lessons.left_behind import Behind, LeftBehind
+from omninav.stages.fusion.growing_prior import ParticlesInMap
+from omninav.stages.fusion.particle_clustering import Clusters
+from omninav.stages.geometry.plane.se2 import between, wrap
+from omninav.stages.mapping.delayed_by_distance import Behind, LeftBehind
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, Learned
 from omninav.stages.match.neighbours import ViewNeighbours
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.sensor.superposition import Superposition
-from omninav.stages.state.clusters import Clusters
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import ViewLimit, WholeView

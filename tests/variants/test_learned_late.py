@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.geometry.se2 import wrap
-from omninav.stages.lessons.left_behind import Behind, LeftBehind
-from omninav.stages.lessons.unimodal_queue import UnimodalQueue, Waiting
-from omninav.stages.limit.first_views import FirstViews, FirstViewsLimit
+from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.mapping.adaptive_views import AdaptiveViews
-from omninav.stages.mapping.before_limit import BeforeLimit
+from omninav.stages.mapping.before_threshold import BeforeLimit
+from omninav.stages.mapping.calibrated_threshold import FirstViews, FirstViewsLimit
+from omninav.stages.mapping.delayed_by_distance import Behind, LeftBehind
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, Learned
-from omninav.stages.metric.map_history import MapHistory
-from omninav.stages.metric.wrong_places import WrongPlaces
+from omninav.stages.mapping.unimodal_queue import UnimodalQueue, Waiting
+from omninav.stages.metrics.map_history import MapHistory
+from omninav.stages.metrics.wrong_places import WrongPlaces
+from omninav.stages.plots.changed_mixtures import ChangedMixtures
 from omninav.stages.values.belief import GaussianMixture, PoseEstimate
 from omninav.stages.values.pose import Motion, Pose, UncertainMotion
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Coefficients
-from omninav.stages.view.changed_mixtures import ChangedMixtures
 
 LAP, LAPS, ROUND_M = 95, 3, 42.0
 """0.44 m a picture: there is a limit after 20 of them, settled after 100, and views wait for nine more."""

@@ -10,17 +10,17 @@ import pytest
 from background_runs import assert_same_bytes, finished, kill, start, wait_for_checkpoint
 from conftest import DATA, needs_data
 
-from omninav.pipeline.artifact import read_artifact
-from omninav.pipeline.codec import decode, encode
-from omninav.pipeline.engine import Engine, StageFailed
-from omninav.pipeline.graph import build
+from omninav.pipeline.engine.artifact import read_artifact
+from omninav.pipeline.engine.codec import decode, encode
+from omninav.pipeline.engine.engine import Engine, StageFailed
+from omninav.pipeline.graph.graph import build
 
 STAGES = "omninav.stages"
 NODES = {
     "source": {"_target_": "round_drive.Rounds"},
     "knows": {"_target_": "round_drive.Knows"},
-    "empty": {"_target_": f"{STAGES}.mapping.empty_view_mixtures.FirstViewMixtures"},
-    "lessons": {"_target_": f"{STAGES}.lessons.unimodal_queue.UnimodalQueue", "length": 12},
+    "empty": {"_target_": f"{STAGES}.mapping.initial_view_mixtures.FirstViewMixtures"},
+    "lessons": {"_target_": f"{STAGES}.mapping.unimodal_queue.UnimodalQueue", "length": 12},
     "mapping": {"_target_": f"{STAGES}.mapping.adaptive_views.AdaptiveViews", "max_views": 20},
 }
 WIRES = {
@@ -56,7 +56,7 @@ LAST_MAP = {"lessons": "left_over.lessons", "limit": "source.limit", "map": "map
 
 
 def test_what_waits_as_the_last_log_ends_is_learned_after_it(tmp_path: Path):
-    left_over = {"_target_": f"{STAGES}.lessons.left_over.LeftOver"}
+    left_over = {"_target_": f"{STAGES}.mapping.flush_pending.LeftOver"}
     graph = build(
         {
             "nodes": {**NODES, "left_over": left_over, "last_map": NODES["mapping"]},

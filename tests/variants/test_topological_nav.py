@@ -9,8 +9,8 @@ import pytest
 from background_runs import assert_same_bytes, finished, killed_and_resumed
 from conftest import DATA, needs_data
 
-from omninav.pipeline.artifact import read_artifact
-from omninav.pipeline.closed_loop import truth_in_the_loop
+from omninav.pipeline.engine.artifact import read_artifact
+from omninav.pipeline.graph.ground_truth import truth_in_the_loop
 from omninav.stages.values.topological_map import TopologicalMap
 
 HOUSE = DATA / "photoreal-house"
@@ -89,8 +89,8 @@ def test_without_a_goal_it_is_said_before_anything_runs(omninav):
 def test_nothing_that_steers_the_robot_knows_the_truth():
     from hydra import compose, initialize_config_module
 
-    from omninav.pipeline.app import complete
-    from omninav.pipeline.run import plan
+    from omninav.pipeline.cli.main import complete
+    from omninav.pipeline.run.run import plan
 
     with initialize_config_module("omninav.conf", version_base="1.3"):
         graph = plan(complete(compose("config", overrides=[*WORDS, "goal=3"]))).graph

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
-from omninav.stages.areas.line_of_sight import (
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.sensor.line_of_sight import (
     LineOfSight,
     axes_of,
     covered,

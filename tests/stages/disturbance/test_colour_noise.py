@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.disturbance.colour_noise import ColourNoise, random_parts, rectangles, sectors
+from omninav.stages.perturbation.colour_noise import ColourNoise, random_parts, rectangles, sectors
 from omninav.stages.values.image import Panorama
 
 GREY = Panorama(np.full((60, 360, 3), 7, dtype=np.uint8), 0.5, -0.5)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.disturbance.lost_features import LostFeatures
+from omninav.stages.perturbation.lost_features import LostFeatures
 from omninav.stages.values.local_features import LocalFeatures
 
 

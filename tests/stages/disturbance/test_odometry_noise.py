@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.disturbance.odometry_noise import LEVELS, NoisyOdometry
-from omninav.stages.geometry.odometry_noise import disturbed
-from omninav.stages.geometry.se2 import chain
+from omninav.stages.geometry.plane.odometry_noise import disturbed
+from omninav.stages.geometry.plane.se2 import chain
+from omninav.stages.perturbation.odometry_noise import LEVELS, NoisyOdometry
 from omninav.stages.values.pose import Motion
 
 RUNS = 4000

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from omninav.pipeline import Context
-from omninav.stages.driving.follow_homing import FollowHoming, Patience
+from omninav.stages.control.follow_homing import FollowHoming, Patience
 from omninav.stages.simulator.config import Day, Door, MirrorCamera, Room
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.source.closed_loop import ClosedLoop, Simulation

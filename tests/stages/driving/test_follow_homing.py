@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.driving.follow_homing import FollowHoming, Patience
-from omninav.stages.driving.ring import free_ahead, way_through
+from omninav.stages.control.clearance import free_ahead, way_through
+from omninav.stages.control.follow_homing import FollowHoming, Patience
 from omninav.stages.values.homing import HomingVector, PathProgress
 from omninav.stages.values.scan import Scan
 

@@ -8,9 +8,15 @@ from scipy import fft
 from turned_robot import CAMERA, both_kinds, look, wrapped
 
 from omninav.pipeline import Context
-from omninav.stages.features.column_segments import FindColumnSegments, Segments, profile_basis, prototypes, segments_of
-from omninav.stages.features.global_moments import ViewMoments
-from omninav.stages.geometry.visual_distance import Matching, match_columns
+from omninav.stages.features.global_colours import ViewMoments
+from omninav.stages.features.vertical_segments import (
+    FindColumnSegments,
+    Segments,
+    profile_basis,
+    prototypes,
+    segments_of,
+)
+from omninav.stages.geometry.appearance.visual_distance import Matching, match_columns
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import ColumnSegments
 

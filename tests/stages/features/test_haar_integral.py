@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.features.haar_integral import Binning, HaarIntegral
-from omninav.stages.geometry.rotation_means import Kernel
+from omninav.stages.geometry.appearance.haar_integrals import Kernel
 from omninav.stages.match.retrieval import normalised_intersections
 from omninav.stages.values.image import Panorama, Pixels, Windows
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.features.averaged import AveragedView
 from omninav.stages.features.pca import PrincipalComponents
 from omninav.stages.mapping.principal_components import LearnPrincipalComponents, principal_components

@@ -8,9 +8,9 @@ import pytest
 from turned_robot import CAMERA, both_kinds, look, wrapped
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.bearings import camera_bearings
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
-from omninav.stages.geometry.bearings import camera_bearings
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import LocalFeatures
 

@@ -4,7 +4,7 @@ import pytest
 from omninav.pipeline import Context
 from omninav.stages.fusion.agreement import Agreement
 from omninav.stages.fusion.auxiliary import auxiliary
-from omninav.stages.geometry.odometry_motion import moved
+from omninav.stages.geometry.plane.odometry_motion import moved
 from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.pose import UncertainMotion
 

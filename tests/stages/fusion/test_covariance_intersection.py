@@ -18,8 +18,8 @@ from omninav.stages.fusion.covariance_intersection import (
     alpha_of_least_determinant,
     fused,
 )
-from omninav.stages.geometry.gaussians import squared_distances
-from omninav.stages.geometry.se2 import wrap
+from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.geometry.probability.gaussians import squared_distances
 from omninav.stages.motion.gaussian import GaussianMotion
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import Motion

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.fusion.importance_resampling import ImportanceResampling, kld_number
-from omninav.stages.fusion.start import Start
+from omninav.stages.fusion.particle_prior import Start
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose

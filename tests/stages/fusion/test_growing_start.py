@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.problems import BadInput
-from omninav.stages.fusion.growing_start import MixtureInMap, ParticlesInMap
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.fusion.growing_prior import MixtureInMap, ParticlesInMap
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.view_mixtures import ViewMixtures
 

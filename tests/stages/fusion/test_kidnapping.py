@@ -7,16 +7,16 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
-from omninav.stages.fusion.start import Start
-from omninav.stages.geometry.segments import turned_view
+from omninav.stages.fusion.particle_prior import Start
+from omninav.stages.geometry.appearance.segments import turned_view
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.sensor.near_references import NearReferences
 from omninav.stages.values.belief import Likelihood
 from omninav.stages.values.features import SegmentHistograms
+from omninav.stages.values.length_scale import Reach
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
-from omninav.stages.values.reach import Reach
 
 SEGMENTS, BINS = 12, 16
 REACH = Reach(0.6)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omninav.stages.geometry.place_graph import links_between
+from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.motion.place_transitions import transitions
 from omninav.stages.sensor.place_likelihood import place_likelihoods
 from omninav.stages.values.belief import PlaceBelief

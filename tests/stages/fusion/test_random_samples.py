@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.problems import BadInput
-from omninav.stages.fusion.random_samples import RandomSamples
-from omninav.stages.fusion.start import Start
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.fusion.particle_prior import Start
+from omninav.stages.fusion.uniform_recovery import RandomSamples
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.grid import FreeSpace
 

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry.bearings import camera_bearings, panorama_bearings, unit_vectors
-from omninav.stages.geometry.rays import panorama_points, pixels_of_rays
-from omninav.stages.values.camera import Camera, Cylindrical, Donut, Equirectangular, Fisheye, HyperbolicMirror
-from omninav.stages.values.camera import Perspective as Pinhole
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.bearings import camera_bearings, panorama_bearings, unit_vectors
+from omninav.stages.camera.models import Camera, Cylindrical, Donut, Equirectangular, Fisheye, HyperbolicMirror
+from omninav.stages.camera.models import Perspective as Pinhole
+from omninav.stages.camera.rays import panorama_points, pixels_of_rays
 from omninav.stages.values.image import column_azimuths
 
 MIRROR = HyperbolicMirror(640, 480, 497.0, 490.0, 319.5, 239.5, 28.095, 23.4125, 34.0, 238.0, 0.4, 0.9, 0.3)

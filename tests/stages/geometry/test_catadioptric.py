@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omninav.stages.geometry.catadioptric import back_project, project
+from omninav.stages.camera.catadioptric import back_project, project
 
 MIRRORS = st.tuples(st.floats(5.0, 60.0), st.floats(5.0, 60.0))
 INTRINSICS = st.tuples(

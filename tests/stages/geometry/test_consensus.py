@@ -8,7 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from two_views import angle_deg, two_views, unit
 
-from omninav.stages.geometry.consensus import SAMPLE, Solver, agreement, false_alarms, refined_pose, relative_pose
+from omninav.stages.geometry.two_views.relative_pose_ransac import (
+    SAMPLE,
+    Solver,
+    agreement,
+    false_alarms,
+    refined_pose,
+    relative_pose,
+)
 
 SEEDS = st.integers(0, 10**6)
 

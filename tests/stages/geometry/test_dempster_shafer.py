@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omninav.stages.geometry.dempster_shafer import (
+from omninav.stages.geometry.probability.dempster_shafer import (
     combine,
     confidence,
     gather,

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from two_views import angle_deg, two_views, unit
 
-from omninav.stages.geometry.epipolar import (
+from omninav.stages.geometry.two_views.epipolar import (
     angular_residuals,
     decompose,
     eight_points,
@@ -24,7 +24,7 @@ from omninav.stages.geometry.epipolar import (
     turn_about_vertical,
     yaw_of,
 )
-from omninav.stages.geometry.triangulation import depths, parallax, triangulate
+from omninav.stages.geometry.two_views.triangulation import depths, parallax, triangulate
 
 SEEDS = st.integers(0, 10**6)
 EITHER = st.booleans()

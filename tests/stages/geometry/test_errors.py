@@ -3,8 +3,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from omninav.stages.geometry.errors import first_settled, heading_errors_deg, position_errors
-from omninav.stages.geometry.se2 import chain, compose
+from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
+from omninav.stages.geometry.plane.se2 import chain, compose
 
 
 def test_errors_worked_by_hand():

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from made_mixtures import Mixture, covariances, drawn_mixture, gap, half_a_turn_apart, mixtures
 from scipy.stats import chi2, multivariate_normal
 
-from omninav.stages.geometry.gaussians import (
+from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.geometry.probability.gaussians import (
     density,
     drawn,
     floored,
@@ -20,7 +21,6 @@ from omninav.stages.geometry.gaussians import (
     moments,
     squared_distances,
 )
-from omninav.stages.geometry.se2 import wrap
 
 UNIT = np.eye(3)
 headings = st.floats(-math.pi, 3.14)

@@ -7,9 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omninav.stages.geometry import matching
-from omninav.stages.geometry.matching import mahalanobis_matches, mutual_nearest, squared_distances, tree_matches
-from omninav.stages.geometry.visual_distance import (
+from omninav.stages.geometry.appearance import feature_matching as matching
+from omninav.stages.geometry.appearance.feature_matching import (
+    mahalanobis_matches,
+    mutual_nearest,
+    squared_distances,
+    tree_matches,
+)
+from omninav.stages.geometry.appearance.visual_distance import (
     Matching,
     Measure,
     Ready,

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from omninav.stages.geometry.particles import heaviest_mode, weighted_moments
-from omninav.stages.geometry.se2 import wrap
+from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.geometry.probability.particles import heaviest_mode, weighted_moments
 
 
 def heaviest_start_by_brute_force(poses, weights, radius=1.0):

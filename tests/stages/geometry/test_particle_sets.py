@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from omninav.stages.geometry.nearby import nearest_cells
-from omninav.stages.geometry.particles import effective_size, occupied_cells, systematic, uniform_around
-from omninav.stages.geometry.se2 import between, compose, wrap
+from omninav.stages.geometry.plane.nearest_cells import nearest_cells
+from omninav.stages.geometry.plane.se2 import between, compose, wrap
+from omninav.stages.geometry.probability.particles import effective_size, occupied_cells, systematic, uniform_around
 
 POSES = st.tuples(*[st.floats(-50, 50)] * 3)
 

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from omninav.stages.geometry.path_reconstruction import reconstructed
-from omninav.stages.geometry.se2 import chain, compose, wrap
+from omninav.stages.geometry.plane.path_reconstruction import reconstructed
+from omninav.stages.geometry.plane.se2 import chain, compose, wrap
 
 
 def root(covariance):

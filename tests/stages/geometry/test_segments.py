@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from omninav.stages.geometry.segments import (
+from omninav.stages.geometry.appearance.segments import (
     euclidean_similarities,
     penalties,
     selective_similarity,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from two_views import angle_deg, unit
 
-from omninav.stages.geometry.three_point_pose import grunert, refined_camera, sees, three_point_pose
+from omninav.stages.geometry.two_views.absolute_pose import grunert, refined_camera, sees, three_point_pose
 
 SEEDS = st.integers(0, 10**6)
 

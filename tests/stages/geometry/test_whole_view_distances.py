@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omninav.stages.geometry.spectra import best_turns, packed, spectral_distances, unpacked
-from omninav.stages.geometry.turned_vectors import all_distances, turned_distances, turns_of_nearest
+from omninav.stages.geometry.appearance.rotated_distances import all_distances, turned_distances, turns_of_nearest
+from omninav.stages.geometry.appearance.spectra import best_turns, packed, spectral_distances, unpacked
 
 RNG = np.random.default_rng(3)
 

@@ -7,9 +7,9 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.features.rotation_reduced_sift import none_found
-from omninav.stages.homing.path_images import Along, PathImages
 from omninav.stages.homing.remember_view import Kept, NoVector, RememberView
-from omninav.stages.metric.homing_errors import HomingErrors
+from omninav.stages.homing.waypoint_images import Along, PathImages
+from omninav.stages.metrics.homing_errors import HomingErrors
 from omninav.stages.values.homing import HomingVector, ImagePath, PathProgress
 from omninav.stages.values.pose import Pose
 

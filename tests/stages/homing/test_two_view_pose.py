@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.epipolar import shared_residuals
+from omninav.stages.geometry.two_views.epipolar import shared_residuals
 from omninav.stages.homing.two_view_pose import TwoViewPose
-from omninav.stages.metric.two_view_errors import TwoViewErrors
+from omninav.stages.metrics.two_view_errors import TwoViewErrors
 from omninav.stages.source.two_views import Posed, TwoViews
 from omninav.stages.values.two_views import BearingPairs, RelativeView
 

@@ -9,13 +9,13 @@ import pytest
 from turned_robot import CAMERA, both_kinds, look, wrapped
 
 from omninav.pipeline import Context
-from omninav.pipeline.codec import decode, encode, encode_state, restore_state
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_state
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.models import Donut
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
-from omninav.stages.geometry.matching import mutual_nearest
-from omninav.stages.geometry.se2 import between
+from omninav.stages.geometry.appearance.feature_matching import mutual_nearest
+from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.homing.visual_homing import Memory, VisualHoming
-from omninav.stages.values.camera import Donut
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.homing import HomingTarget, HomingVector
 from omninav.stages.values.image import Image, Panorama

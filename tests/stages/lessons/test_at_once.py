@@ -3,7 +3,7 @@
 import numpy as np
 
 from omninav.pipeline import Context
-from omninav.stages.lessons.at_once import AtOnce
+from omninav.stages.mapping.immediate_update import AtOnce
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.views import Coefficients
 

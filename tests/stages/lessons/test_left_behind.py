@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.geometry.odometry_motion import moved_gaussians
-from omninav.stages.lessons.left_behind import Behind, LeftBehind
+from omninav.stages.geometry.plane.odometry_motion import moved_gaussians
+from omninav.stages.mapping.delayed_by_distance import Behind, LeftBehind
 from omninav.stages.values.belief import GaussianMixture
-from omninav.stages.values.lesson import Lessons
+from omninav.stages.values.map_update import Lessons
 from omninav.stages.values.pose import UncertainMotion
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Coefficients, Neighbours

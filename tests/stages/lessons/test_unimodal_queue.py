@@ -5,7 +5,7 @@ import pytest
 from round_drive import look, place, way
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.lessons.unimodal_queue import UnimodalQueue, Waiting
+from omninav.stages.mapping.unimodal_queue import UnimodalQueue, Waiting
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.views import Coefficients
 

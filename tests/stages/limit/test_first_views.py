@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.limit.first_views import FirstViews, FirstViewsLimit
+from omninav.stages.mapping.calibrated_threshold import FirstViews, FirstViewsLimit
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.views import Coefficients, ViewLimit
 

@@ -1,9 +1,9 @@
 """A given limit between views."""
 
 from omninav.pipeline import Context
-from omninav.pipeline.stage import signature
-from omninav.stages.limit.first_views import FirstViewsLimit
-from omninav.stages.limit.fixed import FixedLimit
+from omninav.pipeline.graph.stage import signature
+from omninav.stages.mapping.calibrated_threshold import FirstViewsLimit
+from omninav.stages.mapping.fixed_threshold import FixedLimit
 
 
 def test_a_fixed_limit_is_given_at_once() -> None:

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.spectra import packed
+from omninav.stages.geometry.appearance.spectra import packed
 from omninav.stages.mapping.adaptive_views import AdaptiveViews
-from omninav.stages.mapping.before_limit import BeforeLimit
+from omninav.stages.mapping.before_threshold import BeforeLimit
 from omninav.stages.mapping.frozen import Frozen
 from omninav.stages.values.belief import GaussianMixture
-from omninav.stages.values.lesson import Lesson, Lessons
+from omninav.stages.values.map_update import Lesson, Lessons
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Coefficients, Spectrum, ViewLimit
 

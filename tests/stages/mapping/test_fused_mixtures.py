@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from omninav.pipeline import Context
 from omninav.stages.mapping.fused_mixtures import Average, FusedMixtures, Learned
 from omninav.stages.values.belief import GaussianMixture
-from omninav.stages.values.lesson import Lesson, Lessons
+from omninav.stages.values.map_update import Lesson, Lessons
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import Coefficients, ViewLimit
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.artifact import write_artifact
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.engine.artifact import write_artifact
+from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.features.haar_integral import HaarIntegral
 from omninav.stages.mapping.image_database import ImageDatabase, LastTaken
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms

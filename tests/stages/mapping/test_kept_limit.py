@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.artifact import read_artifact, write_artifact
-from omninav.stages.limit.first_views import FirstViews, FirstViewsLimit
+from omninav.pipeline.engine.artifact import read_artifact, write_artifact
 from omninav.stages.mapping.adaptive_views import AdaptiveViews
-from omninav.stages.mapping.before_limit import BeforeLimit
+from omninav.stages.mapping.before_threshold import BeforeLimit
+from omninav.stages.mapping.calibrated_threshold import FirstViews, FirstViewsLimit
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, Learned
 from omninav.stages.match.neighbours import ViewNeighbours
-from omninav.stages.metric.view_map_size import stored_bytes
+from omninav.stages.metrics.view_map_size import stored_bytes
 from omninav.stages.values.belief import GaussianMixture
-from omninav.stages.values.lesson import Lesson, Lessons
+from omninav.stages.values.map_update import Lesson, Lessons
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Coefficients, ViewLimit

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.problems import BadInput
-from omninav.stages.mapping.empty_reference_graph import EmptyReferenceGraph
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.mapping.initial_reference_graph import EmptyReferenceGraph
 from omninav.stages.mapping.reference_graph import Along, LearnReferenceGraph
 from omninav.stages.values.features import SegmentColours, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph

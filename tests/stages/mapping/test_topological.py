@@ -10,10 +10,9 @@ from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial.distance import squareform
 
 from omninav.pipeline import Context
-from omninav.pipeline.codec import decode, encode
-from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry.dempster_shafer import support
-from omninav.stages.geometry.place_clusters import (
+from omninav.pipeline.engine.codec import decode, encode
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.appearance.place_clusters import (
     between_hypotheses,
     complete_linkage,
     hypotheses,
@@ -21,7 +20,8 @@ from omninav.stages.geometry.place_clusters import (
     path_images,
     subclusters,
 )
-from omninav.stages.geometry.visual_distance import Matching, match_patches
+from omninav.stages.geometry.appearance.visual_distance import Matching, match_patches
+from omninav.stages.geometry.probability.dempster_shafer import support
 from omninav.stages.mapping.topological import with_names
 from omninav.stages.match.visual_distance import MatchPlaces
 from omninav.stages.values.local_features import GlobalMoments, LocalFeatures

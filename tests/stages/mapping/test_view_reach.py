@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.mapping.view_reach import ViewReach, excess_by_distance
+from omninav.stages.mapping.appearance_length_scale import ViewReach, excess_by_distance
 from omninav.stages.values.maps import ReferenceGraph
 
 STEP, PLACES = 0.1, 100

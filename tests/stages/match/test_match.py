@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.fusion.best_match import BestMatch
 from omninav.stages.match.candidates import near_belief
 from omninav.stages.match.histogram_intersection import HistogramIntersection
@@ -10,8 +10,8 @@ from omninav.stages.match.l2 import L2Match
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentColours, SegmentHistograms
+from omninav.stages.values.length_scale import Reach
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
 SEGMENTS = 12

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.match.neighbours import Shape, ViewNeighbours, similarity
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Coefficients, Neighbours, ViewLimit

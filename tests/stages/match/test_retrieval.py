@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry.segments import similarities
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.appearance.segments import similarities
 from omninav.stages.match.retrieval import Retrieval, best_answers, normalised_intersections, window_turns
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph

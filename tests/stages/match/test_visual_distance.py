@@ -7,7 +7,7 @@ import pytest
 from made_tour import Landmarks, along, mapped, scattered
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.match.correspondences import MatchFeatures
 from omninav.stages.match.visual_distance import MatchPlaces
 from omninav.stages.values.local_features import GlobalMoments, LocalFeatures

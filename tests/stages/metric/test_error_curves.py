@@ -5,11 +5,11 @@ import pytest
 from omegaconf import OmegaConf
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.ports import convert
-from omninav.stages.geometry.se2 import between
-from omninav.stages.metric.error_curves import ErrorCurves, lap_ends
+from omninav.pipeline.graph.ports import convert
+from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.metrics.error_curves import ErrorCurves, lap_ends
 from omninav.stages.simulator.config import WorldConfig
-from omninav.stages.source.simulated import SimulatedRecording
+from omninav.stages.simulator.simulated_recording import SimulatedRecording
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.pose import Motion, Pose
 

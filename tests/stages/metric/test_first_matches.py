@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
-from omninav.stages.metric.first_matches import FirstMatches, pairs_apart, run_of_right
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.metrics.first_matches import FirstMatches, pairs_apart, run_of_right
 from omninav.stages.values.depths import Depths
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Pose

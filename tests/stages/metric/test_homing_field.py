@@ -8,12 +8,12 @@ import pytest
 
 from omninav.pipeline import Context
 from omninav.stages.homing.towards_first_view import First, TowardsFirstView
-from omninav.stages.metric.homing_field import HomingFieldErrors
+from omninav.stages.metrics.homing_field import HomingFieldErrors
+from omninav.stages.plots.homing_vectors import ShowHomingVectors
 from omninav.stages.source.homing_grid import grid_around
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Pose
-from omninav.stages.view.homing_vectors import ShowHomingVectors
 
 CTX = Context("m")
 POSES = [Pose(0.0, 0.0, 0.4), Pose(0.5, 0.0, math.pi), Pose(0.0, 1.5, 0.0), Pose(0.0, -1.6, 0.0)]

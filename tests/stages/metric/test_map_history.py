@@ -6,9 +6,9 @@ import pytest
 from small_run import mixture_run, small_run
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.se2 import chain, compose
-from omninav.stages.metric.map_history import MapHistory, counted, last_new_ground
-from omninav.stages.metric.view_map_size import ViewMapSize, stored_bytes, visited_area
+from omninav.stages.geometry.plane.se2 import chain, compose
+from omninav.stages.metrics.map_history import MapHistory, counted, last_new_ground
+from omninav.stages.metrics.view_map_size import ViewMapSize, stored_bytes, visited_area
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 

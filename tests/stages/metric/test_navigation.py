@@ -7,9 +7,9 @@ import pytest
 from made_places import made_map
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.metric.navigation import Navigation, shortest_metres
+from omninav.stages.metrics.navigation import Navigation, shortest_metres
 from omninav.stages.values.drive_tally import DriveTally
-from omninav.stages.values.planned_way import PlannedWay
+from omninav.stages.values.planned_route import PlannedWay
 from omninav.stages.values.pose import Pose
 
 # 3 m east, then 4 m north; place 3 lies apart

@@ -7,9 +7,9 @@ import pytest
 from made_places import made_map
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.problems import BadInput
-from omninav.stages.fusion.place_start import PlaceStart
-from omninav.stages.metric.place_hits import PlaceHits
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.fusion.place_prior import PlaceStart
+from omninav.stages.metrics.place_accuracy import PlaceHits
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.pose import Pose
 

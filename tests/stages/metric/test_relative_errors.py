@@ -6,10 +6,10 @@ from scipy.optimize import minimize
 from small_run import eight, small_run
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.se2 import between, compose
-from omninav.stages.metric.map_size import MapSize
-from omninav.stages.metric.pose_estimate import BeliefEstimate
-from omninav.stages.metric.relative_errors import (
+from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.metrics.map_size import MapSize
+from omninav.stages.metrics.pose_estimate import BeliefEstimate
+from omninav.stages.metrics.relative_errors import (
     RelativeErrors,
     absolute_trajectory_errors,
     align,

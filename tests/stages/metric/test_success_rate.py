@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.geometry.se2 import compose
-from omninav.stages.metric.success_rate import SuccessRate
+from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.metrics.success_rate import SuccessRate
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.pose import Motion, Pose
 

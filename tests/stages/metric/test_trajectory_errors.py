@@ -3,7 +3,7 @@ import pytest
 from small_run import small_run
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.metric.trajectory_errors import TrajectoryErrors
+from omninav.stages.metrics.trajectory_errors import TrajectoryErrors
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.pose import Motion, Pose
 

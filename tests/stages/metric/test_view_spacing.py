@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.metric.view_spacing import ViewSpacing, spaced
+from omninav.stages.metrics.view_spacing import ViewSpacing, spaced
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Coefficients
 

@@ -5,8 +5,8 @@ import pytest
 import yaml
 
 from omninav.pipeline import Context
-from omninav.pipeline.series import figure_at
-from omninav.stages.metric.wrong_places import WrongPlaces
+from omninav.pipeline.experiment.series import figure_at
+from omninav.stages.metrics.wrong_places import WrongPlaces
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 

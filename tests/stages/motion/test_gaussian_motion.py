@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from made_mixtures import Mixture, gap, mixtures
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.odometry_motion import increment, moved_gaussians, turn_go_turn
-from omninav.stages.geometry.se2 import compose
+from omninav.stages.geometry.plane.odometry_motion import increment, moved_gaussians, turn_go_turn
+from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.motion.gaussian import GaussianMotion
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.values.belief import GaussianMixture, Particles

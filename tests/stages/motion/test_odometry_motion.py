@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.odometry_motion import moved, turn_go_turn
-from omninav.stages.geometry.se2 import compose, wrap
+from omninav.stages.geometry.plane.odometry_motion import moved, turn_go_turn
+from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.pose import Motion

@@ -5,8 +5,8 @@ import pytest
 from made_places import made_map
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.problems import BadInput
-from omninav.stages.planning.shortest_way import Itinerary, ShortestWay, place_pictured, places_called, shortest_way
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.planning.shortest_path import Itinerary, ShortestWay, place_pictured, places_called, shortest_way
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.homing import DrivingStatus, PathProgress
 from omninav.stages.values.topological_map import TopologicalMap

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.sensor.calibration import Calibration, Stated
+from omninav.stages.sensor.pose_fixes import Calibration, Stated
 from omninav.stages.values.pose import Pose
 
 WAY = [Pose(0.25 * k, 0.0, 0.1) for k in range(13)]  # three metres in steps of 25 cm

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
-from omninav.stages.geometry.nearby import nearest_cells
-from omninav.stages.geometry.segments import selective_similarity, turned_view
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.appearance.segments import selective_similarity, turned_view
+from omninav.stages.geometry.plane.nearest_cells import nearest_cells
 from omninav.stages.match.l2 import L2Match
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.sensor.expected_observation import ExpectedObservation, likeness_of_expected

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.nearby import nearest_cells
+from omninav.stages.geometry.plane.nearest_cells import nearest_cells
 from omninav.stages.sensor.near_references import (
     Field,
     NearReferences,
@@ -13,9 +13,9 @@ from omninav.stages.sensor.near_references import (
     weighted_quantile,
 )
 from omninav.stages.values.belief import Particles
+from omninav.stages.values.length_scale import Reach
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
-from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 
 RNG = np.random.default_rng(0)

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from made_mixtures import drawn_mixture
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.gaussians import density
-from omninav.stages.geometry.se2 import wrap
+from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.geometry.probability.gaussians import density
 from omninav.stages.sensor.superposition import Superposition
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.view_mixtures import ViewMixtures

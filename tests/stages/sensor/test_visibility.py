@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
-from omninav.stages.areas.line_of_sight import axes_of, visibility_areas
-from omninav.stages.geometry.evidence import contrast_power, fresh_share
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.probability.evidence import contrast_power, fresh_share
+from omninav.stages.sensor.line_of_sight import axes_of, visibility_areas
 from omninav.stages.sensor.visibility import FADED, Visibility, looks_at, mean_seen, seen_from, sums_by_turn
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.grid import FREE, OCCUPIED, FreeSpace, OccupancyGrid
+from omninav.stages.values.length_scale import Reach
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
-from omninav.stages.values.reach import Reach
 from omninav.stages.values.similarity import Similarities
 from omninav.stages.values.visibility import VisibilityAreas
 

@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from omninav.pipeline.ports import convert
+from omninav.pipeline.graph.ports import convert
 from omninav.stages.simulator.bodies import Box, box_array
 from omninav.stages.simulator.config import Day, Hanging, Lamp, Room, WorldConfig
 from omninav.stages.simulator.demo import DEMO

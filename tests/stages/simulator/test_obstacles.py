@@ -6,23 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from omninav.stages.geometry.se2 import between
+from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.simulator.config import Event, Ranges, Robot
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.obstacles import Obstacles, beam, gather, nearest
 from omninav.stages.simulator.ranges import measure
-from omninav.stages.simulator.robot import (
-    COLLISIONS,
-    HEADING,
-    NOBODY,
-    SPEED,
-    WAY,
-    at_rest,
-    drive,
-    limits,
-    reach,
-    steer,
-)
+from omninav.stages.simulator.robot import COLLISIONS, HEADING, NOBODY, SPEED, WAY, at_rest, drive, limits, reach, steer
 from omninav.stages.simulator.world import World
 
 ROBOT = Robot()

@@ -7,14 +7,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from omninav.stages.camera.models import Equirectangular
 from omninav.stages.simulator.cameras import camera_rays
 from omninav.stages.simulator.config import Day
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.people import PARTS, Person, Track, figures
 from omninav.stages.simulator.renderer import render
+from omninav.stages.simulator.simulated_recording import SimulatedRecording
 from omninav.stages.simulator.world import World
-from omninav.stages.source.simulated import SimulatedRecording
-from omninav.stages.values.camera import Equirectangular
 
 BUSY = dataclasses.replace(DEMO, days=(Day(people=12),))
 PANORAMA = Equirectangular(720, 180, column_of_forward=360.0, elevation_top=0.7, elevation_bottom=-0.9)

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from omninav.stages.geometry.catadioptric import project
+from omninav.stages.camera.catadioptric import project
+from omninav.stages.camera.models import Camera, Cylindrical, Donut, Equirectangular, HyperbolicMirror, Perspective
 from omninav.stages.simulator.cameras import camera_of, camera_rays, shutter_times, turn
 from omninav.stages.simulator.config import (
     Block,
@@ -26,7 +27,6 @@ from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.people import Person
 from omninav.stages.simulator.renderer import Scene, render
 from omninav.stages.simulator.world import World
-from omninav.stages.values.camera import Camera, Cylindrical, Donut, Equirectangular, HyperbolicMirror, Perspective
 
 EYE = 0.9
 PANORAMA = Equirectangular(

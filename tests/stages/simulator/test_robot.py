@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from omninav.stages.geometry.se2 import between, wrap
+from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.simulator.config import OdometryNoise, Robot
 from omninav.stages.simulator.odometry import Bias, draw_bias, odometry
 from omninav.stages.simulator.robot import drive

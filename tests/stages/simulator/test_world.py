@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from omninav.pipeline.ports import convert
+from omninav.pipeline.graph.ports import convert
 from omninav.stages.simulator import textures
 from omninav.stages.simulator.config import Block, Day, WorldConfig
 from omninav.stages.simulator.demo import DEMO

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from omegaconf import OmegaConf
 
-from omninav.pipeline.ports import convert
-from omninav.stages.geometry.se2 import compose, wrap
+from omninav.pipeline.graph.ports import convert
+from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.simulator import tours
 from omninav.stages.simulator.config import AisleBlock, Block, Day, Door, LampGrid, Room, Route, WorldConfig
 from omninav.stages.simulator.layout import expand
 from omninav.stages.simulator.occupancy import occupancy
 from omninav.stages.simulator.plan import draw_plan
+from omninav.stages.simulator.simulated_log import record
+from omninav.stages.simulator.simulated_recording import SimulatedRecording
 from omninav.stages.simulator.world import World
-from omninav.stages.source.simulated import SimulatedRecording
-from omninav.stages.source.simulated_log import record
 
 CONF = Path(__file__).parents[3] / "conf" / "world"
 NAMES = sorted(path.stem for path in CONF.glob("*.yaml") if path.stem != "empty")

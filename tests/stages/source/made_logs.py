@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 
-from omninav.pipeline.log import LogWriter, make_message, standard_types
+from omninav.pipeline.mcap.log import LogWriter, make_message, standard_types
 
 CAMERA = b"projection: cylindrical\nimage: {width: 48, height: 16}\ncolumn_of_forward: 24\n"
 START = 1_700_000_000_000_000_000

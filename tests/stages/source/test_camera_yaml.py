@@ -5,10 +5,8 @@ import dataclasses
 import pytest
 import yaml
 
-from omninav.pipeline.log import make_message
-from omninav.stages.source.camera_yaml import camera_from_info, parse_camera, write_camera
-from omninav.stages.source.recording import UnreadableRecording
-from omninav.stages.values.camera import (
+from omninav.pipeline.mcap.log import make_message
+from omninav.stages.camera.models import (
     Camera,
     Cylindrical,
     Donut,
@@ -17,6 +15,8 @@ from omninav.stages.values.camera import (
     HyperbolicMirror,
     Perspective,
 )
+from omninav.stages.recordings.camera_yaml import camera_from_info, parse_camera, write_camera
+from omninav.stages.recordings.recording import UnreadableRecording
 
 SIZE = {"width": 640, "height_px": 480}
 PINHOLE = {"focal_x": 497.0, "focal_y": 496.0, "centre_x": 319.5, "centre_y": 239.5, "skew": 0.1}

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.pipeline.codec import decode, encode, encode_state, restore_state
-from omninav.stages.driving.ring import free_ahead, roomier_side
-from omninav.stages.driving.wall_avoider import Memory, WallAvoider
+from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_state
+from omninav.stages.control.clearance import free_ahead, roomier_side
+from omninav.stages.control.wall_avoider import Memory, WallAvoider
+from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator.cameras import shutter_times
 from omninav.stages.simulator.config import Delivery, Event, MirrorCamera, OdometryNoise, Ranges, Sensor, WorldConfig
 from omninav.stages.simulator.demo import DEMO
@@ -18,9 +19,8 @@ from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.robot import around, steer
 from omninav.stages.simulator.world import World
 from omninav.stages.source.closed_loop import ClosedLoop, Simulation
-from omninav.stages.source.recording import UnreadableRecording
 from omninav.stages.values.command import Command
-from omninav.stages.values.planned_way import PlannedWay
+from omninav.stages.values.planned_route import PlannedWay
 from omninav.stages.values.scan import Scan
 
 SMALL = MirrorCamera(

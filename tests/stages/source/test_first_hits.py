@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omninav.stages.simulator.bodies import Box, Tiling
-from omninav.stages.source.first_hits import first_hits
+from omninav.stages.simulator.first_hits import first_hits
 
 NOTHING = (Tiling(np.zeros((1, 1), np.int64), 1.0, 1.0),) * 6
 

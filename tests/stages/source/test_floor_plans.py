@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.recordings.occupancy_grid import boxes, read_grid
 from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.floor_plan import DrivenPlan, WorldPlan
 from omninav.stages.simulator.occupancy import write_grid
 from omninav.stages.simulator.world import World
-from omninav.stages.source.floor_plan import DrivenPlan, WorldPlan
-from omninav.stages.source.occupancy_grid import boxes, read_grid
 
 CTX = Context("plan")
 YAML = "image: map.pgm\nresolution: 0.5\norigin: [-1.0, 2.0, 0.0]\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.plots.image_file import PictureFile
 from omninav.stages.simulator.config import MirrorCamera
 from omninav.stages.simulator.demo import DEMO
-from omninav.stages.source.goal_picture import GoalPicture
+from omninav.stages.source.goal_image import GoalPicture
 from omninav.stages.values.image import Image
-from omninav.stages.view.picture_file import PictureFile
 
 WORLD = replace(DEMO, camera=MirrorCamera(width=16, height_px=12))
 PIXELS = np.random.default_rng(0).integers(0, 255, (12, 16, 3)).astype(np.uint8)

@@ -8,11 +8,11 @@ import pytest
 from conftest import DATA, needs_data
 
 from omninav.pipeline import Context
+from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator.config import MirrorCamera
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.world import World
 from omninav.stages.source.homing_grid import HomingGrid, Placed, grid_around, in_sight
-from omninav.stages.source.recording import UnreadableRecording
 
 SMALL = MirrorCamera(
     width=160, height_px=120, focal=124.25, centre=(79.5, 59.5), inner_radius_px=8.5, outer_radius_px=59.5

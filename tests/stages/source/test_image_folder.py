@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from omninav.stages.source.image_folder import track_directions
-from omninav.stages.source.opening import open_recording
-from omninav.stages.source.recording import UnreadableRecording
-from omninav.stages.source.tables import Angle, Length, Time, read_table
+from omninav.stages.recordings.image_folder import track_directions
+from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.recording import UnreadableRecording
+from omninav.stages.recordings.tables import Angle, Length, Time, read_table
 
 DATA = Path(__file__).parents[3].parent / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"sample data is missing: {DATA}")

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.se2 import between, compose
+from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.source.log import LogSource, Position, disturb
-from omninav.stages.source.opening import open_recording
-from omninav.stages.source.recording import UnreadableRecording
 
 sys.path.insert(0, str(Path(__file__).parent))
 from made_logs import FRAMES, IMAGE, ODOMETRY, START, TRUTH, Made, compressed, messages, write_mcap

@@ -7,16 +7,16 @@ import pytest
 from conftest import DATA, needs_data
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.recordings.occupancy_grid import coarser, read_occupancy
 from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.occupancy import write_grid
 from omninav.stages.simulator.world import World
 from omninav.stages.source.grid import PlaceGrid, along_path, free_space
-from omninav.stages.source.occupancy_grid import coarser, read_occupancy
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid
+from omninav.stages.values.length_scale import Reach
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.reach import Reach
 
 YAML = "image: map.pgm\nresolution: 0.5\norigin: [-1.0, 2.0, 0.0]\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
 CTX = Context("grid")

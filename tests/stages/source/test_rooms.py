@@ -3,7 +3,7 @@
 from omninav.pipeline import Context
 from omninav.stages.simulator.config import Room, WorldConfig
 from omninav.stages.simulator.demo import DEMO
-from omninav.stages.source.rooms import WorldRooms
+from omninav.stages.simulator.world_rooms import WorldRooms
 
 
 def test_rooms_of_a_world_are_given_by_name_and_a_logs_place_is_unknown() -> None:

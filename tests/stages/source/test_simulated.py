@@ -7,13 +7,13 @@ import cv2
 import numpy as np
 import pytest
 
+from omninav.stages.recordings.recording import Recording, UnreadableRecording
+from omninav.stages.simulator import simulated_recording as simulated
 from omninav.stages.simulator.config import Day, Route
 from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.simulated_log import record
+from omninav.stages.simulator.simulated_recording import SimulatedRecording
 from omninav.stages.simulator.world import World
-from omninav.stages.source import simulated
-from omninav.stages.source.recording import Recording, UnreadableRecording
-from omninav.stages.source.simulated import SimulatedRecording
-from omninav.stages.source.simulated_log import record
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +115,7 @@ def test_a_route_that_is_not_there_is_refused_with_those_that_are() -> None:
 
 
 def test_a_written_log_reads_back_as_the_same_drive_and_twice_as_the_same_bytes(tmp_path: Path) -> None:
-    from omninav.stages.source.opening import open_recording
+    from omninav.stages.recordings.opening import open_recording
 
     config = dataclasses.replace(DEMO, routes={"short": Route(((2.0, 1.5), (3.5, 1.5)))})
     recording = SimulatedRecording(config, "short", 2)

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from omninav.pipeline.log import LogReader, make_message
-from omninav.pipeline.problems import BadInput
-from omninav.stages.source.messages import decode_picture, is_blank, pixels_of
-from omninav.stages.source.opening import open_recording
-from omninav.stages.source.recording import UnreadableRecording
-from omninav.stages.source.topics import Topics, ascending
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.mcap.log import LogReader, make_message
+from omninav.stages.recordings.messages import decode_picture, is_blank, pixels_of
+from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.recording import UnreadableRecording
+from omninav.stages.recordings.topics import Topics, ascending
 
 sys.path.insert(0, str(Path(__file__).parent))
 from made_logs import (

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.clusters import clusters
-from omninav.stages.state.clusters import Clusters
+from omninav.stages.fusion.particle_clustering import Clusters
+from omninav.stages.geometry.probability.clusters import clusters
 from omninav.stages.values.belief import GaussianMixture, Particles
 
 

@@ -6,13 +6,9 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Stage, Tick
-from omninav.pipeline.log import LogReader
-from omninav.pipeline.problems import BadInput
-from omninav.stages.unwarp.by_camera import UnwarpByCamera
-from omninav.stages.unwarp.donut import DonutUnwarp, FoundRing, RingNotFound, find_ring
-from omninav.stages.unwarp.hyperbolic import HyperbolicUnwarp, elevation_range
-from omninav.stages.unwarp.strip import StripUnwarp
-from omninav.stages.values.camera import (
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.mcap.log import LogReader
+from omninav.stages.camera.models import (
     Camera,
     Cylindrical,
     Donut,
@@ -21,6 +17,10 @@ from omninav.stages.values.camera import (
     HyperbolicMirror,
     Perspective,
 )
+from omninav.stages.unwarp.by_camera import UnwarpByCamera
+from omninav.stages.unwarp.donut import DonutUnwarp, FoundRing, RingNotFound, find_ring
+from omninav.stages.unwarp.hyperbolic import HyperbolicUnwarp, elevation_range
+from omninav.stages.unwarp.strip import StripUnwarp
 from omninav.stages.values.image import Image, Panorama, Pixels, column_azimuths
 
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data"

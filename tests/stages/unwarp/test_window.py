@@ -4,11 +4,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.pipeline.problems import BadInput
-from omninav.stages.simulator.cameras import camera_rays
-from omninav.stages.unwarp.hyperbolic import elevation_range
-from omninav.stages.unwarp.window import PerspectiveWindow, window_rays
-from omninav.stages.values.camera import (
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.models import (
     Camera,
     Cylindrical,
     Donut,
@@ -17,6 +14,9 @@ from omninav.stages.values.camera import (
     HyperbolicMirror,
     Perspective,
 )
+from omninav.stages.simulator.cameras import camera_rays
+from omninav.stages.unwarp.hyperbolic import elevation_range
+from omninav.stages.unwarp.window import PerspectiveWindow, window_rays
 from omninav.stages.values.image import Image, Pixels, Windows
 
 MIRROR = HyperbolicMirror(640, 480, 497.0, 497.0, 319.5, 239.5, 28.095, 23.4125, 34.0, 238.0, yaw=0.3)

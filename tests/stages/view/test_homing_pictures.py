@@ -6,22 +6,22 @@ import pytest
 from made_places import made_map
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.codec import decode, encode
-from omninav.stages.mapping.album import TourSnapshot, ViewAlbum, bound
-from omninav.stages.values.album import decoded
+from omninav.pipeline.engine.codec import decode, encode
+from omninav.stages.camera.models import Equirectangular, HyperbolicMirror
+from omninav.stages.mapping.thumbnails import TourSnapshot, ViewAlbum, bound
+from omninav.stages.plots.drive_video import DriveFilm
+from omninav.stages.plots.homing_snapshot import HomingSnapshot, Looked
+from omninav.stages.plots.homing_snapshots import HomingMoments
+from omninav.stages.plots.target_images import FirstPicture, picture_of, target_view
+from omninav.stages.plots.video import gif, mp4
 from omninav.stages.values.belief import PlaceBelief
-from omninav.stages.values.camera import Equirectangular, HyperbolicMirror
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing import DrivingStatus, HomingTarget, HomingVector, PathProgress, TrackedFeatures
 from omninav.stages.values.image import Image
 from omninav.stages.values.local_features import LocalFeatures
-from omninav.stages.values.planned_way import PlannedWay
+from omninav.stages.values.planned_route import PlannedWay
 from omninav.stages.values.pose import Pose
-from omninav.stages.view.drive_film import DriveFilm
-from omninav.stages.view.film import gif, mp4
-from omninav.stages.view.homing_moments import HomingMoments
-from omninav.stages.view.homing_snapshot import HomingSnapshot, Looked
-from omninav.stages.view.target_pictures import FirstPicture, picture_of, target_view
+from omninav.stages.values.thumbnails import decoded
 
 CTX = Context("view")
 MIRROR = HyperbolicMirror(640, 480, 497.0, 497.0, 319.5, 239.5, 28.095, 23.4125, 34.0, 238.0, height=0.9, yaw=0.3)
@@ -148,7 +148,7 @@ def test_a_film_has_no_more_frames_than_it_may(tmp_path):
 
 
 def test_without_an_encoder_a_film_is_an_animated_picture(tmp_path, monkeypatch):
-    monkeypatch.setattr("omninav.stages.view.film.mp4", lambda frames, per_second: None)
+    monkeypatch.setattr("omninav.stages.plots.video.mp4", lambda frames, per_second: None)
     ctx = Context("film", folder=tmp_path)
     figure = film_of(ctx=ctx).figure
     assert figure.media_type == "image/gif"

@@ -9,10 +9,10 @@ from made_places import made_map
 from made_tour import Landmarks, along, mapped, scattered
 
 from omninav.pipeline import Context
-from omninav.pipeline.artifact import write_artifact
+from omninav.pipeline.engine.artifact import write_artifact
 from omninav.stages.mapping.topological import TopologicalMapping
-from omninav.stages.metric.loop_links import LoopLinks, at_supports, counted, hypothesis_gaps, parts_of, path_steps
-from omninav.stages.view.loop_hypotheses import ShowLoopHypotheses
+from omninav.stages.metrics.loop_closures import LoopLinks, at_supports, counted, hypothesis_gaps, parts_of, path_steps
+from omninav.stages.plots.loop_hypotheses import ShowLoopHypotheses
 
 CTX = Context("view")
 

@@ -4,17 +4,17 @@ import pytest
 from small_run import reference_graph, small_run
 
 from omninav.pipeline import Context
+from omninav.stages.plots.belief_snapshots import BeliefSnapshots
+from omninav.stages.plots.error_over_time import ErrorOverTime
+from omninav.stages.plots.map_plan import MapPlan
+from omninav.stages.plots.panorama_snapshot import PanoramaSnapshot
+from omninav.stages.plots.panorama_strip import PanoramaStrip
+from omninav.stages.plots.similarity_heat_map import SimilarityHeatMap
+from omninav.stages.plots.similarity_peaks import SimilarityPeaks
+from omninav.stages.plots.snapshot_times import geometric_moments, is_moment, spread_out
+from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.similarity import Similarities
-from omninav.stages.view.belief_snapshots import BeliefSnapshots
-from omninav.stages.view.error_over_time import ErrorOverTime
-from omninav.stages.view.map_plan import MapPlan
-from omninav.stages.view.moments import geometric_moments, is_moment, spread_out
-from omninav.stages.view.panorama_snapshot import PanoramaSnapshot
-from omninav.stages.view.panorama_strip import PanoramaStrip
-from omninav.stages.view.similarity_heat_map import SimilarityHeatMap
-from omninav.stages.view.similarity_peaks import SimilarityPeaks
-from omninav.stages.view.trajectory_over_map import TrajectoryOverMap
 
 CTX = Context("view")
 

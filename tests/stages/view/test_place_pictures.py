@@ -6,15 +6,15 @@ import pytest
 from made_places import made_map
 
 from omninav.pipeline import Context, Tick
+from omninav.stages.plots.drive_over_plan import DriveOverPlan, planned_ways
+from omninav.stages.plots.place_belief_over_time import PlaceBeliefOverTime, binned, with_neighbours
+from omninav.stages.plots.style import broken_at_jumps
+from omninav.stages.plots.true_and_estimated_place import BESIDE, RIGHT, WRONG, BelievedPlaces, judged
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.floor_plan import FloorPlan
-from omninav.stages.values.planned_way import PlannedWay
+from omninav.stages.values.planned_route import PlannedWay
 from omninav.stages.values.pose import Motion, Pose
-from omninav.stages.view.believed_places import BESIDE, RIGHT, WRONG, BelievedPlaces, judged
-from omninav.stages.view.drive_over_plan import DriveOverPlan, planned_ways
-from omninav.stages.view.place_belief_over_time import PlaceBeliefOverTime, binned, with_neighbours
-from omninav.stages.view.style import broken_at_jumps
 
 CTX = Context("view")
 MAP = made_map([(1.0, 1.0), (4.0, 1.0), (4.0, 4.0), (1.0, 4.0)], {(0, 1): 1, (1, 2): 0, (2, 3): 2})

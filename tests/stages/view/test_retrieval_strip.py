@@ -4,17 +4,17 @@ import pytest
 from small_run import small_run
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.codec import decode, encode
-from omninav.stages.mapping.album import CollectAlbum, InAlbum, ReferenceSnapshot
-from omninav.stages.values.album import Album, decoded
+from omninav.pipeline.engine.codec import decode, encode
+from omninav.stages.mapping.thumbnails import CollectAlbum, InAlbum, ReferenceSnapshot
+from omninav.stages.plots.feature_matrix import FeatureMatrix
+from omninav.stages.plots.panorama_snapshot import PanoramaSnapshot
+from omninav.stages.plots.panorama_strip import PanoramaStrip
+from omninav.stages.plots.retrieval_strip import RetrievalStrip
 from omninav.stages.values.image import Panorama, Windows
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.similarity import Answers
-from omninav.stages.view.feature_matrix import FeatureMatrix
-from omninav.stages.view.panorama_snapshot import PanoramaSnapshot
-from omninav.stages.view.panorama_strip import PanoramaStrip
-from omninav.stages.view.retrieval_strip import RetrievalStrip
+from omninav.stages.values.thumbnails import Album, decoded
 
 CTX = Context("view")
 

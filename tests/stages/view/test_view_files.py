@@ -5,11 +5,11 @@ from rosbags.highlevel import AnyReader
 from small_run import small_run
 
 from omninav.pipeline import Context, Tick
+from omninav.stages.plots.result_log import ResultLog, covariance_6x6
+from omninav.stages.plots.thin_belief import ThinBelief, thin
+from omninav.stages.plots.trajectory_file import TrajectoryFile
 from omninav.stages.values.belief import Particles, PoseEstimate, SinglePose
 from omninav.stages.values.pose import Pose
-from omninav.stages.view.result_log import ResultLog, covariance_6x6
-from omninav.stages.view.thin_belief import ThinBelief, thin
-from omninav.stages.view.trajectory_file import TrajectoryFile
 
 
 def estimate(x, y, heading):

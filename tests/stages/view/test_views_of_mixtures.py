@@ -7,17 +7,17 @@ from rosbags.highlevel import AnyReader
 from small_run import mixture_run, small_run
 
 from omninav.pipeline import Context
+from omninav.stages.plots.belief_snapshots import BeliefSnapshots
+from omninav.stages.plots.changed_mixtures import ChangedMixtures
+from omninav.stages.plots.map_ellipses import MapEllipses
+from omninav.stages.plots.map_growth import MapGrowth
+from omninav.stages.plots.reference_life import ReferenceLife, lives_of, most_moved
+from omninav.stages.plots.result_log import ResultLog
+from omninav.stages.plots.thin_belief import ThinBelief, heaviest
+from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
-from omninav.stages.view.belief_snapshots import BeliefSnapshots
-from omninav.stages.view.changed_mixtures import ChangedMixtures
-from omninav.stages.view.map_ellipses import MapEllipses
-from omninav.stages.view.map_growth import MapGrowth
-from omninav.stages.view.reference_life import ReferenceLife, lives_of, most_moved
-from omninav.stages.view.result_log import ResultLog
-from omninav.stages.view.thin_belief import ThinBelief, heaviest
-from omninav.stages.view.trajectory_over_map import TrajectoryOverMap
 
 CTX = Context("view")
 PLAN = FloorPlan(np.array([[[2.0, 2.0], [4.0, 2.0], [4.0, 3.0], [2.0, 3.0]]]), 10.0, 10.0)

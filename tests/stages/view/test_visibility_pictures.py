@@ -3,13 +3,13 @@ import numpy as np
 from small_run import small_run
 
 from omninav.pipeline import Context
-from omninav.stages.areas.line_of_sight import axes_of, visibility_areas
+from omninav.stages.plots.belief_snapshots import BeliefSnapshots
+from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap
+from omninav.stages.plots.visibility_areas import ShowVisibilityAreas, views_by_cell
+from omninav.stages.sensor.line_of_sight import axes_of, visibility_areas
 from omninav.stages.values.grid import FREE, OCCUPIED, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
-from omninav.stages.view.belief_snapshots import BeliefSnapshots
-from omninav.stages.view.trajectory_over_map import TrajectoryOverMap
-from omninav.stages.view.visibility_areas import ShowVisibilityAreas, views_by_cell
 
 CTX = Context("view")
 

@@ -1,0 +1,5 @@
+"""`python -m omninav` is the command `omninav`."""
+
+from omninav.pipeline.cli.main import main
+
+raise SystemExit(main())

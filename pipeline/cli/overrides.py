@@ -1,0 +1,174 @@
+"""The words of a command line that change a configuration: which of them do not fit it, and what to type instead.
+
+Hydra stops at the first word that it cannot use and names nothing that is like it. Here all words are looked at, beside
+the configuration that the fitting ones give. Everything here is called where Hydra is initialised.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from hydra import compose
+from hydra.core.global_hydra import GlobalHydra
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import Override, ValueType
+from hydra.errors import HydraException
+from omegaconf import OmegaConf
+
+from omninav.pipeline.graph.problems import Problem, nearest, suggest
+from omninav.pipeline.graph.registry import UnknownStage, resolve
+from omninav.pipeline.graph.stage import BadStage, signature
+
+WITHIN_GRAPH = ("nodes.", "wires.", "artifacts.", "saves.")
+
+
+def misfits(words: Sequence[str], folders: Sequence[str], said: str) -> list[Problem]:
+    """Every word that fits no group or setting; or what Hydra `said`, where no word is to blame.
+
+    `folders` are those of `--config-dir`.
+    """
+    problems: list[Problem] = []
+    parsed: list[Override] = []
+    for text in words:
+        try:
+            parsed += OverridesParser.create().parse_overrides([text])
+        except HydraException:
+            hint = "write name=value, and quotes within quotes around odd characters: \"camera='my=rig.yaml'\""
+            problems.append(Problem(text, "cannot be read", hint))
+    groups = {name: _options(name, folders) for name in _groups(folders)}
+    swaps = [word for word in parsed if word.key_or_group in groups]
+    unknown = [problem for word in swaps for problem in _unknown_option(word, groups[word.key_or_group])]
+    known = [word for word in swaps if not any(_unknown_option(word, groups[word.key_or_group]))]
+    try:
+        config = compose("config", overrides=[*search(folders), *(_texts(word)[0] for word in known)])
+        plain: Any = OmegaConf.to_container(config, resolve=False)
+    except HydraException:
+        plain = {}
+    for word in parsed if plain else ():
+        # Which nodes there are, and what can be set of them, depends on the options: unknown ones come first.
+        if word not in swaps and not (unknown and word.key_or_group.startswith(WITHIN_GRAPH)):
+            unknown += _unknown_setting(word, plain, list(groups))
+    problems += unknown
+    return problems or [Problem("command line", " ".join(said.partition("Config search path")[0].split()))]
+
+
+def jobs_to_try(words: Sequence[str], folders: Sequence[str]) -> Iterator[list[str]]:
+    """Jobs of a sweep of which one is misspelled if any job is: the first choices, and each other option of a group."""
+    groups = set(_groups(folders))
+    choices = []
+    for word in words:
+        try:
+            parsed = OverridesParser.create().parse_overrides([word])[0]
+        except HydraException:
+            choices.append([word])
+            continue
+        texts = _texts(parsed)
+        choices.append(texts if parsed.key_or_group in groups else texts[:1])
+    choices = [texts for texts in choices if texts]
+    firsts = [texts[0] for texts in choices]
+    yield firsts
+    for number, texts in enumerate(choices):
+        for other in texts[1:]:
+            yield [*firsts[:number], other, *firsts[number + 1 :]]
+
+
+def search(folders: Sequence[str]) -> list[str]:
+    """The override that lets Hydra find configuration in folders."""
+    paths = ",".join(f"file://{Path(folder).resolve()}" for folder in folders)
+    return [f"hydra.searchpath=[{paths}]"] if folders else []
+
+
+def _texts(word: Override) -> list[str]:
+    """A word as it stands in each job of a sweep; itself where it is not swept."""
+    if word.is_delete() or not word.is_sweep_override():
+        return [str(word.input_line)]
+    if word.value_type == ValueType.GLOB_CHOICE_SWEEP or not word.is_discrete_sweep():
+        return []
+    return [f"{word.get_key_element()}={value}" for value in word.sweep_string_iterator()]
+
+
+def _groups(folders: Sequence[str]) -> list[str]:
+    found = {name for name in GlobalHydra.instance().config_loader().list_groups("") if name != "hydra"}
+    for folder in folders:
+        found |= {path.name for path in Path(folder).glob("*/") if any(path.rglob("*.yaml"))}
+    return sorted(found)
+
+
+def _options(group: str, folders: Sequence[str]) -> list[str]:
+    """All options of a group, those in folders within it with their folder (`omniview_mcl/figure_3`)."""
+    loader = GlobalHydra.instance().config_loader()
+    found = set(loader.get_group_options(group))
+    for inner in loader.list_groups(group):
+        found |= {f"{inner}/{option}" for option in _options(f"{group}/{inner}", ())}
+    for folder in folders:
+        place = Path(folder) / group
+        found |= {str(path.relative_to(place).with_suffix("")) for path in place.rglob("*.yaml")}
+    return sorted(found)
+
+
+def _unknown_option(word: Override, options: Sequence[str]) -> Iterator[Problem]:
+    if word.is_delete():
+        return
+    group = word.key_or_group
+    for text in _texts(word):
+        option = text.partition("=")[2].strip("'\"")
+        if option not in options and not option.startswith("["):
+            yield Problem(group, f"there is no '{option}'", suggest(option, options, "options", prefix=f"{group}="))
+
+
+def _unknown_setting(word: Override, config: Mapping[str, Any], groups: list[str]) -> Iterator[Problem]:
+    path = word.key_or_group
+    value = str(word.input_line).partition("=")[2]
+    parents, name, inside = _deepest(config, path)
+    if word.is_add():
+        if name is None and not word.is_force_add() and not isinstance(inside, Mapping):
+            yield Problem(path, "it is there already", f"type {path}={value}")
+        return
+    if name is None or "/" in path:
+        return
+    options = [str(key) for key in inside]
+    above = ".".join(parents)
+    if word.is_delete():
+        yield Problem(path, "there is nothing of that name to take out", _like(name, options, f"~{above}.", ""))
+        return
+    if not parents:
+        options = [key for key in {*options, *groups} if key not in ("hydra", "nodes", "wires", "artifacts", "saves")]
+        yield Problem(path, "there is no such setting or group", _like(name, options, "", f"={value}"))
+        return
+    parameters, stage = _parameters_of(inside)
+    if name in parameters:  # of a stage whose configuration does not list it
+        yield Problem(path, f"the configuration does not list this parameter of {stage}", f"type +{path}={value}")
+        return
+    rest = path.removeprefix(f"{above}.{name}")
+    what = f"{stage} has no parameter '{name}'" if stage else f"there is no '{name}' in '{above}'"
+    hint = _like(name, parameters or options, f"{above}.", f"{rest}={value}")
+    yield Problem(path, what, hint if parameters else f"{hint}; to add it, type +{path}={value}")
+
+
+def _deepest(config: Mapping[str, Any], path: str) -> tuple[list[str], str | None, Any]:
+    """How far a path leads: the names that exist, the first that does not (None if all do), and what is there."""
+    parents: list[str] = []
+    inside: Any = config
+    for name in path.split("."):
+        if not isinstance(inside, Mapping):
+            return parents, None, inside
+        if name not in inside:
+            return parents, name, inside
+        inside = inside[name]
+        parents.append(name)
+    return parents, None, inside
+
+
+def _parameters_of(node: Mapping[str, Any]) -> tuple[list[str], str]:
+    """The parameters of the stage that a node's configuration names, and the stage's name; none where it names none."""
+    try:
+        cls = resolve(str(node["_target_"]))
+        return list(signature(cls).parameters), cls.__name__
+    except (KeyError, UnknownStage, BadStage):
+        return [], ""
+
+
+def _like(name: str, options: Sequence[str], before: str, after: str) -> str:
+    near = nearest(name, options)
+    listing = f"there are: {', '.join(sorted(options))}"
+    return f"did you mean '{before}{near}{after}'? {listing}" if near else listing

@@ -1,0 +1,1 @@
+"""Running a graph: the loop, checkpoints, sequences on disk, artifacts and caches."""

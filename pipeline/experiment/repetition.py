@@ -1,0 +1,253 @@
+"""One condition of an experiment, run once for every seed: what does not depend on the seed is computed once.
+
+Logs are simulated once and read by all conditions. The map and the features come from the cache. The first repetition
+records what follows from log and map alone (a frame's table of similarities), and the others read it.
+"""
+
+import copy
+import json
+import math
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from omninav.pipeline.engine.artifact import Cache
+from omninav.pipeline.engine.disk_sequence import Spool
+from omninav.pipeline.engine.engine import Engine
+from omninav.pipeline.engine.prefix import CachedFront, cached_front, following, front_boundary, front_nodes
+from omninav.pipeline.files import digest_file, digest_text, write_whole
+from omninav.pipeline.graph.graph import Graph, Node
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline.graph.value import Value
+from omninav.pipeline.run.run import (
+    ArtifactPlan,
+    Plan,
+    Run,
+    keep_front,
+    notes_of,
+    obtain,
+    plan,
+    results_of,
+    stage_times,
+    usable,
+)
+
+from .process_pool import Tell
+
+BASE_SEED = 0
+"""Of maps and whatever else the repetitions share."""
+
+
+def measured(graph: Graph) -> Graph:
+    """The part of a graph that its metrics depend on: repetitions need no pictures."""
+    origins = [
+        f"{node.name}.{port.name}"
+        for node in graph.nodes.values()
+        for port in node.signature.outputs.values()
+        if port.type is Metrics
+    ]
+    return graph.leading_to(origins)
+
+
+def condition_key(planned: Plan, groups: Sequence[Sequence[str]] = ()) -> str:
+    """The hash of everything but the seed that decides a condition's results. Its logs must be there.
+
+    `groups`: stages whose time together is among them.
+    """
+    graph = measured(planned.graph)
+    parts = [graph.digest(), *known_digests(graph), *("+".join(group) for group in groups)]
+    for artifact in planned.artifacts:
+        parts += [artifact.name, artifact_key(artifact)]
+    return digest_text("condition", *parts)
+
+
+def artifact_key(artifact: ArtifactPlan) -> str:
+    """The hash of everything that decides an artifact's content. Its logs must be there."""
+    if artifact.graph is None:
+        assert artifact.file is not None
+        return digest_file(artifact.file)
+    return digest_text("artifact", artifact.graph.digest(), artifact.origin, *known_digests(artifact.graph))
+
+
+_DIGESTS: dict[str, str] = {}
+
+
+def known_digests(graph: Graph) -> list[str]:
+    """The content hashes of the files that a graph reads. Opening a long log takes seconds: once will do."""
+    found = []
+    for node in graph.nodes.values():
+        key = f"{node.target} {json.dumps(node.parameters, sort_keys=True, default=str)}"
+        if key not in _DIGESTS:
+            _DIGESTS[key] = node.stage.inputs_digest() or ""
+        found.append(_DIGESTS[key])
+    return [digest for digest in found if digest]
+
+
+def finished(folder: Path, key: str, seeds: Sequence[int], cache: Cache | None = None) -> dict[int, dict[str, Any]]:
+    """The results of a condition by seed: those in its folder that belong to this key, and those in the cache.
+
+    Through the cache experiments share the conditions that they have in common.
+    """
+    found = {}
+    for seed in seeds:
+        for path in _results(folder, key, seed, cache):
+            result = json.loads(path.read_text()) if path.exists() else {}
+            if result.get("key") == key:
+                found[seed] = result
+                break
+    return found
+
+
+def _results(folder: Path, key: str, seed: int, cache: Cache | None) -> list[Path]:
+    """Where a repetition's result lies."""
+    kept = [] if cache is None else [cache.path(digest_text("repetition", key, str(seed)), ".json")]
+    return [folder / f"seed_{seed}.json", *kept]
+
+
+def repeat(given: Mapping[str, Any], tell: Tell) -> None:
+    """Run a condition for some seeds; each one's result is a file, and `tell` hears its seed when it is there.
+
+    Without `shared` nothing but the map comes from the cache or from the repetition before: all is timed as on a robot.
+
+    `given`: `config` (plain; its artifacts are files by now), `folder`, `key`, `code`, `seeds`, `shared`, `groups` (of
+    stages whose time together is measured). Raises `BadInput` where the code has changed since the experiment was
+    started.
+    """
+    folder, seeds = Path(given["folder"]), list(given["seeds"])
+    planned = plan(given["config"])
+    if planned.graph.digest() != given["code"]:
+        raise BadInput("the code has changed while the experiment ran; type the same command again")
+    cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
+    graph = measured(planned.graph)
+    run = Run(folder)
+    shutil.rmtree(run.memory, ignore_errors=True)
+    artifacts: dict[str, Value] = {}
+    facts: dict[str, Any] = {}
+    for artifact in planned.artifacts:
+        artifacts[artifact.name], made = obtain(run, artifact, BASE_SEED, cache, math.inf, Heartbeat(tell))
+        facts[artifact.name] = made
+        (folder / f"{artifact.name}.omap").unlink(missing_ok=True)  # the cache keeps it
+    shared: CachedFront | None = None
+    for number, seed in enumerate(seeds):
+        place = run.memory / f"seed_{seed}"
+        record = bool(given["shared"]) and shared is None and number + 1 < len(seeds)
+        engine, recorded = _once(
+            graph, artifacts, seed, place, cache if given["shared"] else None, shared, record, tell
+        )
+        shared = recorded or shared
+        result = {"key": given["key"], "seed": seed, "metrics": results_of(engine)[0]}
+        result["timing"] = stage_times(engine, given.get("groups") or ())
+        result |= notes_of(engine)
+        result["artifacts"] = facts
+        for spool in engine.spools.values():
+            spool.close()
+        if recorded is None:
+            shutil.rmtree(place, ignore_errors=True)
+        for path in _results(folder, given["key"], seed, cache if given["shared"] else None):
+            write_whole(path, json.dumps(result, indent=1, sort_keys=True, default=str) + "\n")
+        tell({"seed": seed})
+    shutil.rmtree(run.memory, ignore_errors=True)
+
+
+def prepare(given: Mapping[str, Any], tell: Tell) -> None:
+    """Make an artifact for conditions: `config` (plain) of one of them, its `name`, the `folder` to leave it in."""
+    planned = plan(given["config"])
+    cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
+    run = Run(Path(given["folder"]))
+    run.folder.mkdir(parents=True, exist_ok=True)  # nothing else makes it where the cache has the artifact
+    for artifact in planned.artifacts:
+        if artifact.name == given["name"]:
+            obtain(run, artifact, BASE_SEED, cache, math.inf, Heartbeat(tell))
+    shutil.rmtree(run.memory, ignore_errors=True)
+
+
+def _once(
+    graph: Graph,
+    artifacts: Mapping[str, Value],
+    seed: int,
+    place: Path,
+    cache: Cache | None,
+    shared: CachedFront | None,
+    record: bool,
+    tell: Tell,
+) -> tuple[Engine, CachedFront | None]:
+    """One repetition; with `record` also the front that the others may share. What grows in place is its own."""
+    artifacts = {name: copy.deepcopy(value) if value.in_place else value for name, value in artifacts.items()}
+    step = Heartbeat(tell).step
+    if shared is not None:
+        engine = Engine(graph, artifacts, seed, place, place, every_s=math.inf, front=shared, progress=step)
+        engine.run()
+        return engine, None
+    with cached_front(graph, cache, seed) as front:
+        known = usable(front)
+        wanted = _recordable(graph, known) if record else []
+        engine = Engine(
+            graph, artifacts, seed, place, place, every_s=math.inf, front=known, progress=step, recorded=wanted
+        )
+        engine.run()
+        keep_front(engine, front, cache, seed)
+    # Only now is it known which stages draw random numbers: they and what follows from them are run every time.
+    # What grows in place has grown by now: it starts anew too.
+    drew = [name for name, call in engine.calls.items() if call.ctx.drew]
+    seeded = following(graph, [*drew, *(node.name for node in graph.of_lifetime("before") if _grows(node))])
+    nodes = front_nodes(graph, artifacts=True, without=seeded)
+    boundary = front_boundary(graph, nodes)
+    if not nodes or not set(boundary) <= set(wanted):
+        return engine, None
+    before = [node.name for node in graph.of_lifetime("before") if node.name not in seeded]
+    notes = {name: engine.calls[name].ctx.notes() for name in sorted(nodes | set(before))}
+    engine.spools.pop("shared").flush()
+    given = {origin: value for origin, value in engine.values.items() if origin.partition(".")[0] in before}
+    replay = Spool(place / "shared.spool")
+    return engine, CachedFront(nodes | frozenset(before), tuple(boundary), "", "", replay, notes, given)
+
+
+def _grows(node: Node) -> bool:
+    return any(getattr(port.type, "in_place", False) for port in node.signature.outputs.values())
+
+
+def _recordable(graph: Graph, known: CachedFront | None) -> list[str]:
+    """What may have to be shared: all that nodes read of the front, but what is too large to keep over a log.
+
+    Of the part that comes from the cache there is only its boundary.
+    """
+    nodes = front_nodes(graph, artifacts=True)
+    inside = known.nodes if known is not None and known.replay is not None else frozenset()
+    read = {wire.origin for wire in graph.wires if wire.from_node in nodes - inside}
+    small = {origin for origin in read if not getattr(getattr(graph.port(origin), "type", None), "bulky", False)}
+    tick = {f"{graph.source.name}.tick"} if graph.source is not None else set()
+    return sorted(small | tick | set(known.boundary if known is not None and inside else ()))
+
+
+class Heartbeat:
+    """A job's progress, told to its experiment at some frames: a job whose experiment was killed ends soon."""
+
+    def __init__(self, tell: Tell) -> None:
+        self._tell = tell
+
+    def update(self, name: str, done: int, total: int | None = None) -> None:
+        """`done` frames of `total` have gone through the graph `name`, as `Progress` hears it."""
+        self.step(done, total)
+
+    def step(self, done: int, total: int | None = None) -> None:
+        """The same, of the only graph there is."""
+        if done == 1 or done % 25 == 0 or done == total:
+            self._tell({"frames": done, "of": total})
+
+
+def simulate(given: Mapping[str, Any], tell: Tell) -> None:
+    """Write a simulated drive as a log, with what its stages state of it: `config` (plain), `part` and `folder`.
+
+    It appears as a whole: written to `part`, then renamed.
+    """
+    part, folder = Path(given["part"]), Path(given["folder"])
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir(parents=True)
+    planned = plan(given["config"])
+    engine = Engine(planned.graph, {}, planned.seed, progress=Heartbeat(tell).step)
+    engine.run()
+    write_whole(part / "facts.json", json.dumps(notes_of(engine)["facts"], indent=1, sort_keys=True) + "\n")
+    shutil.rmtree(folder, ignore_errors=True)
+    part.rename(folder)

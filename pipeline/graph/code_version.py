@@ -1,0 +1,68 @@
+"""Which code a stage's results follow from."""
+
+import ast
+import functools
+import inspect
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from omninav.pipeline.files import digest_text
+
+from .stage import Stage
+
+
+def code_version(cls: type[Stage]) -> str:
+    """A hash over the source of a stage's module and of all that it imports of its own package, directly or not.
+
+    A change there makes its cached results stale, one elsewhere in the package does not. Imports are read off the
+    source, so that those count as well which run at need only. What other packages hold does not count.
+    """
+    return _of_module(cls.__module__)
+
+
+@functools.cache
+def _of_module(module: str) -> str:
+    file = Path(inspect.getfile(sys.modules[module])).resolve()
+    root = file.parent
+    while (root / "__init__.py").exists():
+        root = root.parent
+    inside = file.relative_to(root).with_suffix("").parts
+    names = module.split(".")
+    outer = ".".join([*names[: -len(inside)], inside[0]])  # the package's full name; or the module's, without one
+    found: dict[str, str] = {}
+    to_read = [module] if ".".join(names[-len(inside) :]) == ".".join(inside) else []
+    while to_read:
+        name = to_read.pop()
+        if name in found or not f"{name}.".startswith(f"{outer}."):
+            continue
+        place = _file_of(root / inside[0], name[len(outer) + 1 :])
+        if place is not None:
+            found[name], imported = _read(place, name)
+            to_read += [name.rpartition(".")[0], *imported]  # a package's own file runs before its modules
+    if not found:  # a file that was given by its path: it has no package, and no name of its own
+        found[inside[-1]] = file.read_text()
+    return digest_text(*(text for name in sorted(found) for text in (name[len(outer) :], found[name])))
+
+
+def _file_of(package: Path, name: str) -> Path | None:
+    path = package.joinpath(*name.split(".")) if name else package
+    files = (path / "__init__.py", path.with_name(f"{path.name}.py"))
+    return next((file for file in files if file.is_file()), None)
+
+
+@functools.cache
+def _read(file: Path, name: str) -> tuple[str, tuple[str, ...]]:
+    text = file.read_text()
+    return text, tuple(_imported(text, name if file.name == "__init__.py" else name.rpartition(".")[0]))
+
+
+def _imported(text: str, package: str) -> Iterator[str]:
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            origin = ".".join([*above, *([node.module] if node.module else [])])
+            yield origin
+            yield from (f"{origin}.{alias.name}" for alias in node.names)  # each may be a module itself

@@ -1,0 +1,160 @@
+"""Names to stage classes: built in, installed by others, named in the environment, or given by their full path.
+
+A third party's stage is named `role.name`, as `match.gradient`:
+
+* installed: an entry point of the group `omninav.stages`, `"match.gradient" = "package.module:GradientMatch"`;
+* not installed: `OMNINAV_STAGES="match.gradient=path/to/gradient.py:GradientMatch"` (several with commas);
+* in a config file or on the command line: `_target_: package.module.GradientMatch`, or
+  `path/to/gradient.py:GradientMatch`.
+"""
+
+import functools
+import importlib
+import importlib.metadata
+import importlib.util
+import inspect
+import os
+import pkgutil
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from omninav.pipeline.files import digest_text
+
+from .stage import Source, Stage, first_line
+
+BUILT_IN = "omninav.stages"
+ENVIRONMENT = "OMNINAV_STAGES"
+ENTRY_POINTS = "omninav.stages"
+
+
+class UnknownStage(Exception):
+    """A name behind which there is no stage class. The message says what is there instead."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A row of the catalogue: a stage, or what is wrong with a plugin.
+
+    `name` is `role.name`; `target` what `_target_` would hold; `origin` is "built in", "installed" or "environment".
+    """
+
+    name: str
+    target: str
+    origin: str
+    summary: str = ""
+    problem: str = ""
+
+    @property
+    def role(self) -> str:
+        """The folder, or the plugin name's first part: which config group the stage belongs to."""
+        return self.name.partition(".")[0]
+
+
+def resolve(target: str) -> type[Stage]:
+    """The stage class behind a `_target_`.
+
+    Raises `UnknownStage` where the module cannot be imported, the name is not in it, or it is not a stage. Whatever
+    the name leads to is looked at, never called.
+    """
+    named = {entry.name: entry.target for entry in plugins()}
+    target = named.get(target, target)
+    module_name, _, class_name = target.rpartition(":") if ":" in target else target.rpartition(".")
+    if not module_name:
+        raise UnknownStage(f"'{target}' is no full name; write package.module.Class or path/to/file.py:Class")
+    module = _load(module_name)
+    thing = getattr(module, class_name, None)
+    if thing is None:
+        here = [name for name, value in vars(module).items() if _is_stage(value)]
+        raise UnknownStage(f"module '{module_name}' has no '{class_name}'; its stages: {', '.join(here) or 'none'}")
+    if not _is_stage(thing):
+        raise UnknownStage(f"'{target}' is not a Stage; only stages can be nodes")
+    return thing  # type: ignore[no-any-return]
+
+
+def _is_stage(thing: Any) -> bool:
+    return inspect.isclass(thing) and issubclass(thing, Stage) and thing not in (Stage, Source)
+
+
+def _load(module_name: str) -> ModuleType:
+    try:
+        if module_name.endswith(".py"):
+            return _load_file(Path(module_name))
+        return importlib.import_module(module_name)
+    except UnknownStage:
+        raise
+    except BaseException as error:  # a plugin may raise anything while it is imported
+        if isinstance(error, KeyboardInterrupt):
+            raise
+        raise UnknownStage(f"module '{module_name}' cannot be imported: {type(error).__name__}: {error}") from None
+
+
+def _load_file(path: Path) -> ModuleType:
+    path = path.expanduser().resolve()
+    if not path.is_file():
+        raise UnknownStage(f"there is no file {path}")
+    name = f"omninav_plugin_{path.stem}_{digest_text(str(path))[:8]}"
+    if name not in sys.modules:
+        spec = importlib.util.spec_from_file_location(name, path)
+        if spec is None or spec.loader is None:
+            raise UnknownStage(f"{path} cannot be read as a Python module")
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module
+        try:
+            spec.loader.exec_module(module)
+        except BaseException:
+            del sys.modules[name]
+            raise
+    return sys.modules[name]
+
+
+@functools.cache
+def _installed(path: tuple[str, ...]) -> tuple[Entry, ...]:
+    """What installed distributions offer; looking through them takes as long as everything else, so once will do."""
+    points = importlib.metadata.entry_points(group=ENTRY_POINTS)
+    return tuple(Entry(point.name, point.value, "installed") for point in sorted(points, key=lambda point: point.name))
+
+
+def plugins() -> list[Entry]:
+    """Stages that others offer, from installed entry points and from the environment; none is imported for this."""
+    found = list(_installed(tuple(sys.path)))
+    for item in filter(None, (text.strip() for text in os.environ.get(ENVIRONMENT, "").split(","))):
+        name, equals, target = item.partition("=")
+        if not equals or "." not in name or ":" not in target:
+            wanted = "write role.name=package.module:Class or role.name=path/to/file.py:Class"
+            found.append(
+                Entry(item, "", "environment", problem=f"'{item}' in {ENVIRONMENT} is not understood; {wanted}")
+            )
+            continue
+        found.append(Entry(name, target, "environment"))
+    return found
+
+
+def entries() -> Iterator[Entry]:
+    """All stages that can be used now, built in and third parties'; a broken plugin is a row with its problem."""
+    yield from built_in()
+    for entry in plugins():
+        if entry.problem:
+            yield entry
+            continue
+        try:
+            cls = resolve(entry.target)
+            yield Entry(entry.name, entry.target, entry.origin, first_line(cls))
+        except UnknownStage as error:
+            yield Entry(entry.name, entry.target, entry.origin, problem=str(error))
+
+
+def built_in() -> Iterator[Entry]:
+    """The stages of omninav itself, in the order of folders and files."""
+    package = importlib.import_module(BUILT_IN)
+    for module_info in sorted(pkgutil.walk_packages(package.__path__, BUILT_IN + "."), key=lambda info: info.name):
+        if module_info.ispkg:
+            continue
+        module = importlib.import_module(module_info.name)
+        role, name = module_info.name.removeprefix(BUILT_IN + ".").split(".", 1)[0], module_info.name.rpartition(".")[2]
+        for cls in vars(module).values():
+            if _is_stage(cls) and cls.__module__ == module.__name__ and not inspect.isabstract(cls):
+                yield Entry(f"{role}.{name}", f"{module.__name__}.{cls.__qualname__}", "built in", first_line(cls))

@@ -1,1 +1,0 @@
-"""From where the views of a map can be seen."""

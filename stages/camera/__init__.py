@@ -1,0 +1,1 @@
+"""Camera models, one file each, and what follows from any of them."""

@@ -1,0 +1,1 @@
+"""From a homing vector or a ring of ranges to velocity commands."""

@@ -1,1 +1,0 @@
-"""What is done to panoramas on purpose, to see what a method stands."""

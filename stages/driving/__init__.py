@@ -1,1 +1,0 @@
-"""From where to go to what the wheels shall do."""

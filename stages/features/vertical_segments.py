@@ -1,0 +1,266 @@
+"""Invariant column segments: what stands upright between two edges, as it looks along its line."""
+
+import math
+from typing import Annotated, NamedTuple, cast
+
+import cv2
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.camera.models import Camera
+from omninav.stages.geometry.appearance.feature_matching import spreads
+from omninav.stages.values.image import Image, Panorama, Pixels
+from omninav.stages.values.local_features import ColumnSegments
+
+from .colour_moments import add_pixel, correlations
+from .prepared_image import ReadPicture, read_picture
+
+Array = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
+
+SAMPLES = 8
+"""Of a segment's intensity profile: the paper's 8-point cosine transform."""
+
+
+def profile_basis() -> Floats:
+    """Rows 1 to 7 of the orthonormal 8-point cosine transform (7, 8): the first, the mean, is left out."""
+    n = np.arange(SAMPLES)
+    rows = np.arange(1, SAMPLES)[:, None]
+    return (math.sqrt(2.0 / SAMPLES) * np.cos(np.pi * (n + 0.5) * rows / SAMPLES)).astype(np.float32)
+
+
+class Segments(NamedTuple):
+    """Segments on upright lines: `lines` (N,); `ends` (N, 2), rows of upper and lower end; `descriptors` (N, 10)."""
+
+    lines: Ints
+    ends: Array
+    descriptors: Floats
+
+
+@numba.njit(cache=True, nogil=True)
+def _edges(steps: Floats, least: float, lines: Ints, rows: Array) -> int:
+    height, width = steps.shape
+    found = 0
+    for column in range(width):
+        for row in range(1, height - 1):
+            before, here, after = steps[row - 1, column], steps[row, column], steps[row + 1, column]
+            if here >= least and here > before and here >= after:
+                bend = before - 2.0 * here + after
+                shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+                lines[found], rows[found] = column, row + shift
+                found += 1
+    return found
+
+
+@numba.njit(cache=True, nogil=True)
+def _describe(
+    pixels: Pixels, grey: Floats, lines: Ints, ends: Array, margin: float, basis: Floats, out: Floats
+) -> None:
+    height = grey.shape[0]
+    sums, profile = np.empty(10), np.empty(SAMPLES, np.float32)
+    for n in range(len(lines)):
+        column, top, bottom = lines[n], ends[n, 0], ends[n, 1]
+        length = bottom - top
+        sums[:] = 0.0
+        first = max(0, int(np.ceil(top - margin * length)))
+        last = min(height - 1, int(np.floor(bottom + margin * length)))
+        for row in range(first, last + 1):
+            blue, green, red = pixels[row, column, 0], pixels[row, column, 1], pixels[row, column, 2]
+            add_pixel(sums, float(blue), float(green), float(red))
+        correlations(sums, out[n])
+        mean = np.float32(0.0)
+        for k in range(SAMPLES):
+            at = top + (k + 0.5) * length / SAMPLES
+            row = min(max(int(at), 0), height - 2)
+            part = np.float32(at - row)
+            profile[k] = (1 - part) * grey[row, column] + part * grey[row + 1, column]
+            mean += profile[k] / SAMPLES
+        norm = np.float32(0.0)
+        for k in range(SAMPLES):
+            profile[k] -= mean
+            norm += profile[k] * profile[k]
+        norm = np.sqrt(norm) if norm > 1e-3 else np.float32(1.0)
+        for c in range(SAMPLES - 1):
+            total = np.float32(0.0)
+            for k in range(SAMPLES):
+                total += basis[c, k] * profile[k]
+            out[n, 3 + c] = total / norm
+
+
+def segments_of(pixels: Pixels, circle: bool, blur: float, gradient: float, shortest: float, margin: float) -> Segments:
+    """All segments of a picture whose columns are upright lines, the upper end of each at the smaller row.
+
+    An edge is a local maximum along a column of the intensity's gradient, of the picture smoothed by `blur` pixels,
+    above `gradient` standard deviations of its intensity per pixel: neither scale nor offset of the light changes it.
+    Every two neighbouring edges at least `shortest` pixels apart make a segment. Descriptors: colour correlations over
+    the segment widened by `margin` of its length on both sides; the profile's cosine coefficients 1 to 7 of 8 samples,
+    its mean taken out and its length made 1. `circle`: the columns go around.
+    """
+    seam = min(max(2, math.ceil(3.0 * blur)), pixels.shape[1]) if circle else 0
+    padded = np.concatenate([pixels[:, pixels.shape[1] - seam :], pixels, pixels[:, :seam]], axis=1) if seam else pixels
+    smooth = cast(Pixels, cv2.GaussianBlur(padded, (0, 0), blur))
+    smooth = np.ascontiguousarray(smooth[:, seam : smooth.shape[1] - seam] if seam else smooth)
+    grey = cv2.cvtColor(smooth, cv2.COLOR_BGR2GRAY).astype(np.float32)
+    steps = np.zeros_like(grey)
+    steps[1:-1] = np.abs(grey[2:] - grey[:-2]) / 2.0
+    lines, rows = np.empty(grey.size, np.int64), np.empty(grey.size)
+    found = _edges(steps, max(gradient * float(grey.std()), 1e-3), lines, rows)
+    lines, rows = lines[:found], rows[:found]
+    kept = np.flatnonzero((lines[1:] == lines[:-1]) & (rows[1:] - rows[:-1] >= shortest))
+    ends = np.stack([rows[kept], rows[kept + 1]], axis=-1)
+    descriptors = np.empty((len(kept), 3 + SAMPLES - 1), np.float32)
+    _describe(smooth, grey, lines[kept], ends, margin, profile_basis(), descriptors)
+    return Segments(lines[kept], ends, descriptors)
+
+
+@numba.njit(cache=True, nogil=True)
+def _alike(
+    starts: Ints, ends: Array, scaled: Floats, reach: int, near: float, apart: float, circle: bool, crowd: Floats
+) -> None:
+    columns = len(starts) - 1
+    for column in range(columns):
+        for step in range(0, reach + 1):
+            other = column + step
+            if other >= columns:
+                if not circle or step >= columns:
+                    break
+                other -= columns
+            across = (step * near) ** 2
+            for i in range(starts[column], starts[column + 1]):
+                for j in range(i if step == 0 else starts[other], starts[other + 1]):
+                    if ends[i, 0] >= ends[j, 1] or ends[j, 0] >= ends[i, 1]:
+                        continue
+                    d = across
+                    for k in range(scaled.shape[1]):
+                        d += (scaled[i, k] - scaled[j, k]) ** 2
+                    if d <= apart * apart:
+                        share = np.float32(1.0 - d / (apart * apart))
+                        crowd[i] += share
+                        if i != j:
+                            crowd[j] += share
+
+
+@numba.njit(cache=True, nogil=True)
+def _prototypes(
+    order: Ints,
+    lines: Ints,
+    starts: Ints,
+    ends: Array,
+    scaled: Floats,
+    reach: int,
+    near: float,
+    apart: float,
+    circle: bool,
+    weights: Floats,
+) -> None:
+    columns = len(starts) - 1
+    taken = np.zeros(len(order), np.bool_)
+    for i in order:
+        if taken[i]:
+            continue
+        for step in range(-reach, reach + 1):
+            other = lines[i] + step
+            if other < 0 or other >= columns:
+                if not circle or 2 * reach >= columns:
+                    continue
+                other = other % columns
+            across = (step * near) ** 2
+            for j in range(starts[other], starts[other + 1]):
+                if taken[j] or ends[i, 0] >= ends[j, 1] or ends[j, 0] >= ends[i, 1]:
+                    continue
+                d = across
+                for k in range(scaled.shape[1]):
+                    d += (scaled[i, k] - scaled[j, k]) ** 2
+                if d <= apart * apart:
+                    taken[j] = True
+                    weights[i] += 1.0
+
+
+def prototypes(found: Segments, columns: int, spread: float, apart: float, circle: bool) -> tuple[Ints, Floats]:
+    """One segment for each group of neighbours that look alike: rows, heaviest first, and how many each stands for.
+
+    Two segments that overlap in height are `apart` at most by the Mahalanobis distance of their descriptors, extended
+    by the distance of their columns, in units of `spread` columns (section 3.3). Those with most alike around them are
+    taken first, and take all alike with them: the middle of a group, however the robot is turned.
+    """
+    weights = np.zeros(len(found.lines), np.float32)
+    if not len(weights):
+        return np.empty(0, np.int64), weights
+    scaled = found.descriptors / spreads(found.descriptors)
+    starts = np.searchsorted(found.lines, np.arange(columns + 1))
+    reach, near = int(apart * spread), 1.0 / spread
+    crowd = np.zeros(len(weights), np.float32)
+    _alike(starts, found.ends, scaled, reach, near, apart, circle, crowd)
+    order = np.argsort(-crowd, kind="stable")
+    _prototypes(order, found.lines, starts, found.ends, scaled, reach, near, apart, circle, weights)
+    kept = order[weights[order] > 0.0]
+    kept = kept[np.argsort(-weights[kept], kind="stable")]
+    return kept, weights[kept]
+
+
+class FindColumnSegments(Stage):
+    """Upright lines between two edges, described by their colours and their profile.
+
+    Goedeme et al. 2007, section 3.3: along every radius of a mirror image (`lines` of them), or every column of a
+    panorama, each two neighbouring gradient maxima bound a segment; its descriptor holds three colour correlations over
+    the segment widened by `margin` of its length at both ends, and seven cosine coefficients of its profile. The
+    paper's 8-point transform has the mean as its first: the profile's mean is taken out and its length made 1, as
+    "invariant to illumination" asks, and the other seven are kept. Neighbours that look alike become one
+    (`prototypes`, `cluster` and `spread_deg`); the `segments` heaviest are kept. Raises BadInput for an image without a
+    camera.
+    """
+
+    segments: Annotated[int, Bounds(ge=1)] = 200
+    lines: Annotated[int, Bounds(ge=8)] = 360
+    largest: Annotated[int, Bounds(ge=1024)] = 76800
+    blur: Annotated[float, Bounds(gt=0)] = 1.0
+    gradient: Annotated[float, Bounds(ge=0)] = 0.25
+    shortest: Annotated[float, Bounds(ge=2)] = 8.0
+    margin: Annotated[float, Bounds(ge=0)] = 0.2
+    cluster: Annotated[float, Bounds(gt=0)] = 2.0
+    spread_deg: Annotated[float, Bounds(gt=0)] = 3.0
+
+    class Out(Outputs):
+        """What was found, the heaviest first; it may be none."""
+
+        columns: ColumnSegments
+
+    def step(self, ctx: Context, picture: Image | Panorama, camera: Camera | None = None) -> Out:
+        """Describe one picture."""
+        read = read_picture(picture, camera, self.largest)
+        pixels, circle = self._upright(read)
+        settings = self.blur, self.gradient, self.shortest, self.margin
+        found = segments_of(pixels, circle, *settings)
+        width = pixels.shape[1]
+        kept, weights = prototypes(found, width, self.spread_deg * width / 360.0, self.cluster, circle)
+        kept, weights = kept[: self.segments], weights[: self.segments]
+        lines = np.broadcast_to(found.lines[kept, None], (len(kept), 2)).astype(np.float64)
+        points = read.original(self._back(np.stack([lines, found.ends[kept]], axis=-1), read))
+        bearings = read.bearings(points)
+        elevations = np.arcsin(np.clip(bearings[..., 2], -1.0, 1.0))
+        middle = bearings.sum(axis=1)
+        azimuths = np.arctan2(middle[:, 1], middle[:, 0])
+        return self.Out(columns=ColumnSegments(azimuths, elevations, found.descriptors[kept], weights, points))
+
+    def _upright(self, read: ReadPicture) -> tuple[Pixels, bool]:
+        """The picture with its upright lines as columns, the outer end of a radius at the top."""
+        if read.ring is None:
+            return read.pixels, read.circle
+        lines, rows = np.meshgrid(np.arange(self.lines), np.arange(int(read.ring.outer - read.ring.inner) + 1))
+        points = self._back(np.stack([lines, rows], axis=-1).astype(np.float64), read).astype(np.float32)
+        upright = cv2.remap(read.pixels, points[..., 0], points[..., 1], cv2.INTER_LINEAR)
+        return cast(Pixels, upright), True
+
+    def _back(self, points: Array, read: ReadPicture) -> Array:
+        """Points (..., 2) of the upright picture as points of the picture that was read."""
+        if read.ring is None:
+            return points
+        angle = 2.0 * math.pi * points[..., 0] / self.lines
+        radius = read.ring.outer - points[..., 1]
+        around = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        middle = np.array([read.ring.centre_x, read.ring.centre_y])
+        back: Array = middle + radius[..., None] * around
+        return back

@@ -1,0 +1,69 @@
+"""The first belief of a log."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.geometry.probability.particles import uniform_around
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.grid import FreeSpace
+from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
+
+
+class Start(Stage):
+    """A belief at the first picture of each log, and none later.
+
+    `at`: `uniform` over the free space (port `area`), where that is wired, else over the area within `around` reaches
+    (port `reach`, else of `reach_m`) of the map's references, all headings; `truth`, the log's first true pose;
+    `origin`; or x, y, heading, sigma of position, sigma of heading (m, m, rad, m, rad). `truth` and `origin` are spread
+    by 0.1 m and 0.1 rad. Raises BadInput where `truth` or a map is asked for and there is none.
+    """
+
+    at: Literal["uniform", "truth", "origin"] | tuple[float, float, float, float, float] = "uniform"
+    number: Annotated[int, Bounds(ge=1)] = 5000
+    around: Annotated[float, Bounds(gt=0)] = 2.0
+    reach_m: Annotated[float, Bounds(gt=0)] = 0.5
+
+    class Out(Outputs):
+        """The belief to begin with; absent at all later pictures."""
+
+        belief: Particles | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        map: ReferenceGraph | None,
+        truth: Pose | None,
+        reach: Reach | None = None,
+        area: FreeSpace | None = None,
+    ) -> Out:
+        """Give the first belief."""
+        if not ctx.tick.first_of_log:
+            return self.Out()
+        if self.at == "uniform" and area is not None:
+            poses = area.draw(ctx.rng, self.number)
+        elif self.at == "uniform":
+            if map is None or not len(map):
+                raise BadInput(
+                    "start: `uniform` needs a map with references; use start=origin, start=truth, or give a map"
+                )
+            unit = self.reach_m if reach is None else reach.metres
+            poses = uniform_around(map.poses, self.around * unit, self.number, ctx.rng)
+        else:
+            if self.at == "truth":
+                if truth is None:
+                    raise BadInput("start: this log has no true pose at its first picture; use start=uniform")
+                x, y, heading, metres, radians = truth.x, truth.y, truth.heading, 0.1, 0.1
+            elif self.at == "origin":
+                x, y, heading, metres, radians = 0.0, 0.0, 0.0, 0.1, 0.1
+            else:
+                x, y, heading, metres, radians = self.at
+            noise = ctx.rng.standard_normal((self.number, 3)) * (metres, metres, radians)
+            poses = noise + np.array([x, y, heading])
+            poses[:, 2] = wrap(poses[:, 2])
+        return self.Out(belief=Particles(poses, np.full(self.number, 1.0 / self.number)))

@@ -1,0 +1,53 @@
+"""Weighs predicted particles by the view, resamples them at every picture, and puts some of them anywhere."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.probability.particles import systematic
+from omninav.stages.values.belief import Likelihood, Particles
+
+
+class RandomSamples(Stage):
+    """Importance weights, bootstrap resampling at every picture, and random samples against lost or kidnapped robots.
+
+    Wolf, Burgard & Burkhardt 2005, sections III and VI-C: of `number` samples (5000 in the paper) `random` (50) are
+    taken anew at each picture from the `proposals`, drawn by their weights, instead of that many resampled ones, so
+    that the number stays (erratum 47). With `sensor=visibility` they are uniform over the free space with all headings,
+    as in the paper. Resampling is systematic; all weights are equal afterwards.
+    Raises BadInput where random samples are wanted and nobody proposes any.
+    """
+
+    number: Annotated[int, Bounds(ge=1)] = 5000
+    random: Annotated[int, Bounds(ge=0)] = 50
+
+    class Out(Outputs):
+        """The belief after the picture."""
+
+        belief: Particles
+
+    def step(
+        self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None = None
+    ) -> Out:
+        """Fuse prediction and observation."""
+        if self.random and proposals is None:
+            raise BadInput(
+                "fusion: random samples need poses to be drawn from; wire fusion.proposals to a sensor that gives them "
+                "(nodes.sensor.proposals above 0), or type nodes.fusion.random=0"
+            )
+        weights = particles.weights * likelihood.values
+        total = float(weights.sum())
+        if not (math.isfinite(total) and total > 0.0):
+            ctx.count("belief_without_support", detail="fusion: no particle explains the picture; weights kept")
+            weights = particles.weights
+        number = min(self.random, self.number)
+        poses = np.empty((0, 3))
+        if number < self.number:
+            poses = particles.poses[systematic(weights, self.number - number, float(ctx.rng.random()))]
+        if proposals is not None and number:
+            drawn = systematic(proposals.weights, number, float(ctx.rng.random()))
+            poses = np.concatenate([poses, proposals.poses[drawn]])
+        return self.Out(belief=Particles(poses, np.full(self.number, 1.0 / self.number)))

@@ -1,0 +1,1 @@
+"""Comparing views: descriptors, rotations between them, visual distance."""

@@ -1,0 +1,1 @@
+"""Poses, motions and rays in the plane (SE(2))."""

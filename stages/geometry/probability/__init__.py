@@ -1,0 +1,1 @@
+"""Gaussians, particles, clusters and evidence."""

@@ -1,0 +1,271 @@
+"""Relative pose from bearings of which many are wrong: random samples, the largest agreement, refined locally.
+
+The paper's RANSAC (Goedemé et al. 2007, section 7.1.1), on the sphere: a pair agrees where its bearings, moved together
+by less than a threshold, meet in front of both cameras (errata 35 and 36). Conventions as in `epipolar`.
+"""
+
+import math
+from typing import Literal
+
+import numba
+import numpy as np
+import numpy.typing as npt
+from scipy.special import betainc
+
+from omninav.stages.geometry.probability.small_systems import cross, rotated_by, solve, unit
+
+from .epipolar import decompose, eight_points, five_points, planar_candidates
+from .ransac import AT_ONCE, AgreedPose, samples_needed, samples_of
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+Ints = npt.NDArray[np.int64]
+Solver = Literal["planar", "five_point", "eight_point"]
+SAMPLE: dict[Solver, int] = {"planar": 2, "five_point": 5, "eight_point": 8}
+"""Pairs of bearings in a sample."""
+
+
+def relative_pose(
+    first: npt.ArrayLike,
+    second: npt.ArrayLike,
+    rng: np.random.Generator,
+    solver: Solver = "planar",
+    threshold: float = math.radians(0.5),
+    confidence: float = 0.9999,
+    most: int = 5000,
+    refine: bool = True,
+) -> AgreedPose | None:
+    """Where view 2 was taken, seen from view 1, by what most pairs of unit bearings (N, 3) and (N, 3) agree on.
+
+    `threshold` (rad): see `agreement`. Samples are drawn until one without a wrong pair is among them with
+    `confidence`, judged by the share that agrees, but at `most` so many. `planar`: a robot on a floor, upright.
+    Of poses on which equally many agree, the linear one with the smaller q_e is taken, as in the paper, else the one
+    with smaller residuals. `refine`: the best so far is brought to its local optimum, over the two freedoms of a robot
+    on a floor or over all five, as the solver has it. None where there are fewer pairs than a sample needs, or no
+    sample has a solution. Draws from `rng`.
+    """
+    first, second = np.ascontiguousarray(first, np.float64), np.ascontiguousarray(second, np.float64)
+    size, pairs = SAMPLE[solver], len(first)
+    if pairs < size:
+        return None
+    sine = math.sin(threshold)
+    found, least, best, drawn, wanted = None, math.inf, (0, -math.inf), 0, float(most)
+    while drawn < min(wanted, most):
+        samples = samples_of(pairs, size, rng)
+        rotations, translations, quality, owners = _candidates(solver, first, second, samples)
+        drawn += AT_ONCE
+        if not len(rotations):
+            continue
+        counts, costs, senses = _judge(rotations, translations, first, second, sine)
+        worth = -quality if solver == "eight_point" else -costs
+        order = np.lexsort((-owners, worth, counts))
+        k = int(order[-1])
+        if (counts[k], worth[k]) <= best:
+            continue
+        best = int(counts[k]), float(worth[k])
+        pose = rotations[k], senses[k] * translations[k]
+        if refine:
+            pose = refined_pose(*pose, first, second, threshold, solver == "planar")
+        # A sample that more agree with need not be the better one once both are refined.
+        cost = _tukey(*pose, first, second, sine * sine)
+        if cost < least:
+            found, least = pose, cost
+            agreeing = int(np.count_nonzero(agreement(*found, first, second, threshold)))
+            wanted = samples_needed(max(agreeing, best[0]) / pairs, size, confidence)
+    if found is None:
+        return None
+    return AgreedPose(*found, agreement(*found, first, second, threshold), drawn)
+
+
+def false_alarms(pose: AgreedPose, first: npt.ArrayLike, second: npt.ArrayLike, threshold: float) -> float:
+    """How many poses that as many pairs agree on are to be expected among wrong pairs alone: above 1 says nothing.
+
+    How often a wrong pair agrees with the pose is counted on these bearings, each with all others' partners: where many
+    look along the horizon, or along the way, that is often. As many poses are tried as there are samples of two pairs,
+    two solutions and two senses each (Moisan & Stival's a-contrario test, 2004). Infinite below three pairs.
+    """
+    first, second = np.ascontiguousarray(first, np.float64), np.ascontiguousarray(second, np.float64)
+    pairs, agreeing = len(first), int(np.count_nonzero(pose.inliers))
+    if pairs < 3 or agreeing < 3:
+        return math.inf
+    limit = math.sin(threshold) ** 2
+    chance = sum(
+        float(_agree(pose.rotation, pose.translation, first, np.roll(second, shift, axis=0), limit).sum())
+        for shift in range(1, min(pairs, 40))
+    ) / (pairs * (min(pairs, 40) - 1))
+    # At least this many of the other pairs: the tail of a binomial distribution.
+    tail = float(betainc(agreeing - 2, pairs - agreeing + 1, max(chance, 1e-6)))
+    return 2.0 * pairs * (pairs - 1) * tail
+
+
+def _candidates(solver: Solver, first: Array, second: Array, samples: Ints) -> tuple[Array, Array, Array, Ints]:
+    # Poses that samples allow, but for the sense of the translation; q_e, 0 where it is not defined; whose they are.
+    if solver == "planar":
+        rotations, translations, owners = planar_candidates(first, second, samples)
+        return rotations, translations, np.zeros(len(owners)), owners
+    if solver == "eight_point":
+        matrices, quality = eight_points(first[samples], second[samples])
+        rotations, translations = decompose(matrices)
+        rotations, translations = rotations[:, ::2].reshape(-1, 3, 3), translations[:, ::2].reshape(-1, 3)
+        return rotations, translations, np.repeat(quality, 2), np.repeat(np.arange(len(samples)), 2)
+    solved = [five_points(first[sample], second[sample]) for sample in samples]
+    numbers = np.array([len(rotations) for rotations, _ in solved])
+    rotations = np.concatenate([rotations for rotations, _ in solved])
+    translations = np.concatenate([translations for _, translations in solved])
+    return rotations, translations, np.zeros(len(rotations)), np.repeat(np.arange(len(samples)), numbers)
+
+
+def agreement(
+    rotation: Array, translation: Array, first: npt.ArrayLike, second: npt.ArrayLike, threshold: float
+) -> Bools:
+    """Which pairs (N,) meet in front of both cameras once their bearings have moved by less than `threshold` (rad).
+
+    Bearings that would meet behind a camera must move until they are parallel, to meet infinitely far away: so a
+    distant point, on the sign of whose depths noise decides, still agrees, and one nearby does not.
+    """
+    first, second = np.ascontiguousarray(first, np.float64), np.ascontiguousarray(second, np.float64)
+    return np.asarray(_agree(rotation, translation, first, second, math.sin(threshold) ** 2))
+
+
+@numba.njit(cache=True, nogil=True)
+def _agree(R: Array, t: Array, first: Array, second: Array, limit: float) -> Bools:
+    agrees = np.empty(len(first), np.bool_)
+    for n in range(len(first)):
+        agrees[n] = _squares(R, t, first[n], second[n])[0] < limit
+    return agrees
+
+
+@numba.njit(cache=True, nogil=True)
+def _residual(R: Array, t: Array, b: Array, c: Array) -> float:
+    # Sine of the shared residual of `epipolar`, with its sign: b.(t x R c) over the lengths of t x R c and t x b.
+    x = R[0, 0] * c[0] + R[0, 1] * c[1] + R[0, 2] * c[2]
+    y = R[1, 0] * c[0] + R[1, 1] * c[1] + R[1, 2] * c[2]
+    z = R[2, 0] * c[0] + R[2, 1] * c[1] + R[2, 2] * c[2]
+    nx, ny, nz = t[1] * z - t[2] * y, t[2] * x - t[0] * z, t[0] * y - t[1] * x
+    mx, my, mz = t[1] * b[2] - t[2] * b[1], t[2] * b[0] - t[0] * b[2], t[0] * b[1] - t[1] * b[0]
+    length = nx * nx + ny * ny + nz * nz + mx * mx + my * my + mz * mz
+    return (b[0] * nx + b[1] * ny + b[2] * nz) / math.sqrt(length) if length > 0.0 else 0.0
+
+
+@numba.njit(cache=True, nogil=True)
+def _squares(R: Array, t: Array, b: Array, c: Array) -> tuple[float, float]:
+    # Squared sines of the angle by which two bearings must move to meet in front of both cameras: with t, with -t.
+    x = R[0, 0] * c[0] + R[0, 1] * c[1] + R[0, 2] * c[2]
+    y = R[1, 0] * c[0] + R[1, 1] * c[1] + R[1, 2] * c[2]
+    z = R[2, 0] * c[0] + R[2, 1] * c[1] + R[2, 2] * c[2]
+    miss = _residual(R, t, b, c) ** 2
+    cos = b[0] * x + b[1] * y + b[2] * z
+    here = t[0] * b[0] + t[1] * b[1] + t[2] * b[2]
+    there = t[0] * x + t[1] * y + t[2] * z
+    behind = miss + (0.5 * max(0.0, 1.0 - cos * cos) if cos > 0.0 else 1.0)
+    ahead, back = here - cos * there, cos * here - there  # the signs of both depths
+    if ahead > 0.0 and back > 0.0:
+        return miss, behind
+    return (behind, miss) if ahead < 0.0 and back < 0.0 else (behind, behind)
+
+
+@numba.njit(cache=True, nogil=True)
+def _judge(
+    rotations: Array, translations: Array, first: Array, second: Array, sine: float
+) -> tuple[Ints, Array, Array]:
+    # For each pose: how many pairs agree, their truncated squares, and which sense of the translation that is.
+    counts, costs, senses = np.empty(len(rotations), np.int64), np.empty(len(rotations)), np.empty(len(rotations))
+    limit = sine * sine
+    for k in range(len(rotations)):
+        plus, minus, cost_plus, cost_minus = 0, 0, 0.0, 0.0
+        for n in range(len(first)):
+            forth, back = _squares(rotations[k], translations[k], first[n], second[n])
+            plus, minus = plus + (forth < limit), minus + (back < limit)
+            cost_plus, cost_minus = cost_plus + min(forth, limit), cost_minus + min(back, limit)
+        right = plus > minus or (plus == minus and cost_plus <= cost_minus)
+        counts[k], costs[k], senses[k] = (plus, cost_plus, 1.0) if right else (minus, cost_minus, -1.0)
+    return counts, costs, senses
+
+
+def refined_pose(
+    rotation: Array,
+    translation: Array,
+    first: npt.ArrayLike,
+    second: npt.ArrayLike,
+    threshold: float,
+    planar: bool,
+    steps: int = 10,
+) -> tuple[Array, Array]:
+    """The relative pose at the local optimum of the shared residuals, with Tukey's weights up to `threshold` (rad).
+
+    `planar`: only the turn about the vertical and the direction on the floor move.
+    """
+    first, second = np.ascontiguousarray(first, np.float64), np.ascontiguousarray(second, np.float64)
+    refined: tuple[Array, Array] = _refine(
+        np.ascontiguousarray(rotation), translation, first, second, math.sin(threshold), planar, steps
+    )
+    return refined
+
+
+@numba.njit(cache=True, nogil=True)
+def _across(t: Array, planar: bool) -> tuple[Array, Array]:
+    # Two unit vectors across t, the first of them level.
+    level = math.hypot(t[0], t[1])
+    side = np.array([-t[1] / level, t[0] / level, 0.0]) if planar or level > 1e-6 else np.array([1.0, 0.0, 0.0])
+    return side, cross(t, side)
+
+
+@numba.njit(cache=True, nogil=True)
+def _moved(R: Array, t: Array, side: Array, up: Array, step: Array, planar: bool) -> tuple[Array, Array]:
+    # Freedoms: the turn about the vertical, t sideways, and, where it is not planar, both other turns and t upwards.
+    if planar:
+        return rotated_by(R, 0.0, 0.0, step[0]), unit(t + step[1] * side)
+    return rotated_by(R, step[2], step[3], step[0]), unit(t + step[1] * side + step[4] * up)
+
+
+@numba.njit(cache=True, nogil=True)
+def _tukey(R: Array, t: Array, first: Array, second: Array, limit: float) -> float:
+    cost = 0.0
+    for n in range(len(first)):
+        square = _squares(R, t, first[n], second[n])[0]
+        cost += 1.0 - (1.0 - square / limit) ** 3 if square < limit else 1.0
+    return cost
+
+
+@numba.njit(cache=True, nogil=True)
+def _refine(
+    R: Array, t: Array, first: Array, second: Array, sine: float, planar: bool, steps: int
+) -> tuple[Array, Array]:
+    # Levenberg and Marquardt over few freedoms; derivatives by difference.
+    freedoms, limit, small, damping = 2 if planar else 5, sine * sine, 1e-7, 1e-3
+    cost = _tukey(R, t, first, second, limit)
+    near_R, near_t = np.empty((freedoms, 3, 3)), np.empty((freedoms, 3))
+    for _ in range(steps):
+        side, up = _across(t, planar)
+        for k in range(freedoms):
+            step = np.zeros(freedoms)
+            step[k] = small
+            near_R[k], near_t[k] = _moved(R, t, side, up, step, planar)
+        square, slope, row = np.zeros((freedoms, freedoms)), np.zeros(freedoms), np.empty(freedoms)
+        for n in range(len(first)):
+            size = _squares(R, t, first[n], second[n])[0]
+            if size >= limit:
+                continue
+            weight, value = (1.0 - size / limit) ** 2, _residual(R, t, first[n], second[n])
+            for k in range(freedoms):
+                row[k] = (_residual(near_R[k], near_t[k], first[n], second[n]) - value) / small
+            for k in range(freedoms):
+                slope[k] += weight * row[k] * value
+                for j in range(freedoms):
+                    square[k, j] += weight * row[k] * row[j]
+        better = False
+        while damping < 1e6:
+            damped = square.copy()
+            for k in range(freedoms):
+                damped[k, k] += damping * square[k, k] + 1e-12
+            step = -solve(damped, slope)
+            new_R, new_t = _moved(R, t, side, up, step, planar)
+            new_cost = _tukey(new_R, new_t, first, second, limit)
+            if new_cost < cost:
+                better = cost - new_cost > 1e-9 * cost
+                R, t, cost, damping = new_R, new_t, new_cost, max(0.1 * damping, 1e-9)
+                break
+            damping *= 10.0
+        if not better:
+            break
+    return R, t

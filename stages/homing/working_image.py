@@ -1,0 +1,92 @@
+"""A picture as homing reads it: small, grey, with ways from its pixels to bearings and back."""
+
+import math
+from typing import NamedTuple, cast
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.bearings import camera_bearings, panorama_bearings
+from omninav.stages.camera.models import Camera, Cylindrical, Equirectangular
+from omninav.stages.camera.rays import panorama_points, pixels_of_rays
+from omninav.stages.values.image import Image, Panorama
+
+Array = npt.NDArray[np.float64]
+Grey = npt.NDArray[np.uint8]
+SEAM = 32
+"""Columns of a full circle that are repeated beyond both edges, so that features can be tracked across the seam."""
+
+
+class WorkingPicture(NamedTuple):
+    """`grey` (rows, columns), with `seam` columns repeated on both sides; points are columns and rows without them.
+
+    `scale`: pixels of the original per pixel of this one, along columns and rows. `original`: what it was made of.
+    """
+
+    grey: Grey
+    seam: int
+    scale: tuple[float, float]
+    original: Image | Panorama
+    camera: Camera | None
+
+    @property
+    def columns(self) -> int:
+        """Columns without those repeated."""
+        return int(self.grey.shape[1]) - 2 * self.seam
+
+    def bearings(self, points: Array) -> Array:
+        """Unit vectors (N, 3) in the robot's frame of points (N, 2)."""
+        there = self.to_original(points)
+        if isinstance(self.original, Panorama):
+            panorama = self.original
+            return panorama_bearings(there, panorama.pixels.shape, panorama.elevation_top, panorama.elevation_bottom)
+        return camera_bearings(there, cast(Camera, self.camera))
+
+    def points(self, rays: Array) -> Array:
+        """Points (N, 2) at which rays (N, 3) of any length in the robot's frame are seen; NaN where they are not."""
+        if isinstance(self.original, Panorama):
+            panorama = self.original
+            there = panorama_points(rays, panorama.pixels.shape, panorama.elevation_top, panorama.elevation_bottom)
+        else:
+            there = np.stack(pixels_of_rays(cast(Camera, self.camera), rays), axis=-1)
+        return self.from_original(there)
+
+    def to_original(self, points: Array) -> Array:
+        """Points (N, 2) in pixels of the original."""
+        return (points + 0.5) * self.scale - 0.5
+
+    def from_original(self, points: Array) -> Array:
+        """Points (N, 2) of the original in pixels of this one."""
+        return (points + 0.5) / self.scale - 0.5
+
+    def inside(self, points: Array, margin: float) -> npt.NDArray[np.bool_]:
+        """Which points (N, 2) are finite and `margin` pixels from the edges of `grey`."""
+        rows, columns = self.grey.shape
+        x, y = points[:, 0] + self.seam, points[:, 1]
+        with np.errstate(invalid="ignore"):
+            return np.asarray((x >= margin) & (x <= columns - 1 - margin) & (y >= margin) & (y <= rows - 1 - margin))
+
+
+def working_picture(picture: Image | Panorama, camera: Camera | None, largest: int) -> WorkingPicture:
+    """Make a picture ready; one of more than `largest` pixels is made smaller.
+
+    Raises BadInput for want of a camera, or of its elevations.
+    """
+    if isinstance(picture, Image):
+        if camera is None:
+            raise BadInput("homing: a camera's picture without its camera; wire it: wires.homing.camera=source.camera")
+        pixels_of_rays(camera, np.empty((0, 3)))  # now, and not once something is tracked
+    grey = cast(Grey, cv2.cvtColor(picture.pixels, cv2.COLOR_BGR2GRAY))
+    rows, columns = grey.shape
+    size = columns, rows
+    shrink = math.sqrt(rows * columns / largest)
+    if shrink > 1.0:
+        size = max(1, round(columns / shrink)), max(1, round(rows / shrink))
+        grey = cast(Grey, cv2.resize(grey, size, interpolation=cv2.INTER_AREA))
+    circle = isinstance(picture, Panorama) or isinstance(camera, Cylindrical | Equirectangular)
+    seam = min(SEAM, size[0]) if circle else 0
+    if seam:
+        grey = np.concatenate([grey[:, -seam:], grey, grey[:, :seam]], axis=1)
+    return WorkingPicture(grey, seam, (columns / size[0], rows / size[1]), picture, camera)

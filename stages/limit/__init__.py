@@ -1,1 +1,0 @@
-"""How far apart two views of one place may be."""

@@ -1,0 +1,28 @@
+"""Whether a state says where the robot is."""
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.geometry.probability.gaussians import moments, squared_distances
+from omninav.stages.values.belief import GaussianMixture
+
+Array = npt.NDArray[np.float64]
+
+
+def certain_state(
+    state: GaussianMixture, least_share: float = 0.5, near_below: float = 7.81
+) -> tuple[Array, Array] | None:
+    """Mean (3,) and covariance (3, 3) of a state that is certain, else None.
+
+    Certain: the components nearer to the heaviest than `near_below` (squared Mahalanobis distance) hold more than
+    `least_share` of the weight. The moments are theirs.
+    """
+    if not len(state):
+        return None
+    top = int(np.argmax(state.weights))
+    centre = (state.means[top : top + 1], state.covariances[top : top + 1])
+    near = squared_distances(*centre, state.means, state.covariances)[0] <= near_below
+    if state.weights[near].sum() <= least_share * state.weights.sum():
+        return None
+    mean, covariance, _ = moments(state.means[near], state.covariances[near], state.weights[near])
+    return mean, covariance

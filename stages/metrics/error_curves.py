@@ -1,0 +1,121 @@
+"""Errors along a drive: lap by lap, over the steps, and over the distance from the start."""
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline.graph.results import Metrics
+from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.drives import Array, Drive, drives, known
+from omninav.stages.values.pose import Motion, Pose
+
+Index = npt.NDArray[np.int64]
+
+
+class ErrorCurves(Stage):
+    """How the error of the estimate and of odometry alone goes on, in parts of the last log that has ground truth.
+
+    `laps`: a list with an entry for each lap: `frames`, the mean, median and largest position error and the mean
+    heading error, and the mean of `odometry_error_m`. A lap ends where the robot is nearest to its start again, within
+    `home_m` and headed as it was there, after it has left that circle by as much again; who leaves by one side, comes
+    back and leaves by the other has not ended a lap. What comes behind the last visit is an entry too.
+    `over_steps`: lists of `points` entries, each the mean over a share of the frames: `step` (its middle),
+    `position_error_m`, `odometry_error_m`. `over_distance`: the same over the true distance from the first true
+    position, in steps of `distance_m`, with the odometry error of the first lap alone beside it
+    (`first_lap_odometry_error_m`); None where no frame lies at that distance. Odometry alone starts at the first true
+    pose and is not aligned. Nothing without ground truth.
+    """
+
+    home_m: Annotated[float, Bounds(gt=0)] = 2.0
+    points: Annotated[int, Bounds(ge=1)] = 60
+    distance_m: Annotated[float, Bounds(gt=0)] = 1.0
+
+    class Out(Outputs):
+        """`metrics`: the entries `laps`, `over_steps` and `over_distance` of metrics.json."""
+
+        metrics: Metrics
+
+    def step(
+        self,
+        ctx: Context,
+        ticks: Sequence[Tick],
+        estimates: Sequence[PoseEstimate | None],
+        truth: Sequence[Pose | None],
+        motion: Sequence[Motion | None],
+    ) -> Out:
+        """The whole run at once."""
+        logs = [drive for drive in drives(ticks, estimates, truth, motion) if drive.has_truth]
+        return self.Out(
+            metrics=Metrics(error_curves(logs[-1], self.home_m, self.points, self.distance_m) if logs else {})
+        )
+
+
+def error_curves(drive: Drive, home_m: float, points: int, distance_m: float) -> dict[str, Any]:
+    """Curves of one drive with ground truth by their names in metrics.json; empty where nothing was estimated."""
+    scored = known(drive.truth) & known(drive.estimate)
+    if not scored.any():
+        return {}
+    truth, frames = drive.truth[scored], np.flatnonzero(scored)
+    metres, degrees = position_errors(drive.estimate[scored], truth), heading_errors_deg(drive.estimate[scored], truth)
+    path = drive.odometry_alone()
+    odometry = np.full(len(metres), np.nan) if path is None else position_errors(path[scored], truth)
+    start = drive.truth[np.argmax(known(drive.truth))]
+    laps = np.split(np.arange(len(truth)), lap_ends(truth, start, home_m))
+    shares = [share for share in np.array_split(np.arange(len(truth)), min(points, len(truth))) if len(share)]
+    away = np.hypot(*(truth[:, :2] - start[:2]).T)
+    rings = (away // distance_m).astype(np.int64)
+    by_ring = [np.flatnonzero(rings == ring) for ring in range(int(rings.max()) + 1)]
+    return {
+        "laps": [
+            {
+                "frames": len(lap),
+                "position_error_m": {
+                    "mean": float(metres[lap].mean()),
+                    "median": float(np.median(metres[lap])),
+                    "max": float(metres[lap].max()),
+                },
+                "heading_error_deg": {"mean": float(degrees[lap].mean())},
+                "odometry_error_m": {"mean": _mean(odometry, lap)},
+            }
+            for lap in laps
+        ],
+        "over_steps": {
+            "step": [float(frames[share].mean()) for share in shares],
+            "position_error_m": [_mean(metres, share) for share in shares],
+            "odometry_error_m": [_mean(odometry, share) for share in shares],
+        },
+        "over_distance": {
+            "distance_m": [(ring + 0.5) * distance_m for ring in range(len(by_ring))],
+            "position_error_m": [_mean(metres, ring) for ring in by_ring],
+            "first_lap_odometry_error_m": [_mean(odometry, ring[ring <= laps[0][-1]]) for ring in by_ring],
+        },
+    }
+
+
+def lap_ends(poses: Array, start: Array, home_m: float) -> list[int]:
+    """The rows of a drive (N, 3) at which a lap after the first begins: where it is nearest to its start, each time.
+
+    A visit begins within `home_m` of the start pose (3,), headed as there (within a right angle), and ends beyond
+    twice that; only what lies between two visits is a lap.
+    """
+    away = np.hypot(*(poses[:, :2] - start[:2]).T)
+    home = (away <= home_m) & (np.cos(poses[:, 2] - start[2]) > 0.0)
+    ends: list[int] = []
+    nearest: int | None = 0  # of the visit that is on; None between visits
+    for row, distance in enumerate(away):
+        if distance > 2.0 * home_m:
+            if nearest is not None:
+                ends.append(nearest)
+            nearest = None
+        elif home[row] and (nearest is None or distance < away[nearest]):
+            nearest = row
+    return ends[1:]  # the first visit is the start itself; the last is not left again
+
+
+def _mean(values: Array, rows: Index) -> float | None:
+    there = values[rows]
+    return float(there.mean()) if len(there) and np.isfinite(there).all() else None

@@ -1,0 +1,206 @@
+"""How many matches of two views are right before the first wrong one."""
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.results import Metrics
+from omninav.stages.camera.bearings import camera_bearings
+from omninav.stages.camera.models import Camera
+from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, one_way_matches
+from omninav.stages.geometry.appearance.visual_distance import Matching, match_patches
+from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.geometry.two_views.true_matches import Motion, angles_between, right_by_depth, right_by_epipolar
+from omninav.stages.values.depths import Depths
+from omninav.stages.values.local_features import ColumnSegments, LocalFeatures
+from omninav.stages.values.pose import Pose
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+Each = TypeVar("Each")
+
+
+class Seen(NamedTuple):
+    """What is known of a picture: where it was taken, and what was found in it, how far away."""
+
+    pose: Array
+    patches: LocalFeatures | None
+    columns: ColumnSegments | None
+    depths: Depths | None
+
+
+class FirstMatches(Stage):
+    """Goes through the matches of pairs of pictures from the best to the worst, up to the first that is wrong.
+
+    Goedemé et al. 2007, section 3.2: of a pair "the first 13 matches are correct". For each of `apart_m` there are
+    `pairs` pairs, the first picture of each evenly along the log, the second the next one that was taken so far away
+    (straight). `by`: of patches, of columns, or of both. `search`: as in the paper's section 3.4 (`both_ways`: each
+    other's nearest, clearly nearer than the second of either), or Lowe's (`one_way`: the second view's nearest, clearly
+    nearer than its second). `best`: the `clearest` (by that ratio), or the `nearest` descriptors (which of two kinds
+    are not to be compared). `ratio`, `column_ratio`, `colour`: as in `MatchFeatures`.
+
+    A match of patches is right where its point, by its depth in one view, is seen in the other within `within_deg` of
+    its partner, or within half the patch's diameter, if that is more; one of columns where both of its ends are, within
+    `column_within_deg`. Without depths: where its bearings lie within `epipolar_deg` of a plane with the way and meet
+    in front of both views. Under `matches`, by distance and over `all`: `first_right` and `right` (medians over pairs),
+    `right_share`; `by_chance`: the share of wrong partners that would be counted as right. Raises BadInput where no
+    truth says where pictures were taken.
+    """
+
+    apart_m: tuple[float, ...] = (0.5, 1.0, 2.0)
+    pairs: Annotated[int, Bounds(ge=1)] = 30
+    by: Literal["patches", "columns", "both"] = "patches"
+    search: Literal["both_ways", "one_way"] = "both_ways"
+    best: Literal["clearest", "nearest"] = "clearest"
+    ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
+    column_ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
+    colour: Annotated[float, Bounds(gt=0)] = 0.5
+    within_deg: Annotated[float, Bounds(gt=0)] = 2.0
+    column_within_deg: Annotated[float, Bounds(gt=0)] = 3.0
+    epipolar_deg: Annotated[float, Bounds(gt=0)] = 1.0
+
+    class Out(Outputs):
+        """`metrics`: the entry `matches` of metrics.json."""
+
+        metrics: Metrics
+
+    def step(
+        self,
+        ctx: Context,
+        truth: Sequence[Pose | None],
+        features: Sequence[LocalFeatures | None] = (),
+        columns: Sequence[ColumnSegments | None] = (),
+        depths: Sequence[Depths | None] = (),
+        camera: Sequence[Camera | None] = (),
+    ) -> Out:
+        """The whole log at once."""
+        there = [row for row, pose in enumerate(truth) if pose is not None]
+        if not there:
+            raise BadInput("matches: no picture of the log has a true pose; use a log with /ground_truth/pose")
+        lens = next((each for each in camera if each is not None), None)
+        views = []
+        for row in there:
+            pose = truth[row]
+            assert pose is not None
+            at = np.array([pose.x, pose.y, pose.heading])
+            views.append(Seen(at, _at(features, row), _at(columns, row), _at(depths, row)))
+        chosen = [pairs_apart(np.array([view.pose for view in views]), far, self.pairs) for far in self.apart_m]
+        told = [[self._judged(views[one], views[other], lens) for one, other in pairs] for pairs in chosen]
+        found: dict[str, Any] = {"depths_known": int(any(view.depths is not None for view in views))}
+        found["apart"] = [{"m": far, **summary(pairs)} for far, pairs in zip(self.apart_m, told, strict=True)]
+        found["all"] = summary([pair for pairs in told for pair in pairs])
+        return self.Out(metrics=Metrics({"matches": found}))
+
+    def _judged(self, one: Seen, other: Seen, lens: Camera | None) -> tuple[Bools, float]:
+        """Which matches are right, the best first, and the share of wrong partners that pass as right."""
+        x, y, turn = (float(number) for number in between(one.pose, other.pose))
+        moved, ratios, rights, chances = (x, y, turn), [], [], []
+        if self.by != "columns" and one.patches is not None and other.patches is not None:
+            pairs = self._patches(one.patches, other.patches)
+            rights.append(self._right_patches(one, other, pairs, moved, lens))
+            ratios.append(pairs.distance if self.best == "nearest" else pairs.ratio)
+            chances.append(self._right_patches(one, other, shifted(pairs), moved, lens))
+        if self.by != "patches" and one.columns is not None and other.columns is not None:
+            pairs = mahalanobis_matches(one.columns.descriptors, other.columns.descriptors, self.column_ratio)
+            rights.append(self._right_columns(one, other, pairs, moved))
+            ratios.append(pairs.distance if self.best == "nearest" else pairs.ratio)
+            chances.append(self._right_columns(one, other, shifted(pairs), moved))
+        if not ratios:
+            return np.zeros(0, np.bool_), math.nan
+        order = np.argsort(np.concatenate(ratios), kind="stable")
+        chance = np.concatenate(chances)
+        return np.concatenate(rights)[order], float(chance.mean()) if len(chance) else math.nan
+
+    def _patches(self, one: LocalFeatures, other: LocalFeatures) -> Pairs:
+        if self.search == "both_ways":
+            return match_patches(one, other, Matching(self.ratio, colour=self.colour))
+        if not len(one) or not len(other):
+            return NO_PAIRS
+        pairs = one_way_matches(one.descriptors, other.descriptors, self.ratio)
+        apart = np.linalg.norm(one.colours[pairs.first] - other.colours[pairs.second], axis=1)
+        return pairs.chosen(apart <= self.colour)
+
+    def _right_patches(self, one: Seen, other: Seen, pairs: Pairs, moved: Motion, lens: Camera | None) -> Bools:
+        assert one.patches is not None
+        assert other.patches is not None
+        first, second = one.patches.bearings[pairs.first], other.patches.bearings[pairs.second]
+        if one.depths is None or other.depths is None:
+            return right_by_epipolar(first, second, moved, math.radians(self.epipolar_deg))
+        limit = np.full(len(first), math.radians(self.within_deg))
+        if lens is not None:
+            limit = np.maximum(limit, half_widths(one.patches, lens)[pairs.first])
+        near, far = one.depths.patches[pairs.first], other.depths.patches[pairs.second]
+        return right_by_depth(first, second, near, far, moved, limit)
+
+    def _right_columns(self, one: Seen, other: Seen, pairs: Pairs, moved: Motion) -> Bools:
+        assert one.columns is not None
+        assert other.columns is not None
+        right = np.ones(len(pairs.first), np.bool_)
+        first, second = one.columns.bearings()[pairs.first], other.columns.bearings()[pairs.second]
+        for end in (0, 1):
+            if one.depths is None or other.depths is None:
+                limit = math.radians(self.epipolar_deg)
+                right &= right_by_epipolar(first[:, end], second[:, end], moved, limit)
+            else:
+                near, far = one.depths.ends[pairs.first, end], other.depths.ends[pairs.second, end]
+                limit = math.radians(self.column_within_deg)
+                right &= right_by_depth(first[:, end], second[:, end], near, far, moved, limit)
+        return right
+
+
+def _at(values: Sequence[Each | None], row: int) -> Each | None:
+    return values[row] if row < len(values) else None
+
+
+def pairs_apart(poses: Array, metres: float, number: int) -> list[tuple[int, int]]:
+    """Up to `number` pairs of pictures: the first evenly along the log, the second the next taken `metres` from it."""
+    found = []
+    for row in range(len(poses)):
+        after = np.flatnonzero(np.hypot(*(poses[row:, :2] - poses[row, :2]).T) >= metres)
+        if len(after):
+            found.append((row, row + int(after[0])))
+    if not found:
+        return []
+    return [found[row] for row in np.unique(np.linspace(0, len(found) - 1, number).round().astype(np.int64))]
+
+
+def shifted(pairs: Pairs) -> Pairs:
+    """The same features with the partners of others: all wrong, but for chance."""
+    return pairs._replace(second=np.roll(pairs.second, max(1, len(pairs.second) // 2)))
+
+
+def half_widths(features: LocalFeatures, camera: Camera) -> Array:
+    """Half of each patch's diameter as an angle (N,), rad: the less of across and down the picture."""
+    reach = features.sizes[:, None].astype(np.float64) / 2.0
+    widths = [
+        angles_between(features.bearings, camera_bearings(features.points + reach * np.array(step), camera))
+        for step in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
+    ]
+    widest = np.nanmin(np.where(np.isfinite(widths), widths, math.inf), axis=0)
+    return np.where(np.isfinite(widest), widest, 0.0)
+
+
+def run_of_right(right: Bools) -> int:
+    """How many are right before the first wrong one; all, where none is wrong."""
+    wrong = np.flatnonzero(~right)
+    return int(wrong[0]) if len(wrong) else len(right)
+
+
+def summary(pairs: Sequence[tuple[Bools, float]]) -> dict[str, float | int | None]:
+    """What is told of some pairs; None where there is none."""
+    if not pairs:
+        return {"pairs": 0, "first_right": None, "right": None, "right_share": None, "by_chance": None}
+    chances = np.array([chance for _, chance in pairs])
+    matched = sum(len(right) for right, _ in pairs)
+    return {
+        "pairs": len(pairs),
+        "first_right": float(np.median([run_of_right(right) for right, _ in pairs])),
+        "right": float(np.median([np.count_nonzero(right) for right, _ in pairs])),
+        "right_share": sum(int(right.sum()) for right, _ in pairs) / matched if matched else None,
+        "by_chance": float(np.nanmean(chances)) if np.isfinite(chances).any() else None,
+    }

@@ -1,0 +1,82 @@
+"""How well a robot found back to where its run began."""
+
+import math
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline.graph.results import Metrics
+from omninav.stages.geometry.plane.se2 import between, wrap
+from omninav.stages.values.drives import pose_rows
+from omninav.stages.values.homing import HomingVector, PathProgress
+from omninav.stages.values.pose import Pose
+
+
+class HomingErrors(Stage):
+    """Where a robot ends that goes back to where it stood at the first tick, and what its homing vectors were worth.
+
+    Under `homing`: `start_m`, how far away it was put; `arrived` (1 or 0); `end_error_m` and `end_turn_deg`, from the
+    first pose to the last (and `end`, the same as pages that pool runs read it); `time_s` until it arrived;
+    `lost_rate`, the share of ticks in which the target was lost; `direction_error_deg` (median, p90, max over ticks
+    further than `from_m` from the target), between the homing vector and the true way; `inliers`, median; `first`:
+    `direction_error_deg`, `turn_error_deg` and `inliers` of the first vector, None where the target was not found at
+    first.
+    """
+
+    from_m: Annotated[float, Bounds(ge=0)] = 0.3
+
+    class Out(Outputs):
+        """Absent where there was never a vector, or no truth."""
+
+        metrics: Metrics | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        ticks: Sequence[Tick],
+        truth: Sequence[Pose | None],
+        vectors: Sequence[HomingVector | None],
+        progress: Sequence[PathProgress | None],
+    ) -> Out:
+        """The whole run at once."""
+        poses = pose_rows(truth)
+        if not len(poses) or not np.isfinite(poses).all():
+            return self.Out()
+        ways = between(poses, poses[0])
+        away = int(np.argmax(np.hypot(ways[:, 0], ways[:, 1])))  # where it was carried to, or drove to
+        after = {k: vector for k, vector in enumerate(vectors) if k >= away and vector is not None}
+        if not after:
+            return self.Out()
+        found = {k: vector for k, vector in after.items() if vector.state != "lost"}
+        off = {k: _off(vector, ways[k]) for k, vector in found.items()}
+        far = [off[k][0] for k in off if math.hypot(*ways[k, :2]) > self.from_m]
+        arrived = next((k for k, at in enumerate(progress) if at is not None and at.arrived and k > away), None)
+        first = min(after)
+        values = {
+            "start_m": float(math.hypot(*ways[away, :2])),
+            "arrived": int(arrived is not None),
+            "end_error_m": float(math.hypot(*ways[-1, :2])),
+            "end": {"error_m": {"mean": float(math.hypot(*ways[-1, :2])), "std": 0.0}, "frames": 1},
+            "end_turn_deg": abs(math.degrees(ways[-1, 2])),
+            "time_s": None if arrived is None else (ticks[arrived].stamp - ticks[away].stamp) / 1e9,
+            "lost_rate": 1.0 - len(found) / len(after),
+            "direction_error_deg": {
+                "median": float(np.median(far)) if far else None,
+                "p90": float(np.percentile(far, 90)) if far else None,
+                "max": float(np.max(far)) if far else None,
+            },
+            "inliers": float(np.median([vector.inliers for vector in found.values()])) if found else None,
+            "first": {
+                "direction_error_deg": off[first][0] if first in off else None,
+                "turn_error_deg": off[first][1] if first in off else None,
+                "inliers": after[first].inliers,
+            },
+        }
+        return self.Out(metrics=Metrics({"homing": values}))
+
+
+def _off(vector: HomingVector, way: np.ndarray) -> tuple[float, float]:
+    direction = float(wrap(vector.direction - math.atan2(way[1], way[0])))
+    return abs(math.degrees(direction)), abs(math.degrees(float(wrap(vector.turn - way[2]))))

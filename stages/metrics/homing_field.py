@@ -1,0 +1,88 @@
+"""How well homing vectors point at their target, by how far away it is."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.graph.results import Metrics
+from omninav.stages.geometry.plane.se2 import between, wrap
+from omninav.stages.values.drives import pose_rows
+from omninav.stages.values.homing import HomingVector
+from omninav.stages.values.homing_field import HomingField
+from omninav.stages.values.pose import Pose
+
+Array = npt.NDArray[np.float64]
+
+
+class HomingFieldErrors(Stage):
+    """Angles between homing vectors and the true way to the first pose, over all ticks and by distance.
+
+    Under `homing_field`: `views`; `found_rate`, of those from which there is a vector; `median_deg`, in which a view
+    without one counts as 180 degrees, and `of_found_deg`, without these; `turn_deg`, the median error of the turn.
+    `by_distance`: lists of the same for each of the `rings`, `width_m` wide, out to `to_m`; `within`: over all views
+    inside of each ring's outer edge. None where no view is.
+    """
+
+    width_m: Annotated[float, Bounds(gt=0)] = 1.0
+    rings: Annotated[int, Bounds(ge=1)] = 8
+
+    class Out(Outputs):
+        """`field`: for the picture. Both absent without a view beside the target's."""
+
+        metrics: Metrics | None = None
+        field: HomingField | None = None
+
+    def step(self, ctx: Context, truth: Sequence[Pose | None], vectors: Sequence[HomingVector | None]) -> Out:
+        """The whole run at once."""
+        poses = pose_rows(truth)
+        rows = [row for row in range(1, len(poses)) if np.isfinite(poses[[0, row]]).all()]
+        if not rows:
+            return self.Out()
+        found = field_of(poses, rows, [vectors[row] for row in rows])
+        turns = np.array([_turn_error(poses, row, vectors[row]) for row in rows])
+        edges = self.width_m * np.arange(self.rings + 1)
+        metres = found.metres - 1e-9
+        rings = [(metres >= low) & (metres < high) for low, high in pairwise(edges)]
+        values: dict[str, Any] = summary(found.errors, turns)
+        for name, parts in (("by_distance", rings), ("within", [metres < high for high in edges[1:]])):
+            told = [summary(found.errors[part], turns[part]) for part in parts]
+            values[name] = {"to_m": edges[1:].tolist(), **{key: [each[key] for each in told] for key in told[0]}}
+        return self.Out(metrics=Metrics({"homing_field": values}), field=found)
+
+
+def field_of(poses: Array, rows: Sequence[int], vectors: Sequence[HomingVector | None]) -> HomingField:
+    """The field over poses (N, 3) of `rows`, towards the first of all."""
+    told = np.array([math.nan if vector is None or vector.state == "lost" else vector.direction for vector in vectors])
+    ways = between(poses[list(rows)], poses[0])
+    return HomingField(
+        poses[0],
+        poses[list(rows)],
+        np.asarray(wrap(told + poses[list(rows), 2])),
+        np.abs(wrap(told - np.arctan2(ways[:, 1], ways[:, 0]))),
+        np.array([0 if vector is None else vector.inliers for vector in vectors], np.int64),
+    )
+
+
+def _turn_error(poses: Array, row: int, vector: HomingVector | None) -> float:
+    if vector is None or vector.state == "lost":
+        return math.nan
+    return abs(float(wrap(vector.turn - between(poses[row], poses[0])[2])))
+
+
+def summary(errors: Array, turns: Array) -> dict[str, float | int | None]:
+    """Figures of some views: errors and turns (N,), rad, NaN where the target was not found; None without a view."""
+    found = np.isfinite(errors)
+    if not len(errors):
+        return {"views": 0, "found_rate": None, "median_deg": None, "of_found_deg": None, "turn_deg": None}
+    return {
+        "views": len(errors),
+        "found_rate": float(found.mean()),
+        "median_deg": math.degrees(float(np.median(np.where(found, errors, math.pi)))),
+        "of_found_deg": math.degrees(float(np.median(errors[found]))) if found.any() else None,
+        "turn_deg": math.degrees(float(np.median(turns[found]))) if found.any() else None,
+    }

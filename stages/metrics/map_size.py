@@ -1,0 +1,32 @@
+"""How much a map takes."""
+
+from omninav.pipeline import Context, Outputs, Stage
+from omninav.pipeline.graph.results import Metrics
+from omninav.stages.values.maps import ReferenceGraph
+
+
+class MapSize(Stage):
+    """Size of the map: bytes of its arrays as stored, references, edges, and where its poses come from."""
+
+    class Out(Outputs):
+        """`metrics`: the entry `map` of metrics.json."""
+
+        metrics: Metrics
+
+    def step(self, ctx: Context, map: ReferenceGraph) -> Out:
+        """The map at the end of the run."""
+        size = map.features.nbytes + map.poses.nbytes + map.edges.nbytes
+        ctx.fact("map_poses", map.pose_source)
+        return self.Out(
+            metrics=Metrics(
+                {
+                    "map": {
+                        "size_bytes": size,
+                        "references": len(map),
+                        "edges": len(map.edges),
+                        "reference_size_bytes": size / len(map) if len(map) else None,
+                        "pose_source": map.pose_source,
+                    }
+                }
+            )
+        )

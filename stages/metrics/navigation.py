@@ -1,0 +1,103 @@
+"""Whether a robot came to where it was told to go, and what that took."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, Any
+
+import networkx
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline.graph.results import Metrics
+from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.planned_route import PlannedWay
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.topological_map import TopologicalMap
+
+
+class Navigation(Stage):
+    """How a drive to a goal ended: the entry `navigation` of metrics.json.
+
+    `reached`: the robot said that it has arrived, within `within_m` of where the medoid of the way's last place was
+    taken; `end_error_m`: how far from there it ended. `collisions`; `path_length_m`: driven; `shortest_m`: from where
+    it began along the pictures of the map, the shortest way that it could have known; `time_s`: until it said that it
+    has arrived or given up, else all of it. `ways`: how many it planned; `state` and `why`: what it last said.
+    `reached_rate` and `clean_rate` (without a collision): 1 or 0, for means over drives. Of drives that reached their
+    goal alone: `detour`, the way driven over the shortest; `pace`, seconds for a metre of the shortest;
+    `reached_error_m`, how far from the place it ended. Truth is used to score alone; of a map whose poses are not truth
+    nothing is said that needs them.
+    """
+
+    within_m: Annotated[float, Bounds(gt=0)] = 0.5
+
+    class Out(Outputs):
+        """`metrics`: absent where no way was ever planned and no truth is known."""
+
+        metrics: Metrics | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        ticks: Sequence[Tick],
+        ways: Sequence[PlannedWay | None],
+        truth: Sequence[Pose | None],
+        tallies: Sequence[DriveTally | None],
+        map: TopologicalMap,
+    ) -> Out:
+        """The whole drive at once."""
+        said = [way for way in ways if way is not None]
+        spots = [(pose.x, pose.y) for pose in truth if pose is not None]
+        if not said or not spots:
+            return self.Out()
+        last = said[-1]
+        ends = (k for k, way in enumerate(ways) if way is not None and way.state in ("arrived", "gave up"))
+        ended = next(ends, len(ticks) - 1)
+        tally = next((each for each in reversed(tallies) if each is not None), None)
+        goal = int(last.places[-1]) if len(last.places) else None
+        apart = shortest = None
+        if goal is not None and map.pose_source == "truth":
+            apart = math.dist(spots[-1], map.poses[map.places[goal]][:2])
+            shortest = shortest_metres(map, spots[0], goal)
+        found: dict[str, Any] = {
+            "collisions": None if tally is None else tally.collisions,
+            "end_error_m": apart,
+            "path_length_m": None if tally is None else tally.distance,
+            "shortest_m": shortest,
+            "time_s": (ticks[ended].stamp - ticks[0].stamp) / 1e9,
+            "ways": last.number + 1,
+            "goal": goal,
+            "state": last.state,
+            "why": last.why,
+        }
+        if map.pose_source == "truth":
+            reached = last.state == "arrived" and apart is not None and apart <= self.within_m
+            found |= {"reached": reached, "reached_rate": float(reached)}
+            if tally is not None:
+                found["clean_rate"] = float(reached and tally.collisions == 0)
+            if reached:
+                found["reached_error_m"] = apart
+            if reached and shortest:
+                found["pace"] = found["time_s"] / shortest
+                if tally is not None:
+                    found["detour"] = tally.distance / shortest
+        return self.Out(metrics=Metrics({"navigation": found}))
+
+
+def shortest_metres(map: TopologicalMap, start: npt.ArrayLike, goal: int) -> float | None:
+    """Metres from a point (x, y) to a place, by the straight way to the closest view and from there along the map's.
+
+    None where no way leads there.
+    """
+    spots = map.poses[:, :2]
+    graph = networkx.Graph()
+    graph.add_nodes_from(range(len(spots)))
+    for link, (one, other) in enumerate(map.links.tolist()):
+        row = [int(map.places[one]), *map.way(link).tolist(), int(map.places[other])]
+        graph.add_edges_from((a, b, {"metres": math.dist(spots[a], spots[b])}) for a, b in pairwise(row))
+    lengths = networkx.single_source_dijkstra_path_length(graph, int(map.places[goal]), weight="metres")
+    ahead = np.hypot(*(spots - np.asarray(start, np.float64)).T)
+    there = [float(ahead[view]) + metres for view, metres in lengths.items()]
+    nearest = int(np.argmin(ahead))
+    return float(ahead[nearest]) + lengths[nearest] if nearest in lengths else min(there, default=None)

@@ -1,0 +1,117 @@
+"""Position and heading errors against ground truth, frame by frame."""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline.graph.results import Metrics
+from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.drives import Array, Drive, drives, known
+from omninav.stages.values.pose import Motion, Pose
+
+
+class TrajectoryErrors(Stage):
+    """Errors of the estimate against ground truth, with those of odometry alone and of the belief's mean beside them.
+
+    Per log: `frames`; `driven_m`, the length of the true path; `position_error_m` and `heading_error_deg` (mean,
+    standard deviation `std`, median, p90, max); `loss_rate`, the share of frames further than `lost_m` from the
+    truth; `converged_after_frames`, how many frames went by before the error
+    stayed below 1 m and 20 degrees for ten frames (None if it never did); the errors and loss rate again under
+    `after_convergence`. `odometry_alone` starts at the first true pose, and says how far off it ended. The top level is
+    the last log, and `logs` has one entry per log where there are several. Frames without truth or without estimate are
+    left out and counted.
+
+    `settle_steps`: the errors and loss rate stand once more under `after_settling`, without so many frames at each
+    log's start: the same frames for every method, where `after_convergence` leaves out more of a method that stays lost
+    for longer. None: they do not.
+    """
+
+    lost_m: Annotated[float, Bounds(gt=0)] = 2.5
+    settle_steps: Annotated[int, Bounds(ge=0)] | None = None
+
+    class Out(Outputs):
+        """`metrics`: for metrics.json."""
+
+        metrics: Metrics
+
+    def step(
+        self,
+        ctx: Context,
+        ticks: Sequence[Tick],
+        estimates: Sequence[PoseEstimate | None],
+        truth: Sequence[Pose | None],
+        motion: Sequence[Motion | None],
+    ) -> Out:
+        """The whole run at once."""
+        found = drives(ticks, estimates, truth, motion)
+        per_log = [drive_metrics(drive, self.lost_m, self.settle_steps) for drive in found]
+        if not per_log:
+            return self.Out(metrics=Metrics({"frames": 0}))
+        values = dict(per_log[-1])
+        if len(per_log) > 1:
+            values["logs"] = per_log
+        return self.Out(metrics=Metrics(values))
+
+
+def drive_metrics(drive: Drive, lost_m: float, settle_steps: int | None = None) -> dict[str, Any]:
+    """Figures of one drive, named as in metrics.json; only `frames` where there is no ground truth."""
+    result: dict[str, Any] = {"frames": len(drive)}
+    if not drive.has_truth:
+        return result
+    scored = known(drive.truth) & known(drive.estimate)
+    true = drive.truth[known(drive.truth)]
+    result["driven_m"] = float(np.hypot(*np.diff(true[:, :2], axis=0).T).sum())
+    result["frames_without_truth"] = int((~known(drive.truth)).sum())
+    result["frames_without_estimate"] = int((known(drive.truth) & ~known(drive.estimate)).sum())
+    if not scored.any():
+        return result
+    truth, estimate, frames = drive.truth[scored], drive.estimate[scored], np.flatnonzero(scored)
+    settled = first_settled(position_errors(estimate, truth), heading_errors_deg(estimate, truth))
+    windows = {"after_convergence": settled}  # the scored frame from which on each counts
+    if settle_steps is not None:
+        windows["after_settling"] = int(np.searchsorted(frames, settle_steps))
+    result |= _errors_over(windows, estimate, truth, lost_m)
+    for name, start in windows.items():
+        if start is not None and result[name] is not None:
+            result[name]["frames"] = len(truth) - start
+    result["converged_after_frames"] = None if settled is None else int(frames[settled])
+    result["mean_pose"] = _errors_over(windows, drive.mean[scored], truth, lost_m)
+    odometry = drive.odometry_alone()
+    if odometry is not None:
+        result["odometry_alone"] = _errors_over(windows, odometry[scored], truth, lost_m)
+        result["odometry_alone"]["final_error_m"] = float(position_errors(odometry[scored], truth)[-1])
+    return result
+
+
+def _errors_over(windows: Mapping[str, int | None], poses: Array, truth: Array, lost_m: float) -> dict[str, Any]:
+    """Errors over all frames, and in each window, the estimate's for all poses: so like is compared with like."""
+    within = {
+        name: None if start is None or start >= len(poses) else pose_errors(poses[start:], truth[start:], lost_m)
+        for name, start in windows.items()
+    }
+    return pose_errors(poses, truth, lost_m) | within
+
+
+def pose_errors(poses: Array, truth: Array, lost_m: float) -> dict[str, Any]:
+    """Position error (m), heading error (degrees) and loss rate of poses (N, 3) against truth (N, 3)."""
+    position = position_errors(poses, truth)
+    return {
+        "position_error_m": spread(position),
+        "heading_error_deg": spread(heading_errors_deg(poses, truth)),
+        "loss_rate": float((position > lost_m).mean()),
+    }
+
+
+def spread(errors: npt.NDArray[np.float64]) -> dict[str, float]:
+    """Mean, standard deviation, median, 90th percentile and maximum (percentiles interpolate linearly)."""
+    return {
+        "mean": float(errors.mean()),
+        "std": float(errors.std()),
+        "median": float(np.median(errors)),
+        "p90": float(np.percentile(errors, 90)),
+        "max": float(errors.max()),
+    }

@@ -1,0 +1,77 @@
+"""How much a map of views takes, and how densely it covers what was visited."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.graph.results import Metrics
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.view_mixtures import ViewMixtures
+
+Array = npt.NDArray[np.float64]
+
+
+class ViewMapSize(Stage):
+    """Size of a map of views and mixtures at the end of a run.
+
+    Under `map`: `references` (views), `components`, `size_bytes` of all its arrays as stored in its file (whose head,
+    some kilobytes of text, is not counted), `reference_size_bytes` (a view's share of them), `pose_source`,
+    `visited_area_m2` and `references_per_m2`. The visited area is what lies within `near_m` of the path: cells of half
+    that size which the true path, or the estimates where there is no truth, comes so near to.
+    A known map may hold more than what this run visited: its density then says too much.
+    """
+
+    near_m: Annotated[float, Bounds(gt=0)] = 1.0
+
+    class Out(Outputs):
+        """`metrics`: the entry `map` of metrics.json."""
+
+        metrics: Metrics
+
+    def step(
+        self,
+        ctx: Context,
+        map: ViewMixtures,
+        estimates: Sequence[PoseEstimate | None],
+        truth: Sequence[Pose | None],
+    ) -> Out:
+        """The map at the end of the run."""
+        ctx.fact("map_poses", map.pose_source)
+        poses = [pose for pose in truth if pose] or [estimate.pose for estimate in estimates if estimate]
+        path = np.array([(pose.x, pose.y) for pose in poses]).reshape(-1, 2)
+        size, area = stored_bytes(map), visited_area(path, self.near_m)
+        figures = {
+            "size_bytes": size,
+            "references": len(map),
+            "components": len(map.weights),
+            "reference_size_bytes": size / len(map) if len(map) else None,
+            "pose_source": map.pose_source,
+            "visited_area_m2": area,
+            "references_per_m2": len(map) / area if area else None,
+        }
+        return self.Out(metrics=Metrics({"map": figures}))
+
+
+def stored_bytes(map: ViewMixtures) -> int:
+    """Bytes of a map's arrays."""
+    fields = (getattr(map, field.name) for field in dataclasses.fields(map))
+    return sum(field.nbytes for field in fields if isinstance(field, np.ndarray))
+
+
+def visited_area(path: Array, near_m: float) -> float:
+    """Area (m²) within `near_m` of a path (N, 2), counted in square cells of half that side by their middles."""
+    if not len(path):
+        return 0.0
+    side = near_m / 2
+    steps = np.arange(-2, 3)
+    around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    home = np.unique(np.floor(path / (side / 4)).astype(np.int64), axis=0)  # a standing robot counts once
+    points = (home + 0.5) * (side / 4)
+    cells = np.floor(points / side).astype(np.int64)[:, None, :] + around
+    within = np.linalg.norm((cells + 0.5) * side - points[:, None, :], axis=2) <= near_m
+    return float(len(np.unique(cells[within], axis=0)) * side**2)

@@ -1,0 +1,83 @@
+"""How evenly the views of a map lie, among views and on the floor."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline.graph.results import Metrics
+from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.views import WholeView
+
+Array = npt.NDArray[np.float64]
+
+
+class ViewSpacing(Stage):
+    """How far each view of a map is from its nearest other one, in the views' own distance and in metres.
+
+    Porta & Kroese 2004, section 5: learning on-line "guarantees a uniform sampling of the feature space and not of the
+    geometric space, as it happens in normal appearance-based localization". Under `spacing`: `between_views` (in the
+    views' unit) and `between_places_m` (between the heaviest components' x, y), each with `mean`, `median`, `p10`,
+    `p90` and `unevenness`, the standard deviation over the mean, which has no unit: 0 where all lie evenly. Nothing for
+    a map of fewer than three views. Of a map of more than `most` views so many are asked, evenly picked by age.
+    """
+
+    most: Annotated[int, Bounds(ge=3)] = 500
+
+    class Out(Outputs):
+        """`metrics`: the entry `spacing` of metrics.json."""
+
+        metrics: Metrics
+
+    def step(self, ctx: Context, ticks: Sequence[Tick], map: ViewMixtures, view: WholeView) -> Out:
+        """The map at the end of the run, which `ticks` wait for; `view`: the last one seen, for how to compare."""
+        if len(map) < 3:
+            return self.Out(metrics=Metrics({}))
+        rows = np.unique(np.linspace(0, len(map) - 1, min(self.most, len(map))).round().astype(np.int64))
+        among, apart = nearest_views(map, view, rows), nearest_places(map)[rows]
+        found = {"between_views": spaced(among), "between_places_m": spaced(apart)}
+        return self.Out(metrics=Metrics({"spacing": found}))
+
+
+def nearest_views(map: ViewMixtures, view: WholeView, rows: npt.NDArray[np.int64]) -> Array:
+    """The distance of some views of a map, `rows` (N,), to their nearest other ones, as they were kept: (N,)."""
+    nearest = np.empty(len(rows))
+    for number, row in enumerate(rows):
+        distances = _as_kept(view, map.views[row]).distances(map.views)
+        distances[row] = np.inf
+        nearest[number] = distances.min()
+    return nearest
+
+
+def nearest_places(map: ViewMixtures) -> Array:
+    """The distance (m) of each view's heaviest place (R,) to that of the nearest other view."""
+    by_owner = np.lexsort((map.weights, map.owner))
+    ends = np.searchsorted(map.owner[by_owner], np.arange(len(map)), side="right")
+    places = map.means[by_owner[ends - 1], :2]
+    apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+    np.fill_diagonal(apart, np.inf)
+    nearest: Array = apart.min(axis=1)
+    return nearest
+
+
+def spaced(nearest: Array) -> dict[str, Any]:
+    """Figures of distances to nearest neighbours (R,)."""
+    mean = float(nearest.mean())
+    return {
+        "mean": mean,
+        "median": float(np.median(nearest)),
+        "p10": float(np.percentile(nearest, 10)),
+        "p90": float(np.percentile(nearest, 90)),
+        "unevenness": float(nearest.std() / mean) if mean else None,
+    }
+
+
+def _as_kept(view: WholeView, values: npt.NDArray[np.float32]) -> WholeView:
+    # A view with a kept one's numbers. What it would look like turned is not kept, so it is compared as it is.
+    own: dict[str, Any] = {"values": values}
+    if any(field.name == "turned" for field in dataclasses.fields(view)):
+        own["turned"] = values[None]
+    return dataclasses.replace(view, **own)

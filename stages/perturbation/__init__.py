@@ -1,0 +1,1 @@
+"""Images, features and odometry made worse on purpose, to test robustness."""

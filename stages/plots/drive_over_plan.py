@@ -1,0 +1,126 @@
+"""Where a robot drove, over the plan of its world."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from omninav.pipeline import Context, Outputs, Stage, Tick
+from omninav.pipeline.graph.results import Figure
+from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.drives import Array, drives
+from omninav.stages.values.floor_plan import FloorPlan
+from omninav.stages.values.planned_route import PlannedWay
+from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.topological_map import TopologicalMap
+
+from .style import (
+    EDGE,
+    ESTIMATE,
+    MARK,
+    ODOMETRY,
+    REFERENCE,
+    broken_at_jumps,
+    draw_ways,
+    fitting_height,
+    picture,
+    plan_axes,
+)
+
+
+class DriveOverPlan(Stage):
+    """The true path of a closed loop over the floor plan, every contact on it, and what odometry made of it.
+
+    With `map` wired its places, where their medoids were taken, joined along the pictures between them; with `ways` the
+    ways that were planned, the last one bold, and its goal.
+    """
+
+    class Out(Outputs):
+        """`figure`: one picture; absent where the robot never was."""
+
+        figure: Figure | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        ticks: Sequence[Tick],
+        truth: Sequence[Pose | None],
+        motion: Sequence[Motion | None],
+        tallies: Sequence[DriveTally | None],
+        plan: FloorPlan,
+        map: TopologicalMap | None = None,
+        ways: Sequence[PlannedWay | None] | None = None,
+    ) -> Out:
+        """The whole run at once."""
+        logs = drives(ticks, [None] * len(ticks), truth, motion)
+        if not logs or not logs[-1].has_truth:
+            return self.Out()
+        counts = np.array([0 if tally is None else tally.collisions for tally in tallies])
+        contacts = np.flatnonzero(np.diff(counts, prepend=0) > 0)
+        path, dead_reckoning = logs[-1].truth, logs[-1].odometry_alone()
+        planned = planned_ways(ways or (), map)
+        return self.Out(
+            figure=Figure(
+                name="drive_over_plan",
+                title="Where it drove",
+                caption=f"The true path of {len(path)} ticks over the floor plan, which the robot does not know. "
+                f"It came into contact with something {int(counts.max())} times (orange crosses). "
+                f"Dashed: where its wheels say it went.{_said(map, planned)}",
+                content=_draw(path, dead_reckoning, path[contacts], plan, map, planned),
+                order=4,
+            )
+        )
+
+
+def planned_ways(ways: Sequence[PlannedWay | None], map: TopologicalMap | None) -> list[Array]:
+    """Each way that was planned, in order: x and y (V, 2) of the views along it."""
+    if map is None:
+        return []
+    found = {way.number: way.places for way in ways if way is not None and len(way.places)}
+    return [map.poses[map.views_along(found[number])[0]][:, :2] for number in sorted(found)]
+
+
+def _said(map: TopologicalMap | None, planned: Sequence[Array]) -> str:
+    if map is None:
+        return ""
+    places = f" Grey: the {len(map)} places of its map, and the ways between them along their pictures."
+    if not planned:
+        return f"{places} It planned no way."
+    earlier = f", thin: the {len(planned) - 1} before it" if len(planned) > 1 else ""
+    return f"{places} Green: the way that it planned last{earlier}, and its goal."
+
+
+def _draw(
+    path: Array,
+    dead_reckoning: Array | None,
+    contacts: Array,
+    plan: FloorPlan,
+    map: TopologicalMap | None,
+    planned: Sequence[Array],
+) -> bytes:
+    from matplotlib.collections import PolyCollection
+
+    extent = (-0.3, plan.width + 0.3, -0.3, plan.depth + 0.3)
+    with picture(8.0, fitting_height(extent, 8.0, 2.6, 8.5)) as drawn:
+        axes = drawn.canvas.add_subplot()
+        axes.add_collection(PolyCollection(list(plan.outlines), facecolors=EDGE, edgecolors=REFERENCE, linewidths=0.6))
+        if map is not None:
+            draw_ways(axes, map)
+            spots = map.poses[map.places]
+            axes.plot(*spots[:, :2].T, "o", color=REFERENCE, markersize=4, zorder=2, label=f"places ({len(map)})")
+        for number, way in enumerate(planned):
+            last = number == len(planned) - 1
+            look = (
+                {"linewidth": 6.0, "alpha": 0.45, "label": "planned way"} if last else {"linewidth": 1.5, "alpha": 0.6}
+            )
+            axes.plot(*way.T, color=MARK, solid_capstyle="round", zorder=2.2, **look)
+        if planned:
+            axes.plot(*planned[-1][-1:].T, "*", color=MARK, markersize=15, zorder=6, label="goal")
+        if dead_reckoning is not None:
+            axes.plot(*dead_reckoning[:, :2].T, "--", color=ODOMETRY, linewidth=1.0, label="odometry alone")
+        axes.plot(*broken_at_jumps(path).T, color=ESTIMATE, linewidth=1.6, zorder=4, label="true path")
+        axes.plot(*path[:1, :2].T, "s", color=MARK, markersize=7, zorder=5, label="start")
+        if len(contacts):
+            axes.plot(*contacts[:, :2].T, "x", color=ODOMETRY, markersize=7, markeredgewidth=2, label="contact")
+        plan_axes(axes, extent)
+        drawn.canvas.legend(loc="outside lower center", ncols=7 if map is not None else 4)
+    return drawn.content

@@ -1,0 +1,119 @@
+"""What a robot saw as it went towards a view, small, because pictures themselves are too large to be kept."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick, Value
+from omninav.stages.camera.models import Camera
+from omninav.stages.camera.rays import panorama_points, pixels_of_rays
+from omninav.stages.camera.thumbnail import small_picture
+from omninav.stages.values.homing import HomingTarget, HomingVector, TrackedFeatures
+from omninav.stages.values.image import Image, Panorama
+
+Array = npt.NDArray[np.float64]
+Points = npt.NDArray[np.float32]
+
+NEAREST, SHORTEST, FARTHEST, UNKNOWN = 0.35, 0.7, 6.0, 1.5
+"""Metres: where a homing vector begins on the floor before the robot, its least and greatest length, and one of unknown
+length."""
+
+
+class HomingGlance(Value):
+    """A picture as JPEG bytes, and what was told of it. Points are columns and rows of that picture of `size`.
+
+    `points`, `kinds` (N,): as in `TrackedFeatures`. `way` (K, 2): the floor in the homing vector's direction, from the
+    robot on; it ends at the target where `metres` are known. `target_points` (M, 2): the target's features in a
+    picture of this size that was taken there; `target_kinds` (M,): their kinds, -1 for those that are not followed.
+    NaN where a point is not seen. `vector`: None where there is no target.
+    """
+
+    jpeg: bytes
+    size: tuple[int, int]
+    points: Points
+    kinds: npt.NDArray[np.int8]
+    way: Points
+    target_points: Points
+    target_kinds: npt.NDArray[np.int8]
+    target: str = ""
+    vector: HomingVector | None = None
+
+
+class Looked(State):
+    """When it looked last (ns)."""
+
+    stamp: int = 0
+
+
+class HomingSnapshot(Stage):
+    """Every `every_s` seconds the robot's picture, at most `columns` wide (JPEG, 80), with all that homing tells of it.
+
+    Of a mirror's or a lens's picture the disc. Without a target the picture alone.
+    """
+
+    every_s: Annotated[float, Bounds(ge=0)] = 0.4
+    columns: Annotated[int, Bounds(ge=32)] = 480
+
+    class Out(Outputs):
+        """`glance`: absent in between."""
+
+        glance: HomingGlance | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        looked: Looked,
+        tick: Tick,
+        picture: Image | Panorama,
+        camera: Camera | None = None,
+        target: HomingTarget | None = None,
+        vector: HomingVector | None = None,
+        tracks: TrackedFeatures | None = None,
+    ) -> Out:
+        """One tick."""
+        if not tick.first_of_log and tick.stamp - looked.stamp < 0.99e9 * self.every_s:
+            return self.Out()
+        looked.stamp = tick.stamp
+        small = small_picture(picture.pixels, camera, self.columns)
+        points, way, there = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2))
+        kinds, of_target = np.zeros(0, np.int64), np.zeros(0, np.int8)
+        if tracks is not None:
+            points, kinds = tracks.points, tracks.kinds
+        if vector is not None:
+            way = seen_at(picture, camera, floor_ahead(vector, getattr(camera, "height", None)))
+        if target is not None:
+            there = seen_at(picture, camera, target.features.bearings)
+            of_target = np.full(len(there), -1, np.int8)
+            if tracks is not None:
+                of_target[tracks.rows] = tracks.kinds
+        glance = HomingGlance(
+            small.jpeg(80),
+            (small.pixels.shape[1], small.pixels.shape[0]),
+            small.points(points),
+            kinds.astype(np.int8),
+            small.points(way),
+            small.points(there),
+            of_target,
+            "" if target is None else target.name,
+            vector,
+        )
+        return self.Out(glance=glance)
+
+
+def floor_ahead(vector: HomingVector, height: float | None) -> Array:
+    """Points (K, 3) of the floor along a homing vector (m, robot frame, from the camera), `height` below it (1 m)."""
+    length = UNKNOWN if vector.metres is None else min(max(vector.metres, SHORTEST), FARTHEST)
+    metres = np.linspace(NEAREST, length, 24)
+    below = np.full(len(metres), -(height or 1.0))
+    return np.stack([metres * math.cos(vector.direction), metres * math.sin(vector.direction), below], axis=-1)
+
+
+def seen_at(picture: Image | Panorama, camera: Camera | None, rays: Array) -> Array:
+    """Columns and rows (N, 2) of a picture at which rays (N, 3) are seen; NaN where they are not."""
+    if isinstance(picture, Panorama):
+        return panorama_points(rays, picture.pixels.shape, picture.elevation_top, picture.elevation_bottom)
+    if camera is None:
+        return np.full((len(rays), 2), np.nan)
+    return np.stack(pixels_of_rays(camera, rays), axis=-1)

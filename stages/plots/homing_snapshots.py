@@ -1,0 +1,190 @@
+"""What homing followed and where it wanted to go, at a few moments of a drive."""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline.graph.results import Figure
+from omninav.stages.values.drives import Array, pose_rows
+from omninav.stages.values.floor_plan import FloorPlan
+from omninav.stages.values.homing import HomingVector, PathProgress
+from omninav.stages.values.image import Pixels
+from omninav.stages.values.planned_route import PlannedWay
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.thumbnails import Album, decoded
+from omninav.stages.values.topological_map import TopologicalMap
+
+from .draw_homing import BRIGHT, LOST, NAMES, VECTOR, hexadecimal, is_known, robots_view, targets_view
+from .homing_snapshot import HomingGlance
+from .snapshot_times import spread_out
+from .style import (
+    ESTIMATE,
+    MARK,
+    ODOMETRY,
+    TRUTH,
+    broken_at_jumps,
+    draw_plan,
+    draw_pose,
+    picture,
+    plan_axes,
+)
+from .target_images import target_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+REACH = 2.2
+"""Metres around the robot that the plan shows."""
+
+
+class Moment(NamedTuple):
+    """A moment of the drive: when, what was seen, the target's picture, where the robot and the target truly were."""
+
+    frame: int
+    seconds: float
+    glance: HomingGlance
+    vector: HomingVector
+    target: Pixels | None
+    pose: Array
+    goal: Array
+    path: Array
+
+
+class HomingMoments(Stage):
+    """The robot's picture beside the target's at `moments` of a drive, with followed features and the homing vector.
+
+    The last panel of each row is the floor around the robot (m): its way so far, the vector, and where the target view
+    was truly taken. `album` holds the pictures of the map's views, without `map` those of the path's own; without one
+    the target's features stand alone. Without `map` the target is where the run began.
+    """
+
+    moments: Annotated[int, Bounds(ge=1, le=8)] = 4
+
+    class Out(Outputs):
+        """`figure`: absent where there never was a target."""
+
+        figure: Figure | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        ticks: Sequence[Tick],
+        glances: Sequence[HomingGlance | None],
+        progress: Sequence[PathProgress | None],
+        truth: Sequence[Pose | None],
+        ways: Sequence[PlannedWay | None] | None = None,
+        map: TopologicalMap | None = None,
+        album: Album | None = None,
+        plan: FloorPlan | None = None,
+    ) -> Out:
+        """The whole run at once."""
+        path = pose_rows(truth)
+        told = [(row, g) for row, g in enumerate(glances) if g is not None and g.vector is not None]
+        if not told:
+            return self.Out()
+        found = []
+        for row, glance in (told[n] for n in chosen([g for _, g in told], self.moments)):
+            assert glance.vector is not None
+            goal, shown = target_of(progress[row], None if ways is None else ways[row], map, path[0], album)
+            seconds = (ticks[row].stamp - ticks[0].stamp) / 1e9
+            found.append(
+                Moment(ticks[row].frame, seconds, glance, glance.vector, shown, path[row], goal, path[: row + 1])
+            )
+        return self.Out(
+            figure=Figure(
+                name="homing_moments",
+                title="Features followed, and the way to the target view",
+                caption="Left: the robot's picture at a few moments, the features of the local map in it, and "
+                "the homing vector drawn over the floor. Middle: the view that it went to, the same features in the "
+                "same colours; light: those that it does not follow. Right: the floor around the robot, its true path "
+                "so far, the vector as homing told it (as long as odometry says, else dashed), and where the target "
+                "view was truly taken (green).",
+                content=_draw(found, plan),
+                media_type="image/jpeg",
+                order=6,
+            )
+        )
+
+
+def chosen(glances: Sequence[HomingGlance], moments: int) -> list[int]:
+    """Spread over the drive; the last of them gives way to the first at which the target was lost."""
+    spread = spread_out(len(glances), moments)
+    lost = [n for n, glance in enumerate(glances) if glance.vector is not None and glance.vector.state == "lost"]
+    if lost and lost[0] not in spread and len(spread) > 2:
+        nearest = min(spread[1:-1], key=lambda n: abs(n - lost[0]))
+        spread = sorted({*spread, lost[0]} - {nearest})
+    return spread
+
+
+def _draw(found: Sequence[Moment], plan: FloorPlan | None) -> bytes:
+    columns, rows = found[0].glance.size
+    strip = columns > 2.5 * rows  # panoramas stand one above the other
+    high = 10.5 / 3.15 * rows / columns
+    with picture(10.5, len(found) * (max(high, 2.6) + 0.4) + 0.4, dpi=100, media_type="image/jpeg") as drawn:
+        grid = drawn.canvas.add_gridspec(2 * len(found) if strip else len(found), 3)
+        for number, moment in enumerate(found):
+            pixels = robots_view(decoded(moment.glance.jpeg), moment.glance)
+            target = targets_view(moment.target, moment.glance, moment.glance.size)
+            here, there = (
+                (grid[2 * number, :2], grid[2 * number + 1, :2]) if strip else (grid[number, 0], grid[number, 1])
+            )
+            _show(drawn.canvas.add_subplot(here), pixels, f"frame {moment.frame} · {moment.seconds:.1f} s")
+            _show(drawn.canvas.add_subplot(there), target, f"going to: {moment.glance.target or 'a view'}")
+            beside = grid[2 * number : 2 * number + 2, 2] if strip else grid[number, 2]
+            axes = drawn.canvas.add_subplot(beside)
+            _draw_floor(axes, moment, plan)
+            if number < len(found) - 1:
+                axes.set_xlabel("")
+        drawn.canvas.legend(handles=_legend(), loc="outside lower center", ncols=6)
+    return drawn.content
+
+
+def _show(axes: "Axes", pixels: Pixels, title: str) -> None:
+    axes.imshow(pixels[:, :, ::-1], interpolation="antialiased")
+    axes.set_title(title, fontsize=8.5)
+    axes.set_axis_off()
+
+
+def _draw_floor(axes: "Axes", moment: Moment, plan: FloorPlan | None) -> None:
+    draw_plan(axes, plan)
+    axes.plot(*broken_at_jumps(moment.path).T, color=ESTIMATE, linewidth=1.4, zorder=2)
+    axes.plot(*moment.goal[:2, None], "o", color=MARK, markersize=10, fillstyle="none", markeredgewidth=2, zorder=5)
+    draw_pose(axes, moment.goal, 0.35, MARK)
+    draw_pose(axes, moment.pose, 0.35, TRUTH)
+    vector = moment.vector
+    towards = moment.pose[2] + vector.direction
+    length = 1.0 if vector.metres is None else max(vector.metres, 0.05)
+    tip = moment.pose[:2] + length * np.array([math.cos(towards), math.sin(towards)])
+    if np.isfinite(tip).all() and is_known(vector):
+        colour = ODOMETRY if vector.state == "lost" else hexadecimal(VECTOR)
+        line = "--" if vector.metres is None or vector.state == "lost" else "-"
+        arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0, "linestyle": line}
+        axes.annotate("", xy=tip.tolist(), xytext=moment.pose[:2].tolist(), arrowprops=arrow, zorder=7)
+    x, y = np.nan_to_num(moment.pose[:2])
+    plan_axes(axes, (x - REACH, x + REACH, y - REACH, y + REACH))
+    kinds = moment.glance.kinds
+    counted = f"{vector.inliers} agree, {int(np.count_nonzero(kinds == LOST))} of {len(kinds)} lost"
+    far = f"{vector.metres:.2f} m" if vector.metres is not None else f"{100 * vector.ratio:.0f} % of the way left"
+    said = (
+        "the target is lost"
+        if vector.state == "lost"
+        else f"{far}, turn {round(math.degrees(vector.turn))}°\n{counted}"
+    )
+    axes.set_title(said, fontsize=8.5)
+
+
+def _legend() -> list[object]:
+    from matplotlib.lines import Line2D
+
+    looks = {
+        kind: Line2D(
+            [], [], linestyle="", marker="x" if kind == LOST else "o", color=hexadecimal(BRIGHT[kind]), label=name
+        )
+        for kind, name in NAMES.items()
+    }
+    vector = Line2D([], [], color=hexadecimal(VECTOR), linewidth=2.5, label="homing vector")
+    spot = Line2D([], [], linestyle="", marker="o", fillstyle="none", markersize=9, color=MARK, label="target, truly")
+    return [*looks.values(), vector, spot]

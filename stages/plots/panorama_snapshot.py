@@ -1,0 +1,48 @@
+"""A few pictures as small encoded ones, because images themselves are too large to be kept."""
+
+import math
+
+import cv2
+import numpy as np
+
+from omninav.pipeline import Context, Outputs, Stage, Tick, Value
+from omninav.stages.values.image import Panorama, Windows
+
+from .snapshot_times import is_moment
+
+
+class EncodedPanorama(Value):
+    """A panorama as JPEG bytes, columns as in `Panorama`; or windows side by side, the left one on the left.
+
+    `headings`: where windows look, from the left to the right (radians, counter-clockwise from forward); empty: it is
+    a panorama.
+    """
+
+    jpeg: bytes
+    headings: tuple[float, ...] = ()
+
+
+class PanoramaSnapshot(Stage):
+    """Encodes the panorama or the windows at frames 0, 1, 2, 5, 10, 20, 50, …; JPEG quality 90, at most 720 columns."""
+
+    class Out(Outputs):
+        """`snapshot`: absent at all other frames."""
+
+        snapshot: EncodedPanorama | None = None
+
+    def step(self, ctx: Context, tick: Tick, panorama: Panorama | Windows) -> Out:
+        """One frame."""
+        if not is_moment(tick.frame):
+            return self.Out()
+        headings: tuple[float, ...] = ()
+        pixels: cv2.typing.MatLike = panorama.pixels
+        if isinstance(panorama, Windows):
+            # From just right of straight behind around to straight behind, as a panorama is cut open.
+            order = np.argsort(np.mod(math.pi - panorama.headings, 2 * math.pi), kind="stable")
+            headings = tuple(float(panorama.headings[n]) for n in order)
+            pixels = np.concatenate([panorama.pixels[n] for n in order], axis=1)
+        if pixels.shape[1] > 720:
+            size = (720, max(1, round(pixels.shape[0] * 720 / pixels.shape[1])))
+            pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+        _, jpeg = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 90])
+        return self.Out(snapshot=EncodedPanorama(jpeg.tobytes(), headings))

@@ -1,0 +1,42 @@
+"""What is kept of the similarities for a picture: the best one of each reference, at a few frames."""
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Context, Outputs, Stage, Tick, Value
+from omninav.stages.values.similarity import Similarities
+
+from .snapshot_times import is_moment
+
+
+class Peaks(Value):
+    """The best of each reference's similarities, and all headings of the best reference.
+
+    `best` (references,) in [0, 1]; `candidates` (references,) their indices in the map, None: all; `profile`
+    (headings,) of reference number `reference` of the map, headings as in `Similarities`.
+    """
+
+    best: npt.NDArray[np.float32]
+    candidates: npt.NDArray[np.int64] | None
+    reference: int
+    profile: npt.NDArray[np.float32]
+
+
+class SimilarityPeaks(Stage):
+    """Keeps, at frames 0, 1, 2, 5, 10, 20, 50, …, the best similarity of each reference and the best one's headings."""
+
+    class Out(Outputs):
+        """`peaks`: absent at all other frames."""
+
+        peaks: Peaks | None = None
+
+    def step(self, ctx: Context, tick: Tick, similarities: Similarities) -> Out:
+        """One frame."""
+        values = similarities.values
+        if not is_moment(tick.frame) or not len(values):
+            return self.Out()
+        best = values.max(axis=1)
+        winner = int(np.argmax(best))
+        candidates = similarities.candidates
+        reference = winner if candidates is None else int(candidates[winner])
+        return self.Out(peaks=Peaks(best.astype(np.float32), candidates, reference, values[winner].astype(np.float32)))

@@ -1,0 +1,184 @@
+"""One look for all pictures: colours that colour-blind readers tell apart, units on axes, the same bytes every time."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline.report.plot_style import Picture, picture
+from omninav.stages.values.floor_plan import FloorPlan
+from omninav.stages.values.grid import OCCUPIED, UNKNOWN, OccupancyGrid
+from omninav.stages.values.map_places import AnyMap
+from omninav.stages.values.topological_map import TopologicalMap
+from omninav.stages.values.view_mixtures import ViewMixtures
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = [
+    "Picture",
+    "broken_at_jumps",
+    "draw_gaussians",
+    "draw_grid",
+    "draw_map",
+    "draw_plan",
+    "draw_pose",
+    "draw_ways",
+    "extent_of",
+    "faded",
+    "fitting_height",
+    "grid_extent",
+    "picture",
+    "plan_axes",
+]
+
+Array = npt.NDArray[np.float64]
+
+# Okabe & Ito's palette (2008), dark enough on white
+ESTIMATE, TRUTH, ODOMETRY = "#0072B2", "#111111", "#D55E00"
+REFERENCE, EDGE, MARK, PARTICLE = "#8a8f98", "#c9ccd1", "#009E73", "#CC79A7"
+
+
+def plan_axes(axes: "Axes", extent: tuple[float, float, float, float] | None = None) -> None:
+    """Axes of a plan view: metres, equal scales, optionally the part (x from, x to, y from, y to) to show."""
+    axes.set_aspect("equal", adjustable="box" if extent else "datalim")
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+    if extent:
+        axes.set_xlim(extent[0], extent[1])
+        axes.set_ylim(extent[2], extent[3])
+
+
+def draw_map(axes: "Axes", map: AnyMap | None, label: bool = True) -> None:
+    """Reference views as grey dots, joined by their edges; of mixtures every component's mean, as dark as it weighs; of
+    a topological map its places, joined along the pictures between them."""
+    if map is None or not len(map):
+        return
+    from matplotlib.collections import LineCollection
+
+    if isinstance(map, ViewMixtures):
+        size = float(np.clip(3000 / max(len(map.weights), 1), 1.5, 9))
+        name = f"views ({len(map)}) at {len(map.weights)} places" if label else None
+        x, y = map.means[:, :2].T
+        heaviest = float(map.weights.max(initial=0.0)) or 1.0
+        colours = faded(REFERENCE, np.clip(map.weights / heaviest, 0.3, 1.0))
+        axes.scatter(x, y, s=size, c=colours, linewidths=0, zorder=1.5, label=name)
+        return
+    topological = isinstance(map, TopologicalMap)
+    poses, edges = (map.poses[map.places], map.links[:0]) if isinstance(map, TopologicalMap) else (map.poses, map.edges)
+    if isinstance(map, TopologicalMap):
+        draw_ways(axes, map)
+    if len(edges):
+        axes.add_collection(LineCollection(list(poses[edges][:, :, :2]), colors=EDGE, linewidths=0.7, zorder=1))
+    size = float(np.clip(3000 / len(map), 1.5, 25 if topological else 9))
+    name = f"{'places' if topological else 'references'} ({len(map)})" if label else None
+    axes.scatter(poses[:, 0], poses[:, 1], s=size, color=REFERENCE, linewidths=0, zorder=1.5, label=name)
+
+
+def draw_ways(axes: "Axes", map: TopologicalMap) -> None:
+    """The links of a topological map, each along the pictures between its two places."""
+    from matplotlib.collections import LineCollection
+
+    poses = map.poses[:, :2]
+    ways = [poses[[map.places[a], *map.way(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
+    axes.add_collection(LineCollection(ways, colors=REFERENCE, linewidths=0.7, zorder=1))
+
+
+def draw_gaussians(
+    axes: "Axes", means: Array, covariances: Array, colours: Array, sigmas: float = 2.0, zorder: float = 3
+) -> None:
+    """Gaussians over the pose, (K, 3) and (K, 3, 3), as ellipses of `sigmas` standard deviations in the plane.
+
+    `colours` (K, 4) are those of the lines; the inside is a third as opaque, and less where there are many.
+    """
+    if not len(means):
+        return
+    from matplotlib.collections import EllipseCollection
+
+    spread, axes_of = np.linalg.eigh(covariances[:, :2, :2])  # ascending: the long axis is the last
+    diameters = 2 * sigmas * np.sqrt(np.maximum(spread, 0.0))
+    axes.add_collection(
+        EllipseCollection(
+            widths=diameters[:, 1],
+            heights=diameters[:, 0],
+            angles=np.degrees(np.arctan2(axes_of[:, 1, 1], axes_of[:, 0, 1])),
+            units="xy",
+            offsets=means[:, :2],
+            offset_transform=axes.transData,
+            facecolors=colours * (1, 1, 1, min(0.33, 15 / len(means))),
+            edgecolors=colours,
+            linewidths=0.7,
+            zorder=zorder,
+        )
+    )
+
+
+def draw_plan(axes: "Axes", plan: FloorPlan | None) -> None:
+    """What stands on the floor, in grey."""
+    if plan is None:
+        return
+    from matplotlib.collections import PolyCollection
+
+    # edges in the same grey, so that no seams show between the boxes of a grid
+    axes.add_collection(
+        PolyCollection(list(plan.outlines), facecolors=EDGE, edgecolors=EDGE, linewidths=0.6, zorder=0.5)
+    )
+
+
+def draw_grid(axes: "Axes", grid: OccupancyGrid | None) -> None:
+    """What is occupied in dark grey and what is unknown in light grey, under everything else."""
+    if grid is None:
+        return
+    colours = np.zeros((*grid.cells.shape, 4))
+    colours[grid.cells == OCCUPIED] = faded("#6d727b", np.ones(1))[0]
+    colours[grid.cells == UNKNOWN] = faded("#eceef1", np.ones(1))[0]
+    axes.imshow(colours, extent=grid_extent(grid), origin="lower", interpolation="nearest", zorder=0.4)
+
+
+def grid_extent(grid: OccupancyGrid) -> tuple[float, float, float, float]:
+    """Where a grid lies: x from, x to, y from, y to (m)."""
+    rows, columns = grid.cells.shape
+    x, y = grid.origin
+    return x, x + columns * grid.resolution, y, y + rows * grid.resolution
+
+
+def faded(colour: str, opacity: Array) -> Array:
+    """A colour with opacities (N,) in [0, 1]: (N, 4) red, green, blue, opacity."""
+    from matplotlib.colors import to_rgb
+
+    return np.column_stack([np.tile(to_rgb(colour), (len(opacity), 1)), opacity])
+
+
+def draw_pose(axes: "Axes", pose: Array, length: float, colour: str, label: str | None = None) -> None:
+    """A pose as a dot with an arrow of `length` metres along its heading."""
+    if not np.isfinite(pose).all():
+        return
+    tip = (pose[0] + length * np.cos(pose[2]), pose[1] + length * np.sin(pose[2]))
+    arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", xy=tip, xytext=(pose[0], pose[1]), arrowprops=arrow, zorder=6)
+    axes.plot([pose[0]], [pose[1]], "o", color=colour, markersize=4.5, zorder=6, label=label)
+
+
+def extent_of(*points: Array, margin: float = 0.06) -> tuple[float, float, float, float] | None:
+    """The part of the plane that holds all finite points, (N, 2 or more) each, with a margin; None: there are none."""
+    together = np.concatenate([np.empty((0, 2)), *(p[:, :2] for p in points)])
+    together = together[np.isfinite(together).all(axis=1)]
+    if not len(together):
+        return None
+    low, high = together.min(axis=0), together.max(axis=0)
+    pad = margin * float((high - low).max()) + 0.25
+    return float(low[0] - pad), float(high[0] + pad), float(low[1] - pad), float(high[1] + pad)
+
+
+def broken_at_jumps(path: Array, metres: float = 1.0) -> Array:
+    """A path (N, 2 or more) as x and y, with a row of NaN wherever it jumps farther: nobody drove there."""
+    jumps = np.flatnonzero(np.hypot(*np.diff(path[:, :2], axis=0).T) > metres) + 1
+    return np.insert(path[:, :2], jumps, np.nan, axis=0)
+
+
+def fitting_height(extent: tuple[float, float, float, float] | None, width: float, low: float, high: float) -> float:
+    """Height (inches) at which an equal-axes plot of `extent` fills a figure of this width, within limits."""
+    if extent is None:
+        return low
+    shape = (extent[3] - extent[2]) / (extent[1] - extent[0])
+    return float(np.clip(width * shape + 0.9, low, high))

@@ -1,0 +1,1 @@
+"""Readers and writers of logs, grids and camera files. No stages."""

@@ -1,0 +1,269 @@
+"""Visibility areas over an occupancy grid."""
+
+import math
+from typing import Annotated, NamedTuple
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.results import Metrics
+from omninav.stages.values.grid import FREE, OCCUPIED, Cells, FreeSpace, OccupancyGrid
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.visibility import VisibilityAreas
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Runs = npt.NDArray[np.uint16]
+
+LARGEST = 65535
+"""Rows and columns of a grid are stored in 16 bits."""
+BEFORE = 1e-3
+"""Cells between the face of an occupied cell and the point that must be visible."""
+FACES = np.array([[0.0, 0.5 + BEFORE], [0.0, -0.5 - BEFORE], [0.5 + BEFORE, 0.0], [-0.5 - BEFORE, 0.0]])
+"""From an occupied cell's centre to the point before a face: rows, columns; to its right, left, above, below."""
+BINS = 360
+"""Headings that are told apart where a share of the state space is counted."""
+
+
+class Sight(NamedTuple):
+    """What rays meet: `cells` (N, 2) row and column of the occupied cell, -1 where none; `faces` (N,) of `FACES`."""
+
+    cells: Ints
+    faces: Ints
+
+
+def axes_of(sectors: int) -> Array:
+    """Azimuths (rad) of the middles of a panorama's equal parts; one part looks straight ahead. (sectors,)."""
+    axes: Array = np.pi - 2 * np.pi * (np.arange(sectors) + 0.5) / sectors
+    return axes
+
+
+def first_occupied(cells: Cells, starts: Array, directions: Array) -> Sight:
+    """The closest occupied cell along rays through free cells.
+
+    `starts` (N, 2): row and column in cells, as numbers whose whole part is the cell; `directions` (N,) rad. A ray that
+    begins in a cell that is not free, leaves the grid, or enters an unknown cell meets nothing (erratum 46).
+    """
+    found, faces = _cast(cells, np.ascontiguousarray(starts), np.ascontiguousarray(directions))
+    return Sight(found, faces)
+
+
+@numba.njit(cache=True, nogil=True)
+def _cast(cells: Cells, starts: Array, directions: Array) -> tuple[Ints, Ints]:
+    found, faces = np.full((len(starts), 2), -1, np.int64), np.full(len(starts), -1, np.int64)
+    rows, columns = cells.shape
+    for n in range(len(starts)):
+        row, column = math.floor(starts[n, 0]), math.floor(starts[n, 1])
+        if not (0 <= row < rows and 0 <= column < columns) or cells[row, column] != FREE:
+            continue
+        y, x = math.sin(directions[n]), math.cos(directions[n])
+        up, right = 1 if y > 0 else -1, 1 if x > 0 else -1
+        # How far along the ray the next row and the next column begin, and how far they lie apart.
+        step_y, step_x = 1.0 / max(abs(y), 1e-12), 1.0 / max(abs(x), 1e-12)
+        next_y = step_y * (row + 1 - starts[n, 0] if up > 0 else starts[n, 0] - row)
+        next_x = step_x * (column + 1 - starts[n, 1] if right > 0 else starts[n, 1] - column)
+        while True:
+            sideways = next_x < next_y
+            if sideways:
+                column, next_x = column + right, next_x + step_x
+            else:
+                row, next_y = row + up, next_y + step_y
+            if not (0 <= row < rows and 0 <= column < columns):
+                break
+            if cells[row, column] == OCCUPIED:
+                found[n, 0], found[n, 1] = row, column
+                faces[n] = (1 if right > 0 else 0) if sideways else (3 if up > 0 else 2)
+                break
+            if cells[row, column] != FREE:
+                break
+    return found, faces
+
+
+@numba.njit(cache=True, nogil=True)
+def _sees(cells: Cells, row: int, column: int, to_row: float, to_column: float) -> bool:
+    # Whether the line from a cell's middle to a point crosses free cells only. The point lies in a free cell.
+    y, x = to_row - (row + 0.5), to_column - (column + 0.5)
+    last_row, last_column = math.floor(to_row), math.floor(to_column)
+    up, right = 1 if y > 0 else -1, 1 if x > 0 else -1
+    step_y, step_x = 1.0 / max(abs(y), 1e-12), 1.0 / max(abs(x), 1e-12)
+    next_y, next_x = 0.5 * step_y, 0.5 * step_x
+    for _ in range(abs(last_row - row) + abs(last_column - column)):
+        if next_x < next_y:
+            column, next_x = column + right, next_x + step_x
+        else:
+            row, next_y = row + up, next_y + step_y
+        if cells[row, column] != FREE:
+            return False
+    return row == last_row and column == last_column
+
+
+def grown_areas(cells: Cells, points: Array) -> tuple[Runs, npt.NDArray[np.int32]]:
+    """Cells from which points are visible, by constrained region growing (Wolf, Burgard & Burkhardt 2005, section V).
+
+    `points` (T, 2): row and column in cells, in free cells. From a point's own cell the area grows over its eight
+    neighbours as long as they are free and the line from their middle to the point crosses free cells only. Gives runs
+    of rows (N, 3) row, first column, column behind the last, and where each point's begin, (T + 1,).
+    """
+    return _grow(cells, np.ascontiguousarray(points))
+
+
+@numba.njit(cache=True, nogil=True)
+def _grow(cells: Cells, points: Array) -> tuple[Runs, npt.NDArray[np.int32]]:
+    rows, columns = cells.shape
+    tried = np.full((rows, columns), -1, np.int32)
+    seen = np.full((rows, columns), -1, np.int32)
+    waiting = np.empty((rows * columns, 2), np.int32)
+    runs, number = np.empty((1024, 3), np.uint16), 0
+    starts = np.zeros(len(points) + 1, np.int32)
+    for t in range(len(points)):
+        row, column = math.floor(points[t, 0]), math.floor(points[t, 1])
+        tried[row, column] = seen[row, column] = t
+        waiting[0] = row, column
+        done, end = 0, 1
+        low, high, left, right = row, row, column, column
+        while done < end:
+            row, column = waiting[done]
+            done += 1
+            for i in range(max(row - 1, 0), min(row + 2, rows)):
+                for j in range(max(column - 1, 0), min(column + 2, columns)):
+                    if tried[i, j] == t or cells[i, j] != FREE:
+                        continue
+                    tried[i, j] = t
+                    if _sees(cells, i, j, points[t, 0], points[t, 1]):
+                        seen[i, j] = t
+                        waiting[end] = i, j
+                        end += 1
+                        low, high, left, right = min(low, i), max(high, i), min(left, j), max(right, j)
+        for i in range(low, high + 1):
+            j = left
+            while j <= right:
+                if seen[i, j] != t:
+                    j += 1
+                    continue
+                first = j
+                while j <= right and seen[i, j] == t:
+                    j += 1
+                if number == len(runs):
+                    larger = np.empty((2 * number, 3), np.uint16)
+                    larger[:number] = runs
+                    runs = larger
+                runs[number, 0], runs[number, 1], runs[number, 2] = i, first, j
+                number += 1
+        starts[t + 1] = number
+    return runs[:number].copy(), starts
+
+
+def visibility_areas(poses: Array, grid: OccupancyGrid, axes: Array) -> VisibilityAreas:
+    """The visibility areas of views from poses (R, 3) along azimuths (S,) from their headings.
+
+    Where the paper speaks of the closest occupied cell, here the face of it counts that the view meets: a wall that is
+    one cell thick is not seen from its other side. A point lambda is the middle of such a face; views that meet the
+    same face share one point and one area.
+    """
+    rows, columns = grid.cells.shape
+    starts = (poses[:, 1::-1] - grid.origin[::-1]) / grid.resolution
+    directions = (poses[:, 2, None] + axes).ravel()
+    sight = first_occupied(grid.cells, np.repeat(starts, len(axes), axis=0), directions)
+    hit = sight.faces >= 0
+    numbers = (sight.cells[hit, 0] * columns + sight.cells[hit, 1]) * len(FACES) + sight.faces[hit]
+    faces, which = np.unique(numbers, return_inverse=True)
+    target = np.full(len(hit), -1, np.int32)
+    target[hit] = which
+    cell, face = np.divmod(faces, len(FACES))
+    points = np.column_stack(np.divmod(cell, columns)) + 0.5 + FACES[face]
+    runs, first = grown_areas(grid.cells, points)
+    metres = np.array(grid.origin) + grid.resolution * points[:, ::-1]
+    shape = target.reshape(len(poses), len(axes))
+    return VisibilityAreas(axes, shape, metres, first, runs, (rows, columns), grid.resolution, grid.origin)
+
+
+def covered(areas: VisibilityAreas, centres: Array, window: float) -> tuple[float, float]:
+    """Which share of places (N, 2) lies in any area, and of places and headings in one whose point is at most `window`
+    radians aside of the heading."""
+    if not len(centres):
+        return 0.0, 0.0
+    cells = np.floor((centres[:, ::-1] - areas.origin[::-1]) / areas.resolution).astype(np.int64)
+    where = np.full(areas.shape, -1, np.int64)
+    where[cells[:, 0], cells[:, 1]] = np.arange(len(centres))
+    seen = _headings(areas.starts, areas.runs, areas.points, where, centres, window)
+    return float(seen.any(axis=1).mean()), float(seen.mean())
+
+
+@numba.njit(cache=True, nogil=True)
+def _headings(
+    starts: npt.NDArray[np.int32], runs: Runs, points: Array, where: Ints, centres: Array, window: float
+) -> npt.NDArray[np.bool_]:
+    seen = np.zeros((len(centres), BINS), np.bool_)
+    half = min(round(window / (2 * math.pi) * BINS), BINS // 2)
+    for t in range(len(points)):
+        for k in range(starts[t], starts[t + 1]):
+            for column in range(runs[k, 1], runs[k, 2]):
+                n = where[runs[k, 0], column]
+                if n >= 0:
+                    direction = math.atan2(points[t, 1] - centres[n, 1], points[t, 0] - centres[n, 0])
+                    middle = math.floor(direction / (2 * math.pi) * BINS)
+                    for b in range(middle - half, middle + half + 1):
+                        seen[n, b % BINS] = True
+    return seen
+
+
+class LineOfSight(Stage):
+    """Visibility areas of a map's references: the free cells from which what they look at is in sight.
+
+    Wolf, Burgard & Burkhardt 2005, section V: along a view's optical axis lies the closest occupied cell, lambda; its
+    visibility area are the free cells from which lambda is visible, found by constrained region growing. Occupied and
+    unknown cells block (erratum 46). Of lambda the face counts that the view meets, so that no view is seen through a
+    thin wall. A view all around has one area for each of `sectors` equal parts of it (null: as many as the map's views
+    have segments), along the part's middle; an ordinary camera's has one, straight ahead. A reference has none where it
+    stands in no free cell, or where its ray ends in unknown.
+
+    `within_deg`: how far an ordinary camera's heading may be off lambda in the share of the state space (place and
+    heading) that is reported as covered. It is counted over `free`, where that is wired, else over all free cells.
+    """
+
+    sectors: Annotated[int, Bounds(ge=1)] | None = None
+    within_deg: Annotated[float, Bounds(gt=0, le=180)] = 5.0
+
+    class Out(Outputs):
+        """`areas`, and what share of the free space they cover."""
+
+        areas: VisibilityAreas
+        metrics: Metrics
+
+    def step(self, ctx: Context, map: ReferenceGraph, grid: OccupancyGrid, free: FreeSpace | None = None) -> Out:
+        """Cast, grow, and count."""
+        if max(grid.cells.shape) > LARGEST:
+            raise BadInput(f"grid: {grid.cells.shape} cells are more than {LARGEST} a side; use a coarser resolution")
+        axes = axes_of(self.sectors or max(map.features.shape[1], 1))
+        areas = visibility_areas(map.poses, grid, axes)
+        none = int((areas.target < 0).sum())
+        if none == areas.target.size:
+            raise BadInput(
+                "grid: no reference of the map sees an occupied cell in it; are both in the same frame? The map's "
+                f"poses come from {map.pose_source}"
+            )
+        if none:
+            ctx.count("view_without_area", none, "areas: the view meets no occupied cell of the grid")
+        places = grid.centres(*np.nonzero(grid.cells == FREE)) if free is None else free.centres
+        place, state = covered(areas, places, math.radians(self.within_deg) if len(axes) == 1 else math.pi)
+        said = {
+            "references": len(map),
+            "areas": areas.target.size - none,
+            "points": len(areas.points),
+            "area_median_m2": float(np.median(_sizes(areas))) * grid.resolution**2,
+            "free_m2": len(places) * grid.resolution**2,
+            "covered_rate": place,
+            "covered_with_heading_rate": state,
+            "size_bytes": areas.nbytes,
+            "grid": grid.made_from,
+        }
+        return self.Out(areas=areas, metrics=Metrics({"visibility": said}))
+
+
+def _sizes(areas: VisibilityAreas) -> Array:
+    lengths = (areas.runs[:, 2] - areas.runs[:, 1]).astype(np.float64)
+    sizes: Array = np.diff(np.concatenate([[0.0], np.cumsum(lengths)])[areas.starts])
+    return sizes

@@ -1,0 +1,74 @@
+"""What stands on the floor, as a value: of a simulated world, or of the place where a log was recorded."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.files import digest_file
+from omninav.stages.recordings.occupancy_grid import read_grid
+from omninav.stages.values.floor_plan import FloorPlan
+
+from .config import WorldConfig
+from .demo import DEMO
+from .world import World, outline
+
+
+class WorldPlan(Stage):
+    """The plan of a simulated world on a day, for pictures of where a robot drove."""
+
+    world: WorldConfig = DEMO
+    day: Annotated[int, Bounds(ge=0)] = 1
+
+    class Out(Outputs):
+        plan: FloorPlan
+
+    def step(self, ctx: Context) -> Out:
+        """Outlines of everything that a robot cannot drive over or under."""
+        return self.Out(plan=plan_of(self.world, self.day))
+
+
+class DrivenPlan(Stage):
+    """The plan of where logs were recorded, for pictures: the occupancy grid beside the first log that has one.
+
+    Beside `drive.mcap` that is `drive.grid/map.yaml`, as `omninav simulate` writes it, or else `map.yaml`, in the
+    format of ROS map_server and in the frame of the true poses. Without a log it is the simulated world's plan on the
+    first day.
+    """
+
+    log: str | tuple[str, ...] | None = None
+    world: WorldConfig = DEMO
+    day: int | tuple[int, ...] = 1
+
+    class Out(Outputs):
+        """`plan`: absent where no log has a grid beside it."""
+
+        plan: FloorPlan | None = None
+
+    def inputs_digest(self) -> str | None:
+        """Of the grid that is read, where there is one."""
+        grid = self._grid()
+        return None if grid is None else digest_file(grid)
+
+    def step(self, ctx: Context) -> Out:
+        """Read or make the plan."""
+        if self.log is None:
+            return self.Out(plan=plan_of(self.world, self.day if isinstance(self.day, int) else self.day[0]))
+        grid = self._grid()
+        return self.Out(plan=None if grid is None else read_grid(grid))
+
+    def _grid(self) -> Path | None:
+        logs = () if self.log is None else (self.log,) if isinstance(self.log, str) else self.log
+        for path in (Path(log).expanduser() for log in logs):
+            for grid in (path.parent / f"{path.stem}.grid" / "map.yaml", path.parent / "map.yaml"):
+                if path.is_file() and grid.is_file():
+                    return grid
+        return None
+
+
+def plan_of(world: WorldConfig, day: int) -> FloorPlan:
+    """A simulated world's plan on a day."""
+    outlines = np.array([outline(box) for box in World(world, day).obstacles]).reshape(-1, 4, 2)
+    width, depth = world.size
+    return FloorPlan(outlines, float(width), float(depth))

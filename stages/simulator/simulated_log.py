@@ -1,0 +1,123 @@
+"""Simulated drives as MCAP logs."""
+
+import itertools
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline.mcap.log import LogWriter
+from omninav.stages.camera.models import Camera, HyperbolicMirror, Perspective
+from omninav.stages.recordings.camera_yaml import write_camera
+
+from .simulated_recording import SimulatedRecording
+
+F64 = npt.NDArray[np.float64]
+
+WHEEL_TRANSIT, RING_TRANSIT = 2_000_000, 5_000_000
+"""Nanoseconds from the stamp of odometry and of a range reading to its arrival."""
+
+
+def record(
+    recordings: SimulatedRecording | Sequence[SimulatedRecording],
+    path: Path,
+    quality: int = 90,
+    progress: Callable[[int, int | None], None] = lambda done, total: None,
+) -> None:
+    """Write a simulated drive, or several one after the other, as an MCAP log; the same drives give the same bytes.
+
+    Topics as every recording has them: JPEG pictures, camera information, odometry, truth, ranges (`/scan`); what was
+    done to the robot stands on `/ground_truth/event` as JSON; camera.yaml is attached. Odometry, truth and ranges come
+    at their own rates. Log times run behind header stamps as a camera's, a wheel's and a ring's do. `progress` hears of
+    every picture: how many are written, of how many.
+    """
+    drives = [recordings] if isinstance(recordings, SimulatedRecording) else recordings
+    total = sum(len(drive.sent) for drive in drives)
+    written = itertools.count(1)
+    with LogWriter(path) as log:
+        log.attach("camera.yaml", write_camera(drives[0].camera).encode(), "application/yaml")
+        for drive in drives:
+            _write(log, drive, quality, lambda: progress(next(written), total))
+
+
+def _write(log: LogWriter, recording: SimulatedRecording, quality: int, wrote_picture: Callable[[], None]) -> None:
+    for arrival, topic, number in sorted(_arrivals(recording)):
+        if topic == "odometry":
+            _write_odometry(log, recording, number, arrival)
+        elif topic == "truth":
+            stamp = int(recording.true_times[number])
+            truth = {"header": {"frame_id": "map"}, "pose": _pose(recording.true_poses[number])}
+            log.write("/ground_truth/pose", "geometry_msgs/msg/PoseStamped", stamp, truth, arrival)
+        elif topic == "scan":
+            _write_scan(log, recording, number, arrival)
+        elif topic == "event":
+            said = json.dumps(asdict(recording.lifted[number][1]))
+            log.write("/ground_truth/event", "std_msgs/msg/String", arrival, {"data": said})
+        else:
+            _write_picture(log, recording, number, arrival, quality)
+            wrote_picture()
+
+
+def _arrivals(recording: SimulatedRecording) -> list[tuple[int, str, int]]:
+    """All messages by the time of their arrival (ns): what it is, and its number."""
+    found = [(int(stamp) + WHEEL_TRANSIT, "odometry", number) for number, stamp in enumerate(recording.times)]
+    found += [(int(stamp) + WHEEL_TRANSIT, "truth", number) for number, stamp in enumerate(recording.true_times)]
+    found += [(int(stamp) + RING_TRANSIT, "scan", number) for number, stamp in enumerate(recording.ring_times)]
+    found += [(stamp, "event", number) for number, (stamp, _) in enumerate(recording.lifted)]
+    return found + [(arrival, "picture", number) for number, (arrival, _, _) in enumerate(recording.sent)]
+
+
+def _write_odometry(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int) -> None:
+    message = {
+        "header": {"frame_id": "odom"},
+        "child_frame_id": "base_link",
+        "pose": {"pose": _pose(recording.rolled[number])},
+    }
+    log.write("/odom", "nav_msgs/msg/Odometry", int(recording.times[number]), message, arrival)
+
+
+def _write_scan(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int) -> None:
+    scan = recording.ring(number)
+    message = {
+        "header": {"frame_id": "base_link"},
+        "angle_min": scan.first,
+        "angle_max": scan.first + scan.step * (len(scan.ranges) - 1),
+        "angle_increment": scan.step,
+        "scan_time": 1.0 / recording.world.ranges.rate,
+        "range_min": scan.nearest,
+        "range_max": scan.farthest,
+        "ranges": scan.ranges.astype(np.float32),
+    }
+    log.write("/scan", "sensor_msgs/msg/LaserScan", int(recording.ring_times[number]), message, arrival)
+
+
+def _write_picture(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int, quality: int) -> None:
+    _, stamp, shot = recording.sent[number]
+    info = _camera_info(recording.camera)
+    _, packed = cv2.imencode(".jpg", recording.picture(shot), [cv2.IMWRITE_JPEG_QUALITY, quality])
+    picture = {"header": {"frame_id": "omni_camera"}, "format": "jpeg", "data": packed.ravel()}
+    log.write("/camera/camera_info", "sensor_msgs/msg/CameraInfo", stamp, info, arrival)
+    log.write("/camera/image/compressed", "sensor_msgs/msg/CompressedImage", stamp, picture, arrival)
+
+
+def _camera_info(camera: Camera) -> dict[str, Any]:
+    """What a CameraInfo can say of a camera; camera.yaml says the rest."""
+    info = {"header": {"frame_id": "omni_camera"}, "width": camera.width, "height": camera.height_px}
+    if isinstance(camera, HyperbolicMirror | Perspective):
+        k = [camera.focal_x, camera.skew, camera.centre_x, 0.0, camera.focal_y, camera.centre_y, 0.0, 0.0, 1.0]
+        info["k"] = k
+    if isinstance(camera, HyperbolicMirror):
+        info |= {"distortion_model": "hyperbolic_mirror", "d": [camera.a, camera.b]}
+    return info
+
+
+def _pose(pose: F64) -> dict[str, Any]:
+    """A pose (x, y, heading) as the fields of a geometry_msgs/Pose."""
+    x, y, heading = (float(value) for value in pose)
+    turned = {"z": float(np.sin(heading / 2)), "w": float(np.cos(heading / 2))}
+    return {"position": {"x": x, "y": y}, "orientation": turned}

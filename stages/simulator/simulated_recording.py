@@ -1,0 +1,247 @@
+"""Drives through a simulated world as recordings: pictures are rendered when asked for."""
+
+import dataclasses
+import json
+from collections import Counter
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline.files import digest_file, digest_text
+from omninav.stages import simulator
+from omninav.stages.camera import catadioptric
+from omninav.stages.geometry.plane import odometry_noise, se2
+from omninav.stages.recordings.recording import UnreadableRecording
+from omninav.stages.recordings.topics import ascending
+from omninav.stages.values.image import Pixels
+from omninav.stages.values.scan import Scan
+
+from . import tours
+from .cameras import Rays, camera_of, camera_rays, shutter_times
+from .config import Day, Event, WorldConfig
+from .obstacles import Obstacles, gather, nearest
+from .odometry import draw_bias, odometry
+from .people import Person, Track
+from .ranges import azimuths, measure, round_bodies
+from .renderer import Scene, render
+from .robot import NOBODY, drive, reach
+from .streams import stream
+from .world import World
+
+F64 = npt.NDArray[np.float64]
+I64 = npt.NDArray[np.int64]
+
+EPOCH = 1_767_571_200 * 10**9
+"""Midnight before day 0, 2026-01-05 UTC, in nanoseconds."""
+OFFSET = 0.52
+"""Seconds from the start of a drive to its first picture: odometry reaches back before it."""
+TRANSIT = 42_000_000
+"""Nanoseconds from a picture's stamp to its arrival."""
+
+
+class SimulatedRecording:
+    """One drive along a named route of a world, on a day: the same seed, route, day and events give the same bytes.
+
+    A `Recording`. Pictures come in any order at the same price and with the same noise. The day decides the line that
+    is driven, the odometry's errors, the noise and which goods were moved. `collisions` counts what the robot touched.
+    Raises `UnreadableRecording` for a route that the world does not have.
+    """
+
+    def __init__(self, world: WorldConfig, route: str, day: int, events: Sequence[Event] = ()) -> None:
+        if route not in world.routes:
+            raise UnreadableRecording(
+                f"world '{world.name}' has no route '{route}'; it has: {', '.join(sorted(world.routes)) or 'none'}"
+            )
+        self.world, self.route, self.day = world, route, day
+        self.events = tuple(sorted([*world.routes[route].events, *events], key=lambda event: event.at))
+        self._later: World | None = None
+        self._lasts = world.routes[route].day_lasts
+        self.camera = camera_of(world.camera)
+        self.dropped: Counter[str] = Counter()
+        self.details: dict[str, str] = {}
+        self._start = EPOCH + day * 86400 * 10**9 + (9 + sorted(world.routes).index(route)) * 3600 * 10**9
+        self._drive()
+        self._take_pictures()
+        self._turn_rings()
+
+    def _drive(self) -> None:
+        world = self.world
+        try:
+            way = tours.plan(self._world, world.routes[self.route])
+        except tours.NoWay as why:
+            raise UnreadableRecording(f"route '{self.route}': {why}") from None
+        line = tours.wandered(self._world, way, world.robot.wander, self._stream("line"))
+        for event in self.events:
+            if event.to is not None:
+                refuse_no_room(world, self._room, event.to, "events")
+        if self._lasts is not None and any(later.furniture or later.doors < 1.0 for later in world.days[self.day :]):
+            raise UnreadableRecording(
+                f"route '{self.route}' lasts several days, and on one of world '{world.name}' furniture or doors move; "
+                "lamps, curtains and goods may change while the robot drives, but what it may run into may not"
+            )
+        driven = drive(line, world.robot, world.timing.odometry, room=self._room, events=self.events)
+        self._seconds, self.driven, self.collisions = driven.times, driven.poses, driven.collisions
+        bias = draw_bias(world.odometry, stream(world.seed, "odometry bias", self.day))
+        self.rolled = odometry(driven.poses, world.odometry, bias, self._stream("odometry"), driven.rolled_to)
+        self.times = self._stamps(driven.times)
+        self.lifted = [(int(self.times[row]), event) for row, event in driven.events]
+        """When (ns) somebody put the robot down again, and what had been done to it."""
+        put = np.unique([row for row, _ in driven.events]).astype(np.int64)
+        # Up to that moment it was where its wheels had brought it: nobody flies from one place to the other
+        self._true_seconds = np.insert(driven.times, put, driven.times[put])
+        self.true_poses = np.insert(driven.poses, put, driven.rolled_to[put], axis=0)
+        self._true_columns = (*self.true_poses[:, :2].T.copy(), np.unwrap(self.true_poses[:, 2]))
+        self.true_times: I64 = np.insert(self.times, put, self.times[put] - 1)
+
+    def _take_pictures(self) -> None:
+        timing, delivery = self.world.timing, self.world.delivery
+        count = max(0, int(np.floor((self._seconds[-1] - OFFSET) * timing.pictures + 1e-9)) + 1)
+        self._shots = OFFSET + np.arange(count) / timing.pictures
+        fate = self._stream("delivery").uniform(size=(count, 2))
+        stamps = self._stamps(self._shots)
+        late = np.where(fate[:, 1] < delivery.late, round(delivery.late_by * 1e9), 0)
+        arrivals = stamps + TRANSIT + late
+        sent = np.flatnonzero(fate[:, 0] >= delivery.dropped)
+        self.sent: list[tuple[int, int, int]] = sorted(
+            (int(arrivals[shot]), int(stamps[shot]), int(shot)) for shot in sent
+        )
+        """What leaves the camera, in the order of arrival: time of arrival, stamp (ns), number of the picture."""
+        kept, _, overtaken = ascending([stamp for _, stamp, _ in self.sent])  # as whoever reads the log will find them
+        if overtaken:
+            self.dropped["backward_stamp"] = len(overtaken)
+            stamp = self.sent[overtaken[0]][1]
+            self.details["backward_stamp"] = f"{self.name}: a picture was overtaken, stamp {stamp} ns"
+        self._taken: I64 = np.array([self.sent[number][2] for number in kept], dtype=np.int64)
+        self.stamps: I64 = stamps[self._taken]
+        self.truth = self._true(self._shots[self._taken])
+        self.odometry = se2.interpolate(self._seconds, self.rolled, self._shots[self._taken])
+
+    def _turn_rings(self) -> None:
+        rate = self.world.ranges.rate
+        self._rings = np.arange(int(np.floor(self._seconds[-1] * rate + 1e-9)) + 1) / rate
+        self.ring_times = self._stamps(self._rings)
+        """Stamps (ns) of all turns of the range ring."""
+        self._ring_key = int(self._stream("ranges").integers(2**62))
+
+    def _stamps(self, seconds: F64) -> I64:
+        stamps: I64 = self._start + np.round(seconds * 1e9).astype(np.int64)
+        return stamps
+
+    def _true(self, seconds: F64) -> F64:
+        """Where the robot was, (N, 3), at times (N,); `se2.interpolate` would go through the whole drive each time."""
+        columns = [np.interp(seconds, self._true_seconds, column) for column in self._true_columns]
+        return np.stack([columns[0], columns[1], se2.wrap(columns[2])], axis=-1)
+
+    @property
+    def name(self) -> str:
+        """World, route and day in words."""
+        return f"{self.world.name}, route {self.route}, day {self.day}"
+
+    @cached_property
+    def _world(self) -> World:
+        return World(self.world, self.day)
+
+    def _scene(self, seconds: float) -> Scene:
+        """The world as it looks at a time: a long drive may see several days."""
+        if self._lasts is None or seconds < self._lasts:
+            return self._world.scene
+        number = self.day + int(seconds // self._lasts)
+        if self._later is None or self._later.day != number:
+            self._later = World(self.world, number)
+        return self._later.scene
+
+    @cached_property
+    def _room(self) -> Obstacles:
+        return gather(self._world.obstacles, self.world.size, reach(self.world.robot))
+
+    @cached_property
+    def _key(self) -> int:
+        return int(self._stream("pixels").integers(2**62))
+
+    def _stream(self, purpose: str) -> np.random.Generator:
+        return stream(self.world.seed, purpose, self.route, self.day)
+
+    def image(self, frame: int) -> Pixels:
+        """The picture of a frame, (height, width, 3) uint8 blue-green-red, rendered now."""
+        return self.picture(int(self._taken[frame]))
+
+    def picture(self, shot: int) -> Pixels:
+        """A picture by its number among all that were taken, also those that nobody received."""
+        sensor, at = self.world.sensor, self._shots[shot]
+        swing = np.sin(2 * np.pi * at / sensor.exposure_period)
+        return render(
+            self._scene(float(at)),
+            self._rays,
+            self._true(shutter_times(sensor, at)),
+            self.world.camera.height,
+            exposure=sensor.exposure * (1.0 + sensor.exposure_drift * float(swing)),
+            noise=sensor.noise,
+            key=self._key + shot,
+            people=self._people(float(at)),
+        )
+
+    @cached_property
+    def _rays(self) -> Rays:
+        return camera_rays(self.camera, self.world.sensor.vignetting, self.world.robot.radius)
+
+    def scan(self, frame: int) -> Scan | None:
+        """The last turn of the range ring before a frame."""
+        return self.ring(int(np.searchsorted(self.ring_times, self.stamps[frame], side="right")) - 1)
+
+    def ring(self, turn: int) -> Scan:
+        """A turn of the range ring, by its number."""
+        at, ring = self._rings[turn], self.world.ranges
+        people = round_bodies(self._people(float(at)))
+        rng = np.random.default_rng([self._ring_key, turn])
+        metres = measure(self._room, people[None], self._true(at[None]), ring, rng)[0]
+        return ring_scan(self.world, metres.astype(np.float32).astype(np.float64))  # as a message holds them
+
+    def _people(self, seconds: float) -> tuple[Person, ...]:
+        """Who is about, some of them because of the robot."""
+        return self._world.people_at(seconds, Track(self._seconds, self.driven))
+
+    def digest(self) -> str:
+        """sha256 over what the drive sees of the world, the route, the day, the events and the code that renders it."""
+        events = json.dumps([dataclasses.asdict(event) for event in self.events])
+        return digest_text(simulation_digest(self._seen()), self.route, str(self.day), events)
+
+    def _seen(self) -> WorldConfig:
+        """The world without the days before and after the drive: drives of a day are alike whatever others bring."""
+        to_come = self.world.days[self.day + 1 :] if self._lasts is not None else ()
+        return dataclasses.replace(self.world, days=(*(Day(),) * self.day, self.world.day(self.day), *to_come))
+
+
+def refuse_no_room(world: WorldConfig, room: Obstacles, place: Sequence[float], where: str) -> None:
+    """Raise `UnreadableRecording` for a place (x, y, heading) where the robot has no room to stand."""
+    clear = nearest(room, NOBODY, float(place[0]), float(place[1]))[0]
+    if clear < world.robot.radius:
+        raise UnreadableRecording(
+            f"{where}: {place[0]:g}, {place[1]:g} of world '{world.name}' is {max(clear, 0.0):.2f} m from an obstacle, "
+            f"and the robot's radius is {world.robot.radius:g} m; choose another place on the floor plan"
+        )
+
+
+def in_order(days: int | Sequence[int]) -> list[int]:
+    """Days that a route is driven on, each once, in the order of the calendar. Raises `UnreadableRecording`."""
+    listed = sorted({days} if isinstance(days, int) else set(days))
+    if not listed or listed[0] < 0:
+        raise UnreadableRecording("days are numbered from 0; type day=1 or day=[0,1,2]")
+    return listed
+
+
+def simulation_digest(world: WorldConfig) -> str:
+    """sha256 over a world and the code that simulates it."""
+    folder = Path(simulator.__file__).parent
+    used = [Path(str(module.__file__)) for module in (catadioptric, odometry_noise, se2)]
+    code = [*sorted(folder.glob("*.py")), Path(__file__), *used]
+    described = json.dumps(dataclasses.asdict(world), sort_keys=True)
+    return digest_text(described, *(digest_file(path) for path in code))
+
+
+def ring_scan(world: WorldConfig, metres: F64) -> Scan:
+    """A turn of a world's range ring as the value that travels on wires."""
+    first, step = azimuths(world.ranges)
+    return Scan(metres, first, step, nearest=0.0, farthest=world.ranges.farthest)

@@ -1,0 +1,72 @@
+"""A picture of where to go, from an image file."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from omninav.pipeline import Context, Outputs, Stage
+from omninav.pipeline.files import digest_file
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.camera.models import Camera
+from omninav.stages.simulator.cameras import camera_of
+from omninav.stages.simulator.config import WorldConfig
+from omninav.stages.simulator.demo import DEMO
+from omninav.stages.values.image import Image, Pixels
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".tif", ".tiff", ".webp")
+"""How a goal ends that is an image file."""
+
+
+class GoalPicture(Stage):
+    """The picture that a goal names, with the camera that it was taken with: the robot's own.
+
+    A `goal` that ends like an image file is one; any other names a place, and there is no picture. Raises BadInput
+    where none is named, where there is no such file, where it is no image, and where it has another size than the
+    robot's camera takes: before anything runs, as far as can be.
+    """
+
+    goal: str | int | None = None
+    world: WorldConfig = DEMO
+
+    class Out(Outputs):
+        """Absent where the goal is no picture."""
+
+        image: Image | None = None
+        camera: Camera | None = None
+
+    def inputs_digest(self) -> str | None:
+        """Of the picture, if there is one."""
+        file = self._file()
+        return None if file is None else digest_file(file)
+
+    def step(self, ctx: Context) -> Out:
+        """Read the picture."""
+        file = self._file()
+        if file is None:
+            return self.Out()
+        pixels, camera = read_image(file), camera_of(self.world.camera)
+        if pixels.shape[:2] != (camera.height_px, camera.width):
+            raise BadInput(
+                f"goal: {file} has {pixels.shape[1]} x {pixels.shape[0]} pixels, and the robot's camera takes "
+                f"{camera.width} x {camera.height_px}; give a picture that this camera took"
+            )
+        return self.Out(image=Image(pixels), camera=camera)
+
+    def _file(self) -> Path | None:
+        if self.goal is None or not str(self.goal).strip():
+            raise BadInput("goal: no goal is named; type goal=PLACE, its name or number, or goal=PICTURE.png")
+        if not str(self.goal or "").lower().endswith(SUFFIXES):
+            return None
+        file = Path(str(self.goal))
+        if not file.is_file():
+            raise BadInput(f"goal: there is no file {file}; give a picture, or a place's number or name")
+        return file
+
+
+def read_image(file: Path) -> Pixels:
+    """The pixels of an image file. Raises BadInput where it cannot be read as one."""
+    pixels = cv2.imdecode(np.frombuffer(file.read_bytes() or b"\0", np.uint8), cv2.IMREAD_COLOR)
+    if pixels is None:
+        raise BadInput(f"goal: {file} cannot be read as an image; give a .png or .jpg that the robot's camera took")
+    return np.asarray(pixels, np.uint8)

@@ -1,1 +1,0 @@
-"""Beliefs of one kind as beliefs of another."""
