@@ -132,10 +132,24 @@ def graph_on_field(variant: str, source: dict[str, Any], limit: float | None = N
     nodes, wires = config["nodes"], config["wires"]
     nodes["source"] = {"_target_": "benchmarks.changing_field.ChangingField", **source}
     if limit is not None:
-        nodes["limit"], wires["limit"] = {"_target_": "omninav.stages.mapping.fixed_threshold.FixedLimit"}, {}
-        nodes["limit"]["distance"] = limit
-    kept = {"source", "limit", "match", "sensor", "first_belief", "motion", "fusion", "state", "lessons", "mapping"}
-    kept = {name for name in kept | {"empty_map", "estimate"} if nodes.get(name)}
+        nodes["novelty_threshold"], wires["novelty_threshold"] = (
+            {"_target_": "omninav.stages.mapping.fixed_threshold.FixedThreshold"},
+            {},
+        )
+        nodes["novelty_threshold"]["distance"] = limit
+    kept = {
+        "source",
+        "novelty_threshold",
+        "match",
+        "sensor",
+        "prior",
+        "motion",
+        "fusion",
+        "particle_clustering",
+        "map_update",
+        "mapping",
+    }
+    kept = {name for name in kept | {"initial_map", "estimate"} if nodes.get(name)}
     config["nodes"] = {name: nodes[name] for name in nodes if name in kept}
     config["wires"] = {
         name: {port: "source.view" if wire == "features.view" else wire for port, wire in ports.items()}

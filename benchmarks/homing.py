@@ -13,7 +13,7 @@ from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.two_views.absolute_pose import grunert, three_point_pose
 from omninav.stages.geometry.two_views.epipolar import planar_two_points
 from omninav.stages.geometry.two_views.relative_pose_ransac import relative_pose
-from omninav.stages.homing.visual_homing import Memory, VisualHoming
+from omninav.stages.homing.visual_homing import VisualHomingState, VisualHoming
 from omninav.stages.match.correspondences import MatchFeatures
 from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.config import MirrorCamera
@@ -150,15 +150,19 @@ def _homing() -> list[Row]:
     pairs = [match.step(ctx, features, goal).correspondences for features in seen]
 
     def begin() -> None:
-        stage.step(Context("h", np.random.default_rng(0)), Memory(), pictures[0], target, seen[0], pairs[0], camera)
+        stage.step(
+            Context("h", np.random.default_rng(0)), VisualHomingState(), pictures[0], target, seen[0], pairs[0], camera
+        )
 
     def begin_all() -> None:
         features = sift.step(ctx, pictures[0], camera).features
         found = match.step(ctx, features, goal).correspondences
-        stage.step(Context("h", np.random.default_rng(0)), Memory(), pictures[0], target, features, found, camera)
+        stage.step(
+            Context("h", np.random.default_rng(0)), VisualHomingState(), pictures[0], target, features, found, camera
+        )
 
     def drive() -> None:
-        memory, own = Memory(), Context("h", np.random.default_rng(0))
+        memory, own = VisualHomingState(), Context("h", np.random.default_rng(0))
         for picture, features, found in zip(pictures, seen, pairs, strict=True):
             out = stage.step(own, memory, picture, target, features, found, camera)
         assert out.vector is not None

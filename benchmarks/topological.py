@@ -10,7 +10,7 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import encode
 from omninav.stages.camera.models import HyperbolicMirror
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
-from omninav.stages.features.vertical_segments import FindColumnSegments
+from omninav.stages.features.vertical_segments import FindVerticalSegments
 from omninav.stages.geometry.appearance.visual_distance import Matching, match_columns, match_patches
 from omninav.stages.mapping.topological import TopologicalMapping
 from omninav.stages.match.visual_distance import MatchPlaces
@@ -19,7 +19,7 @@ from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.world import World
 from omninav.stages.values.image import Image, Pixels
-from omninav.stages.values.local_features import GlobalMoments, LocalFeatures
+from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.pose import Pose
 
 from .table import Row, medians
@@ -52,7 +52,7 @@ def two_views() -> tuple[list[Pixels], HyperbolicMirror]:
 
 def _pair() -> list[Row]:
     pictures, camera = two_views()
-    sift, columns, context = RotationReducedSift(), FindColumnSegments(), Context("features")
+    sift, columns, context = RotationReducedSift(), FindVerticalSegments(), Context("features")
     sift.setup(context)
     own = cv2.SIFT.create(nfeatures=sift.features, contrastThreshold=sift.contrast)
     brute = cv2.BFMatcher(cv2.NORM_L2)
@@ -107,7 +107,7 @@ def a_tour(images: int, landmarks: int = 6000, seen: int = 200) -> tuple[list[Lo
 
 def _map() -> list[Row]:
     views, poses = a_tour(IMAGES)
-    grey = GlobalMoments(np.zeros(3, np.float32))  # all alike: no two views can be told apart at a glance
+    grey = GlobalDescriptor(np.zeros(3, np.float32))  # all alike: no two views can be told apart at a glance
     ticks = [Tick(row, row * 10**9) for row in range(IMAGES)]
     start = time.process_time()
     out = TopologicalMapping().step(

@@ -7,7 +7,7 @@ import numpy as np
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.mapping.topological import TopologicalMapping
-from omninav.stages.values.local_features import GlobalMoments, LocalFeatures
+from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.pose import Pose
 
 
@@ -65,7 +65,7 @@ def mapped(
         Context("mapping"),
         ticks=ticks,
         features=[world.seen(pose) for pose in poses],
-        moments=[GlobalMoments(np.zeros(3, np.float32)) for _ in poses],
+        descriptor=[GlobalDescriptor(np.zeros(3, np.float32)) for _ in poses],
         odometry=poses,
         truth=poses if truth else [None] * len(poses),
         known=known,

@@ -7,7 +7,7 @@ from omninav.stages.geometry.plane.odometry_motion import turn_go_turn
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import UncertainMotion
-from omninav.stages.values.views import Coefficients, ViewLimit
+from omninav.stages.values.views import Coefficients, NoveltyThreshold
 
 ROUND = 25
 FREQUENCIES = np.random.default_rng(1).normal(0.0, 1.5, (2, 12))
@@ -38,7 +38,7 @@ class Rounds(Source):
     class Out(Outputs):
         tick: Tick
         view: Coefficients
-        limit: ViewLimit
+        limit: NoveltyThreshold
         model: UncertainMotion | None = None
 
     def step(self, ctx: Context, at: At) -> Out | None:
@@ -51,7 +51,7 @@ class Rounds(Source):
         first = n % half == 0
         view = Coefficients(look(n), look(n)[None])
         tick = Tick(n, n * 10**9, n // half, n % half, first)
-        return self.Out(tick=tick, view=view, limit=ViewLimit(1.0), model=None if first else model)
+        return self.Out(tick=tick, view=view, limit=NoveltyThreshold(1.0), model=None if first else model)
 
 
 class Knows(Stage):

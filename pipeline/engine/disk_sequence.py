@@ -10,7 +10,7 @@ from .codec import BadEncoding, decode, encode
 _RECORD = struct.Struct("<I")
 
 
-class Spool(Sequence[Any]):
+class DiskSequence(Sequence[Any]):
     """Values in the order they came, each record its length and its bytes.
 
     `append` adds one; reading decodes on demand. `cut(size)` drops everything behind a byte length that a

@@ -22,7 +22,7 @@ from omninav.pipeline.graph.stage import Context, Source, State
 from . import checkpoint as checkpoints
 from .checkpoint import Checkpoint
 from .codec import encode_state, restore_state
-from .disk_sequence import Spool
+from .disk_sequence import DiskSequence
 
 
 class StageFailed(Exception):
@@ -42,7 +42,7 @@ class Front(Protocol):
 class Present(Sequence[Any]):
     """The present values of a spooled sequence, without the gaps."""
 
-    def __init__(self, spool: Spool) -> None:
+    def __init__(self, spool: DiskSequence) -> None:
         self._spool = spool
         self._where = [number for number, value in enumerate(spool) if value is not None]
 
@@ -168,16 +168,16 @@ class Engine:
             w.origin for w in graph.wires if w.from_node in ticking and (w.hold or w.to_node in after) and not w.collect
         }
         self.kept |= {origin for origin in wanted if origin.partition(".")[0] in ticking}
-        self.spools: dict[str, Spool] = {}
+        self.spools: dict[str, DiskSequence] = {}
         self.together: dict[str, tuple[str, ...]] = {}
         if memory is not None:
             collected = {wire.origin for wire in graph.wires if wire.collect and wire.from_node in ticking}
-            self.spools = {origin: Spool(memory / f"{origin}.spool") for origin in sorted(collected)}
+            self.spools = {origin: DiskSequence(memory / f"{origin}.spool") for origin in sorted(collected)}
             if front is not None and front.replay is None:
                 self.together["front"] = tuple(front.boundary)
             if recorded:
                 self.together["shared"] = tuple(recorded)
-            self.spools |= {name: Spool(memory / f"{name}.spool") for name in self.together}
+            self.spools |= {name: DiskSequence(memory / f"{name}.spool") for name in self.together}
         self.ticks = 0
         self.ended = False
 

@@ -18,11 +18,11 @@ from omninav.pipeline.graph.graph import ARTIFACTS, Graph
 
 from .artifact import Cache
 from .codec import BadEncoding, decode, encode, seal, unseal
-from .disk_sequence import Spool
+from .disk_sequence import DiskSequence
 
 
 @dataclass
-class CachedFront:
+class CachedPrefix:
     """The front of a graph in a cache. `replay` is None where it is still to be computed.
 
     `said` tells in words why it was found or not.
@@ -105,7 +105,7 @@ def front_key(graph: Graph, nodes: frozenset[str]) -> str:
 
 
 @contextmanager
-def cached_front(graph: Graph, cache: Cache | None, seed: int) -> Iterator[CachedFront | None]:
+def cached_front(graph: Graph, cache: Cache | None, seed: int) -> Iterator[CachedPrefix | None]:
     """The front of a graph, found in the cache or to be recorded. Others who want the same one wait meanwhile."""
     nodes = front_nodes(graph)
     if cache is None or not nodes or graph.source is None:
@@ -116,7 +116,7 @@ def cached_front(graph: Graph, cache: Cache | None, seed: int) -> Iterator[Cache
     bulky = [origin for origin in boundary if getattr(getattr(graph.port(origin), "type", None), "bulky", False)]
     if bulky:
         who = ", ".join(sorted({wire.to_node for wire in readers if wire.origin == bulky[0]}))
-        yield CachedFront(
+        yield CachedPrefix(
             nodes, tuple(boundary), "", f"not cached: {bulky[0]} is too large to keep and is read by {who}", replay=None
         )
         return
@@ -129,16 +129,16 @@ def cached_front(graph: Graph, cache: Cache | None, seed: int) -> Iterator[Cache
                 try:
                     notes = decode(unseal(cache.path(candidate, ".notes").read_bytes(), str(path)))
                     if digest_file(path) == notes["digest"]:
-                        spool = Spool(path)
+                        spool = DiskSequence(path)
                         held.close()
                         said = (
                             f"found: {', '.join(sorted(nodes))} of this log with these parameters were computed before"
                         )
-                        yield CachedFront(nodes, tuple(boundary), key, said, spool, notes["nodes"])
+                        yield CachedPrefix(nodes, tuple(boundary), key, said, spool, notes["nodes"])
                         return
                 except (BadEncoding, FileNotFoundError):
                     path.unlink(missing_ok=True)  # half a result is no result: it is made again
-        yield CachedFront(
+        yield CachedPrefix(
             nodes, tuple(boundary), key, "not found: code, parameters or log are new, or it never ran to its end"
         )
 
@@ -148,7 +148,7 @@ def seeded(key: str, seed: int) -> str:
     return digest_text(key, f"seed {seed}")
 
 
-def keep(front: CachedFront, cache: Cache, seed: int, spool: Path, notes: Mapping[str, Mapping[str, Any]]) -> None:
+def keep(front: CachedPrefix, cache: Cache, seed: int, spool: Path, notes: Mapping[str, Mapping[str, Any]]) -> None:
     """Put a recorded front into the cache. `notes` are those of its `lineage`: counts, facts, and who drew."""
     drew = any(note["drew"] for note in notes.values())
     key = seeded(front.key, seed) if drew else front.key

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from omninav.pipeline.engine.artifact import Cache
-from omninav.pipeline.engine.disk_sequence import Spool
+from omninav.pipeline.engine.disk_sequence import DiskSequence
 from omninav.pipeline.engine.engine import Engine
-from omninav.pipeline.engine.prefix import CachedFront, cached_front, following, front_boundary, front_nodes
+from omninav.pipeline.engine.prefix import CachedPrefix, cached_front, following, front_boundary, front_nodes
 from omninav.pipeline.files import digest_file, digest_text, write_whole
 from omninav.pipeline.graph.graph import Graph, Node
 from omninav.pipeline.graph.problems import BadInput
@@ -129,7 +129,7 @@ def repeat(given: Mapping[str, Any], tell: Tell) -> None:
         artifacts[artifact.name], made = obtain(run, artifact, BASE_SEED, cache, math.inf, Heartbeat(tell))
         facts[artifact.name] = made
         (folder / f"{artifact.name}.omap").unlink(missing_ok=True)  # the cache keeps it
-    shared: CachedFront | None = None
+    shared: CachedPrefix | None = None
     for number, seed in enumerate(seeds):
         place = run.memory / f"seed_{seed}"
         record = bool(given["shared"]) and shared is None and number + 1 < len(seeds)
@@ -169,10 +169,10 @@ def _once(
     seed: int,
     place: Path,
     cache: Cache | None,
-    shared: CachedFront | None,
+    shared: CachedPrefix | None,
     record: bool,
     tell: Tell,
-) -> tuple[Engine, CachedFront | None]:
+) -> tuple[Engine, CachedPrefix | None]:
     """One repetition; with `record` also the front that the others may share. What grows in place is its own."""
     artifacts = {name: copy.deepcopy(value) if value.in_place else value for name, value in artifacts.items()}
     step = Heartbeat(tell).step
@@ -200,15 +200,15 @@ def _once(
     notes = {name: engine.calls[name].ctx.notes() for name in sorted(nodes | set(before))}
     engine.spools.pop("shared").flush()
     given = {origin: value for origin, value in engine.values.items() if origin.partition(".")[0] in before}
-    replay = Spool(place / "shared.spool")
-    return engine, CachedFront(nodes | frozenset(before), tuple(boundary), "", "", replay, notes, given)
+    replay = DiskSequence(place / "shared.spool")
+    return engine, CachedPrefix(nodes | frozenset(before), tuple(boundary), "", "", replay, notes, given)
 
 
 def _grows(node: Node) -> bool:
     return any(getattr(port.type, "in_place", False) for port in node.signature.outputs.values())
 
 
-def _recordable(graph: Graph, known: CachedFront | None) -> list[str]:
+def _recordable(graph: Graph, known: CachedPrefix | None) -> list[str]:
     """What may have to be shared: all that nodes read of the front, but what is too large to keep over a log.
 
     Of the part that comes from the cache there is only its boundary.

@@ -29,7 +29,7 @@ Compose = Callable[[Sequence[str]], dict[str, Any]]
 
 
 @dataclass
-class Cell:
+class ConditionRun:
     """A condition over one drive, or a run beside it, on its way: configuration, folder, results by seed, error."""
 
     condition: Condition
@@ -72,7 +72,7 @@ class Log:
         return facts
 
 
-class FramesOfJobs:
+class JobProgress:
     """How many frames jobs have done, of how many: what each one told last, added up."""
 
     def __init__(self, jobs: int) -> None:
@@ -139,7 +139,7 @@ class ExperimentRun:
             for condition in experiment.conditions()
             for drive, driven in drives.items()
         ]
-        self.beside: list[list[Cell]] = []
+        self.beside: list[list[ConditionRun]] = []
         for remark in experiment.remarks:
             row = []
             for label, own in experiment.sweep[remark.over].items():
@@ -155,7 +155,7 @@ class ExperimentRun:
         return sorted({measure.stages for measure in self.experiment.measures.values() if measure.stages})
 
     @property
-    def all_cells(self) -> list[Cell]:
+    def all_cells(self) -> list[ConditionRun]:
         """Conditions and the runs beside them."""
         return [*self.cells, *(cell for row in self.beside for cell in row)]
 
@@ -178,14 +178,14 @@ class ExperimentRun:
         parts: Sequence[str],
         words: Sequence[str],
         beside: bool = False,
-    ) -> Cell:
+    ) -> ConditionRun:
         own = [word for part in (self.experiment.common, *parts) for word in words_of(part)]
         named = any(word.startswith("variant=") for word in own)  # a condition may be of another variant
         typed = (*([] if named else [f"variant={variant}"]), *own, *words)
         said = " ".join(part for part in (condition.name, drive, variant if beside else "") if part)
         name = re.sub(r"[^A-Za-z0-9.]+", "_", said).strip("_")
         seeds = (0,) if beside else tuple(range(self.experiment.repetitions))
-        cell = Cell(
+        cell = ConditionRun(
             condition,
             drive,
             variant,
@@ -285,7 +285,7 @@ class ExperimentRun:
                     if str(log.file) in json.dumps(cell.config):
                         cell.error = f"its log ({log.name}) could not be simulated: {failed[log.name]}"
 
-    def _use_log(self, cell: Cell, graph: Graph, config: dict[str, Any], route: Any, day: Any) -> None:
+    def _use_log(self, cell: ConditionRun, graph: Graph, config: dict[str, Any], route: Any, day: Any) -> None:
         """Let the graph's source read a simulated log instead of rendering for itself, where no log is named.
 
         What the log was made of is no longer among the source's parameters: drives that look alike are one.
@@ -334,7 +334,7 @@ class ExperimentRun:
     def _make_maps(self) -> None:
         """One job for each map that an unfinished condition needs, so that no condition waits for another's."""
         jobs: dict[str, Job] = {}
-        needs: dict[str, list[tuple[Cell, str, Path]]] = {}
+        needs: dict[str, list[tuple[ConditionRun, str, Path]]] = {}
         for cell in self._unfinished():
             assert cell.planned is not None
             for artifact in cell.planned.artifacts:
@@ -361,7 +361,7 @@ class ExperimentRun:
 
     # repetitions
 
-    def _unfinished(self) -> list[Cell]:
+    def _unfinished(self) -> list[ConditionRun]:
         return [cell for cell in self.all_cells if not cell.error and len(cell.results) < len(cell.seeds)]
 
     def _repeat(self) -> None:
@@ -408,7 +408,7 @@ class ExperimentRun:
     def _through(self, jobs: Sequence[Job], what: str) -> dict[str, str]:
         if not jobs:
             return {}
-        frames, name = FramesOfJobs(len(jobs)), f"{self.experiment.name}: {what}"
+        frames, name = JobProgress(len(jobs)), f"{self.experiment.name}: {what}"
         with Progress() as progress:
 
             def show() -> None:

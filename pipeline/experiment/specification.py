@@ -73,7 +73,7 @@ class Claim:
 
 
 @dataclass(frozen=True)
-class Arrangement:
+class PageLayout:
     """How results stand on the page: a table by `rows` and `columns`, and a figure along `along` where it is named.
 
     `drawn`: the measures that have a figure, by default the first.
@@ -106,7 +106,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Remark:
+class Note:
     """Something said on the page from runs of another variant beside the experiment: one for each label of `over`."""
 
     says: str
@@ -135,7 +135,7 @@ class Experiment:
     variant: str
     sweep: Mapping[str, Mapping[Any, str]]
     measures: Mapping[str, Measure]
-    page: Arrangement
+    page: PageLayout
     common: str = ""
     set: str = ""
     repetitions: int = 50
@@ -144,7 +144,7 @@ class Experiment:
     published: Mapping[str, Any] = field(default_factory=dict)
     claims: tuple[Claim, ...] = ()
     curves: tuple[Curve, ...] = ()
-    remarks: tuple[Remark, ...] = ()
+    remarks: tuple[Note, ...] = ()
     notes: tuple[str, ...] = ()
     shared: bool = True
     cores: int | None = None

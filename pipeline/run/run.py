@@ -19,7 +19,7 @@ import yaml
 
 from omninav.pipeline.engine.artifact import Cache, read_artifact, read_header, write_artifact
 from omninav.pipeline.engine.engine import Engine, StageFailed
-from omninav.pipeline.engine.prefix import CachedFront, cached_front, keep, lineage, seeded
+from omninav.pipeline.engine.prefix import CachedPrefix, cached_front, keep, lineage, seeded
 from omninav.pipeline.files import digest_file, digest_text, write_whole
 from omninav.pipeline.graph.graph import ARTIFACTS, Graph, build
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
@@ -441,12 +441,12 @@ def _provenance(graph: Graph, engine: Engine, variant: str) -> dict[str, Any]:
     return {**notes_of(engine, graph.nodes), "variant": variant, "stages": stages_of(graph)}
 
 
-def usable(front: CachedFront | None) -> CachedFront | None:
+def usable(front: CachedPrefix | None) -> CachedPrefix | None:
     """A front that is found or may be recorded; None where it is too large to keep."""
     return front if front is not None and front.key else None
 
 
-def keep_front(engine: Engine, front: CachedFront | None, cache: Cache | None, seed: int) -> None:
+def keep_front(engine: Engine, front: CachedPrefix | None, cache: Cache | None, seed: int) -> None:
     """Put the front that an engine recorded into the cache, where it was not found there."""
     if cache is not None and front is not None and front.key and front.replay is None:
         spool = engine.spools["front"]
@@ -471,7 +471,7 @@ def notes_of(engine: Engine, only: Container[str] | None = None) -> dict[str, An
     return {"dropped": dropped, "facts": facts}
 
 
-def _finish(run: Run, planned: Plan, engine: Engine, front: CachedFront | None) -> dict[str, Any]:
+def _finish(run: Run, planned: Plan, engine: Engine, front: CachedPrefix | None) -> dict[str, Any]:
     from omninav.pipeline.report.report import write_report
 
     metrics, figures, tables = results_of(engine)

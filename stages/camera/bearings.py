@@ -88,7 +88,7 @@ def camera_bearings(points: Array, camera: Camera) -> Array:
             raise BadInput(
                 f"camera: no bearings are known for the pixels of this {type(camera).__name__}; give its model in "
                 "camera.yaml (a donut: centre and mask), or find features on the panorama: "
-                "wires.features.picture=unwarp.panorama"
+                "wires.features.image=unwarp.panorama"
             )
 
 

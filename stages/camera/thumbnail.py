@@ -13,7 +13,7 @@ Pixels = npt.NDArray[np.uint8]
 Array = npt.NDArray[np.float64]
 
 
-class SmallPicture(NamedTuple):
+class Thumbnail(NamedTuple):
     """`pixels` of the part of a picture that begins at `corner` (column, row), `scale` times as large."""
 
     pixels: Pixels
@@ -31,7 +31,7 @@ class SmallPicture(NamedTuple):
         return encoded.tobytes()
 
 
-def small_picture(pixels: Pixels, camera: Camera | None, columns: int) -> SmallPicture:
+def small_picture(pixels: Pixels, camera: Camera | None, columns: int) -> Thumbnail:
     """A picture (rows, columns, 3) of at most so many columns; of a mirror's or a lens's the disc alone."""
     left, right, top, bottom = used_part(camera, pixels.shape)
     part = pixels[top:bottom, left:right]
@@ -39,7 +39,7 @@ def small_picture(pixels: Pixels, camera: Camera | None, columns: int) -> SmallP
     if scale < 1.0:
         size = columns, max(1, round(part.shape[0] * scale))
         part = np.asarray(cv2.resize(part, size, interpolation=cv2.INTER_AREA), np.uint8)
-    return SmallPicture(part, scale, (left, top))
+    return Thumbnail(part, scale, (left, top))
 
 
 def used_part(camera: Camera | None, shape: tuple[int, ...]) -> tuple[int, int, int, int]:

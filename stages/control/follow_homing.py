@@ -18,7 +18,7 @@ from .wall_avoider import wandering
 F64 = npt.NDArray[np.float64]
 
 
-class Patience(State):
+class FollowHomingState(State):
     """For how many ticks in a row the target has been lost, and for how many there has been no way through.
 
     `target`: the one it goes to; `closest`: the least ratio of the way to it that was left; ticks since then in all
@@ -78,7 +78,7 @@ class FollowHoming(Stage):
     def step(
         self,
         ctx: Context,
-        patience: Patience,
+        patience: FollowHomingState,
         vector: HomingVector | None = None,
         progress: PathProgress | None = None,
         scan: Scan | None = None,
@@ -128,7 +128,7 @@ class FollowHoming(Stage):
             speed = 0.0
         return self.Out(command=Command(speed, self._turn(direction)), status=DrivingStatus("driving"))
 
-    def _kept_away(self, patience: Patience, vector: HomingVector, ranges: F64, around: F64) -> str:
+    def _kept_away(self, patience: FollowHomingState, vector: HomingVector, ranges: F64, around: F64) -> str:
         """Why it will not come closer to the target than it has been, "" as long as it may."""
         if vector.number != patience.target:
             patience.target, patience.closest = vector.number, math.inf
@@ -145,7 +145,7 @@ class FollowHoming(Stage):
             return f"something stands in the way, and going around it for {self.detour} ticks led no closer"
         return f"{self.idle} ticks have led no closer" if patience.since > self.idle else ""
 
-    def _wander(self, patience: Patience, scan: Scan, why: str) -> Out:
+    def _wander(self, patience: FollowHomingState, scan: Scan, why: str) -> Out:
         ranges, around = np.minimum(scan.ranges, scan.farthest), scan.azimuths()
         room = (free_ahead(ranges, around, self.radius, self.margin) - self.stop_at) / self.room
         speed, turning, patience.side = wandering(room, roomier_side(ranges, around), patience.side)

@@ -20,7 +20,7 @@ def _no_ranges() -> F64:
     return np.zeros(0)
 
 
-class Memory(State):
+class WallAvoiderState(State):
     """Which way it turns away (1 left, -1 right, 0 undecided), and the ranges of the tick before."""
 
     side: int = 0
@@ -47,7 +47,7 @@ class WallAvoider(Stage):
     class Out(Outputs):
         command: Command
 
-    def step(self, ctx: Context, scan: Scan, memory: Memory) -> Out:
+    def step(self, ctx: Context, scan: Scan, memory: WallAvoiderState) -> Out:
         """The command that this ring of ranges asks for."""
         heard = np.minimum(scan.ranges, scan.farthest)
         ranges = np.minimum(heard, memory.ranges) if len(memory.ranges) == len(heard) else heard

@@ -5,13 +5,13 @@ from typing import Annotated
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.camera.models import Camera
 from omninav.stages.values.image import Image, Panorama
-from omninav.stages.values.local_features import GlobalMoments
+from omninav.stages.values.local_features import GlobalDescriptor
 
 from .colour_moments import picture_colours
 from .prepared_image import read_picture
 
 
-class ViewMoments(Stage):
+class GlobalColours(Stage):
     """Colour correlations of a whole view, which light does not change: unlike views differ at a glance.
 
     Goedeme et al. 2007, section 4.2.1: the moments of equation 1 (erratum 25) over all of a panorama, or over the ring
@@ -23,9 +23,9 @@ class ViewMoments(Stage):
     class Out(Outputs):
         """Three correlations."""
 
-        moments: GlobalMoments
+        descriptor: GlobalDescriptor
 
-    def step(self, ctx: Context, picture: Image | Panorama, camera: Camera | None = None) -> Out:
+    def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
         """Describe one picture."""
-        read = read_picture(picture, camera, self.largest)
-        return self.Out(moments=GlobalMoments(picture_colours(read.pixels, read.seen)))
+        read = read_picture(image, camera, self.largest)
+        return self.Out(descriptor=GlobalDescriptor(picture_colours(read.pixels, read.seen)))

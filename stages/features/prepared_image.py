@@ -28,7 +28,7 @@ class Ring(NamedTuple):
     yaw: float
 
 
-class ReadPicture(NamedTuple):
+class PreparedImage(NamedTuple):
     """A picture made ready. `pixels` (rows, columns, 3); `seen` (rows, columns): where it shows the world.
 
     `scale`: pixels of the original per pixel of this one. `ring`: of a mirror image, in these pixels; None: columns are
@@ -63,13 +63,13 @@ def ring_of(camera: Camera) -> Ring | None:
         case Donut():
             raise BadInput(
                 "camera: a donut without centre_x, centre_y, inner_radius_px and outer_radius_px; give them in "
-                "camera.yaml, or find features on the panorama: wires.features.picture=unwarp.panorama"
+                "camera.yaml, or find features on the panorama: wires.features.image=unwarp.panorama"
             )
         case _:
             return None
 
 
-def read_picture(picture: Image | Panorama, camera: Camera | None, largest: int) -> ReadPicture:
+def read_picture(picture: Image | Panorama, camera: Camera | None, largest: int) -> PreparedImage:
     """Make a picture ready; one of more than `largest` pixels is made smaller.
 
     A panorama needs no camera. Raises BadInput for an image without one.
@@ -103,4 +103,4 @@ def read_picture(picture: Image | Panorama, camera: Camera | None, largest: int)
         down, right = np.ogrid[: pixels.shape[0], : pixels.shape[1]]
         radius = np.hypot(right - ring.centre_x, down - ring.centre_y)
         seen = (radius >= ring.inner) & (radius <= ring.outer)
-    return ReadPicture(pixels, seen, scale, ring, circle, bearings)
+    return PreparedImage(pixels, seen, scale, ring, circle, bearings)

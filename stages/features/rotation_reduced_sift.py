@@ -12,7 +12,7 @@ from omninav.stages.values.image import Image, Panorama, Pixels
 from omninav.stages.values.local_features import LocalFeatures
 
 from .colour_moments import disc_colours
-from .prepared_image import ReadPicture, read_picture
+from .prepared_image import PreparedImage, read_picture
 
 Array = npt.NDArray[np.float64]
 
@@ -49,9 +49,9 @@ class RotationReducedSift(Stage):
             contrastThreshold=self.contrast, edgeThreshold=self.edge, sigma=self.sigma, enable_precise_upscale=True
         )
 
-    def step(self, ctx: Context, picture: Image | Panorama, camera: Camera | None = None) -> Out:
+    def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
         """Describe one picture."""
-        read = read_picture(picture, camera, self.largest)
+        read = read_picture(image, camera, self.largest)
         pixels, seen, seam = read.pixels, read.seen, 0
         if read.circle:
             seam = min(SEAM, pixels.shape[1])
@@ -72,7 +72,7 @@ class RotationReducedSift(Stage):
         shown = np.isfinite(features.bearings).all(axis=1)  # beyond the mirror's edge there is nothing to see
         return self.Out(features=features.chosen(np.flatnonzero(shown)))
 
-    def _strongest(self, found: list[cv2.KeyPoint], read: ReadPicture, seam: int) -> list[cv2.KeyPoint]:
+    def _strongest(self, found: list[cv2.KeyPoint], read: PreparedImage, seam: int) -> list[cv2.KeyPoint]:
         if not found:
             return []
         rows = np.array([(p.response, p.pt[0], p.pt[1], p.size, p.angle) for p in found], np.float64)

@@ -12,10 +12,10 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.camera.models import Camera
 from omninav.stages.geometry.appearance.feature_matching import spreads
 from omninav.stages.values.image import Image, Panorama, Pixels
-from omninav.stages.values.local_features import ColumnSegments
+from omninav.stages.values.local_features import VerticalSegments
 
 from .colour_moments import add_pixel, correlations
-from .prepared_image import ReadPicture, read_picture
+from .prepared_image import PreparedImage, read_picture
 
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
@@ -201,7 +201,7 @@ def prototypes(found: Segments, columns: int, spread: float, apart: float, circl
     return kept, weights[kept]
 
 
-class FindColumnSegments(Stage):
+class FindVerticalSegments(Stage):
     """Upright lines between two edges, described by their colours and their profile.
 
     Goedeme et al. 2007, section 3.3: along every radius of a mirror image (`lines` of them), or every column of a
@@ -226,11 +226,11 @@ class FindColumnSegments(Stage):
     class Out(Outputs):
         """What was found, the heaviest first; it may be none."""
 
-        columns: ColumnSegments
+        vertical_segments: VerticalSegments
 
-    def step(self, ctx: Context, picture: Image | Panorama, camera: Camera | None = None) -> Out:
+    def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
         """Describe one picture."""
-        read = read_picture(picture, camera, self.largest)
+        read = read_picture(image, camera, self.largest)
         pixels, circle = self._upright(read)
         settings = self.blur, self.gradient, self.shortest, self.margin
         found = segments_of(pixels, circle, *settings)
@@ -243,9 +243,11 @@ class FindColumnSegments(Stage):
         elevations = np.arcsin(np.clip(bearings[..., 2], -1.0, 1.0))
         middle = bearings.sum(axis=1)
         azimuths = np.arctan2(middle[:, 1], middle[:, 0])
-        return self.Out(columns=ColumnSegments(azimuths, elevations, found.descriptors[kept], weights, points))
+        return self.Out(
+            vertical_segments=VerticalSegments(azimuths, elevations, found.descriptors[kept], weights, points)
+        )
 
-    def _upright(self, read: ReadPicture) -> tuple[Pixels, bool]:
+    def _upright(self, read: PreparedImage) -> tuple[Pixels, bool]:
         """The picture with its upright lines as columns, the outer end of a radius at the top."""
         if read.ring is None:
             return read.pixels, read.circle
@@ -254,7 +256,7 @@ class FindColumnSegments(Stage):
         upright = cv2.remap(read.pixels, points[..., 0], points[..., 1], cv2.INTER_LINEAR)
         return cast(Pixels, upright), True
 
-    def _back(self, points: Array, read: ReadPicture) -> Array:
+    def _back(self, points: Array, read: PreparedImage) -> Array:
         """Points (..., 2) of the upright picture as points of the picture that was read."""
         if read.ring is None:
             return points

@@ -183,12 +183,12 @@ class CovarianceIntersection(Stage):
         ctx: Context,
         prediction: GaussianMixture,
         hypothesis: GaussianMixture | None,
-        calibration: GaussianMixture | None = None,
+        fixes: GaussianMixture | None = None,
         other: GaussianMixture | None = None,
     ) -> Out:
         """Fuse all that is there."""
         belief = _heavy(prediction)
-        for source in (hypothesis, calibration, other):
+        for source in (hypothesis, fixes, other):
             if source is not None:
                 belief = fused(belief, _heavy(source), self.gamma, self.alpha, self.weighted)
         if not len(belief[2]):

@@ -19,7 +19,7 @@ Where = Literal["uniform", "truth", "origin"] | tuple[float, float, float, float
 
 
 @dataclass(kw_only=True, eq=False)
-class GrowingStart:
+class GrowingPrior:
     """Where a log begins, at a known pose while the map is empty, anywhere in the map later: a mixin, beside `Stage`.
 
     All localisation is with respect to the pose at which a map is begun (Porta & Kroese 2004, section 3): with an empty
@@ -50,7 +50,7 @@ class GrowingStart:
         return np.array(at[:3]), np.array([at[3], at[3], at[4]])
 
 
-class ParticlesInMap(GrowingStart, Stage):
+class ParticlesInMap(GrowingPrior, Stage):
     """The first particles of a log: around a known pose, or drawn from the map so far with any heading.
 
     With an empty map `start=uniform` begins at the log's first true pose, else at the origin (Porta & Kroese 2004,
@@ -79,7 +79,7 @@ class ParticlesInMap(GrowingStart, Stage):
         return self.Out(belief=Particles(poses, np.full(self.number, 1.0 / self.number)))
 
 
-class MixtureInMap(GrowingStart, Stage):
+class MixtureInMap(GrowingPrior, Stage):
     """The first Gaussian of a log: a known pose, or one as wide as the map so far, with any heading.
 
     With an empty map `start=uniform` begins at the log's first true pose, else at the origin (Porta & Kroese 2004,

@@ -15,7 +15,7 @@ from omninav.stages.values.belief import GaussianMixture, Particles
 Array = npt.NDArray[np.float64]
 
 
-class Clusters(Stage):
+class ParticleClustering(Stage):
     """Particles that lie close together become one Gaussian: its mean, its spread, the sum of their weights.
 
     Porta & Kroese 2004, section 3.2. Close means: in the same cell of `close_m` by `close_deg`, or in cells that touch,

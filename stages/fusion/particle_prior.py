@@ -10,12 +10,12 @@ from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.particles import uniform_around
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.grid import FreeSpace
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
 
 
-class Start(Stage):
+class ParticlePrior(Stage):
     """A belief at the first picture of each log, and none later.
 
     `at`: `uniform` over the free space (port `area`), where that is wired, else over the area within `around` reaches
@@ -39,7 +39,7 @@ class Start(Stage):
         ctx: Context,
         map: ReferenceGraph | None,
         truth: Pose | None,
-        reach: Reach | None = None,
+        length_scale: LengthScale | None = None,
         area: FreeSpace | None = None,
     ) -> Out:
         """Give the first belief."""
@@ -52,7 +52,7 @@ class Start(Stage):
                 raise BadInput(
                     "start: `uniform` needs a map with references; use start=origin, start=truth, or give a map"
                 )
-            unit = self.reach_m if reach is None else reach.metres
+            unit = self.reach_m if length_scale is None else length_scale.metres
             poses = uniform_around(map.poses, self.around * unit, self.number, ctx.rng)
         else:
             if self.at == "truth":

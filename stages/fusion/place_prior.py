@@ -11,7 +11,7 @@ from omninav.stages.values.pose import Pose
 from omninav.stages.values.topological_map import TopologicalMap
 
 
-class PlaceStart(Stage):
+class PlacePrior(Stage):
     """A belief over places at the first picture of each log.
 
     Goedemé et al. 2007, section 5.1: `uniform`, a kidnapped robot. Or a place: the one whose medoid was taken closest

@@ -11,7 +11,7 @@ from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Likelihood, Particles
 
 
-class RandomSamples(Stage):
+class UniformRecovery(Stage):
     """Importance weights, bootstrap resampling at every picture, and random samples against lost or kidnapped robots.
 
     Wolf, Burgard & Burkhardt 2005, sections III and VI-C: of `number` samples (5000 in the paper) `random` (50) are

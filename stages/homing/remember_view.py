@@ -7,7 +7,7 @@ from omninav.stages.values.homing import HomingVector, ImagePath
 from omninav.stages.values.local_features import LocalFeatures
 
 
-class Kept(State):
+class RememberViewState(State):
     """The first view, until it is given, and when it was seen (ns)."""
 
     views: tuple[LocalFeatures, ...] = ()
@@ -26,7 +26,7 @@ class RememberView(Stage):
     class Out(Outputs):
         path: ImagePath | None = None
 
-    def step(self, ctx: Context, kept: Kept, tick: Tick, features: LocalFeatures) -> Out:
+    def step(self, ctx: Context, kept: RememberViewState, tick: Tick, features: LocalFeatures) -> Out:
         """The path, once."""
         if tick.first_of_log:
             kept.views, kept.stamp = (features,), tick.stamp

@@ -5,7 +5,7 @@ from omninav.stages.values.homing import HomingTarget
 from omninav.stages.values.local_features import LocalFeatures
 
 
-class First(State):
+class TowardsFirstViewState(State):
     """The first view."""
 
     views: tuple[LocalFeatures, ...] = ()
@@ -24,7 +24,7 @@ class TowardsFirstView(Stage):
         target: HomingTarget | None = None
         features: LocalFeatures | None = None
 
-    def step(self, ctx: Context, first: First, tick: Tick, features: LocalFeatures) -> Out:
+    def step(self, ctx: Context, first: TowardsFirstViewState, tick: Tick, features: LocalFeatures) -> Out:
         """The target of this tick."""
         if tick.first_of_log:
             first.views = (features,)

@@ -3,7 +3,7 @@
 Goedemé et al. 2007, sections 7.2.1 and 7.2.2: the point that can be tracked best close to a feature is followed (Shi
 and Tomasi, Lucas and Kanade: OpenCV's); what was lost is looked for around where the local map says it must be, by the
 histogram of its intensities, which does not change where a mirror's picture turns. Points are columns and rows without
-the repeated ones of a `WorkingPicture`.
+the repeated ones of a `WorkingImage`.
 """
 
 from typing import Any, cast
@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from .working_image import Grey, WorkingPicture
+from .working_image import Grey, WorkingImage
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -21,12 +21,12 @@ LEVELS = 16
 """Bins of an intensity histogram."""
 
 
-def trackability(picture: WorkingPicture) -> Floats:
+def trackability(picture: WorkingImage) -> Floats:
     """The smaller eigenvalue of the gradients' matrix around each pixel of `grey` (equation 18): (rows, columns)."""
     return cast(Floats, cv2.cornerMinEigenVal(picture.grey, blockSize=5, ksize=3))
 
 
-def best_nearby(strength: Floats, picture: WorkingPicture, points: Array, reach: int) -> Array:
+def best_nearby(strength: Floats, picture: WorkingImage, points: Array, reach: int) -> Array:
     """For points (N, 2) the most trackable pixels (N, 2) at most `reach` rows and columns away, if inside."""
     offsets = np.stack(np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)), axis=-1).reshape(-1, 2)
     near = np.rint(points).astype(np.int64)[:, None, :] + offsets
@@ -38,7 +38,7 @@ def best_nearby(strength: Floats, picture: WorkingPicture, points: Array, reach:
     return best
 
 
-def histograms(picture: WorkingPicture, points: Array, radius: int) -> Floats:
+def histograms(picture: WorkingImage, points: Array, radius: int) -> Floats:
     """Intensity histograms (N, 16), each of sum 1, of the discs of `radius` pixels around points (N, 2) in the picture.
 
     Their parts outside `grey` repeat its edge.
@@ -56,7 +56,7 @@ def histograms(picture: WorkingPicture, points: Array, radius: int) -> Floats:
 
 
 def track(
-    before: Grey, picture: WorkingPicture, points: Array, guesses: Array, window: int, levels: int, agreed: float
+    before: Grey, picture: WorkingImage, points: Array, guesses: Array, window: int, levels: int, agreed: float
 ) -> tuple[Array, Bools]:
     """Where points (N, 2) of the picture before are now, and whether they were followed: (N, 2) and (N,).
 
@@ -86,7 +86,7 @@ def track(
 
 
 def find_again(
-    picture: WorkingPicture,
+    picture: WorkingImage,
     strength: Floats,
     expected: Array,
     looks: Floats,

@@ -22,7 +22,7 @@ from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Motion
 
 from .tracking import LEVELS, best_nearby, find_again, histograms, track, trackability
-from .working_image import WorkingPicture, working_picture
+from .working_image import WorkingImage, working_picture
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -36,7 +36,7 @@ def _rows(*shape: int) -> Array:
     return field(default_factory=lambda: np.zeros((0, *shape)))
 
 
-class Memory(State):
+class VisualHomingState(State):
     """The local map, where the robot and the target are in it, and what is being tracked.
 
     The map's frame is the robot's where it was made, its unit the way from there to the target. `anchors` (N, 3): the
@@ -71,7 +71,7 @@ class Memory(State):
         """How far it is over the floor to the target, in the map's unit."""
         return math.hypot(*(self.goal_translation - self.translation)[:2])
 
-    def expected(self, seen: WorkingPicture, rows: Ints | slice = slice(None)) -> Array:
+    def expected(self, seen: WorkingImage, rows: Ints | slice = slice(None)) -> Array:
         """Where the tracked points of `rows` must be in a picture taken where the robot is: (N, 2)."""
         return seen.points((self.corners[rows] - self.translation) @ self.rotation)
 
@@ -130,8 +130,8 @@ class VisualHoming(Stage):
     def step(
         self,
         ctx: Context,
-        memory: Memory,
-        picture: Image | Panorama,
+        memory: VisualHomingState,
+        image: Image | Panorama,
         target: HomingTarget | None = None,
         features: LocalFeatures | None = None,
         correspondences: Correspondences | None = None,
@@ -142,7 +142,7 @@ class VisualHoming(Stage):
         if target is None:
             memory.number, memory.mapped = -1, False
             return self.Out()
-        seen = working_picture(picture, camera, self.largest)
+        seen = working_picture(image, camera, self.largest)
         if target.number != memory.number:
             memory.number, memory.mapped, memory.unit = target.number, False, 1.0
         matched = self._matched(features, target, correspondences)
@@ -188,11 +188,11 @@ class VisualHoming(Stage):
             pairs.second,
         )
 
-    def _could_be_better(self, memory: Memory, matches: int) -> bool:
+    def _could_be_better(self, memory: VisualHomingState, matches: int) -> bool:
         # Closer to the target more is matched with it; at the target the baseline is too short.
         return matches > self.anew * memory.made_of and memory.left() > self.too_near * memory.depth
 
-    def _contradicted(self, memory: Memory, first: Array, second: Array, inliers: int) -> bool:
+    def _contradicted(self, memory: VisualHomingState, first: Array, second: Array, inliers: int) -> bool:
         # At the target what is matched with it stands where the target view has it, but for the turn.
         if memory.left() > self.near * memory.depth or inliers > len(first) / 3:
             return False
@@ -203,8 +203,8 @@ class VisualHoming(Stage):
     def _begin(
         self,
         ctx: Context,
-        memory: Memory,
-        seen: WorkingPicture,
+        memory: VisualHomingState,
+        seen: WorkingImage,
         first: Array,
         pixels: Array,
         second: Array,
@@ -250,7 +250,7 @@ class VisualHoming(Stage):
         memory.picture, memory.mapped, memory.made_of = seen.grey, True, inliers
         return inliers, ""
 
-    def _predict(self, memory: Memory, motion: Motion | None) -> None:
+    def _predict(self, memory: VisualHomingState, motion: Motion | None) -> None:
         # The robot's pose in the map as odometry has it; without one it stays.
         if motion is None:
             return
@@ -261,7 +261,14 @@ class VisualHoming(Stage):
         memory.rotation = memory.rotation @ turn_about_vertical(motion.turn)
 
     def _follow(
-        self, ctx: Context, memory: Memory, seen: WorkingPicture, first: Array, pixels: Array, second: Array, rows: Ints
+        self,
+        ctx: Context,
+        memory: VisualHomingState,
+        seen: WorkingImage,
+        first: Array,
+        pixels: Array,
+        second: Array,
+        rows: Ints,
     ) -> tuple[Ints, Array, int]:
         """Track, find again, and place the robot in the local map; gives kinds, points, and how many agree."""
         kinds, points = np.full(len(memory.rows), LOST), np.full((len(memory.rows), 2), np.nan)
@@ -306,7 +313,7 @@ class VisualHoming(Stage):
         memory.depth = float(np.median(np.linalg.norm(memory.anchors - memory.translation, axis=1)))
         return kinds, points, inliers
 
-    def _start_again(self, memory: Memory, seen: WorkingPicture, strength: Floats, rows: Ints) -> None:
+    def _start_again(self, memory: VisualHomingState, seen: WorkingImage, strength: Floats, rows: Ints) -> None:
         """Features that were matched anew are tracked again: at the best point near to where theirs must be."""
         expected = memory.expected(seen, rows)
         inside = seen.inside(expected, 2.0)
@@ -319,7 +326,9 @@ class VisualHoming(Stage):
         memory.corners[rows] = memory.translation + (away[:, None] * rays) @ memory.rotation.T
         memory.points[rows], memory.alive[rows] = corners, True
 
-    def _find_lost(self, memory: Memory, seen: WorkingPicture, strength: Floats, kinds: Ints, points: Array) -> None:
+    def _find_lost(
+        self, memory: VisualHomingState, seen: WorkingImage, strength: Floats, kinds: Ints, points: Array
+    ) -> None:
         expected = memory.expected(seen)
         lost = np.flatnonzero((kinds == LOST) & seen.inside(expected, 2.0))
         if not len(lost):
@@ -336,14 +345,14 @@ class VisualHoming(Stage):
         )
         points[lost[who]], kinds[lost[who]] = again[who], AGAIN
 
-    def _learn_metres(self, memory: Memory) -> None:
+    def _learn_metres(self, memory: VisualHomingState) -> None:
         # Ways by odometry and in the map since it was made; a tenth of the unit is enough to compare them.
         rolled, went = math.hypot(*memory.rolled[:2]), math.hypot(*memory.translation[:2])
         if went > 0.1 and rolled > 0.05:
             memory.metres = rolled / went
 
     def _vector(
-        self, memory: Memory, state: Literal["new", "tracking", "lost"], inliers: int, why: str = ""
+        self, memory: VisualHomingState, state: Literal["new", "tracking", "lost"], inliers: int, why: str = ""
     ) -> HomingVector:
         left = memory.rotation.T @ (memory.goal_translation - memory.translation)
         distance = float(np.hypot(left[0], left[1]))
@@ -363,8 +372,8 @@ class VisualHoming(Stage):
 
     def _out(
         self,
-        memory: Memory,
-        seen: WorkingPicture,
+        memory: VisualHomingState,
+        seen: WorkingImage,
         state: Literal["new", "tracking"],
         inliers: int,
         kinds: Ints,

@@ -1,4 +1,4 @@
-"""Along a path of pictures: which one to go to now."""
+"""WaypointImagesState a path of pictures: which one to go to now."""
 
 import math
 from typing import Annotated
@@ -8,7 +8,7 @@ from omninav.stages.values.homing import HomingTarget, HomingVector, ImagePath, 
 from omninav.stages.values.local_features import LocalFeatures
 
 
-class Along(State):
+class WaypointImagesState(State):
     """Where on which path it is: numbers of the path and of the target, views reached, whether only a turn is left."""
 
     path: int = -1
@@ -18,7 +18,7 @@ class Along(State):
     arrived: bool = False
 
 
-class PathImages(Stage):
+class WaypointImages(Stage):
     """Goes on to the next view of a path as soon as one is close enough, and stops at the last with its heading.
 
     Goedemé et al. 2007, section 7.2.4. A view on the way is reached where `reached` of the way to it is left, or where
@@ -45,7 +45,11 @@ class PathImages(Stage):
         progress: PathProgress | None = None
 
     def step(
-        self, ctx: Context, along: Along, path: ImagePath | None = None, vector: HomingVector | None = None
+        self,
+        ctx: Context,
+        along: WaypointImagesState,
+        path: ImagePath | None = None,
+        vector: HomingVector | None = None,
     ) -> Out:
         """The target of this tick."""
         if path is None or not path.views:
@@ -64,7 +68,7 @@ class PathImages(Stage):
         view = path.views[along.at]
         return self.Out(target=HomingTarget(along.target, view, last, name), features=view, progress=progress)
 
-    def _go_on(self, along: Along, vector: HomingVector, views: int) -> None:
+    def _go_on(self, along: WaypointImagesState, vector: HomingVector, views: int) -> None:
         behind, close = math.cos(vector.direction) < 0.0, vector.nearness <= self.passed_nearness
         if along.at < views - 1:
             if close or vector.ratio <= self.reached or (behind and vector.ratio < 0.5):

@@ -19,7 +19,7 @@ SEAM = 32
 """Columns of a full circle that are repeated beyond both edges, so that features can be tracked across the seam."""
 
 
-class WorkingPicture(NamedTuple):
+class WorkingImage(NamedTuple):
     """`grey` (rows, columns), with `seam` columns repeated on both sides; points are columns and rows without them.
 
     `scale`: pixels of the original per pixel of this one, along columns and rows. `original`: what it was made of.
@@ -69,7 +69,7 @@ class WorkingPicture(NamedTuple):
             return np.asarray((x >= margin) & (x <= columns - 1 - margin) & (y >= margin) & (y <= rows - 1 - margin))
 
 
-def working_picture(picture: Image | Panorama, camera: Camera | None, largest: int) -> WorkingPicture:
+def working_picture(picture: Image | Panorama, camera: Camera | None, largest: int) -> WorkingImage:
     """Make a picture ready; one of more than `largest` pixels is made smaller.
 
     Raises BadInput for want of a camera, or of its elevations.
@@ -89,4 +89,4 @@ def working_picture(picture: Image | Panorama, camera: Camera | None, largest: i
     seam = min(SEAM, size[0]) if circle else 0
     if seam:
         grey = np.concatenate([grey[:, -seam:], grey, grey[:, :seam]], axis=1)
-    return WorkingPicture(grey, seam, (columns / size[0], rows / size[1]), picture, camera)
+    return WorkingImage(grey, seam, (columns / size[0], rows / size[1]), picture, camera)

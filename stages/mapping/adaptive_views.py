@@ -18,11 +18,11 @@ from omninav.stages.geometry.probability.gaussians import (
     squared_distances,
 )
 from omninav.stages.values.belief import GaussianMixture
-from omninav.stages.values.map_update import Lesson, Lessons
+from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
-from omninav.stages.values.views import ViewLimit
+from omninav.stages.values.views import NoveltyThreshold
 
-from .before_threshold import BeforeLimit, due
+from .before_threshold import BeforeThreshold, due
 from .view_cap import within_cap
 from .view_events import view_event
 
@@ -51,7 +51,7 @@ class AdaptiveViews(Stage):
     4. Components below `least_weight` go, and views without any (erratum 9: after the weights have grown; checked to be
        below beta least_similarity, so that none dies at birth). Above `max_views` (0: no limit) the weakest views go.
 
-    Lessons wait until there is a limit, all but the first of a map.
+    MapUpdates wait until there is a limit, all but the first of a map.
 
     `forgetting: passive` is the model of Porta & Kroese that Table 1 compares with. A state of several modes, which the
     paper does not learn from, teaches each mode by its weight p: it is taken in where S p >= `least_similarity`, the
@@ -99,11 +99,16 @@ class AdaptiveViews(Stage):
             )
 
     def step(
-        self, ctx: Context, lessons: Lessons | None, limit: ViewLimit | None, map: ViewMixtures, waiting: BeforeLimit
+        self,
+        ctx: Context,
+        updates: MapUpdates | None,
+        threshold: NoveltyThreshold | None,
+        map: ViewMixtures,
+        waiting: BeforeThreshold,
     ) -> Out:
         """Learn from what this tick has to teach."""
-        map.take_limit(limit)
-        ready = due(() if lessons is None else lessons.items, limit, map, waiting)
+        map.take_limit(threshold)
+        ready = due(() if updates is None else updates.items, threshold, map, waiting)
         if not ready:
             return self.Out(map=map)
         before = map.names
@@ -112,7 +117,7 @@ class AdaptiveViews(Stage):
         full = False
         for lesson in ready:
             seen[map.next_name] = lesson.index  # if it is a new one
-            changed.append(self._learn(lesson, limit, map))
+            changed.append(self._learn(lesson, threshold, map))
             kept = within_cap(map, self.max_views)
             full = full or not kept.all()
             map.keep_views(kept)
@@ -120,7 +125,7 @@ class AdaptiveViews(Stage):
         names = np.concatenate([*changed, np.array(list(seen))])
         return self.Out(map=map, events=view_event(map, before, names, seen, "full" if full else "forgotten"))
 
-    def _learn(self, lesson: Lesson, limit: ViewLimit | None, map: ViewMixtures) -> Ints:
+    def _learn(self, lesson: MapUpdate, limit: NoveltyThreshold | None, map: ViewMixtures) -> Ints:
         # The names of the views whose places changed.
         view = lesson.view
         state = _floored(lesson.state, self.least_m, np.radians(self.least_deg))

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.appearance.segments import similarities
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 
 Array = npt.NDArray[np.float64]
@@ -38,7 +38,7 @@ def excess_by_distance(distances: Array, alike: Array, bins: int = 30) -> tuple[
     return np.sqrt(edges[:-1] * edges[1:])[full], sums[full] / counts[full]
 
 
-class ViewReach(Stage):
+class AppearanceLengthScale(Stage):
     """The distance at which the map's own views have lost half of their excess similarity.
 
     Not in the paper, whose maps are all of one store; it replaces thresholds in metres by one that is measured on each
@@ -58,13 +58,13 @@ class ViewReach(Stage):
     class Out(Outputs):
         """`reach` of the map's views."""
 
-        reach: Reach
+        length_scale: LengthScale
 
     def step(self, ctx: Context, map: ReferenceGraph) -> Out:
         """Measure one map."""
         metres = self._measured(map)
         ctx.fact("view_reach_m", round(metres, 3))
-        return self.Out(reach=Reach(metres))
+        return self.Out(length_scale=LengthScale(metres))
 
     def _measured(self, map: ReferenceGraph) -> float:
         if len(map) < self.least:

@@ -13,7 +13,7 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
-class Taught(Value):
+class AppliedUpdate(Value):
     """The lesson of tick `index`: its state was taken in by the views `names` (J,), turned by `turns` (J,) rad against
     it and `alike` (J,), S in (0, 1]. What they held before: components (C,) as in `ViewMixtures`, `owner` in [0, J).
     """
@@ -45,18 +45,20 @@ class Taught(Value):
         map.keep_components(~np.isin(map.owner, rows))
         map.put_mixtures(rows[self.owner], self.means, self.covariances, self.weights, self.counts)
 
-    def within(self, map: ViewMixtures) -> "Taught":
+    def within(self, map: ViewMixtures) -> "AppliedUpdate":
         """What it did to those views that the map still has."""
         kept = np.isin(self.names, map.names)
         mine, row = kept[self.owner], np.cumsum(kept) - 1
         held = (self.means[mine], self.covariances[mine], self.weights[mine], self.counts[mine])
         views = (self.names[kept], self.turns[kept], self.alike[kept])
-        return Taught(self.index, self.state, *views, row[self.owner[mine]], *held)
+        return AppliedUpdate(self.index, self.state, *views, row[self.owner[mine]], *held)
 
 
-def taught_by(state: GaussianMixture, index: int, names: Ints, turns: Array, alike: Array, map: ViewMixtures) -> Taught:
+def taught_by(
+    state: GaussianMixture, index: int, names: Ints, turns: Array, alike: Array, map: ViewMixtures
+) -> AppliedUpdate:
     """What a lesson is about to do to the views `names` of the map: what they hold now is kept."""
     chosen = np.flatnonzero(np.isin(map.names[map.owner], names))
     owner = np.searchsorted(names, map.names[map.owner[chosen]])
     held = (getattr(map, field)[chosen] for field in ("means", "covariances", "weights", "counts"))
-    return Taught(index, state, names, turns, alike, owner, *held)
+    return AppliedUpdate(index, state, names, turns, alike, owner, *held)

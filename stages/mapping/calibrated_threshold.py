@@ -10,27 +10,27 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import ViewLimit, WholeView
+from omninav.stages.values.views import NoveltyThreshold, WholeView
 
 Array = npt.NDArray[np.float64]
 FloatArray = npt.NDArray[np.float32]
 
 
-class FirstViews(State):
+class CalibratedThresholdState(State):
     """The limit so far, and what it is measured on, which is let go of once it is settled.
 
     `views`: (n, D). `table`: the distances of each to all before it. `ways`: metres to each from the one before.
     `since`: metres since the last.
     """
 
-    limit: ViewLimit | None = None
+    limit: NoveltyThreshold | None = None
     views: FloatArray = field(default_factory=lambda: np.zeros((0, 0), np.float32))
     table: list[Array] = field(default_factory=list)
     ways: list[float] = field(default_factory=list)
     since: float = 0.0
 
 
-class FirstViewsLimit(Stage):
+class CalibratedThreshold(Stage):
     """A share of the median distance between a drive's first views that are `apart` views or more from each other.
 
     A threshold in the views' unit that follows from the drive itself: delta_y of Porta & Kröse 2004, E_max of Gross,
@@ -53,7 +53,7 @@ class FirstViewsLimit(Stage):
     class Out(Outputs):
         """The limit, once there is one."""
 
-        limit: ViewLimit | None = None
+        threshold: NoveltyThreshold | None = None
 
     def __post_init__(self) -> None:
         """There must be a pair."""
@@ -65,7 +65,7 @@ class FirstViewsLimit(Stage):
         ctx: Context,
         view: WholeView,
         motion: Motion | None,
-        first: FirstViews,
+        first: CalibratedThresholdState,
         known: ViewMixtures | None = None,
     ) -> Out:
         """Take one view in."""
@@ -77,21 +77,21 @@ class FirstViewsLimit(Stage):
             if not len(first.views) or first.since >= self.least_m:
                 take_in(view, first)
                 self._measure(ctx, first)
-        return self.Out(limit=first.limit)
+        return self.Out(threshold=first.limit)
 
-    def _measure(self, ctx: Context, first: FirstViews) -> None:
+    def _measure(self, ctx: Context, first: CalibratedThresholdState) -> None:
         pairs = np.concatenate([distances[: max(len(distances) + 1 - self.apart, 0)] for distances in first.table])
         if not len(pairs):
             return
         distance = self.share * float(np.median(pairs))
         ctx.fact("view_limit", round(distance, 4))
         settled = len(first.views) >= self.views
-        first.limit = ViewLimit(distance, settled, way_beyond(distance, first.table, first.ways))
+        first.limit = NoveltyThreshold(distance, settled, way_beyond(distance, first.table, first.ways))
         if settled:
             first.views, first.table, first.ways = first.views[:0], [], []
 
 
-def take_in(view: WholeView, first: FirstViews) -> None:
+def take_in(view: WholeView, first: CalibratedThresholdState) -> None:
     """Add a view to the first ones."""
     first.table.append(view.distances(first.views) if len(first.views) else np.zeros(0))
     first.views = np.concatenate([first.views.reshape(-1, len(view.values)), view.values[None]])
@@ -100,7 +100,7 @@ def take_in(view: WholeView, first: FirstViews) -> None:
 
 
 def way_beyond(limit: float, table: list[Array], ways: list[float]) -> float:
-    """The median way from a view to the next one beyond the limit (m), 0 where there is none; arguments: FirstViews."""
+    """The median way from a view to the next one beyond the limit (m), 0 where there is none; arguments: CalibratedThresholdState."""
     at = np.cumsum(ways)
     found = []
     for row in range(len(at)):

@@ -12,7 +12,7 @@ from omninav.stages.geometry.plane.odometry_motion import increment
 from omninav.stages.geometry.plane.path_reconstruction import reconstructed
 from omninav.stages.geometry.probability.gaussians import squared_distances
 from omninav.stages.values.belief import GaussianMixture
-from omninav.stages.values.map_update import Lesson, Lessons
+from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.pose import UncertainMotion
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Neighbours, WholeView
@@ -22,7 +22,7 @@ from .unimodality import certain_state
 Array = npt.NDArray[np.float64]
 
 
-class Behind(State):
+class DelayedByDistanceState(State):
     """Lessons that wait, and how far the robot had driven when it saw each (m).
 
     `past`: the last views with their states as they are known by now, learned or not; `ways`: the motions between them.
@@ -30,15 +30,15 @@ class Behind(State):
     map's steps) of the oldest view that spoke for the new place.
     """
 
-    lessons: list[Lesson] = field(default_factory=list)
+    lessons: list[MapUpdate] = field(default_factory=list)
     seen_at: list[float] = field(default_factory=list)
     driven: float = 0.0
-    past: list[Lesson] = field(default_factory=list)
+    past: list[MapUpdate] = field(default_factory=list)
     ways: list[UncertainMotion] = field(default_factory=list)
     jumps: list[tuple[int, int]] = field(default_factory=list)
 
 
-class LeftBehind(Stage):
+class DelayedByDistance(Stage):
     """Each view waits, with the state it was seen in, until the robot has driven on for `metres`.
 
     A view that is learned at once tells the robot, one picture later, what it has just told the map: the map seems to
@@ -46,7 +46,7 @@ class LeftBehind(Stage):
     Mueller 2005, section 2.1, delay by a short queue for the same reason; how far its length in pictures takes the
     robot depends on the camera's rate. States of any number of modes are learned. `longest`: no more views than these
     wait, however long the robot stands. What waits when a log ends is learned as the next one begins, and after the
-    last one by `waiting` (LeftOver).
+    last one by `waiting` (FlushPending).
 
     `retrace`: wrong places in the map lead the belief away from where odometry, rightly, had it; where the map is right
     again, the belief comes back. That shows: it jumps to where odometry leads from the state before it was led away
@@ -75,8 +75,8 @@ class LeftBehind(Stage):
     class Out(Outputs):
         """What has been left behind, in the order in which it was seen, and what would be as the next log begins."""
 
-        lessons: Lessons
-        waiting: Lessons
+        updates: MapUpdates
+        waiting: MapUpdates
 
     def step(
         self,
@@ -84,14 +84,14 @@ class LeftBehind(Stage):
         view: WholeView,
         state: GaussianMixture,
         model: UncertainMotion | None,
-        behind: Behind,
+        behind: DelayedByDistanceState,
         neighbours: Neighbours | None = None,
         map: ViewMixtures | None = None,
     ) -> Out:
         """Take one view in, and give out those that are left behind."""
         behind.driven += 0.0 if model is None else math.fabs(model.way[1])
-        lesson = Lesson(view, state, ctx.tick.index)
-        again: list[Lesson] = []
+        lesson = MapUpdate(view, state, ctx.tick.index)
+        again: list[MapUpdate] = []
         if self.retrace or self.back_propagate:
             remember(lesson, model, behind, self.longest)
             if neighbours is not None and map is not None and len(neighbours.rows) and len(behind.past) > 1:
@@ -105,9 +105,9 @@ class LeftBehind(Stage):
             due = max(due, sum(1 for lesson in behind.lessons if lesson.index < ctx.tick.index))
         ready, behind.lessons, behind.seen_at = behind.lessons[:due], behind.lessons[due:], behind.seen_at[due:]
         open_from = behind.past[0].index if self.back_propagate else None
-        return self.Out(lessons=Lessons((*again, *ready), open_from), waiting=Lessons(tuple(behind.lessons)))
+        return self.Out(updates=MapUpdates((*again, *ready), open_from), waiting=MapUpdates(tuple(behind.lessons)))
 
-    def _corrected(self, ctx: Context, oldest: int, behind: Behind) -> list[Lesson]:
+    def _corrected(self, ctx: Context, oldest: int, behind: DelayedByDistanceState) -> list[MapUpdate]:
         # What is to be learned again, now that a view of the map, the oldest of this age, spoke for the present state.
         end = certain_state(behind.past[-1].state)
         rows = range(len(behind.past) - 2, -1, -1)
@@ -128,7 +128,9 @@ class LeftBehind(Stage):
         behind.jumps.append((behind.past[before].index, oldest))
         return []
 
-    def _propagated(self, ctx: Context, behind: Behind, end: tuple[Array, Array], latest: int) -> list[Lesson]:
+    def _propagated(
+        self, ctx: Context, behind: DelayedByDistanceState, end: tuple[Array, Array], latest: int
+    ) -> list[MapUpdate]:
         # The states since one, up to row `latest`, that was known about as well as the present one, `end`.
         if not self.back_propagate:
             return []
@@ -149,7 +151,9 @@ class LeftBehind(Stage):
         ctx.count("view_propagated", len(put))
         return put_right(behind, put)
 
-    def _retraced(self, ctx: Context, behind: Behind, row: int, means: Array, covariances: Array) -> list[Lesson]:
+    def _retraced(
+        self, ctx: Context, behind: DelayedByDistanceState, row: int, means: Array, covariances: Array
+    ) -> list[MapUpdate]:
         put = {}
         for k in range(row + 1, len(behind.past) - 1):
             mean, covariance = means[k - row][None], covariances[k - row][None]
@@ -168,7 +172,7 @@ def doubt(state: tuple[Array, Array] | None) -> float:
     return math.inf if state is None else float(np.linalg.det(state[1]))
 
 
-def remember(lesson: Lesson, model: UncertainMotion | None, behind: Behind, longest: int) -> None:
+def remember(lesson: MapUpdate, model: UncertainMotion | None, behind: DelayedByDistanceState, longest: int) -> None:
     """Add a view to the way the robot came; where there is no motion, a way begins."""
     if model is None:
         behind.past, behind.ways, behind.jumps = [lesson], [], []
@@ -177,7 +181,7 @@ def remember(lesson: Lesson, model: UncertainMotion | None, behind: Behind, long
     behind.jumps = [jump for jump in behind.jumps if jump[0] >= behind.past[0].index]
 
 
-def led(behind: Behind, row: int, end: tuple[Array, Array]) -> tuple[Array, Array, float]:
+def led(behind: DelayedByDistanceState, row: int, end: tuple[Array, Array]) -> tuple[Array, Array, float]:
     """The way from a certain state in the past to the present one, `end`, along odometry: see `reconstructed`.
 
     The two count as independent: after a jump, and where the map has made the present state much more certain, what is
@@ -190,13 +194,13 @@ def led(behind: Behind, row: int, end: tuple[Array, Array]) -> tuple[Array, Arra
     return reconstructed(*start, motions, noise, *end)
 
 
-def put_right(behind: Behind, states: dict[int, GaussianMixture]) -> list[Lesson]:
+def put_right(behind: DelayedByDistanceState, states: dict[int, GaussianMixture]) -> list[MapUpdate]:
     """Replace states of the past, also of lessons that wait; gives lessons for those that had been given out."""
     waiting = {lesson.index: place for place, lesson in enumerate(behind.lessons)}
-    again: list[Lesson] = []
+    again: list[MapUpdate] = []
     for row in sorted(states):
         old = behind.past[row]
-        fresh = Lesson(old.view, states[row], old.index, reconstructed=True)
+        fresh = MapUpdate(old.view, states[row], old.index, reconstructed=True)
         behind.past[row] = fresh
         if old.index in waiting:
             behind.lessons[waiting[old.index]] = fresh

@@ -5,10 +5,10 @@ from typing import Annotated
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import ViewLimit, WholeView
+from omninav.stages.values.views import NoveltyThreshold, WholeView
 
 
-class FixedLimit(Stage):
+class FixedThreshold(Stage):
     """A given distance between views, in their own unit. It needs nothing of what the others measure."""
 
     distance: Annotated[float, Bounds(gt=0)] = 100.0
@@ -16,7 +16,7 @@ class FixedLimit(Stage):
     class Out(Outputs):
         """The limit."""
 
-        limit: ViewLimit
+        threshold: NoveltyThreshold
 
     def step(
         self,
@@ -26,4 +26,4 @@ class FixedLimit(Stage):
         known: ViewMixtures | None = None,
     ) -> Out:
         """Give it."""
-        return self.Out(limit=ViewLimit(self.distance))
+        return self.Out(threshold=NoveltyThreshold(self.distance))

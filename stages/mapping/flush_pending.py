@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from omninav.pipeline import Context, Outputs, Stage, Tick
-from omninav.stages.values.map_update import Lessons
+from omninav.stages.values.map_update import MapUpdates
 
 
-class LeftOver(Stage):
+class FlushPending(Stage):
     """Gives out, once the last log has ended, the lessons that would have waited for the next one.
 
     No tick tells that it is the last. So this stage runs after the loop, which is all that `ticks` is collected for; a
@@ -16,8 +16,8 @@ class LeftOver(Stage):
     class Out(Outputs):
         """What is left, in the order in which it was seen."""
 
-        lessons: Lessons | None = None
+        updates: MapUpdates | None = None
 
-    def step(self, ctx: Context, ticks: Sequence[Tick], waiting: Lessons | None = None) -> Out:
+    def step(self, ctx: Context, ticks: Sequence[Tick], waiting: MapUpdates | None = None) -> Out:
         """Give it all out."""
-        return self.Out(lessons=waiting)
+        return self.Out(updates=waiting)

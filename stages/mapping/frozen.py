@@ -1,9 +1,9 @@
 """A map of views that is used and not changed."""
 
 from omninav.pipeline import Context, Outputs, Stage
-from omninav.stages.values.map_update import Lessons
+from omninav.stages.values.map_update import MapUpdates
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
-from omninav.stages.values.views import ViewLimit
+from omninav.stages.values.views import NoveltyThreshold
 
 
 class Frozen(Stage):
@@ -16,7 +16,11 @@ class Frozen(Stage):
         events: ViewEvent | None = None
 
     def step(
-        self, ctx: Context, map: ViewMixtures, lessons: Lessons | None = None, limit: ViewLimit | None = None
+        self,
+        ctx: Context,
+        map: ViewMixtures,
+        updates: MapUpdates | None = None,
+        threshold: NoveltyThreshold | None = None,
     ) -> Out:
         """Hand the map on."""
         return self.Out(map=map)

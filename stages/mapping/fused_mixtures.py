@@ -12,12 +12,12 @@ from omninav.stages.geometry.appearance.view_similarity import similarity
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.gaussians import merged
 from omninav.stages.values.belief import GaussianMixture
-from omninav.stages.values.map_update import Lesson, Lessons
+from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
-from omninav.stages.values.views import ViewLimit
+from omninav.stages.values.views import NoveltyThreshold
 
-from .applied_update import Taught, taught_by
-from .before_threshold import BeforeLimit, due
+from .applied_update import AppliedUpdate, taught_by
+from .before_threshold import BeforeThreshold, due
 from .view_cap import within_cap
 from .view_events import view_event
 
@@ -27,10 +27,10 @@ Parts = tuple[Array, Array, Array, Array]
 Average = Literal["visits", "halves"]
 
 
-class Learned(BeforeLimit):
+class FusedMixturesState(BeforeThreshold):
     """Lessons that wait for a limit, and those that can be taken back."""
 
-    open: list[Taught] = field(default_factory=list)
+    open: list[AppliedUpdate] = field(default_factory=list)
 
 
 class FusedMixtures(Stage):
@@ -41,7 +41,7 @@ class FusedMixtures(Stage):
     stored view's: the two mixtures side by side, the closest pairs merged while their squared Mahalanobis distance is
     below `merge_below` (7.81: places that are the same at 95 %), weights made to sum to 1, and components below
     `least_weight` dropped. So a place that is not confirmed loses half of its weight each time, and is gone after the
-    seventh at 0.01. Lessons wait until there is a limit, all but the first view of a map. `spread`: whether a merged
+    seventh at 0.01. MapUpdates wait until there is a limit, all but the first view of a map. `spread`: whether a merged
     covariance holds how far apart the two means were; the paper's does not and is over-confident (erratum 16).
     `max_views` 0: no limit; else the weakest views go first.
 
@@ -51,7 +51,7 @@ class FusedMixtures(Stage):
     two views are (S from 1 to 0 at the limit): eta of Gross, Koenig & Mueller 2005, equations 11 to 14. How much a
     place weighs against the others of its view is the paper's either way.
 
-    Lessons that may be given again (`Lessons.open_from`) are taken back when they are: all since the first of them is
+    MapUpdates that may be given again (`MapUpdates.open_from`) are taken back when they are: all since the first of them is
     undone, and learned again with the states as they are known now. No view comes or goes by it.
     """
 
@@ -68,21 +68,26 @@ class FusedMixtures(Stage):
         events: ViewEvent | None = None
 
     def step(
-        self, ctx: Context, lessons: Lessons | None, limit: ViewLimit | None, map: ViewMixtures, learned: Learned
+        self,
+        ctx: Context,
+        updates: MapUpdates | None,
+        threshold: NoveltyThreshold | None,
+        map: ViewMixtures,
+        learned: FusedMixturesState,
     ) -> Out:
         """Learn from what this tick has to teach."""
-        map.take_limit(limit)
-        lessons = Lessons(()) if lessons is None else lessons
-        open_from = math.inf if lessons.open_from is None else lessons.open_from
+        map.take_limit(threshold)
+        updates = MapUpdates(()) if updates is None else updates
+        open_from = math.inf if updates.open_from is None else updates.open_from
         learned.open = [taught for taught in learned.open if taught.index >= open_from]
         before = map.names.copy()
         new, changed = (
-            self._put_right(ctx, lessons.items, learned, map) if open_from < math.inf else (lessons.items, [])
+            self._put_right(ctx, updates.items, learned, map) if open_from < math.inf else (updates.items, [])
         )
         seen: dict[int, int] = {}
-        for lesson in due(new, limit, map, learned):
+        for lesson in due(new, threshold, map, learned):
             seen[map.next_name] = lesson.index  # if it is a new one
-            taught = self._learn(lesson, limit, map)
+            taught = self._learn(lesson, threshold, map)
             changed.append(taught.names)
             if lesson.index >= open_from:
                 learned.open.append(taught)
@@ -96,8 +101,8 @@ class FusedMixtures(Stage):
         return self.Out(map=map, events=view_event(map, before, np.concatenate(changed), seen, why))
 
     def _put_right(
-        self, ctx: Context, lessons: tuple[Lesson, ...], learned: Learned, map: ViewMixtures
-    ) -> tuple[tuple[Lesson, ...], list[Ints]]:
+        self, ctx: Context, lessons: tuple[MapUpdate, ...], learned: FusedMixturesState, map: ViewMixtures
+    ) -> tuple[tuple[MapUpdate, ...], list[Ints]]:
         # Those of the lessons that are new, and the names of the views that changed because of the others.
         fresh = {lesson.index: lesson for lesson in lessons}
         learned.waiting = [fresh.pop(lesson.index, lesson) for lesson in learned.waiting]
@@ -112,7 +117,7 @@ class FusedMixtures(Stage):
             ctx.count("lesson_taken_back", len(lessons) - len(fresh))
         return tuple(fresh.values()), [taught.names for taught in again]
 
-    def _learn(self, lesson: Lesson, limit: ViewLimit | None, map: ViewMixtures) -> Taught:
+    def _learn(self, lesson: MapUpdate, limit: NoveltyThreshold | None, map: ViewMixtures) -> AppliedUpdate:
         view = lesson.view
         distances = view.distances(map.views) if len(map) and limit else np.empty(0)
         rows = np.flatnonzero(distances < limit.distance) if limit else np.empty(0, np.int64)
@@ -126,7 +131,7 @@ class FusedMixtures(Stage):
 
     def _take_in(
         self, state: GaussianMixture, index: int, names: Ints, turns: Array, alike: Array, map: ViewMixtures
-    ) -> Taught:
+    ) -> AppliedUpdate:
         taught = taught_by(state, index, names, turns, alike, map)
         mixtures = [
             fused([places, parts(state, turn, s)], self.merge_below, self.spread, self.least_weight, self.average)

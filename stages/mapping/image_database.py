@@ -14,7 +14,7 @@ from omninav.stages.values.pose import Pose
 from .pose_of_view import Supervised, pose_of_view
 
 
-class LastTaken(State):
+class ImageDatabaseState(State):
     """The picture taken last: its first reference, where the robot stood, and what its neighbours are joined to."""
 
     reference: int = -1
@@ -51,7 +51,7 @@ class ImageDatabase(Stage):
         odometry: Pose | None,
         truth: Pose | None,
         map: ReferenceGraph,
-        last: LastTaken,
+        last: ImageDatabaseState,
     ) -> Out:
         """Take one picture into the map, or not."""
         if ctx.tick.first_of_log:
@@ -76,7 +76,7 @@ class ImageDatabase(Stage):
         last.reference, last.x, last.y, last.heading = added[0], pose.x, pose.y, pose.heading
         return self.Out(map=map, events=ReferenceEvent(added[0], "first" if first else "far"))
 
-    def _far(self, pose: Pose, last: LastTaken) -> bool:
+    def _far(self, pose: Pose, last: ImageDatabaseState) -> bool:
         if last.reference < 0 or (self.apart_m <= 0.0 and self.apart_deg <= 0.0):
             return True
         moved = math.hypot(pose.x - last.x, pose.y - last.y)

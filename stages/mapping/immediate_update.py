@@ -2,13 +2,13 @@
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.belief import GaussianMixture
-from omninav.stages.values.map_update import Lesson, Lessons
+from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.pose import UncertainMotion
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Neighbours, WholeView
 
 
-class AtOnce(Stage):
+class ImmediateUpdate(Stage):
     """Each view is a lesson in the tick in which it is seen, with the whole state, however many modes it has.
 
     Porta & Kroese 2004, section 3.2. A state without any component teaches nothing.
@@ -17,8 +17,8 @@ class AtOnce(Stage):
     class Out(Outputs):
         """What this tick has to teach: one lesson, or none. Nothing waits."""
 
-        lessons: Lessons
-        waiting: Lessons | None = None
+        updates: MapUpdates
+        waiting: MapUpdates | None = None
 
     def step(
         self,
@@ -30,5 +30,5 @@ class AtOnce(Stage):
         map: ViewMixtures | None = None,
     ) -> Out:
         """Make a lesson of the view."""
-        items = (Lesson(view, state, ctx.tick.index),) if len(state) else ()
-        return self.Out(lessons=Lessons(items))
+        items = (MapUpdate(view, state, ctx.tick.index),) if len(state) else ()
+        return self.Out(updates=MapUpdates(items))

@@ -4,7 +4,7 @@ from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.maps import ReferenceGraph
 
 
-class EmptyReferenceGraph(Stage):
+class InitialReferenceGraph(Stage):
     """A reference graph with no reference in it: what a mapping drive begins with."""
 
     class Out(Outputs):

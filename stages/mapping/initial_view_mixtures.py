@@ -4,7 +4,7 @@ from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 
-class FirstViewMixtures(Stage):
+class InitialViewMixtures(Stage):
     """The map to begin with: the known one, where there is one (`map=FILE`), else one with no view in it."""
 
     class Out(Outputs):

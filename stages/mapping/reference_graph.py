@@ -13,7 +13,7 @@ from omninav.stages.values.pose import Pose
 from .pose_of_view import Supervised, pose_of_view
 
 
-class Along(State):
+class LearnReferenceGraphState(State):
     """The reference the drive is at: the next one is joined to it."""
 
     reference: int = -1
@@ -46,7 +46,7 @@ class LearnReferenceGraph(Stage):
         odometry: Pose | None,
         truth: Pose | None,
         map: ReferenceGraph,
-        along: Along,
+        along: LearnReferenceGraphState,
     ) -> Out:
         """Take one view into the map, or not."""
         if ctx.tick.first_of_log:

@@ -10,17 +10,17 @@ from omninav.stages.camera.models import Camera
 from omninav.stages.camera.thumbnail import small_picture
 from omninav.stages.values.image import Image, Panorama, Windows
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.thumbnails import Album
+from omninav.stages.values.thumbnails import Thumbnails
 from omninav.stages.values.topological_map import TopologicalMap
 
 
-class ReferencePictures(Value):
+class ReferenceThumbnails(Value):
     """Pictures of the references that a tick added to a map, as JPEG bytes, in the map's order."""
 
     jpegs: tuple[bytes, ...]
 
 
-class InAlbum(State):
+class ThumbnailsState(State):
     """How many references have their picture."""
 
     references: int = 0
@@ -38,30 +38,30 @@ class ReferenceSnapshot(Stage):
     class Out(Outputs):
         """`pictures`: absent where the map did not grow."""
 
-        pictures: ReferencePictures | None = None
+        pictures: ReferenceThumbnails | None = None
 
-    def step(self, ctx: Context, panorama: Panorama | Windows, map: ReferenceGraph, album: InAlbum) -> Out:
+    def step(self, ctx: Context, panorama: Panorama | Windows, map: ReferenceGraph, thumbnails: ThumbnailsState) -> Out:
         """One tick."""
-        if len(map) <= album.references:
+        if len(map) <= thumbnails.references:
             return self.Out()
         seen = list(panorama.pixels) if isinstance(panorama, Windows) else [panorama.pixels]
-        new = len(map) - album.references
-        album.references = len(map)
+        new = len(map) - thumbnails.references
+        thumbnails.references = len(map)
         jpegs = (small_picture(pixels, None, self.columns).jpeg(self.quality) for pixels in seen[:new])
-        return self.Out(pictures=ReferencePictures(tuple(jpegs)))
+        return self.Out(pictures=ReferenceThumbnails(tuple(jpegs)))
 
 
-class CollectAlbum(Stage):
+class CollectThumbnails(Stage):
     """Binds the pictures of all references into an album, which is kept in a file of its own."""
 
     class Out(Outputs):
         """A picture per reference of the map."""
 
-        album: Album
+        thumbnails: Thumbnails
 
-    def step(self, ctx: Context, pictures: Sequence[ReferencePictures]) -> Out:
+    def step(self, ctx: Context, pictures: Sequence[ReferenceThumbnails]) -> Out:
         """The whole tour at once."""
-        return self.Out(album=bound([jpeg for some in pictures for jpeg in some.jpegs]))
+        return self.Out(thumbnails=bound([jpeg for some in pictures for jpeg in some.jpegs]))
 
 
 class TourSnapshot(Stage):
@@ -76,27 +76,27 @@ class TourSnapshot(Stage):
     class Out(Outputs):
         """One picture."""
 
-        pictures: ReferencePictures
+        pictures: ReferenceThumbnails
 
-    def step(self, ctx: Context, picture: Image | Panorama, camera: Camera | None = None) -> Out:
+    def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
         """One tick."""
-        jpeg = small_picture(picture.pixels, camera, self.columns).jpeg(self.quality)
-        return self.Out(pictures=ReferencePictures((jpeg,)))
+        jpeg = small_picture(image.pixels, camera, self.columns).jpeg(self.quality)
+        return self.Out(pictures=ReferenceThumbnails((jpeg,)))
 
 
-class ViewAlbum(Stage):
+class ViewThumbnails(Stage):
     """Binds the pictures of a topological map's views into an album; those of a `known` map's views are not known."""
 
     class Out(Outputs):
         """A picture per view of the map."""
 
-        album: Album
+        thumbnails: Thumbnails
 
     def step(
         self,
         ctx: Context,
         ticks: Sequence[Tick],
-        pictures: Sequence[ReferencePictures | None],
+        pictures: Sequence[ReferenceThumbnails | None],
         map: TopologicalMap,
         known: TopologicalMap | None = None,
     ) -> Out:
@@ -104,10 +104,10 @@ class ViewAlbum(Stage):
         first = 0 if known is None or not len(known.frames) else 1 + int(known.frames.max())
         rows = (map.frames - first).tolist()
         found = [pictures[row] if row >= 0 else None for row in rows]
-        return self.Out(album=bound([b"" if some is None else some.jpegs[0] for some in found]))
+        return self.Out(thumbnails=bound([b"" if some is None else some.jpegs[0] for some in found]))
 
 
-def bound(jpegs: Sequence[bytes]) -> Album:
+def bound(jpegs: Sequence[bytes]) -> Thumbnails:
     """Pictures as an album; an empty one stands for a picture that is not known."""
     ends = np.cumsum([0, *(len(jpeg) for jpeg in jpegs)], dtype=np.int64)
-    return Album(np.frombuffer(b"".join(jpegs), np.uint8), ends)
+    return Thumbnails(np.frombuffer(b"".join(jpegs), np.uint8), ends)

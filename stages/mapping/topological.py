@@ -22,7 +22,7 @@ from omninav.stages.geometry.appearance.visual_distance import (
 )
 from omninav.stages.geometry.probability import dempster_shafer
 from omninav.stages.values.drives import pose_row
-from omninav.stages.values.local_features import ColumnSegments, GlobalMoments, LocalFeatures
+from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, VerticalSegments
 from omninav.stages.values.pose import Pose, PoseSource
 from omninav.stages.values.rooms import Rooms
 from omninav.stages.values.topological_map import DRIVEN, LOOP, LoopHypotheses, TopologicalMap, stored
@@ -41,8 +41,8 @@ class View(NamedTuple):
     """
 
     features: LocalFeatures
-    columns: ColumnSegments | None
-    moments: GlobalMoments
+    columns: VerticalSegments | None
+    moments: GlobalDescriptor
     pose: tuple[float, float, float]
     frame: int
     order: int
@@ -54,7 +54,7 @@ class Kept(NamedTuple):
     """What a map keeps of a view."""
 
     features: LocalFeatures
-    columns: ColumnSegments
+    columns: VerticalSegments
 
 
 class AllCompared(NamedTuple):
@@ -153,8 +153,8 @@ class TopologicalMapping(Stage):
         ctx: Context,
         ticks: Sequence[Tick],
         features: Sequence[LocalFeatures | None],
-        moments: Sequence[GlobalMoments | None],
-        columns: Sequence[ColumnSegments | None] = (),
+        descriptor: Sequence[GlobalDescriptor | None],
+        vertical_segments: Sequence[VerticalSegments | None] = (),
         odometry: Sequence[Pose | None] = (),
         truth: Sequence[Pose | None] = (),
         known: TopologicalMap | None = None,
@@ -162,7 +162,7 @@ class TopologicalMapping(Stage):
     ) -> Out:
         """The whole tour at once."""
         source = self._pose_source(ctx, truth, known)
-        kept = self._kept(ticks, features, moments)
+        kept = self._kept(ticks, features, descriptor)
         poses = truth if source == "truth" else odometry
         views = self._views(known)
         first = 1 + max((view.frame for view in views), default=-1)
@@ -171,10 +171,10 @@ class TopologicalMapping(Stage):
             fresh = place == 0 or ticks[kept[place - 1]].log != ticks[row].log
             order += math.ceil(self.reach) + 1 if fresh else 1  # tours do not follow each other on the floor
             at = pose_row(poses[row] if row < len(poses) else None)
-            seen, whole = features[row], moments[row]
+            seen, whole = features[row], descriptor[row]
             assert seen is not None
             assert whole is not None
-            beside = columns[row] if row < len(columns) else None
+            beside = vertical_segments[row] if row < len(vertical_segments) else None
             views.append(View(seen, beside, whole, at, first + row, order, 1 + ticks[row].log))
         if not views:
             raise BadInput("mapping: no picture of the tour shows anything; use another tour")
@@ -192,7 +192,7 @@ class TopologicalMapping(Stage):
         self,
         ticks: Sequence[Tick],
         features: Sequence[LocalFeatures | None],
-        moments: Sequence[GlobalMoments | None],
+        moments: Sequence[GlobalDescriptor | None],
     ) -> list[int]:
         """The pictures that take part: no two of a tour closer together than `every_s`, a tenth of it forgiven."""
         kept: list[int] = []
@@ -362,10 +362,10 @@ class TopologicalMapping(Stage):
         return Kept(whole.features.chosen(np.sort(np.argsort(-seen, kind="stable")[: self.patches])), columns)
 
 
-def no_columns() -> ColumnSegments:
+def no_columns() -> VerticalSegments:
     """No column segments."""
     nothing = np.empty(0, np.float32)
-    return ColumnSegments(np.empty(0), np.empty((0, 2)), np.empty((0, 10), np.float32), nothing, np.empty((0, 2, 2)))
+    return VerticalSegments(np.empty(0), np.empty((0, 2)), np.empty((0, 10), np.float32), nothing, np.empty((0, 2, 2)))
 
 
 def nearest_views(distances: Array, part: Ints, pairs: Ints) -> Ints:

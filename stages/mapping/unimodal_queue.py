@@ -10,7 +10,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.plane.odometry_motion import increment
 from omninav.stages.geometry.plane.path_reconstruction import reconstructed
 from omninav.stages.values.belief import GaussianMixture
-from omninav.stages.values.map_update import Lesson, Lessons
+from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.pose import UncertainMotion
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Neighbours, WholeView
@@ -18,12 +18,12 @@ from omninav.stages.values.views import Neighbours, WholeView
 from .unimodality import certain_state
 
 
-class Waiting(State):
+class UnimodalQueueState(State):
     """Lessons waiting for their time, the last certain state, and the views and motions since then."""
 
-    queue: list[Lesson] = field(default_factory=list)
+    queue: list[MapUpdate] = field(default_factory=list)
     certain: GaussianMixture | None = None
-    seen: list[Lesson] = field(default_factory=list)
+    seen: list[MapUpdate] = field(default_factory=list)
     ways: list[UncertainMotion] = field(default_factory=list)
 
 
@@ -31,7 +31,7 @@ class UnimodalQueue(Stage):
     """Lessons from unimodal states only, `length` ticks late; states between two unimodal ones are reconstructed.
 
     Gross, Koenig & Mueller 2005, section 2.1: updating at once would feed the map's own errors back into the state. The
-    queue gives out what is left in it when the next log begins, and after the last log by `waiting` (LeftOver).
+    queue gives out what is left in it when the next log begins, and after the last log by `waiting` (FlushPending).
 
     The test for a unimodal state is not given (erratum 12a). `unimodal: share`: the components nearer to the heaviest
     than `near_below` (squared Mahalanobis distance) hold more than `least_share` of the weight; the lesson's state has
@@ -58,8 +58,8 @@ class UnimodalQueue(Stage):
     class Out(Outputs):
         """What is due in this tick, in the order in which it was seen, and what would be due as the next log begins."""
 
-        lessons: Lessons
-        waiting: Lessons
+        updates: MapUpdates
+        waiting: MapUpdates
 
     def step(
         self,
@@ -67,13 +67,13 @@ class UnimodalQueue(Stage):
         view: WholeView,
         state: GaussianMixture,
         model: UncertainMotion | None,
-        waiting: Waiting,
+        waiting: UnimodalQueueState,
         neighbours: Neighbours | None = None,
         map: ViewMixtures | None = None,
     ) -> Out:
         """Take one view in, and give out what has waited long enough."""
         now = ctx.tick.index
-        due: list[Lesson] = []
+        due: list[MapUpdate] = []
         if ctx.tick.first_of_log:
             due, waiting.queue = waiting.queue, []
         if model is None:
@@ -82,17 +82,17 @@ class UnimodalQueue(Stage):
             waiting.ways.append(model)
         single = self._single(state)
         if single is not None:
-            lesson = Lesson(view, single, now)
+            lesson = MapUpdate(view, single, now)
             waiting.queue += [*self._between(ctx, waiting, single), lesson]
             waiting.certain, waiting.seen, waiting.ways = single, [], []
         elif waiting.certain is None or not self.reconstruct or len(waiting.seen) >= self.longest:
             self._forget_the_way(ctx, waiting)
             ctx.count("view_not_learned", detail="lessons: views between states that are not certain are not learned")
         else:
-            waiting.seen.append(Lesson(view, state, now, reconstructed=True))
+            waiting.seen.append(MapUpdate(view, state, now, reconstructed=True))
         ready = sum(1 for lesson in waiting.queue if lesson.index <= now - self.length)
         due, waiting.queue = due + waiting.queue[:ready], waiting.queue[ready:]
-        return self.Out(lessons=Lessons(tuple(due)), waiting=Lessons(tuple(waiting.queue)))
+        return self.Out(updates=MapUpdates(tuple(due)), waiting=MapUpdates(tuple(waiting.queue)))
 
     def _single(self, state: GaussianMixture) -> GaussianMixture | None:
         # The state as one Gaussian, where it is certain.
@@ -107,8 +107,8 @@ class UnimodalQueue(Stage):
             return None
         return GaussianMixture(mean[None], covariance[None], np.ones(1))
 
-    def _between(self, ctx: Context, waiting: Waiting, end: GaussianMixture) -> list[Lesson]:
-        # Lessons of the views since the last certain state.
+    def _between(self, ctx: Context, waiting: UnimodalQueueState, end: GaussianMixture) -> list[MapUpdate]:
+        # MapUpdates of the views since the last certain state.
         start, seen = waiting.certain, waiting.seen
         if start is None or not seen:
             return []
@@ -129,9 +129,9 @@ class UnimodalQueue(Stage):
         states = (
             GaussianMixture(means[k : k + 1], covariances[k : k + 1], np.ones(1)) for k in range(1, len(seen) + 1)
         )
-        return [Lesson(s.view, state, s.index, reconstructed=True) for s, state in zip(seen, states, strict=True)]
+        return [MapUpdate(s.view, state, s.index, reconstructed=True) for s, state in zip(seen, states, strict=True)]
 
-    def _forget_the_way(self, ctx: Context, waiting: Waiting) -> None:
+    def _forget_the_way(self, ctx: Context, waiting: UnimodalQueueState) -> None:
         if waiting.seen:
             ctx.count(
                 "view_not_learned",

@@ -12,7 +12,7 @@ from omninav.pipeline import Bounds, Context, Outputs
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph, kind_of
 from omninav.stages.values.similarity import Similarities
 
@@ -118,7 +118,9 @@ class NearBelief:
 
         similarities: Similarities
 
-    def candidates(self, ctx: Context, map: ReferenceGraph, near: Particles | None, reach: Reach | None) -> Candidates:
+    def candidates(
+        self, ctx: Context, map: ReferenceGraph, near: Particles | None, reach: LengthScale | None
+    ) -> Candidates:
         """The references to compare at this tick."""
         unit = self.reach_m if reach is None else reach.metres
         radius, aside = self.radius * unit, self.radius_aside * unit

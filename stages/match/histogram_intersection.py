@@ -4,7 +4,7 @@ from omninav.pipeline import Context, Stage
 from omninav.stages.geometry.appearance.segments import similarities
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentHistograms
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 
@@ -24,10 +24,10 @@ class HistogramIntersection(NearBelief, Stage):
         features: SegmentHistograms,
         map: ReferenceGraph,
         near: Particles | None = None,
-        reach: Reach | None = None,
+        length_scale: LengthScale | None = None,
     ) -> NearBelief.Out:
         """Compare one view."""
         check_alike(features, map)
-        chosen, stands_for = self.candidates(ctx, map, near, reach)
+        chosen, stands_for = self.candidates(ctx, map, near, length_scale)
         values = similarities(map.features, features.values, self.headings, True, False, chosen=chosen)
         return self.Out(similarities=Similarities(values, chosen, stands_for, exponent=0.0))

@@ -8,7 +8,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.appearance.view_similarity import Shape, similarity
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import Neighbours, ViewLimit, WholeView
+from omninav.stages.values.views import Neighbours, NoveltyThreshold, WholeView
 
 
 class ViewNeighbours(Stage):
@@ -29,7 +29,7 @@ class ViewNeighbours(Stage):
 
         neighbours: Neighbours
 
-    def step(self, ctx: Context, view: WholeView, map: ViewMixtures, limit: ViewLimit | None = None) -> Out:
+    def step(self, ctx: Context, view: WholeView, map: ViewMixtures, threshold: NoveltyThreshold | None = None) -> Out:
         """Look through the map."""
         map.check_kind(view)
         if not len(map):
@@ -42,7 +42,7 @@ class ViewNeighbours(Stage):
             rows = order[: self.count]
             within = float(distances[order[min(self.count, len(order) - 1)]]) if len(order) > 1 else math.inf
         else:
-            within = 0.0 if limit is None else limit.distance
+            within = 0.0 if threshold is None else threshold.distance
             rows = np.flatnonzero(distances < within)
             rows = rows[np.argsort(distances[rows], kind="stable")]
         near = distances[rows]

@@ -13,7 +13,7 @@ from omninav.stages.geometry.appearance.segments import LANES, turned_views
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentHistograms
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Answers, Similarities
 
@@ -123,7 +123,7 @@ class Retrieval(NearBelief, Stage):
         features: SegmentHistograms,
         map: ReferenceGraph,
         near: Particles | None = None,
-        reach: Reach | None = None,
+        length_scale: LengthScale | None = None,
     ) -> Out:
         """Look one view up."""
         if features.directions is None:
@@ -133,7 +133,7 @@ class Retrieval(NearBelief, Stage):
         else:
             check_alike(SegmentHistograms(features.values[:1]), map)
             queries = features.values[window_turns(features.directions), None]
-        chosen, stands_for = self.candidates(ctx, map, near, reach)
+        chosen, stands_for = self.candidates(ctx, map, near, length_scale)
         values = normalised_intersections(map.features, queries, features.scales, chosen)
         similarities = Similarities(values, chosen, stands_for)
         if not len(map) or not ctx.is_read("answers"):

@@ -6,7 +6,7 @@ from omninav.pipeline import Bounds, Context, Stage
 from omninav.stages.geometry.appearance.segments import EXPONENTS, LARGEST_COLOUR_DISTANCE, similarities
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 
@@ -34,11 +34,11 @@ class SelectiveMatch(NearBelief, Stage):
         features: SegmentFeatures,
         map: ReferenceGraph,
         near: Particles | None = None,
-        reach: Reach | None = None,
+        length_scale: LengthScale | None = None,
     ) -> NearBelief.Out:
         """Compare one view."""
         histograms = check_alike(features, map)
-        chosen, stands_for = self.candidates(ctx, map, near, reach)
+        chosen, stands_for = self.candidates(ctx, map, near, length_scale)
         exponent, scale = EXPONENTS[self.penalty], self.colour_scale
         values = similarities(map.features, features.values, self.headings, histograms, True, exponent, chosen, scale)
         return self.Out(similarities=Similarities(values, chosen, stands_for, exponent, scale))

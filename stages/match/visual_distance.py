@@ -15,7 +15,7 @@ from omninav.stages.geometry.appearance.visual_distance import (
     compare,
     made_ready,
 )
-from omninav.stages.values.local_features import ColumnSegments, GlobalMoments, LocalFeatures
+from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, VerticalSegments
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
 
@@ -49,9 +49,9 @@ class MatchPlaces(Stage):
         self,
         ctx: Context,
         features: LocalFeatures,
-        moments: GlobalMoments,
+        descriptor: GlobalDescriptor,
         map: TopologicalMap,
-        columns: ColumnSegments | None = None,
+        vertical_segments: VerticalSegments | None = None,
     ) -> Out:
         """Compare one view with all places."""
         if self._map is not map:
@@ -62,10 +62,10 @@ class MatchPlaces(Stage):
                 f"match: descriptors of {features.descriptors.shape[1]} numbers against a map of "
                 f"{map.views.descriptors.shape[1]}; use the features it was made with, or make it anew"
             )
-        here = made_ready(features, columns)
+        here = made_ready(features, vertical_segments)
         matching = Matching(self.ratio, self.column_ratio, self.patch_colour)
         measure = Measure(self.least_matches, math.radians(self.least_angle_deg))
-        near = colours_apart(map.views.moments[map.places], moments.values) <= self.colour
+        near = colours_apart(map.views.moments[map.places], descriptor.values) <= self.colour
         distances, turns = np.full(len(map), math.inf), np.zeros(len(map))
         matches = np.zeros(len(map), np.int64)
         for place in np.flatnonzero(near):

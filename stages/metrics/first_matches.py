@@ -17,7 +17,7 @@ from omninav.stages.geometry.appearance.visual_distance import Matching, match_p
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.true_matches import Motion, angles_between, right_by_depth, right_by_epipolar
 from omninav.stages.values.depths import Depths
-from omninav.stages.values.local_features import ColumnSegments, LocalFeatures
+from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
 from omninav.stages.values.pose import Pose
 
 Array = npt.NDArray[np.float64]
@@ -30,7 +30,7 @@ class Seen(NamedTuple):
 
     pose: Array
     patches: LocalFeatures | None
-    columns: ColumnSegments | None
+    columns: VerticalSegments | None
     depths: Depths | None
 
 
@@ -74,7 +74,7 @@ class FirstMatches(Stage):
         ctx: Context,
         truth: Sequence[Pose | None],
         features: Sequence[LocalFeatures | None] = (),
-        columns: Sequence[ColumnSegments | None] = (),
+        vertical_segments: Sequence[VerticalSegments | None] = (),
         depths: Sequence[Depths | None] = (),
         camera: Sequence[Camera | None] = (),
     ) -> Out:
@@ -88,7 +88,7 @@ class FirstMatches(Stage):
             pose = truth[row]
             assert pose is not None
             at = np.array([pose.x, pose.y, pose.heading])
-            views.append(Seen(at, _at(features, row), _at(columns, row), _at(depths, row)))
+            views.append(Seen(at, _at(features, row), _at(vertical_segments, row), _at(depths, row)))
         chosen = [pairs_apart(np.array([view.pose for view in views]), far, self.pairs) for far in self.apart_m]
         told = [[self._judged(views[one], views[other], lens) for one, other in pairs] for pairs in chosen]
         found: dict[str, Any] = {"depths_known": int(any(view.depths is not None for view in views))}

@@ -15,7 +15,7 @@ from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
 Array = npt.NDArray[np.float64]
 
 
-class LoopLinks(Stage):
+class LoopClosures(Stage):
     """Precision and recall of accepted loop hypotheses against truth, and how large the map is.
 
     A hypothesis is right where some picture of one of its subclusters was taken within `near_m` of some picture of the

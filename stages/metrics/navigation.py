@@ -12,7 +12,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.graph.results import Metrics
 from omninav.stages.values.drive_tally import DriveTally
-from omninav.stages.values.planned_route import PlannedWay
+from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.topological_map import TopologicalMap
 
@@ -41,18 +41,18 @@ class Navigation(Stage):
         self,
         ctx: Context,
         ticks: Sequence[Tick],
-        ways: Sequence[PlannedWay | None],
+        routes: Sequence[PlannedRoute | None],
         truth: Sequence[Pose | None],
         tallies: Sequence[DriveTally | None],
         map: TopologicalMap,
     ) -> Out:
         """The whole drive at once."""
-        said = [way for way in ways if way is not None]
+        said = [way for way in routes if way is not None]
         spots = [(pose.x, pose.y) for pose in truth if pose is not None]
         if not said or not spots:
             return self.Out()
         last = said[-1]
-        ends = (k for k, way in enumerate(ways) if way is not None and way.state in ("arrived", "gave up"))
+        ends = (k for k, way in enumerate(routes) if way is not None and way.state in ("arrived", "gave up"))
         ended = next(ends, len(ticks) - 1)
         tally = next((each for each in reversed(tallies) if each is not None), None)
         goal = int(last.places[-1]) if len(last.places) else None

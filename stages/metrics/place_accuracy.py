@@ -13,7 +13,7 @@ from omninav.stages.values.pose import Pose
 from omninav.stages.values.topological_map import TopologicalMap
 
 
-class PlaceHits(Stage):
+class PlaceAccuracy(Stage):
     """The share of pictures at which the belief's maximum is at the place whose medoid was taken closest to the truth.
 
     Goedemé et al. 2007, section 8.3. Under `localisation`, over all logs: `right_rate` of all pictures; `near_rate`:

@@ -4,7 +4,7 @@ from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.image import Panorama
 
 
-class NoDisturbance(Stage):
+class NoPerturbation(Stage):
     """Hands the panorama on as it is: the undisturbed end of an experiment."""
 
     class Out(Outputs):

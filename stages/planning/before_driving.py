@@ -2,7 +2,7 @@
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.homing import DrivingStatus, PathProgress
-from omninav.stages.values.planned_route import PlannedWay
+from omninav.stages.values.planned_route import PlannedRoute
 
 
 class BeforeDriving(Stage):
@@ -11,7 +11,7 @@ class BeforeDriving(Stage):
     class Out(Outputs):
         status: DrivingStatus | None = None
         progress: PathProgress | None = None
-        way: PlannedWay | None = None
+        route: PlannedRoute | None = None
 
     def step(self, ctx: Context) -> Out:
         """Nothing."""

@@ -12,7 +12,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.pipeline.graph.problems import BadInput, nearest
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.homing import DrivingStatus, ImagePath, PathProgress
-from omninav.stages.values.planned_route import PlannedWay
+from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
 
@@ -44,7 +44,7 @@ class Itinerary(State):
     blocked: str = ""
 
 
-class ShortestWay(Stage):
+class ShortestPathPlanner(Stage):
     """From the most probable place to the goal over as few links as there are, as the pictures along that way.
 
     Goedemé et al. 2007, section 6 (Dijkstra's algorithm): the medoid of the place where the robot is believed to be,
@@ -74,7 +74,7 @@ class ShortestWay(Stage):
         """`path`: the views, in the tick in which they are planned. `way`: through which places, at every tick."""
 
         path: ImagePath | None = None
-        way: PlannedWay
+        route: PlannedRoute
 
     def step(
         self,
@@ -82,7 +82,7 @@ class ShortestWay(Stage):
         itinerary: Itinerary,
         belief: PlaceBelief,
         map: TopologicalMap,
-        picture: VisualDistances | None = None,
+        image: VisualDistances | None = None,
         status: DrivingStatus | None = None,
         progress: PathProgress | None = None,
     ) -> Out:
@@ -90,15 +90,15 @@ class ShortestWay(Stage):
 
         `picture`: how far the goal's picture is from each place, where the goal is one.
         """
-        pictured = None if picture is None else place_pictured(self.goal, picture, self.alike, map)
+        pictured = None if image is None else place_pictured(self.goal, image, self.alike, map)
         goals = places_called(self.goal, map) if pictured is None else pictured
         if itinerary.ended or not self._must_plan(itinerary, belief, status, progress):
-            return self.Out(way=_way(itinerary))
+            return self.Out(route=_way(itinerary))
         if itinerary.number >= 0 and progress is not None and status is not None:
             _remember(itinerary, progress.at)
             itinerary.blocked = status.why if status.state == "blocked" else itinerary.blocked
         path = self._plan(ctx, itinerary, belief.probabilities, goals, map)
-        return self.Out(path=path, way=_way(itinerary))
+        return self.Out(path=path, route=_way(itinerary))
 
     def _must_plan(
         self, itinerary: Itinerary, belief: PlaceBelief, status: DrivingStatus | None, progress: PathProgress | None
@@ -239,10 +239,10 @@ def _called(map: TopologicalMap, view: int) -> str:
     return named if int(map.places[place]) == view else f"on the way, picture {int(map.frames[view])}"
 
 
-def _way(itinerary: Itinerary) -> PlannedWay:
+def _way(itinerary: Itinerary) -> PlannedRoute:
     state: Literal["locating", "under way", "arrived", "gave up"] = "under way"
     if itinerary.ended:
         state = "arrived" if itinerary.ended == "arrived" else "gave up"
     elif itinerary.number < 0 or itinerary.waited > 0:
         state = "locating"
-    return PlannedWay(itinerary.places, state, itinerary.number, itinerary.why)
+    return PlannedRoute(itinerary.places, state, itinerary.number, itinerary.why)

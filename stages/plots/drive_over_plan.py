@@ -9,7 +9,7 @@ from omninav.pipeline.graph.results import Figure
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.drives import Array, drives
 from omninav.stages.values.floor_plan import FloorPlan
-from omninav.stages.values.planned_route import PlannedWay
+from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.topological_map import TopologicalMap
 
@@ -48,7 +48,7 @@ class DriveOverPlan(Stage):
         tallies: Sequence[DriveTally | None],
         plan: FloorPlan,
         map: TopologicalMap | None = None,
-        ways: Sequence[PlannedWay | None] | None = None,
+        routes: Sequence[PlannedRoute | None] | None = None,
     ) -> Out:
         """The whole run at once."""
         logs = drives(ticks, [None] * len(ticks), truth, motion)
@@ -57,7 +57,7 @@ class DriveOverPlan(Stage):
         counts = np.array([0 if tally is None else tally.collisions for tally in tallies])
         contacts = np.flatnonzero(np.diff(counts, prepend=0) > 0)
         path, dead_reckoning = logs[-1].truth, logs[-1].odometry_alone()
-        planned = planned_ways(ways or (), map)
+        planned = planned_ways(routes or (), map)
         return self.Out(
             figure=Figure(
                 name="drive_over_plan",
@@ -71,7 +71,7 @@ class DriveOverPlan(Stage):
         )
 
 
-def planned_ways(ways: Sequence[PlannedWay | None], map: TopologicalMap | None) -> list[Array]:
+def planned_ways(ways: Sequence[PlannedRoute | None], map: TopologicalMap | None) -> list[Array]:
     """Each way that was planned, in order: x and y (V, 2) of the views along it."""
     if map is None:
         return []

@@ -17,9 +17,9 @@ from omninav.stages.values.drives import pose_rows
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing import DrivingStatus, PathProgress
 from omninav.stages.values.image import Pixels
-from omninav.stages.values.planned_route import PlannedWay
+from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Pose
-from omninav.stages.values.thumbnails import Album, decoded
+from omninav.stages.values.thumbnails import Thumbnails, decoded
 from omninav.stages.values.topological_map import TopologicalMap
 
 from .draw_homing import (
@@ -69,7 +69,7 @@ class Scene(NamedTuple):
     pose: Array
     goal: Array
     belief: PlaceBelief | None
-    way: PlannedWay | None
+    way: PlannedRoute | None
     progress: PathProgress | None
     status: DrivingStatus | None
 
@@ -89,7 +89,7 @@ class Window:
         return there + self.middle
 
 
-class DriveFilm(Stage):
+class DriveVideo(Stage):
     """Writes `drive.mp4`: a frame for every glance of homing, `per_second` of them a second, at most `frames` in all.
 
     The robot's picture with the features it follows and the homing vector, the view that it goes to, the plan with its
@@ -112,28 +112,28 @@ class DriveFilm(Stage):
         self,
         ctx: Context,
         ticks: Sequence[Tick],
-        glances: Sequence[HomingGlance | None],
+        snapshots: Sequence[HomingGlance | None],
         progress: Sequence[PathProgress | None],
         statuses: Sequence[DrivingStatus | None],
         truth: Sequence[Pose | None],
         plan: FloorPlan | None = None,
         beliefs: Sequence[PlaceBelief | None] | None = None,
-        ways: Sequence[PlannedWay | None] | None = None,
+        routes: Sequence[PlannedRoute | None] | None = None,
         map: TopologicalMap | None = None,
-        album: Album | None = None,
+        thumbnails: Thumbnails | None = None,
     ) -> Out:
         """The whole run at once."""
         path = pose_rows(truth)
         stamps = np.array([tick.stamp for tick in ticks])
-        last = _last_tick(list(statuses), None if ways is None else list(ways), stamps, round(1e9 * self.after_s))
-        there = [row for row, glance in enumerate(glances) if glance is not None and row <= last]
+        last = _last_tick(list(statuses), None if routes is None else list(routes), stamps, round(1e9 * self.after_s))
+        there = [row for row, glance in enumerate(snapshots) if glance is not None and row <= last]
         if not there:
             return self.Out()
         scenes = []
         for row in (there[n] for n in spread_out(len(there), self.frames)):
-            glance, way = glances[row], None if ways is None else ways[row]
+            glance, way = snapshots[row], None if routes is None else routes[row]
             assert glance is not None
-            goal, shown = target_of(progress[row], way, map, path[0], album)
+            goal, shown = target_of(progress[row], way, map, path[0], thumbnails)
             if glance.vector is None:
                 goal = np.full(3, np.nan)
             seconds = (int(stamps[row]) - int(stamps[0])) / 1e9
@@ -169,7 +169,7 @@ class DriveFilm(Stage):
 
 def _last_tick(
     statuses: Sequence[DrivingStatus | None],
-    ways: Sequence[PlannedWay | None] | None,
+    ways: Sequence[PlannedRoute | None] | None,
     stamps: npt.NDArray[np.int64],
     after: int,
 ) -> int:

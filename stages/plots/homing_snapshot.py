@@ -41,7 +41,7 @@ class HomingGlance(Value):
     vector: HomingVector | None = None
 
 
-class Looked(State):
+class HomingSnapshotState(State):
     """When it looked last (ns)."""
 
     stamp: int = 0
@@ -59,14 +59,14 @@ class HomingSnapshot(Stage):
     class Out(Outputs):
         """`glance`: absent in between."""
 
-        glance: HomingGlance | None = None
+        snapshot: HomingGlance | None = None
 
     def step(
         self,
         ctx: Context,
-        looked: Looked,
+        looked: HomingSnapshotState,
         tick: Tick,
-        picture: Image | Panorama,
+        image: Image | Panorama,
         camera: Camera | None = None,
         target: HomingTarget | None = None,
         vector: HomingVector | None = None,
@@ -76,15 +76,15 @@ class HomingSnapshot(Stage):
         if not tick.first_of_log and tick.stamp - looked.stamp < 0.99e9 * self.every_s:
             return self.Out()
         looked.stamp = tick.stamp
-        small = small_picture(picture.pixels, camera, self.columns)
+        small = small_picture(image.pixels, camera, self.columns)
         points, way, there = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2))
         kinds, of_target = np.zeros(0, np.int64), np.zeros(0, np.int8)
         if tracks is not None:
             points, kinds = tracks.points, tracks.kinds
         if vector is not None:
-            way = seen_at(picture, camera, floor_ahead(vector, getattr(camera, "height", None)))
+            way = seen_at(image, camera, floor_ahead(vector, getattr(camera, "height", None)))
         if target is not None:
-            there = seen_at(picture, camera, target.features.bearings)
+            there = seen_at(image, camera, target.features.bearings)
             of_target = np.full(len(there), -1, np.int8)
             if tracks is not None:
                 of_target[tracks.rows] = tracks.kinds
@@ -99,7 +99,7 @@ class HomingSnapshot(Stage):
             "" if target is None else target.name,
             vector,
         )
-        return self.Out(glance=glance)
+        return self.Out(snapshot=glance)
 
 
 def floor_ahead(vector: HomingVector, height: float | None) -> Array:

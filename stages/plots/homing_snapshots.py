@@ -12,9 +12,9 @@ from omninav.stages.values.drives import Array, pose_rows
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing import HomingVector, PathProgress
 from omninav.stages.values.image import Pixels
-from omninav.stages.values.planned_route import PlannedWay
+from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Pose
-from omninav.stages.values.thumbnails import Album, decoded
+from omninav.stages.values.thumbnails import Thumbnails, decoded
 from omninav.stages.values.topological_map import TopologicalMap
 
 from .draw_homing import BRIGHT, LOST, NAMES, VECTOR, hexadecimal, is_known, robots_view, targets_view
@@ -53,7 +53,7 @@ class Moment(NamedTuple):
     path: Array
 
 
-class HomingMoments(Stage):
+class HomingSnapshots(Stage):
     """The robot's picture beside the target's at `moments` of a drive, with followed features and the homing vector.
 
     The last panel of each row is the floor around the robot (m): its way so far, the vector, and where the target view
@@ -72,23 +72,23 @@ class HomingMoments(Stage):
         self,
         ctx: Context,
         ticks: Sequence[Tick],
-        glances: Sequence[HomingGlance | None],
+        snapshots: Sequence[HomingGlance | None],
         progress: Sequence[PathProgress | None],
         truth: Sequence[Pose | None],
-        ways: Sequence[PlannedWay | None] | None = None,
+        routes: Sequence[PlannedRoute | None] | None = None,
         map: TopologicalMap | None = None,
-        album: Album | None = None,
+        thumbnails: Thumbnails | None = None,
         plan: FloorPlan | None = None,
     ) -> Out:
         """The whole run at once."""
         path = pose_rows(truth)
-        told = [(row, g) for row, g in enumerate(glances) if g is not None and g.vector is not None]
+        told = [(row, g) for row, g in enumerate(snapshots) if g is not None and g.vector is not None]
         if not told:
             return self.Out()
         found = []
         for row, glance in (told[n] for n in chosen([g for _, g in told], self.moments)):
             assert glance.vector is not None
-            goal, shown = target_of(progress[row], None if ways is None else ways[row], map, path[0], album)
+            goal, shown = target_of(progress[row], None if routes is None else routes[row], map, path[0], thumbnails)
             seconds = (ticks[row].stamp - ticks[0].stamp) / 1e9
             found.append(
                 Moment(ticks[row].frame, seconds, glance, glance.vector, shown, path[row], goal, path[: row + 1])

@@ -10,7 +10,7 @@ from omninav.pipeline.files import write_whole
 from omninav.stages.values.image import Image
 
 
-class PictureAt(Stage):
+class ImageAt(Stage):
     """The picture of frame `frame` of each log."""
 
     frame: Annotated[int, Bounds(ge=0)] = 0
@@ -25,7 +25,7 @@ class PictureAt(Stage):
         return self.Out(image=image if tick.frame == self.frame else None)
 
 
-class PictureFile(Stage):
+class ImageFile(Stage):
     """Writes the first of the pictures that it is given as `picture.png` into the run's folder, pixel by pixel."""
 
     class Out(Outputs):

@@ -11,7 +11,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from .style import ESTIMATE, draw_map, extent_of, fitting_height, picture, plan_axes
 
 
-class MapPlan(Stage):
+class MapPlot(Stage):
     """The map's references with their headings, and its edges. Map frame, metres."""
 
     class Out(Outputs):

@@ -12,7 +12,7 @@ from omninav.stages.values.image import Pixels
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.similarity import Answers
-from omninav.stages.values.thumbnails import Album, decoded
+from omninav.stages.values.thumbnails import Thumbnails, decoded
 
 from .panorama_snapshot import EncodedPanorama
 from .snapshot_times import spread_out
@@ -59,7 +59,7 @@ class RetrievalStrip(Stage):
         answers: Sequence[Answers | None],
         truth: Sequence[Pose | None],
         map: ReferenceGraph,
-        album: Album | None = None,
+        thumbnails: Thumbnails | None = None,
     ) -> Out:
         """The whole run at once."""
         kept = [
@@ -70,7 +70,7 @@ class RetrievalStrip(Stage):
         queries = [query for log, query in kept if log == kept[-1][0]]
         if not queries:
             return self.Out()
-        pictures = album is not None and len(album) == len(map)
+        pictures = thumbnails is not None and len(thumbnails) == len(map)
         return self.Out(
             figure=Figure(
                 name="retrieval_strip",
@@ -79,14 +79,14 @@ class RetrievalStrip(Stage):
                 "first: the similarity, and where it is known how far the robot truly was from where it would be if "
                 f"the reference were right (green: within {NEAR_M:g} m and {NEAR_DEG:g}°)."
                 + ("" if pictures else " There is no album of the references' pictures: their poses stand instead."),
-                content=_draw([queries[n] for n in spread_out(len(queries), self.frames)], map, album, pictures),
+                content=_draw([queries[n] for n in spread_out(len(queries), self.frames)], map, thumbnails, pictures),
                 media_type="image/jpeg",
                 order=42,
             )
         )
 
 
-def _draw(queries: Sequence[Query], map: ReferenceGraph, album: Album | None, pictures: bool) -> bytes:
+def _draw(queries: Sequence[Query], map: ReferenceGraph, album: Thumbnails | None, pictures: bool) -> bytes:
     asked = [decoded(query.seen.jpeg) for query in queries]
     windows = len(queries[0].seen.headings)
     shape = asked[0].shape[0] / asked[0].shape[1] * max(windows, 1)

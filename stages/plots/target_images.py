@@ -8,30 +8,32 @@ from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.drives import Array
 from omninav.stages.values.homing import PathProgress
 from omninav.stages.values.image import Pixels
-from omninav.stages.values.planned_route import PlannedWay
-from omninav.stages.values.thumbnails import Album, decoded
+from omninav.stages.values.planned_route import PlannedRoute
+from omninav.stages.values.thumbnails import Thumbnails, decoded
 from omninav.stages.values.topological_map import TopologicalMap
 
 from .homing_snapshot import HomingGlance
 
 
-class FirstPicture(Stage):
+class FirstThumbnail(Stage):
     """An album of one: the first picture of a run, to which a robot that was carried away goes back."""
 
     class Out(Outputs):
         """`album`: absent where nothing was seen."""
 
-        album: Album | None = None
+        thumbnails: Thumbnails | None = None
 
-    def step(self, ctx: Context, glances: Sequence[HomingGlance]) -> Out:
+    def step(self, ctx: Context, snapshots: Sequence[HomingGlance]) -> Out:
         """The whole run at once."""
-        first = next(iter(glances), None)
+        first = next(iter(snapshots), None)
         if first is None:
             return self.Out()
-        return self.Out(album=Album(np.frombuffer(first.jpeg, np.uint8), np.array([0, len(first.jpeg)], np.int64)))
+        return self.Out(
+            thumbnails=Thumbnails(np.frombuffer(first.jpeg, np.uint8), np.array([0, len(first.jpeg)], np.int64))
+        )
 
 
-def target_view(progress: PathProgress | None, way: PlannedWay | None, map: TopologicalMap | None) -> int | None:
+def target_view(progress: PathProgress | None, way: PlannedRoute | None, map: TopologicalMap | None) -> int | None:
     """The number of the view that the robot goes to: on a way over a map the map's, else the path's own; None: none."""
     if progress is None:
         return None
@@ -45,7 +47,11 @@ def target_view(progress: PathProgress | None, way: PlannedWay | None, map: Topo
 
 
 def target_of(
-    progress: PathProgress | None, way: PlannedWay | None, map: TopologicalMap | None, start: Array, album: Album | None
+    progress: PathProgress | None,
+    way: PlannedRoute | None,
+    map: TopologicalMap | None,
+    start: Array,
+    album: Thumbnails | None,
 ) -> tuple[Array, Pixels | None]:
     """Where the view that the robot goes to was taken (3,), NaN where it is not known, and its picture.
 
@@ -57,7 +63,7 @@ def target_of(
     return start if map is None else map.poses[view], picture_of(view, album)
 
 
-def picture_of(view: int | None, album: Album | None) -> Pixels | None:
+def picture_of(view: int | None, album: Thumbnails | None) -> Pixels | None:
     """A view's picture, where the album has it."""
     if view is None or album is None or view >= len(album) or album.ends[view] == album.ends[view + 1]:
         return None

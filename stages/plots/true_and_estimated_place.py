@@ -30,7 +30,7 @@ from .style import (
 RIGHT, BESIDE, WRONG = range(3)
 
 
-class BelievedPlaces(Stage):
+class TrueAndEstimatedPlace(Stage):
     """The topological map over the true path, each picture joined with the place that was believed most (map frame, m).
 
     As opaque as it was probable; green where that place's medoid is the truly nearest, blue where it is linked with the

@@ -13,7 +13,7 @@ from omninav.stages.values.image import Pixels
 from .snapshot_times import spread_out
 
 
-class Film(NamedTuple):
+class Video(NamedTuple):
     """A film's bytes and what they are: `video/mp4` or `image/gif`."""
 
     content: bytes
@@ -25,7 +25,7 @@ class Film(NamedTuple):
         return f".{self.media_type.partition('/')[2]}"
 
 
-def encoded(frames: Sequence[Pixels], per_second: float) -> Film:
+def encoded(frames: Sequence[Pixels], per_second: float) -> Video:
     """Frames (rows, columns, 3), blue-green-red, all of one even size, as a film: the same bytes every time.
 
     Every frame is drawn once for an MP4 and once for a GIF: `frames` may draw them when asked.
@@ -33,7 +33,7 @@ def encoded(frames: Sequence[Pixels], per_second: float) -> Film:
     return mp4(frames, per_second) or gif(frames, per_second)
 
 
-def mp4(frames: Sequence[Pixels], per_second: float) -> Film | None:
+def mp4(frames: Sequence[Pixels], per_second: float) -> Video | None:
     """VP9 in MP4, which all browsers play, from libvpx as OpenCV's wheels have it; None where this OpenCV has not."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.mp4"
@@ -47,10 +47,10 @@ def mp4(frames: Sequence[Pixels], per_second: float) -> Film | None:
             writer.release()
         finally:
             cv2.utils.logging.setLogLevel(told)
-        return Film(path.read_bytes(), "video/mp4") if path.exists() and path.stat().st_size else None
+        return Video(path.read_bytes(), "video/mp4") if path.exists() and path.stat().st_size else None
 
 
-def gif(frames: Sequence[Pixels], per_second: float) -> Film:
+def gif(frames: Sequence[Pixels], per_second: float) -> Video:
     """An animated GIF in 128 colours, those of a few of its frames."""
     from PIL import Image as Picture  # comes with matplotlib
 
@@ -64,4 +64,4 @@ def gif(frames: Sequence[Pixels], per_second: float) -> Film:
     buffer = io.BytesIO()
     rest = {"save_all": True, "append_images": small[1:], "duration": round(1000 / per_second), "loop": 0}
     small[0].save(buffer, format="GIF", optimize=False, **rest)
-    return Film(buffer.getvalue(), "image/gif")
+    return Video(buffer.getvalue(), "image/gif")

@@ -12,7 +12,7 @@ from omninav.stages.geometry.appearance.segments import LARGEST_COLOUR_DISTANCE,
 from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
@@ -146,7 +146,7 @@ class ExpectedObservation(NearReferences):
         particles: Particles,
         map: ReferenceGraph,
         motion: Motion | None = None,
-        reach: Reach | None = None,
+        length_scale: LengthScale | None = None,
     ) -> NearReferences.Out:
         """Weigh all particles."""
         if similarities.exponent is None:
@@ -156,7 +156,7 @@ class ExpectedObservation(NearReferences):
             )
         self._view, self._exponent = features, similarities.exponent
         self._colour_scale = similarities.colour_scale or LARGEST_COLOUR_DISTANCE
-        return super().step(ctx, similarities, particles, map, motion, reach)
+        return super().step(ctx, similarities, particles, map, motion, length_scale)
 
     def _expected(
         self, poses: Array, map: ReferenceGraph, rows: Ints, values: Floats, unit: float, floor: float

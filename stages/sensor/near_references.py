@@ -12,7 +12,7 @@ from omninav.stages.geometry.plane.nearest_cells import NearestCells, nearest_ce
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.evidence import best_headings, contrast_power, fresh_share
 from omninav.stages.values.belief import Likelihood, Particles
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
@@ -180,10 +180,10 @@ class NearReferences(Stage):
         particles: Particles,
         map: ReferenceGraph,
         motion: Motion | None = None,
-        reach: Reach | None = None,
+        length_scale: LengthScale | None = None,
     ) -> Out:
         """Weigh all particles."""
-        unit = self.reach_m if reach is None else reach.metres
+        unit = self.reach_m if length_scale is None else length_scale.metres
         values = similarities.values
         if not values.size:
             return self.Out(likelihood=Likelihood(np.ones(len(particles.poses))))

@@ -18,7 +18,7 @@ class Stated(State):
     at: tuple[float, float] | None = None
 
 
-class Calibration(Stage):
+class PoseFixes(Stage):
     """States the robot's true pose now and then, as a Gaussian: a manual position calibration.
 
     "While building the map for the first time, supplementary localization information could be given to achieve a

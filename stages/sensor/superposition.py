@@ -9,7 +9,7 @@ from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import Neighbours, ViewLimit
+from omninav.stages.values.views import Neighbours, NoveltyThreshold
 
 Array = npt.NDArray[np.float64]
 
@@ -63,7 +63,7 @@ class Superposition(Stage):
         hypothesis: GaussianMixture | None = None
 
     def step(
-        self, ctx: Context, neighbours: Neighbours | None, map: ViewMixtures, limit: ViewLimit | None = None
+        self, ctx: Context, neighbours: Neighbours | None, map: ViewMixtures, threshold: NoveltyThreshold | None = None
     ) -> Out:
         """Superpose what is near."""
         if neighbours is None or not len(neighbours.rows):
@@ -75,7 +75,7 @@ class Superposition(Stage):
             shares = shares / total if total > 0.0 else np.full(number, 1.0 / number)
         rows = neighbours.rows[:number]
         ways = np.zeros(number)
-        if self.extent and limit is not None and limit.distance > 0.0:
-            ways = neighbours.distances[:number] / limit.distance * limit.metres
+        if self.extent and threshold is not None and threshold.distance > 0.0:
+            ways = neighbours.distances[:number] / threshold.distance * threshold.metres
         means, covariances, weights = superposed(rows, shares, neighbours.turns[:number], ways, map)
         return self.Out(hypothesis=GaussianMixture(means, covariances, weights) if len(weights) else None)

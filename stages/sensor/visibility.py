@@ -12,7 +12,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.probability.evidence import best_headings, contrast_power, fresh_share
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.grid import FreeSpace, cells_of
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
@@ -322,7 +322,7 @@ class Visibility(Stage):
     in the paper: never. Defaults: docs/experiments/retrieval_mcl_defaults.md.
 
     `proposals`: poses anywhere in the free space (port `free`), all headings, of equal weight, drawn anew at each
-    picture; `fusion=random_samples` takes its random samples from them. Without a free space there are none.
+    picture; `fusion=uniform_recovery` takes its random samples from them. Without a free space there are none.
 
     `retrieval` false is the ablation of section VI-E: all particles that lie in any visibility area weigh alike, and
     all others nothing, whatever the picture shows.
@@ -358,7 +358,7 @@ class Visibility(Stage):
         map: ReferenceGraph,
         areas: VisibilityAreas,
         motion: Motion | None = None,
-        reach: Reach | None = None,
+        length_scale: LengthScale | None = None,
         free: FreeSpace | None = None,
     ) -> Out:
         """Weigh all particles."""
@@ -385,7 +385,7 @@ class Visibility(Stage):
         raised: Array = (values.astype(np.float64) / max(float(best.max()), 1e-12)) ** power
         anywhere = float(np.average(raised.mean(axis=1), weights=each))
         around = values.shape[1] > 1 if self.sees == "auto" else self.sees == "around"
-        window, unit = math.radians(self.window_deg), self.reach_m if reach is None else reach.metres
+        window, unit = math.radians(self.window_deg), self.reach_m if length_scale is None else length_scale.metres
         sums, number = sums_by_turn(self._looks, rows, raised if around else raised[:, :1], each)
         seen_by = None if around else window, self.shape, near
         mean = mean_seen(particles.poses, self._cells, self._looks, sums, number, anywhere, *seen_by)

@@ -7,7 +7,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 from omninav.stages.values.depths import Depths
-from omninav.stages.values.local_features import ColumnSegments, LocalFeatures
+from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
 from omninav.stages.values.pose import Pose
 
 from .config import WorldConfig
@@ -36,13 +36,17 @@ class FeatureDepths(Stage):
         self._world = World(self.world, self.day) if self.log is None else None
 
     def step(
-        self, ctx: Context, truth: Pose, features: LocalFeatures | None = None, columns: ColumnSegments | None = None
+        self,
+        ctx: Context,
+        truth: Pose,
+        features: LocalFeatures | None = None,
+        vertical_segments: VerticalSegments | None = None,
     ) -> Out:
         """Cast the rays of one picture."""
         if self._world is None:
             return self.Out()
         patches = np.zeros((0, 3)) if features is None else features.bearings
-        ends = np.zeros((0, 2, 3)) if columns is None else columns.bearings()
+        ends = np.zeros((0, 2, 3)) if vertical_segments is None else vertical_segments.bearings()
         rays = np.concatenate([patches, ends.reshape(-1, 3)])
         eye = (truth.x, truth.y, self.world.camera.height)
         metres = first_hits(self._world.boxes, self.world.height, eye, rays @ turn_about_vertical(truth.heading).T)

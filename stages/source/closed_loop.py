@@ -26,7 +26,7 @@ from omninav.stages.simulator.world import World
 from omninav.stages.values.command import Command
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.image import Image
-from omninav.stages.values.planned_route import PlannedWay
+from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
 
@@ -41,7 +41,7 @@ def _nowhere() -> F64:
     return np.zeros(0)
 
 
-class Simulation(State):
+class ClosedLoopState(State):
     """The robot as it is: its state (see `robot`; empty before the first tick), odometry pose, ticks made.
 
     `track` (N, 4): time (s) and pose at the last ticks; people who keep it company follow it. `crowd` (P, 5): where
@@ -110,10 +110,14 @@ class ClosedLoop(Source):
         return int(self.seconds * self.rate)
 
     def step(
-        self, ctx: Context, simulation: Simulation, command: Command | None = None, way: PlannedWay | None = None
+        self,
+        ctx: Context,
+        simulation: ClosedLoopState,
+        command: Command | None = None,
+        route: PlannedRoute | None = None,
     ) -> Out | None:
         """Drive on under the last command, then perceive; None when the time, or the way, is over."""
-        simulation.ended += way is not None and way.state in ("arrived", "gave up")
+        simulation.ended += route is not None and route.state in ("arrived", "gave up")
         if simulation.ticks >= int(self.seconds * self.rate) or simulation.ended > self.rest * self.rate:
             return None
         motion = None
@@ -125,7 +129,7 @@ class ClosedLoop(Source):
         simulation.ticks += 1
         return out
 
-    def _drive(self, ctx: Context, simulation: Simulation, command: Command) -> Motion:
+    def _drive(self, ctx: Context, simulation: ClosedLoopState, command: Command) -> Motion:
         """One tick under a command, and what the wheels say of it."""
         robot, now = simulation.robot, simulation.ticks / self.rate
         before = robot[:3].copy()
@@ -138,7 +142,7 @@ class ClosedLoop(Source):
                 put_down(robot, event)
         return Motion(*(float(value) for value in rolled))
 
-    def _perceive(self, ctx: Context, simulation: Simulation, motion: Motion | None) -> Out:
+    def _perceive(self, ctx: Context, simulation: ClosedLoopState, motion: Motion | None) -> Out:
         pose, now = simulation.robot[:3], simulation.ticks / self.rate
         people = self._meet(simulation, now)
         metres = measure(self._room, round_bodies(people)[None], pose[None], self.world.ranges, ctx.rng)[0]
@@ -169,7 +173,7 @@ class ClosedLoop(Source):
         )
         return Image(seen)
 
-    def _meet(self, simulation: Simulation, now: float) -> tuple[Person, ...]:
+    def _meet(self, simulation: ClosedLoopState, now: float) -> tuple[Person, ...]:
         """The robot is where it is now, and people have walked on until then: everybody who is about."""
         crowd, before = self._world.crowd, simulation.track
         simulation.track = np.vstack([before, [now, *simulation.robot[:3]]])[-REMEMBERED:]
@@ -180,7 +184,7 @@ class ClosedLoop(Source):
             simulation.crowd = crowd.gathered(track)
         return self._people(simulation)
 
-    def _people(self, simulation: Simulation) -> tuple[Person, ...]:
+    def _people(self, simulation: ClosedLoopState) -> tuple[Person, ...]:
         """Who is about at the last tick that was made."""
         return self._world.crowd.seen(simulation.crowd, float(simulation.track[-1, 0]))
 

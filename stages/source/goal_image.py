@@ -18,7 +18,7 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".tif", ".tiff", ".webp")
 """How a goal ends that is an image file."""
 
 
-class GoalPicture(Stage):
+class GoalImage(Stage):
     """The picture that a goal names, with the camera that it was taken with: the robot's own.
 
     A `goal` that ends like an image file is one; any other names a place, and there is no picture. Raises BadInput

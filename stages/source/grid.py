@@ -18,7 +18,7 @@ from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.occupancy import occupancy
 from omninav.stages.simulator.world import World
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 
 Array = npt.NDArray[np.float64]
@@ -59,13 +59,13 @@ class PlaceGrid(Stage):
         read_occupancy(file)
         return digest_file(file)
 
-    def step(self, ctx: Context, map: ReferenceGraph | None = None, reach: Reach | None = None) -> Out:
+    def step(self, ctx: Context, map: ReferenceGraph | None = None, length_scale: LengthScale | None = None) -> Out:
         """Read, take or make the grid."""
         file = self._file()
         if self.grid == FROM_TOUR:
             if map is None or not len(map):
                 raise BadInput("grid: from_tour needs a map with references; give tour=FILE, or grid=FOLDER/map.yaml")
-            unit = self.reach_m if reach is None else reach.metres
+            unit = self.reach_m if length_scale is None else length_scale.metres
             grid = along_path(map.poses, map.edges, self.around * unit, self.resolution)
             ctx.fact("grid", "a stand-in made from the tour's free path: walls are where it ends, not where they are")
             ctx.count("grid_is_a_stand_in", detail="grid: made from the tour's free path; a map_server file is better")

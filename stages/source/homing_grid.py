@@ -24,7 +24,7 @@ from omninav.stages.values.pose import Pose
 Array = npt.NDArray[np.float64]
 
 
-class Placed(State):
+class HomingGridState(State):
     """How many views there have been."""
 
     views: int = 0
@@ -83,7 +83,7 @@ class HomingGrid(Source):
         """Views in all."""
         return len(self._views.poses)
 
-    def step(self, ctx: Context, placed: Placed) -> Out | None:
+    def step(self, ctx: Context, placed: HomingGridState) -> Out | None:
         """The next view that can be read; None when there were enough."""
         while placed.views < len(self._views.poses):
             row = placed.views

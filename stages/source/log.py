@@ -24,7 +24,7 @@ from omninav.stages.values.scan import Scan
 Array = npt.NDArray[np.float64]
 
 
-class Position(State):
+class LogSourceState(State):
     """Where in the logs the source is: log, next frame and last used frame (-1: none) as positions in the selection,
     ticks made, and the made-up odometry so far (x, y in metres, heading in radians)."""
 
@@ -100,7 +100,7 @@ class LogSource(Source):
         self._open()
         return sum(len(frames) for frames in self._frames)
 
-    def step(self, ctx: Context, position: Position) -> Out | None:
+    def step(self, ctx: Context, position: LogSourceState) -> Out | None:
         """The next picture that can be used; None after the last."""
         while position.log < len(self._recordings):
             recording, frames = self._recordings[position.log], self._frames[position.log]
@@ -118,7 +118,7 @@ class LogSource(Source):
         return None
 
     def _out(
-        self, ctx: Context, position: Position, recording: Recording, frames: npt.NDArray[np.int64], image: Image
+        self, ctx: Context, position: LogSourceState, recording: Recording, frames: npt.NDArray[np.int64], image: Image
     ) -> Out:
         frame, first = int(frames[position.next]), position.last < 0
         last = None if first else int(frames[position.last])

@@ -10,7 +10,7 @@ from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 from omninav.stages.values.two_views import BearingPairs, RelativeView
 
 
-class Posed(State):
+class TwoViewsState(State):
     """How many problems there have been."""
 
     problems: int = 0
@@ -45,7 +45,7 @@ class TwoViews(Source):
         """Problems in all."""
         return self.problems
 
-    def step(self, ctx: Context, posed: Posed) -> Out | None:
+    def step(self, ctx: Context, posed: TwoViewsState) -> Out | None:
         """The next problem; None when there were enough."""
         if posed.problems >= self.problems:
             return None

@@ -105,7 +105,7 @@ def donut_table(camera: Donut, columns: int, rows: int) -> Table:
     return fixed_point(u, v)
 
 
-class FoundRing(State):
+class DonutUnwrapState(State):
     """What was found in the first picture of a log that showed a ring; it stays, so that panoramas do not jump."""
 
     log: int = -1
@@ -115,7 +115,7 @@ class FoundRing(State):
     outer_radius_px: float = math.nan
 
 
-def with_ring(camera: Donut, image: Image, found: FoundRing, ctx: Context) -> Donut | None:
+def with_ring(camera: Donut, image: Image, found: DonutUnwrapState, ctx: Context) -> Donut | None:
     """The camera with centre and radii; what it leaves open is found in the picture, once per log (`found`)."""
     given = (camera.centre_x, camera.centre_y, camera.inner_radius_px, camera.outer_radius_px)
     if all(value is not None for value in given):
@@ -162,7 +162,7 @@ class DonutUnwarp(Stage):
         assert isinstance(camera, Donut)
         return donut_table(camera, self.columns, self.rows)
 
-    def step(self, ctx: Context, image: Image, camera: Camera, found: FoundRing) -> Out:
+    def step(self, ctx: Context, image: Image, camera: Camera, found: DonutUnwrapState) -> Out:
         """Unroll one picture."""
         if not isinstance(camera, Donut):
             raise other_camera(camera, "a Donut")

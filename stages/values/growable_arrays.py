@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 
-class GrowingArrays:
+class GrowableArrays:
     """Mixin of in-place values whose array fields grow: `append` is cheap, however many rows there are."""
 
     def put(self, **fields: object) -> None:

@@ -3,7 +3,7 @@
 from omninav.pipeline import Value
 
 
-class Reach(Value):
+class LengthScale(Value):
     """The distance at which two views of a map have lost half of what makes them more alike than strangers.
 
     `metres`: some tenths in a room, some hundredths between blades of grass. It is the unit in which "near a reference"

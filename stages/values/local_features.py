@@ -39,7 +39,7 @@ class LocalFeatures(Value):
         )
 
 
-class ColumnSegments(Value):
+class VerticalSegments(Value):
     """Pieces of upright lines between two edges, with what they look like (Goedeme et al. 2007, section 3.3).
 
     `azimuths` (N,): radians, counter-clockwise from forward. `elevations` (N, 2): of the upper and the lower end
@@ -57,9 +57,9 @@ class ColumnSegments(Value):
     def __len__(self) -> int:
         return len(self.azimuths)
 
-    def chosen(self, rows: npt.NDArray[np.int64] | slice) -> "ColumnSegments":
+    def chosen(self, rows: npt.NDArray[np.int64] | slice) -> "VerticalSegments":
         """Some of them."""
-        return ColumnSegments(
+        return VerticalSegments(
             self.azimuths[rows], self.elevations[rows], self.descriptors[rows], self.weights[rows], self.points[rows]
         )
 
@@ -70,7 +70,7 @@ class ColumnSegments(Value):
         return np.stack([level * np.cos(around), level * np.sin(around), np.sin(self.elevations)], axis=-1)
 
 
-class GlobalMoments(Value):
+class GlobalDescriptor(Value):
     """The colours of a whole view. `values` (3,) float32: correlations as in `LocalFeatures`, over all of it."""
 
     values: Floats

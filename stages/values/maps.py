@@ -8,7 +8,7 @@ import numpy.typing as npt
 from omninav.pipeline import Value
 
 from .features import SegmentFeatures, SegmentHistograms
-from .growable_arrays import GrowingArrays
+from .growable_arrays import GrowableArrays
 from .pose import Pose, PoseSource
 
 FeatureKind = Literal["histograms", "colours"]
@@ -19,7 +19,7 @@ def kind_of(features: SegmentFeatures) -> FeatureKind:
     return "histograms" if isinstance(features, SegmentHistograms) else "colours"
 
 
-class ReferenceGraph(GrowingArrays, Value):
+class ReferenceGraph(GrowableArrays, Value):
     """Reference views at known poses, joined by edges along the drive (Gross & Koenig 2004, section 2).
 
     `poses`: (R, 3) x, y (m), heading (rad) of the robot when the view was taken. `features`: (R, segments, bins) in

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from omninav.pipeline import Value
 
 
-class PlannedWay(Value):
+class PlannedRoute(Value):
     """Through which `places` (K,) the robot is to go, the believed one first, the goal last; none before it is known.
 
     `state`: `locating`, it is not yet known where the robot is; `under way`; `arrived`; `gave up`; and `why`, where one

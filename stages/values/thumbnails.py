@@ -11,7 +11,7 @@ from omninav.pipeline import Value
 from .image import Pixels
 
 
-class Album(Value):
+class Thumbnails(Value):
     """A small picture of each reference of a map, in the map's order, for people to look at.
 
     `jpegs`: their JPEG bytes one after the other; picture n lies from `ends[n]` to `ends[n + 1]`, nowhere where it is

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Value
 
-from .local_features import ColumnSegments, GlobalMoments, LocalFeatures
+from .local_features import GlobalDescriptor, LocalFeatures, VerticalSegments
 from .pose import PoseSource
 
 Array = npt.NDArray[np.float64]
@@ -61,11 +61,11 @@ class StoredViews(Value):
             self.sizes[rows].astype(np.float32),
         )
 
-    def columns(self, view: int) -> ColumnSegments:
+    def columns(self, view: int) -> VerticalSegments:
         """The columns of a view; their points in a picture are not known any more (NaN)."""
         rows = slice(int(self.column_starts[view]), int(self.column_starts[view + 1]))
         angles = self.column_directions[rows].astype(np.float64) * ANGLE
-        return ColumnSegments(
+        return VerticalSegments(
             angles[:, 0],
             angles[:, 1:],
             self.column_descriptors[rows].astype(np.float32),
@@ -73,12 +73,14 @@ class StoredViews(Value):
             np.full((len(angles), 2, 2), np.nan),
         )
 
-    def global_moments(self, view: int) -> GlobalMoments:
+    def global_moments(self, view: int) -> GlobalDescriptor:
         """The colours of a view as a whole."""
-        return GlobalMoments(self.moments[view])
+        return GlobalDescriptor(self.moments[view])
 
 
-def stored(features: list[LocalFeatures], columns: list[ColumnSegments], moments: list[GlobalMoments]) -> StoredViews:
+def stored(
+    features: list[LocalFeatures], columns: list[VerticalSegments], moments: list[GlobalDescriptor]
+) -> StoredViews:
     """Views made small; one entry of each list per view."""
     bearings = np.concatenate([np.empty((0, 3)), *(f.bearings for f in features)])
     azimuths = np.arctan2(bearings[:, 1], bearings[:, 0])

@@ -8,16 +8,16 @@ import numpy.typing as npt
 from omninav.pipeline import Value
 from omninav.pipeline.graph.problems import BadInput
 
-from .growable_arrays import GrowingArrays
+from .growable_arrays import GrowableArrays
 from .pose import PoseSource
-from .views import ViewLimit, WholeView
+from .views import NoveltyThreshold, WholeView
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
 
 
-class ViewMixtures(GrowingArrays, Value):
+class ViewMixtures(GrowableArrays, Value):
     """Views and for each a mixture of Gaussians over the poses from which it is seen (Porta & Kroese 2004, section 3;
     Gross, Koenig & Mueller 2005, equations 9 and 10). Changed in place by the stage that learns it.
 
@@ -44,7 +44,7 @@ class ViewMixtures(GrowingArrays, Value):
     steps: int
     next_name: int
     pose_source: PoseSource
-    limit: ViewLimit | None = None
+    limit: NoveltyThreshold | None = None
 
     @classmethod
     def empty(cls) -> "ViewMixtures":
@@ -132,7 +132,7 @@ class ViewMixtures(GrowingArrays, Value):
         """Say where the first pose came from."""
         self.put(pose_source=source)
 
-    def take_limit(self, limit: ViewLimit | None) -> None:
+    def take_limit(self, limit: NoveltyThreshold | None) -> None:
         """Keep the limit it is learned with, once that is settled."""
         if limit is not None and limit.settled:
             self.put(limit=limit)

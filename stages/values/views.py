@@ -65,7 +65,7 @@ class Spectrum(WholeView):
         return best_turns(self.values, kept, self.channels, self.segments)
 
 
-class ViewLimit(Value):
+class NoveltyThreshold(Value):
     """The distance between views within which they count as the same place's: delta_y, E_max. In the views' unit.
 
     `settled`: False while it is still being measured. `metres`: how far a robot drives until what it sees is beyond the

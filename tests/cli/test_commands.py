@@ -58,16 +58,16 @@ def test_check_says_who_reads_the_truth(omninav):
     assert "nothing wrong" in said
     readers = said.partition("ground truth is read by: ")[2].strip().split(", ")
     assert set(readers) <= {
-        "first_belief",
+        "prior",
         "errors",
-        "curves",
-        "relative",
-        "error_view",
-        "path_view",
-        "belief_view",
-        "similarity_view",
+        "error_curves",
+        "relative_errors",
+        "error_plot",
+        "trajectory_plot",
+        "belief_plot",
+        "similarity_plot",
         "result_log",
-        "success",
+        "success_rate",
     }
 
 
@@ -110,8 +110,8 @@ def test_a_log_of_ones_own_without_a_map_says_what_to_type(omninav, tmp_path: Pa
         (("check", "~nodes.macth"), "did you mean '~nodes.match'?"),
         (("check", "+nodes.match.headings=18"), "it is there already\n      type nodes.match.headings=18"),
         (("check", "wires.sensor.mapp=artifacts.map"), "did you mean 'wires.sensor.map=artifacts.map'?"),
-        (("check", "~nodes.reach"), "if the node was taken out, type '~wires.reach' too"),
-        (("check", "~nodes.reach"), "type '~wires.sensor.reach' if it can do without"),
+        (("check", "~nodes.length_scale"), "if the node was taken out, type '~wires.length_scale' too"),
+        (("check", "~nodes.length_scale"), "type '~wires.sensor.length_scale' if it can do without"),
         (("--config-dir=nowhere",), "there is no folder nowhere"),
     ],
 )

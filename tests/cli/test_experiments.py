@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from background_runs import kill, start
 
-from omninav.pipeline.experiment.runner import FramesOfJobs
+from omninav.pipeline.experiment.runner import JobProgress
 
 STAGES = '''
 import time
@@ -386,7 +386,7 @@ def test_check_checks_every_condition_and_runs_none(omninav, place: Path):
 
 
 def test_frames_of_jobs_add_up_and_silent_ones_count_as_the_mean_of_the_others():
-    frames = FramesOfJobs(3)
+    frames = JobProgress(3)
     assert (frames.done, frames.total) == (0, None)
     frames.heard("training", {"frames": 100, "of": 3000})
     assert (frames.done, frames.total) == (100, 9000)

@@ -54,7 +54,7 @@ def test_it_is_a_claim_that_odometry_alone_ends_two_metres_off(name):
 def test_its_last_condition_can_be_built(name, profile):
     found = experiment(name, profile)
     planned = plan(complete(compose("config", overrides=typed(found, found.conditions()[-1]))))
-    assert {"errors", "curves", "history"} <= set(planned.graph.nodes)
+    assert {"errors", "error_curves", "map_history"} <= set(planned.graph.nodes)
 
 
 def test_an_interval_is_asked_for_only_where_there_are_repetitions_for_one():

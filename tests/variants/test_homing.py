@@ -16,7 +16,7 @@ WORDS = (
     "events=[{at: 0.5, to: [4.0, 4.2, 1.5]}]",
     "checkpoint_s=0.1",
     "cache=null",
-    "nodes.film.frames=8",
+    "nodes.video.frames=8",
 )
 
 

@@ -13,14 +13,14 @@ from omninav.stages.fusion.agreement import Agreement
 from omninav.stages.fusion.growing_prior import ParticlesInMap
 from omninav.stages.fusion.particle_clustering import Clusters
 from omninav.stages.geometry.plane.se2 import between, wrap
-from omninav.stages.mapping.delayed_by_distance import Behind, LeftBehind
-from omninav.stages.mapping.fused_mixtures import FusedMixtures, Learned
+from omninav.stages.mapping.delayed_by_distance import DelayedByDistance, DelayedByDistanceState
+from omninav.stages.mapping.fused_mixtures import FusedMixtures, FusedMixturesState
 from omninav.stages.match.neighbours import ViewNeighbours
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.sensor.superposition import Superposition
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import ViewLimit, WholeView
+from omninav.stages.values.views import NoveltyThreshold, WholeView
 
 Array = npt.NDArray[np.float64]
 RADIUS, STEPS, LAPS, LIMIT = 3.0, 60, 10, 0.5
@@ -72,13 +72,18 @@ def run(
     ctx = {
         name: Context(name, np.random.default_rng(n)) for n, name in enumerate(("first", "motion", "fusion", "rest"))
     }
-    known, limit, behind, learned = ViewMixtures.empty(), ViewLimit(LIMIT), Behind(), Learned()
+    known, limit, behind, learned = (
+        ViewMixtures.empty(),
+        NoveltyThreshold(LIMIT),
+        DelayedByDistanceState(),
+        FusedMixturesState(),
+    )
     start, move, fuse = ParticlesInMap(number=500), RotationTranslationRotation(), Agreement(**filter_options)
     match, sensor, gather, teach, learn = (
         ViewNeighbours(),
         Superposition(),
         Clusters(),
-        LeftBehind(retrace=retrace, back_propagate=back_propagate),
+        DelayedByDistance(retrace=retrace, back_propagate=back_propagate),
         FusedMixtures(),
     )
     errors, wrong, belief = [], [], None
@@ -93,7 +98,7 @@ def run(
         moved = move.step(ctx["motion"], belief, motion)
         belief = fuse.step(ctx["fusion"], moved.belief, hypothesis).belief
         state = gather.step(ctx["rest"], belief).state
-        lessons = teach.step(ctx["rest"], view, state, moved.model, behind, neighbours, known).lessons
+        lessons = teach.step(ctx["rest"], view, state, moved.model, behind, neighbours, known).updates
         known = learn.step(ctx["rest"], lessons, limit, known, learned).map
         at = belief.estimate().pose
         errors.append(math.hypot(at.x - pose[0], at.y - pose[1]))

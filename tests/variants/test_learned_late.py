@@ -8,11 +8,11 @@ import pytest
 from omninav.pipeline import Context, Tick
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.mapping.adaptive_views import AdaptiveViews
-from omninav.stages.mapping.before_threshold import BeforeLimit
-from omninav.stages.mapping.calibrated_threshold import FirstViews, FirstViewsLimit
-from omninav.stages.mapping.delayed_by_distance import Behind, LeftBehind
-from omninav.stages.mapping.fused_mixtures import FusedMixtures, Learned
-from omninav.stages.mapping.unimodal_queue import UnimodalQueue, Waiting
+from omninav.stages.mapping.before_threshold import BeforeThreshold
+from omninav.stages.mapping.calibrated_threshold import CalibratedThreshold, CalibratedThresholdState
+from omninav.stages.mapping.delayed_by_distance import DelayedByDistance, DelayedByDistanceState
+from omninav.stages.mapping.fused_mixtures import FusedMixtures, FusedMixturesState
+from omninav.stages.mapping.unimodal_queue import UnimodalQueue, UnimodalQueueState
 from omninav.stages.metrics.map_history import MapHistory
 from omninav.stages.metrics.wrong_places import WrongPlaces
 from omninav.stages.plots.changed_mixtures import ChangedMixtures
@@ -27,8 +27,8 @@ SIGMAS = np.diag([0.05, 0.05, 0.02])
 
 
 WAYS = {
-    "left_behind": lambda: (LeftBehind(), Behind(), FusedMixtures(), Learned()),
-    "at_once": lambda: (UnimodalQueue(length=0), Waiting(), AdaptiveViews(), BeforeLimit()),
+    "left_behind": lambda: (DelayedByDistance(), DelayedByDistanceState(), FusedMixtures(), FusedMixturesState()),
+    "at_once": lambda: (UnimodalQueue(length=0), UnimodalQueueState(), AdaptiveViews(), BeforeThreshold()),
 }
 
 
@@ -38,7 +38,12 @@ def told(request):
     rng = np.random.default_rng(0)
     waves, phases = rng.normal(0.0, 1.0, (2, 60)), rng.uniform(0.0, 2 * math.pi, 60)
     step, radius = 2 * math.pi / LAP, ROUND_M / (2 * math.pi)
-    limit, first, changes, map = FirstViewsLimit(), FirstViews(), ChangedMixtures(), ViewMixtures.empty()
+    limit, first, changes, map = (
+        CalibratedThreshold(),
+        CalibratedThresholdState(),
+        ChangedMixtures(),
+        ViewMixtures.empty(),
+    )
     lessons, waiting, mapping, learned = WAYS[request.param]()
     ctx = Context("late")
     ticks, truth, motions, events, mixtures = [], [], [], [], []
@@ -50,7 +55,7 @@ def told(request):
         view, state = Coefficients(values, values[None]), GaussianMixture(pose[None], SIGMAS[None] ** 2, np.ones(1))
         motion = Motion(radius * step, 0.0, step) if n else None
         model = UncertainMotion((step / 2, radius * step, step / 2), (0.01, 0.03, 0.01)) if n else None
-        due = lessons.step(ctx, view, state, model, waiting).lessons
+        due = lessons.step(ctx, view, state, model, waiting).updates
         event = mapping.step(ctx, due, limit.step(ctx, view, motion, first).limit, map, learned).events
         ticks.append(ctx.tick)
         truth.append(Pose(*pose))

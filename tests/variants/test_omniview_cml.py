@@ -19,7 +19,7 @@ STAGES = "omninav.stages"
 NODES = {
     "source": {"_target_": "round_drive.Rounds"},
     "knows": {"_target_": "round_drive.Knows"},
-    "empty": {"_target_": f"{STAGES}.mapping.initial_view_mixtures.FirstViewMixtures"},
+    "empty": {"_target_": f"{STAGES}.mapping.initial_view_mixtures.InitialViewMixtures"},
     "lessons": {"_target_": f"{STAGES}.mapping.unimodal_queue.UnimodalQueue", "length": 12},
     "mapping": {"_target_": f"{STAGES}.mapping.adaptive_views.AdaptiveViews", "max_views": 20},
 }
@@ -27,7 +27,7 @@ WIRES = {
     "knows": {"view": "source.view"},
     "lessons": {"view": "source.view", "state": "knows.belief", "model": "source.model"},
     "mapping": {
-        "lessons": "lessons.lessons",
+        "lessons": "lessons.updates",
         "limit": "source.limit",
         "map": {"from": "mapping.map", "delay": 1, "initial": "empty.map"},
     },
@@ -52,11 +52,11 @@ def test_a_run_stopped_while_lessons_wait_goes_on_to_the_same_map(tmp_path: Path
 
 
 LEFT_OVER = {"ticks": {"from": "source.tick", "collect": True}, "waiting": "lessons.waiting"}
-LAST_MAP = {"lessons": "left_over.lessons", "limit": "source.limit", "map": "mapping.map"}
+LAST_MAP = {"lessons": "left_over.updates", "limit": "source.limit", "map": "mapping.map"}
 
 
 def test_what_waits_as_the_last_log_ends_is_learned_after_it(tmp_path: Path):
-    left_over = {"_target_": f"{STAGES}.mapping.flush_pending.LeftOver"}
+    left_over = {"_target_": f"{STAGES}.mapping.flush_pending.FlushPending"}
     graph = build(
         {
             "nodes": {**NODES, "left_over": left_over, "last_map": NODES["mapping"]},
@@ -75,7 +75,7 @@ WORDS = (
     "variant=omniview_cml",
     f"log=[{HOUSE / 'tour.mcap'},{HOUSE / 'drive.mcap'}]",
     "nodes.source.stop=45",
-    "nodes.limit.views=40",
+    "nodes.novelty_threshold.views=40",
     "checkpoint_s=0.05",
     "cache=null",
 )

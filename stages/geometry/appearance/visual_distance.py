@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.values.local_features import ColumnSegments, LocalFeatures
+from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
 
 from .feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, mutual_nearest, tree_matches
 
@@ -46,13 +46,13 @@ class Ready(NamedTuple):
     """A view made ready to be compared often: its descriptors as float32, their squared lengths, and its azimuths."""
 
     patches: LocalFeatures | None
-    columns: ColumnSegments | None
+    columns: VerticalSegments | None
     descriptors: Floats
     squares: Floats
     azimuths: Array
 
 
-def made_ready(patches: LocalFeatures | None, columns: ColumnSegments | None) -> Ready:
+def made_ready(patches: LocalFeatures | None, columns: VerticalSegments | None) -> Ready:
     """A view of whichever kinds of features there are."""
     looks = np.empty((0, 1), np.float32) if patches is None else patches.descriptors.astype(np.float32)
     around = np.empty(0) if patches is None else azimuths(patches)
@@ -79,7 +79,7 @@ def _matched(one: Ready, other: Ready, by: Matching) -> Pairs:
     return pairs.chosen(apart <= by.colour)
 
 
-def match_columns(one: ColumnSegments, other: ColumnSegments, by: Matching) -> Pairs:
+def match_columns(one: VerticalSegments, other: VerticalSegments, by: Matching) -> Pairs:
     """Column segments of two views that look alike (section 3.4, equation 2)."""
     return mahalanobis_matches(one.descriptors, other.descriptors, by.column_ratio)
 

@@ -18,7 +18,7 @@ from omninav.stages.values.local_features import LocalFeatures
 def found(picture: Image | Panorama, **parameters: object) -> LocalFeatures:
     stage, context = RotationReducedSift(**parameters), Context("features")
     stage.setup(context)
-    features = stage.step(context, picture=picture, camera=CAMERA).features
+    features = stage.step(context, image=picture, camera=CAMERA).features
     assert isinstance(features, LocalFeatures)
     return features
 
@@ -69,7 +69,7 @@ def test_beyond_the_mirrors_edge_there_is_nothing_to_see() -> None:
     assert np.isnan(camera_bearings(np.array([[638.0, 2.0]]), larger)).all()
     stage, context = RotationReducedSift(), Context("features")
     stage.setup(context)
-    features = stage.step(context, picture=Image(noise), camera=larger).features
+    features = stage.step(context, image=Image(noise), camera=larger).features
     assert len(features) > 10
     assert np.isfinite(features.bearings).all()
 
@@ -100,4 +100,4 @@ def test_a_picture_of_nothing_has_no_features_and_one_without_a_camera_is_refuse
     stage = RotationReducedSift()
     stage.setup(Context("features"))
     with pytest.raises(BadInput, match=r"wires\.features\.camera=source\.camera"):
-        stage.step(Context("features"), picture=Image(np.zeros((48, 64, 3), np.uint8)))
+        stage.step(Context("features"), image=Image(np.zeros((48, 64, 3), np.uint8)))

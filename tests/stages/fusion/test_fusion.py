@@ -4,7 +4,7 @@ import pytest
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.fusion.importance_resampling import ImportanceResampling, kld_number
-from omninav.stages.fusion.particle_prior import Start
+from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
@@ -129,7 +129,7 @@ def a_map() -> ReferenceGraph:
 
 
 def start(
-    stage: Start, map: ReferenceGraph | None = None, truth: Pose | None = None, first: bool = True
+    stage: ParticlePrior, map: ReferenceGraph | None = None, truth: Pose | None = None, first: bool = True
 ) -> Particles | None:
     ctx = Context("start", np.random.default_rng(0))
     ctx.tick = Tick(index=0, stamp=0, first_of_log=first)
@@ -137,12 +137,12 @@ def start(
 
 
 def test_a_belief_is_given_at_the_first_picture_only() -> None:
-    assert start(Start(), a_map(), first=False) is None
-    assert start(Start(), a_map()) is not None
+    assert start(ParticlePrior(), a_map(), first=False) is None
+    assert start(ParticlePrior(), a_map()) is not None
 
 
 def test_the_uniform_start_covers_the_map() -> None:
-    particles = start(Start(number=4000, around=2.0, reach_m=0.5), a_map())
+    particles = start(ParticlePrior(number=4000, around=2.0, reach_m=0.5), a_map())
     assert particles is not None
     assert (particles.poses[:, 0] < 4).mean() == pytest.approx(0.5, abs=0.03)
 
@@ -152,7 +152,7 @@ def test_the_uniform_start_covers_the_map() -> None:
     [("truth", (3.0, 4.0, 1.0)), ("origin", (0.0, 0.0, 0.0)), ((1.0, 2.0, -1.0, 0.2, 0.1), (1.0, 2.0, -1.0))],
 )
 def test_other_starts_lie_around_their_pose(at: str, mean: tuple[float, float, float]) -> None:
-    particles = start(Start(at=at, number=4000), None, Pose(3.0, 4.0, 1.0))  # type: ignore[arg-type]
+    particles = start(ParticlePrior(at=at, number=4000), None, Pose(3.0, 4.0, 1.0))  # type: ignore[arg-type]
     assert particles is not None
     assert np.allclose(particles.poses.mean(axis=0), mean, atol=0.02)
 
@@ -160,4 +160,4 @@ def test_other_starts_lie_around_their_pose(at: str, mean: tuple[float, float, f
 @pytest.mark.parametrize("at", ["uniform", "truth"])
 def test_a_start_that_lacks_what_it_needs_says_what_to_type(at: str) -> None:
     with pytest.raises(BadInput, match="start="):
-        start(Start(at=at))  # type: ignore[arg-type]
+        start(ParticlePrior(at=at))  # type: ignore[arg-type]

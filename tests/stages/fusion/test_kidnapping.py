@@ -7,19 +7,19 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
-from omninav.stages.fusion.particle_prior import Start
+from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.geometry.appearance.segments import turned_view
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.sensor.near_references import NearReferences
 from omninav.stages.values.belief import Likelihood
 from omninav.stages.values.features import SegmentHistograms
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 
 SEGMENTS, BINS = 12, 16
-REACH = Reach(0.6)
+REACH = LengthScale(0.6)
 STEP = Motion(0.3, 0.0, 0.0)
 
 
@@ -62,7 +62,7 @@ class Filtered(NamedTuple):
 
 def drive(path: list[np.ndarray], match: SelectiveMatch, seed: int = 0) -> Filtered:
     stages = {
-        "start": Start(),
+        "start": ParticlePrior(),
         "motion": RotationTranslationRotation(),
         "match": match,
         "sensor": NearReferences(),

@@ -9,12 +9,12 @@ from omninav.pipeline import Context
 from omninav.stages.geometry.two_views.epipolar import shared_residuals
 from omninav.stages.homing.two_view_pose import TwoViewPose
 from omninav.stages.metrics.two_view_errors import TwoViewErrors
-from omninav.stages.source.two_views import Posed, TwoViews
+from omninav.stages.source.two_views import TwoViews, TwoViewsState
 from omninav.stages.values.two_views import BearingPairs, RelativeView
 
 
 def problems(seed: int = 0, **how) -> list[TwoViews.Out]:
-    source, ctx, posed = TwoViews(**how), Context("source", np.random.default_rng(seed)), Posed()
+    source, ctx, posed = TwoViews(**how), Context("source", np.random.default_rng(seed)), TwoViewsState()
     source.setup(ctx)
     found = []
     while (out := source.step(ctx, posed)) is not None:

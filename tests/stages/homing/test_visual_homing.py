@@ -15,7 +15,7 @@ from omninav.stages.camera.models import Donut
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest
 from omninav.stages.geometry.plane.se2 import between
-from omninav.stages.homing.visual_homing import Memory, VisualHoming
+from omninav.stages.homing.visual_homing import VisualHoming, VisualHomingState
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.homing import HomingTarget, HomingVector
 from omninav.stages.values.image import Image, Panorama
@@ -29,7 +29,7 @@ TARGET = (5.0, 5.0, 0.4)
 def described(kind: str, pose: tuple[float, float, float]) -> LocalFeatures:
     stage, context = RotationReducedSift(), Context("features")
     stage.setup(context)
-    return stage.step(context, picture=look(kind, pose[2], *pose[:2]), camera=CAMERA).features
+    return stage.step(context, image=look(kind, pose[2], *pose[:2]), camera=CAMERA).features
 
 
 def matched(features: LocalFeatures, other: LocalFeatures) -> Correspondences:
@@ -43,7 +43,7 @@ class Homing:
 
     def __init__(self, kind: str = "mirror", seed: int = 0, **parameters) -> None:
         self.stage, self.kind = VisualHoming(**parameters), kind
-        self.ctx, self.memory = Context("homing", np.random.default_rng(seed)), Memory()
+        self.ctx, self.memory = Context("homing", np.random.default_rng(seed)), VisualHomingState()
         self.target = HomingTarget(3, described(kind, TARGET))
 
     def at(self, pose, motion=None, matches=True, picture: Image | Panorama | None = None, share=1.0) -> HomingVector:
@@ -138,7 +138,7 @@ def test_what_was_covered_is_found_again() -> None:
         homing.at(pose, matches=k == 0)
     covered = look("mirror", poses[3][2], *poses[3][:2]).pixels.copy()
     cv2.ellipse(covered, (320, 240), (240, 240), 0, 0, 120, (90, 90, 90), -1)  # a third of all azimuths
-    homing.at(poses[3], matches=False, picture=Image(covered))
+    homing.at(poses[3], matches=False, image=Image(covered))
     lost = np.bincount(homing.out.tracks.kinds, minlength=4)
     assert lost[0] > 0.2 * lost.sum()
     vector = homing.at(poses[4], matches=False)
@@ -156,7 +156,7 @@ def test_whoever_looks_is_told_where_lost_features_should_be_and_which_of_the_ta
     before = homing.out.tracks
     covered = look("mirror", poses[3][2], *poses[3][:2]).pixels.copy()
     cv2.ellipse(covered, (320, 240), (240, 240), 0, 0, 120, (90, 90, 90), -1)
-    homing.at(poses[3], matches=False, picture=Image(covered))
+    homing.at(poses[3], matches=False, image=Image(covered))
     tracks = homing.out.tracks
     assert tracks.rows.tolist() == before.rows.tolist() == homing.memory.rows.tolist()
     gone = (tracks.kinds == 0) & (before.kinds == 1)
@@ -185,7 +185,7 @@ def test_a_lost_target_says_why() -> None:
     assert homing.ctx.counts["lost_target"] == 1
     homing.at((4.2, 4.6, 0.4))
     blank = Image(np.full_like(look("mirror", 0.4).pixels, 80))
-    vector = homing.at((4.2, 4.6, 0.4), matches=False, picture=blank)
+    vector = homing.at((4.2, 4.6, 0.4), matches=False, image=blank)
     assert vector.state == "lost"
     assert vector.why.startswith("0 tracked features agree on where the robot is, 6 are needed; 0 of 0 matches")
     assert off_deg(vector, (4.2, 4.6, 0.4))[0] < 3.0  # what was known last

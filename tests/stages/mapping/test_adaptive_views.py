@@ -8,14 +8,14 @@ import pytest
 from omninav.pipeline import Context
 from omninav.stages.geometry.appearance.spectra import packed
 from omninav.stages.mapping.adaptive_views import AdaptiveViews
-from omninav.stages.mapping.before_threshold import BeforeLimit
+from omninav.stages.mapping.before_threshold import BeforeThreshold
 from omninav.stages.mapping.frozen import Frozen
 from omninav.stages.values.belief import GaussianMixture
-from omninav.stages.values.map_update import Lesson, Lessons
+from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import Coefficients, Spectrum, ViewLimit
+from omninav.stages.values.views import Coefficients, NoveltyThreshold, Spectrum
 
-LIMIT = ViewLimit(1.0)
+LIMIT = NoveltyThreshold(1.0)
 FREE = {"least_m": 0.0, "least_deg": 0.0}
 
 
@@ -32,8 +32,8 @@ def state(*means, sigma=0.1, weights=None):
 
 def learn(map, view, state, **options):
     stage = AdaptiveViews(**{**FREE, **options})
-    lessons = Lessons((Lesson(view, state, 0),))
-    return stage.step(Context("mapping"), lessons, LIMIT, map, BeforeLimit()).events
+    lessons = MapUpdates((MapUpdate(view, state, 0),))
+    return stage.step(Context("mapping"), lessons, LIMIT, map, BeforeThreshold()).events
 
 
 def test_a_view_unlike_all_others_is_kept_with_its_place_and_weight_beta():
@@ -195,18 +195,18 @@ def test_a_state_of_two_modes_teaches_each_by_its_weight():
 
 def test_views_above_the_limit_go_though_lessons_come_many_at_once():
     map = ViewMixtures.empty()
-    lessons = Lessons(tuple(Lesson(view(2 * n, 0), state([n, 0, 0]), n) for n in range(9)))
+    lessons = MapUpdates(tuple(MapUpdate(view(2 * n, 0), state([n, 0, 0]), n) for n in range(9)))
     stage = AdaptiveViews(max_views=4)
-    event = stage.step(Context("mapping"), lessons, LIMIT, map, BeforeLimit()).events
+    event = stage.step(Context("mapping"), lessons, LIMIT, map, BeforeThreshold()).events
     assert len(map) == event.views == 4
     assert 8 in map.names
     assert event.inserted.tolist() == map.names.tolist()
 
 
 def test_before_there_is_a_limit_only_the_first_view_is_kept_and_the_others_wait():
-    map, stage, waiting = ViewMixtures.empty(), AdaptiveViews(**FREE), BeforeLimit()
+    map, stage, waiting = ViewMixtures.empty(), AdaptiveViews(**FREE), BeforeThreshold()
     for n in range(3):
-        lessons = Lessons((Lesson(view(2 * n, 0), state([n, 0, 0]), n),))
+        lessons = MapUpdates((MapUpdate(view(2 * n, 0), state([n, 0, 0]), n),))
         stage.step(Context("mapping"), lessons, None, map, waiting)
         assert len(map) == 1
     event = stage.step(Context("mapping"), None, LIMIT, map, waiting).events
@@ -217,29 +217,29 @@ def test_before_there_is_a_limit_only_the_first_view_is_kept_and_the_others_wait
 
 def test_nothing_to_learn_leaves_the_map_alone_and_a_frozen_map_learns_nothing():
     map = ViewMixtures.empty()
-    assert AdaptiveViews().step(Context("m"), Lessons(()), LIMIT, map, BeforeLimit()).events is None
-    lessons = Lessons((Lesson(view(0, 0), state([0, 0, 0]), 0),))
-    out = Frozen().step(Context("m"), map=map, lessons=lessons, limit=LIMIT)
+    assert AdaptiveViews().step(Context("m"), MapUpdates(()), LIMIT, map, BeforeThreshold()).events is None
+    lessons = MapUpdates((MapUpdate(view(0, 0), state([0, 0, 0]), 0),))
+    out = Frozen().step(Context("m"), map=map, updates=lessons, threshold=LIMIT)
     assert out.map is map
     assert (len(map), map.steps) == (0, 0)
 
 
 def test_weights_stay_in_0_to_1_and_covariances_positive_definite_over_10000_updates_in_a_row():
     rng = np.random.default_rng(0)
-    map, waiting = ViewMixtures.empty(), BeforeLimit()
+    map, waiting = ViewMixtures.empty(), BeforeThreshold()
 
     def random_lesson(least):
         parts = int(rng.integers(1, 4))
         roots = rng.normal(0, 0.2, (parts, 3, 3))
         covariances = roots @ roots.transpose(0, 2, 1) + np.eye(3) * least
         where = GaussianMixture(rng.normal(0, 1, (parts, 3)), covariances, rng.random(parts) + 1e-3)
-        return Lesson(view(*rng.normal(0, 2.0, 2)), where, 0)
+        return MapUpdate(view(*rng.normal(0, 2.0, 2)), where, 0)
 
     for _ in range(1000):
         forgetting, beta = str(rng.choice(["active", "passive", "none"])), rng.uniform(0.1, 1.0)
         stage = AdaptiveViews(forgetting=forgetting, beta=beta, gain_m=5.0, max_views=12, **FREE)
         least = 10.0 ** rng.uniform(-6, -1)
-        stage.step(Context("m"), Lessons(tuple(random_lesson(least) for _ in range(10))), LIMIT, map, waiting)
+        stage.step(Context("m"), MapUpdates(tuple(random_lesson(least) for _ in range(10))), LIMIT, map, waiting)
         assert (map.weights >= 0).all()
         assert (map.weights <= 1).all()
         assert (map.counts > 0).all()

@@ -4,11 +4,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from omninav.pipeline import Context
-from omninav.stages.mapping.fused_mixtures import Average, FusedMixtures, Learned
+from omninav.stages.mapping.fused_mixtures import Average, FusedMixtures, FusedMixturesState
 from omninav.stages.values.belief import GaussianMixture
-from omninav.stages.values.map_update import Lesson, Lessons
+from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
-from omninav.stages.values.views import Coefficients, ViewLimit
+from omninav.stages.values.views import Coefficients, NoveltyThreshold
 
 SIGMA = 0.1
 HELD = ("means", "covariances", "weights", "counts")
@@ -36,7 +36,9 @@ def learn(
     limit: float = 1.0,
 ) -> ViewEvent:
     stage = FusedMixtures(spread=False) if stage is None else stage
-    out = stage.step(Context("mapping"), Lessons((Lesson(view, state, 0),)), ViewLimit(limit), map, Learned())
+    out = stage.step(
+        Context("mapping"), MapUpdates((MapUpdate(view, state, 0),)), NoveltyThreshold(limit), map, FusedMixturesState()
+    )
     assert out.events is not None
     return out.events
 
@@ -88,12 +90,12 @@ def test_a_lesson_given_again_leaves_the_map_as_if_it_had_been_known_in_the_firs
     known = np.where(np.isin(np.arange(12), again), then, first)
     maps = []
     for taught, corrected in ((first, again), (known, [])):
-        map, stage, learned = ViewMixtures.empty(), FusedMixtures(average=average), Learned()
+        map, stage, learned = ViewMixtures.empty(), FusedMixtures(average=average), FusedMixturesState()
         for lessons in (
-            *([Lesson(view(views[n]), state(taught[n]), n)] for n in range(12)),
-            [Lesson(view(views[n]), state(then[n]), int(n)) for n in corrected],
+            *([MapUpdate(view(views[n]), state(taught[n]), n)] for n in range(12)),
+            [MapUpdate(view(views[n]), state(then[n]), int(n)) for n in corrected],
         ):
-            stage.step(Context("mapping"), Lessons(tuple(lessons), open_from=0), ViewLimit(1.0), map, learned)
+            stage.step(Context("mapping"), MapUpdates(tuple(lessons), open_from=0), NoveltyThreshold(1.0), map, learned)
         maps.append(map)
     assert maps[0].names.tolist() == maps[1].names.tolist()
     for row in range(len(maps[0])):
@@ -102,18 +104,18 @@ def test_a_lesson_given_again_leaves_the_map_as_if_it_had_been_known_in_the_firs
 
 
 def test_a_lesson_from_before_the_open_ones_stays_and_is_learned_once_more() -> None:
-    map, stage, learned = ViewMixtures.empty(), FusedMixtures(), Learned()
+    map, stage, learned = ViewMixtures.empty(), FusedMixtures(), FusedMixturesState()
     for index, place, open_from in ((0, 0.0, 0), (1, 9.0, 1), (0, 5.0, 1)):
-        lessons = Lessons((Lesson(view(0.0), state(place), index),), open_from)
-        stage.step(Context("mapping"), lessons, ViewLimit(1.0), map, learned)
+        lessons = MapUpdates((MapUpdate(view(0.0), state(place), index),), open_from)
+        stage.step(Context("mapping"), lessons, NoveltyThreshold(1.0), map, learned)
     assert sorted(map.means[:, 0].tolist()) == [0.0, 5.0, 9.0]
 
 
 def test_what_a_full_map_has_dropped_does_not_come_back_with_a_lesson_given_again() -> None:
-    map, stage, learned = ViewMixtures.empty(), FusedMixtures(max_views=2), Learned()
+    map, stage, learned = ViewMixtures.empty(), FusedMixtures(max_views=2), FusedMixturesState()
     for index, place in ((0, 0.0), (1, 3.0), (2, 6.0), (1, 4.0)):
-        lessons = Lessons((Lesson(view(3.0 * index), state(place), index),), 0)
-        stage.step(Context("mapping"), lessons, ViewLimit(1.0), map, learned)
+        lessons = MapUpdates((MapUpdate(view(3.0 * index), state(place), index),), 0)
+        stage.step(Context("mapping"), lessons, NoveltyThreshold(1.0), map, learned)
     assert map.views[:, 0].tolist() == [3.0, 6.0]
     assert sorted(map.means[:, 0].tolist()) == [4.0, 6.0]
 
@@ -161,19 +163,19 @@ def test_headings_are_kept_as_those_of_a_robot_that_sees_the_view_unturned() -> 
 
 
 def test_before_there_is_a_limit_only_the_first_view_is_kept_and_the_others_wait() -> None:
-    map, stage, learned = ViewMixtures.empty(), FusedMixtures(), Learned()
+    map, stage, learned = ViewMixtures.empty(), FusedMixtures(), FusedMixturesState()
     for value in (0.0, 9.0):
-        stage.step(Context("mapping"), Lessons((Lesson(view(value), state(0.0), 0),)), None, map, learned)
+        stage.step(Context("mapping"), MapUpdates((MapUpdate(view(value), state(0.0), 0),)), None, map, learned)
     assert len(map) == 1
-    stage.step(Context("mapping"), None, ViewLimit(1.0), map, learned)
+    stage.step(Context("mapping"), None, NoveltyThreshold(1.0), map, learned)
     assert map.views[:, 0].tolist() == [0.0, 9.0]
     assert not learned.waiting
 
 
 def test_nothing_to_learn_changes_nothing() -> None:
     map = ViewMixtures.empty()
-    assert FusedMixtures().step(Context("mapping"), Lessons(()), None, map, Learned()).events is None
-    assert FusedMixtures().step(Context("mapping"), None, None, map, Learned()).map is map
+    assert FusedMixtures().step(Context("mapping"), MapUpdates(()), None, map, FusedMixturesState()).events is None
+    assert FusedMixtures().step(Context("mapping"), None, None, map, FusedMixturesState()).map is map
 
 
 def test_a_map_never_holds_more_views_than_it_may() -> None:
@@ -200,24 +202,24 @@ def test_of_parts_that_are_all_weak_the_heaviest_stays(average: Average) -> None
 
 def test_weights_stay_in_0_to_1_and_covariances_positive_definite_over_10000_updates_in_a_row() -> None:
     rng = np.random.default_rng(0)
-    map, learned = ViewMixtures.empty(), Learned()
+    map, learned = ViewMixtures.empty(), FusedMixturesState()
     averages: tuple[Average, ...] = ("visits", "halves")
 
-    def random_lesson(least: float) -> Lesson:
+    def random_lesson(least: float) -> MapUpdate:
         parts = int(rng.integers(1, 4))
         roots = rng.normal(0, 0.2, (parts, 3, 3))
         covariances = roots @ roots.transpose(0, 2, 1) + np.eye(3) * least
         weights = rng.random(parts) + 1e-3
         values = rng.normal(0, 2.0, 2).astype(np.float32)
         state = GaussianMixture(rng.normal(0, 1, (parts, 3)), covariances, weights / weights.sum())
-        return Lesson(Coefficients(values, values[None]), state, 0)
+        return MapUpdate(Coefficients(values, values[None]), state, 0)
 
     for _ in range(1000):
         average = averages[int(rng.integers(2))]
         stage = FusedMixtures(average=average, spread=bool(rng.random() < 0.5), max_views=12)
         least = 10.0 ** rng.uniform(-6, -1)
-        lessons = Lessons(tuple(random_lesson(least) for _ in range(10)))
-        stage.step(Context("mapping"), lessons, ViewLimit(1.0), map, learned)
+        lessons = MapUpdates(tuple(random_lesson(least) for _ in range(10)))
+        stage.step(Context("mapping"), lessons, NoveltyThreshold(1.0), map, learned)
         assert (map.weights >= 0).all()
         assert (map.weights <= 1).all()
         assert (map.counts > 0).all()

@@ -8,7 +8,7 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.artifact import write_artifact
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.features.haar_integral import HaarIntegral
-from omninav.stages.mapping.image_database import ImageDatabase, LastTaken
+from omninav.stages.mapping.image_database import ImageDatabase, ImageDatabaseState
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
 from omninav.stages.values.image import Panorama, Windows
 from omninav.stages.values.maps import ReferenceGraph
@@ -22,7 +22,7 @@ def views(segments: int, bins: int = 8, seed: int = 0) -> np.ndarray:
 
 
 def learned(stage: ImageDatabase, tour: Tour, features: SegmentFeatures, odometry_only: bool = False) -> ReferenceGraph:
-    ctx, map, last = Context("mapping"), ReferenceGraph.empty(), LastTaken()
+    ctx, map, last = Context("mapping"), ReferenceGraph.empty(), ImageDatabaseState()
     for number, pose in enumerate(tour):
         ctx.tick = Tick(number, number, first_of_log=number == 0)
         truth = None if odometry_only else Pose(*pose)

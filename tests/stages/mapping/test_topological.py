@@ -24,7 +24,7 @@ from omninav.stages.geometry.appearance.visual_distance import Matching, match_p
 from omninav.stages.geometry.probability.dempster_shafer import support
 from omninav.stages.mapping.topological import with_names
 from omninav.stages.match.visual_distance import MatchPlaces
-from omninav.stages.values.local_features import GlobalMoments, LocalFeatures
+from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.rooms import Rooms
 from omninav.stages.values.topological_map import LOOP, LoopHypotheses, TopologicalMap
@@ -150,7 +150,7 @@ def test_the_spread_is_what_a_robot_measures_in_the_right_place(once: tuple[Topo
     for row, pose in enumerate(found.poses):
         seen = WORLD.seen(Pose(*(float(number) for number in pose)))
         distances = match.step(
-            context, features=seen, moments=GlobalMoments(np.zeros(3, np.float32)), map=made
+            context, features=seen, descriptor=GlobalDescriptor(np.zeros(3, np.float32)), map=made
         ).distances
         if row != made.frames[made.places[found.place[row]]]:
             apart.append(distances.distances[found.place[row]])

@@ -10,7 +10,7 @@ from omninav.stages.match.l2 import L2Match
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentColours, SegmentHistograms
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 
@@ -127,7 +127,7 @@ def test_how_far_is_near_follows_the_reach_of_the_views(match: type[SelectiveMat
     stage, seen = match(headings=SEGMENTS, strangers=10, whole_up_to=0), SegmentHistograms(map.features[80])
     compared = []
     for reach in (0.1, 0.5, 2.0):
-        candidates = stage.step(Context("match"), seen, map, belief, Reach(reach)).similarities.candidates
+        candidates = stage.step(Context("match"), seen, map, belief, LengthScale(reach)).similarities.candidates
         assert candidates is not None
         assert set(np.flatnonzero(gaps_to(map, belief) <= 4.5 * reach)) <= set(candidates)
         compared.append(len(candidates))

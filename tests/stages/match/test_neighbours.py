@@ -9,7 +9,7 @@ from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.match.neighbours import Shape, ViewNeighbours, similarity
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import Coefficients, Neighbours, ViewLimit
+from omninav.stages.values.views import Coefficients, Neighbours, NoveltyThreshold
 
 
 def view(*values: float) -> Coefficients:
@@ -25,7 +25,7 @@ def map_of(*places: float) -> ViewMixtures:
 
 
 def near(stage: ViewNeighbours, kept: ViewMixtures, limit: float | None) -> Neighbours:
-    given = None if limit is None else ViewLimit(limit)
+    given = None if limit is None else NoveltyThreshold(limit)
     return stage.step(Context("match"), view(0.0, 0.0), kept, given).neighbours
 
 

@@ -10,13 +10,13 @@ from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.match.correspondences import MatchFeatures
 from omninav.stages.match.visual_distance import MatchPlaces
-from omninav.stages.values.local_features import GlobalMoments, LocalFeatures
+from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
 
 WORLD = Landmarks(scattered(40.0, 14.0, 400))
-GREY = GlobalMoments(np.zeros(3, np.float32))
+GREY = GlobalDescriptor(np.zeros(3, np.float32))
 
 
 @pytest.fixture(scope="module")
@@ -24,10 +24,10 @@ def made() -> TopologicalMap:
     return mapped(WORLD, [along([(6.0, 7.0), (34.0, 7.0)], 1.0)]).map
 
 
-def compared(features: LocalFeatures, map: TopologicalMap, moments: GlobalMoments = GREY) -> VisualDistances:
+def compared(features: LocalFeatures, map: TopologicalMap, moments: GlobalDescriptor = GREY) -> VisualDistances:
     stage, context = MatchPlaces(), Context("match")
     stage.setup(context)
-    return stage.step(context, features=features, moments=moments, map=map).distances
+    return stage.step(context, features=features, descriptor=moments, map=map).distances
 
 
 def test_the_place_where_a_robot_stands_is_the_nearest_and_says_how_it_is_turned(made: TopologicalMap) -> None:
@@ -45,7 +45,7 @@ def test_far_places_have_nothing_in_common_and_other_colours_are_not_looked_at(m
     assert np.isinf(found.distances[gap > 16.0]).all()
     assert np.isfinite(found.distances[gap < 4.0]).all()
     assert np.isinf(
-        compared(WORLD.seen(Pose(6.0, 7.0, 0.0)), made, GlobalMoments(np.ones(3, np.float32))).distances
+        compared(WORLD.seen(Pose(6.0, 7.0, 0.0)), made, GlobalDescriptor(np.ones(3, np.float32))).distances
     ).all()
 
 

@@ -13,7 +13,7 @@ from omninav.stages.sensor.near_references import (
     weighted_quantile,
 )
 from omninav.stages.values.belief import Particles
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
@@ -159,7 +159,9 @@ def test_distances_are_meant_in_reaches() -> None:
 
     def at(reach: float) -> np.ndarray:
         stage.setup(ctx)
-        return stage.step(ctx, Similarities(one_good_match()), belief, a_map(), None, Reach(reach)).likelihood.values
+        return stage.step(
+            ctx, Similarities(one_good_match()), belief, a_map(), None, LengthScale(reach)
+        ).likelihood.values
 
     assert at(1.0)[3] > 100 * np.median(at(1.0))  # 0.3 m is near where views change slowly
     assert at(0.05)[3] < 1.01 * np.median(at(0.05))  # and far where they change quickly

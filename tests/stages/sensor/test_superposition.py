@@ -12,7 +12,7 @@ from omninav.stages.geometry.probability.gaussians import density
 from omninav.stages.sensor.superposition import Superposition
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.view_mixtures import ViewMixtures
-from omninav.stages.values.views import Neighbours, ViewLimit
+from omninav.stages.values.views import Neighbours, NoveltyThreshold
 
 CTX = Context("sensor")
 
@@ -111,7 +111,7 @@ def test_it_is_the_sum_over_views_and_components_written_as_two_loops() -> None:
 
 def test_a_view_with_an_extent_may_be_seen_from_around_where_it_was_learned() -> None:
     # At 0.25 and at half of the limit, of a drive whose views reach it after 2 m: 0.5 m and 1 m in x and in y.
-    stage, limit = Superposition(extent=True), ViewLimit(2.0, metres=2.0)
+    stage, limit = Superposition(extent=True), NoveltyThreshold(2.0, metres=2.0)
     neighbours = Neighbours(np.array([1, 0]), np.array([0.5, 1.0]), np.array([0.75, 0.5]), np.zeros(2), 0.5)
     wide, plain = stage.step(CTX, neighbours, TWO, limit).hypothesis, said(Superposition(), neighbours)
     assert wide is not None
@@ -121,8 +121,8 @@ def test_a_view_with_an_extent_may_be_seen_from_around_where_it_was_learned() ->
     np.testing.assert_array_equal(wide.weights, plain.weights)
 
 
-@pytest.mark.parametrize("limit", [None, ViewLimit(2.0), ViewLimit(0.0, metres=2.0)])
-def test_without_a_measured_way_there_is_no_extent(limit: ViewLimit | None) -> None:
+@pytest.mark.parametrize("limit", [None, NoveltyThreshold(2.0), NoveltyThreshold(0.0, metres=2.0)])
+def test_without_a_measured_way_there_is_no_extent(limit: NoveltyThreshold | None) -> None:
     found = Superposition(extent=True).step(CTX, near([1], [0.9]), TWO, limit).hypothesis
     assert found is not None
     np.testing.assert_array_equal(found.covariances, said(Superposition(), near([1], [0.9])).covariances)

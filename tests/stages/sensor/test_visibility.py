@@ -13,7 +13,7 @@ from omninav.stages.sensor.line_of_sight import axes_of, visibility_areas
 from omninav.stages.sensor.visibility import FADED, Visibility, looks_at, mean_seen, seen_from, sums_by_turn
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.grid import FREE, OCCUPIED, FreeSpace, OccupancyGrid
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
@@ -246,7 +246,7 @@ def test_a_standing_robots_pictures_are_little_evidence_where_that_is_asked_for(
 
     def at(motion: Motion):
         return stage.step(
-            Context("sensor"), Similarities(values), particles, a_map(), areas, motion, Reach(0.4)
+            Context("sensor"), Similarities(values), particles, a_map(), areas, motion, LengthScale(0.4)
         ).likelihood
 
     moving, standing = at(Motion(0.3, 0.0, 0.0)), at(Motion(0.0, 0.0, 0.1))

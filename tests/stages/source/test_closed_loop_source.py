@@ -10,7 +10,7 @@ import pytest
 from omninav.pipeline import Context
 from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_state
 from omninav.stages.control.clearance import free_ahead, roomier_side
-from omninav.stages.control.wall_avoider import Memory, WallAvoider
+from omninav.stages.control.wall_avoider import WallAvoider, WallAvoiderState
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator.cameras import shutter_times
 from omninav.stages.simulator.config import Delivery, Event, MirrorCamera, OdometryNoise, Ranges, Sensor, WorldConfig
@@ -18,9 +18,9 @@ from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.robot import around, steer
 from omninav.stages.simulator.world import World
-from omninav.stages.source.closed_loop import ClosedLoop, Simulation
+from omninav.stages.source.closed_loop import ClosedLoop, ClosedLoopState
 from omninav.stages.values.command import Command
-from omninav.stages.values.planned_route import PlannedWay
+from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.scan import Scan
 
 SMALL = MirrorCamera(
@@ -36,7 +36,7 @@ class Loop:
     def __init__(self, seed: int = 0, **parameters: object) -> None:
         self.source = ClosedLoop(**{"world": WORLD, **parameters})  # type: ignore[arg-type]
         self.ctx = Context("source", np.random.default_rng(seed))
-        self.state = Simulation()
+        self.state = ClosedLoopState()
         self.source.setup(self.ctx)
 
     def step(self, command: Command | None = None) -> ClosedLoop.Out | None:
@@ -63,7 +63,7 @@ def test_it_starts_where_the_route_starts_and_ends_when_the_time_is_over():
 @pytest.mark.parametrize("state", ["arrived", "gave up"])
 def test_a_way_that_has_ended_ends_the_drive_a_moment_later(state):
     loop = Loop(seconds=20.0, rest=1.0)
-    ways = [None, *[PlannedWay(np.array([3]), "under way", 0)] * 5, *[PlannedWay(np.array([3]), state, 0)] * 9]
+    ways = [None, *[PlannedRoute(np.array([3]), "under way", 0)] * 5, *[PlannedRoute(np.array([3]), state, 0)] * 9]
     outs = [loop.source.step(loop.ctx, loop.state, None, way) for way in ways]
     assert [out is not None for out in outs] == [True] * 11 + [False] * 4
 
@@ -203,15 +203,15 @@ def test_free_way_is_the_nearest_echo_within_the_robots_width():
 def test_the_driver_goes_on_where_there_is_room_and_turns_on_the_spot_where_there_is_none():
     driver = WallAvoider()
     ctx = Context("driver")
-    free = driver.step(ctx, ring(), Memory()).command
+    free = driver.step(ctx, ring(), WallAvoiderState()).command
     assert (free.speed, free.turning) == pytest.approx((driver.speed, 0.0))
-    blocked = driver.step(ctx, ring(_8=0.4, _9=0.5), Memory()).command
+    blocked = driver.step(ctx, ring(_8=0.4, _9=0.5), WallAvoiderState()).command
     assert blocked.speed == 0.0
     assert blocked.turning < 0.0
 
 
 def test_a_single_missing_echo_does_not_free_the_way():
-    driver, memory, ctx = WallAvoider(), Memory(), Context("driver")
+    driver, memory, ctx = WallAvoider(), WallAvoiderState(), Context("driver")
     driver.step(ctx, ring(_8=0.4), memory)
     assert driver.step(ctx, ring(), memory).command.speed == 0.0
     assert driver.step(ctx, ring(), memory).command.speed == driver.speed
@@ -220,7 +220,7 @@ def test_a_single_missing_echo_does_not_free_the_way():
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_the_driver_wanders_without_touching_anything(seed: int, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(ClosedLoop, "_look", lambda *_: None)  # it does not look at pictures
-    loop, driver, memory = Loop(seed=seed, seconds=300.0), WallAvoider(), Memory()
+    loop, driver, memory = Loop(seed=seed, seconds=300.0), WallAvoider(), WallAvoiderState()
     command, track = None, []
     while (out := loop.step(command)) is not None:
         command = driver.step(loop.ctx, out.scan, memory).command

@@ -12,7 +12,7 @@ from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator.config import MirrorCamera
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.world import World
-from omninav.stages.source.homing_grid import HomingGrid, Placed, grid_around, in_sight
+from omninav.stages.source.homing_grid import HomingGrid, HomingGridState, grid_around, in_sight
 
 SMALL = MirrorCamera(
     width=160, height_px=120, focal=124.25, centre=(79.5, 59.5), inner_radius_px=8.5, outer_radius_px=59.5
@@ -23,7 +23,7 @@ ANTWORLD = DATA / "antworld-rendered" / "grid_200mm"
 
 
 def ticks(source: HomingGrid, seed: int = 0) -> list[HomingGrid.Out]:
-    ctx, placed = Context("source", np.random.default_rng(seed)), Placed()
+    ctx, placed = Context("source", np.random.default_rng(seed)), HomingGridState()
     source.setup(ctx)
     found = []
     while (out := source.step(ctx, placed)) is not None:

@@ -14,7 +14,7 @@ from omninav.pipeline import Context
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import UnreadableRecording
-from omninav.stages.source.log import LogSource, Position, disturb
+from omninav.stages.source.log import LogSource, LogSourceState, disturb
 
 sys.path.insert(0, str(Path(__file__).parent))
 from made_logs import FRAMES, IMAGE, ODOMETRY, START, TRUTH, Made, compressed, messages, write_mcap
@@ -24,8 +24,10 @@ def context(seed: int = 0) -> Context:
     return Context("source", np.random.default_rng(seed))
 
 
-def drive(source: LogSource, ctx: Context | None = None, position: Position | None = None, most: int = 10**6) -> list:
-    ctx, position, outs = ctx or context(), position or Position(), []
+def drive(
+    source: LogSource, ctx: Context | None = None, position: LogSourceState | None = None, most: int = 10**6
+) -> list:
+    ctx, position, outs = ctx or context(), position or LogSourceState(), []
     source.setup(ctx)
     while len(outs) < most and (out := source.step(ctx, position)) is not None:
         outs.append(out)
@@ -90,9 +92,9 @@ def test_a_source_resumed_from_its_state_goes_on_with_the_same_values(
 ) -> None:
     path = str(write_mcap(tmp_path / "log.mcap", None if measured else without(ODOMETRY)))
     whole = drive(LogSource(log=(path, path)))
-    ctx, position = context(), Position()
+    ctx, position = context(), LogSourceState()
     head = drive(LogSource(log=(path, path)), ctx, position, stop)
-    later, kept = context(99), Position(**copy.deepcopy(vars(position)))
+    later, kept = context(99), LogSourceState(**copy.deepcopy(vars(position)))
     later.rng.bit_generator.state = ctx.rng.bit_generator.state
     tail = drive(LogSource(log=(path, path)), later, kept)
     assert len(head) + len(tail) == len(whole) == 2 * FRAMES

@@ -21,7 +21,7 @@ from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.simulated_log import record
 from omninav.stages.simulator.simulated_recording import SimulatedRecording
 from omninav.stages.simulator.world import World
-from omninav.stages.source.log import LogSource, Position
+from omninav.stages.source.log import LogSource, LogSourceState
 
 SMALL = MirrorCamera(
     width=160, height_px=120, focal=124.25, centre=(79.5, 59.5), inner_radius_px=8.5, outer_radius_px=59.5
@@ -151,7 +151,7 @@ def test_the_log_source_gives_ranges_with_each_tick_and_does_without(log: Path):
     def first(**parameters: object) -> LogSource.Out:
         source, ctx = LogSource(log=str(log), **parameters), Context("source")  # type: ignore[arg-type]
         source.setup(ctx)
-        out = source.step(ctx, Position())
+        out = source.step(ctx, LogSourceState())
         assert out is not None
         return out
 
@@ -186,7 +186,7 @@ def test_several_days_in_one_log_are_read_as_one_drive_after_another(tmp_path: P
     record(days, tmp_path / "days.mcap")
 
     def ticks(source: LogSource) -> list[LogSource.Out]:
-        ctx, position, outs = Context("source"), Position(), []
+        ctx, position, outs = Context("source"), LogSourceState(), []
         source.setup(ctx)
         while (out := source.step(ctx, position)) is not None:
             outs.append(out)

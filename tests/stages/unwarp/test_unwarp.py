@@ -18,7 +18,7 @@ from omninav.stages.camera.models import (
     Perspective,
 )
 from omninav.stages.unwarp.by_camera import UnwarpByCamera
-from omninav.stages.unwarp.donut import DonutUnwarp, FoundRing, RingNotFound, find_ring
+from omninav.stages.unwarp.donut import DonutUnwarp, DonutUnwrapState, RingNotFound, find_ring
 from omninav.stages.unwarp.hyperbolic import HyperbolicUnwarp, elevation_range
 from omninav.stages.unwarp.strip import StripUnwarp
 from omninav.stages.values.image import Image, Panorama, Pixels, column_azimuths
@@ -164,7 +164,7 @@ def test_a_picture_without_a_ring_says_so() -> None:
 
 
 def test_each_log_has_a_ring_of_its_own() -> None:
-    ctx, stage, found = Context("unwarp"), DonutUnwarp(), FoundRing()
+    ctx, stage, found = Context("unwarp"), DonutUnwarp(), DonutUnwrapState()
     stage.setup(ctx)
     camera = Donut(640, 480)  # that two logs share a description does not make them one camera
     for log, centre in enumerate(((330, 236), (300, 250))):
@@ -174,7 +174,7 @@ def test_each_log_has_a_ring_of_its_own() -> None:
 
 
 def test_what_was_found_once_stays_for_all_pictures() -> None:
-    ctx, stage, found = Context("unwarp"), DonutUnwarp(), FoundRing()
+    ctx, stage, found = Context("unwarp"), DonutUnwarp(), DonutUnwrapState()
     stage.setup(ctx)
     camera = Donut(640, 480)
     stage.step(ctx, Image(ring_picture((330, 236), 200, 40, 0)), camera, found)

@@ -1,0 +1,121 @@
+"""Values as bytes and back, and files that notice damage."""
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+import toys
+from omninav.pipeline.engine.artifact import read_artifact, read_header, write_artifact
+from omninav.pipeline.engine.codec import BadEncoding, decode, encode, seal, unseal
+from omninav.pipeline.engine.disk_sequence import DiskSequence
+from omninav.pipeline.graph.problems import BadInput
+
+plain = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text() | st.binary(),
+    lambda inner: (
+        st.lists(inner) | st.lists(inner).map(tuple) | st.dictionaries(st.text() | st.integers(), inner, max_size=4)
+    ),
+    max_leaves=12,
+)
+
+
+@given(plain)
+def test_plain_data_comes_back_as_it_was(thing: object):
+    assert decode(encode(thing)) == thing
+
+
+@given(
+    arrays.arrays(
+        dtype=st.sampled_from(["f8", "f4", "u1", "i8", "?", "c16"]), shape=arrays.array_shapes(min_dims=0, min_side=0)
+    )
+)
+def test_arrays_come_back_bit_for_bit(array: np.ndarray):
+    back = decode(encode({"a": array, "b": [array]}))
+    for one in (back["a"], back["b"][0]):
+        assert (one.dtype, one.shape, one.tobytes()) == (array.dtype, array.shape, array.tobytes())
+
+
+def test_values_counters_paths_and_scalars_come_back():
+    big = decode(encode((toys.Number(1.5), toys.Big(np.arange(3)), Counter("aab"), Path("x/y"), np.float32(0.1))))
+    assert isinstance(big[0], toys.Number)
+    assert big[0].value == 1.5
+    assert list(big[1].array) == [0, 1, 2]
+    assert big[2:] == (Counter("aab"), Path("x/y"), np.float32(0.1))
+
+
+def test_what_is_no_value_cannot_be_written_or_named():
+    with pytest.raises(BadEncoding, match="make it a Value"):
+        encode(object())
+    with pytest.raises(BadEncoding, match="array of objects"):
+        encode(np.array([object()]))
+    forged = encode(toys.Number(1.0)).replace(b"toys.Number", b"os.PathLike")
+    with pytest.raises(BadEncoding, match=r"unknown value type 'os\.PathLike'"):
+        decode(forged)
+
+
+@given(st.data())
+def test_a_flipped_or_cut_seal_is_noticed(data: st.DataObject):
+    sealed = bytearray(seal(encode({"a": np.arange(20)})))
+    if data.draw(st.booleans()):
+        sealed[data.draw(st.integers(0, len(sealed) - 1))] ^= 1 << data.draw(st.integers(0, 7))
+    else:
+        sealed = sealed[: data.draw(st.integers(0, len(sealed) - 1))]
+    with pytest.raises(BadEncoding, match="the thing is damaged"):
+        unseal(bytes(sealed), "the thing")
+
+
+def test_a_spool_is_read_lazily_and_cut_back_to_a_length(tmp_path: Path):
+    spool = DiskSequence(tmp_path / "numbers.spool")
+    for number in range(5):
+        spool.append(toys.Number(float(number)) if number != 2 else None)
+    size = spool.size
+    spool.append(toys.Number(9.0))
+    assert len(spool) == 6
+    spool.cut(size)
+    assert [n.value if n else None for n in spool] == [0, 1, None, 3, 4]
+    assert spool[-1].value == 4
+    assert [n.value for n in spool[3:]] == [3, 4]
+    spool.close()
+    again = DiskSequence(tmp_path / "numbers.spool")
+    assert len(again) == 5
+    with pytest.raises(BadEncoding, match="shorter than its checkpoint"):
+        again.cut(size + 1)
+
+
+def test_an_artifact_comes_back_with_its_facts_and_opens_in_numpy(tmp_path: Path):
+    path = tmp_path / "map.omap"
+    write_artifact(path, toys.Big(np.arange(6).reshape(2, 3)), {"poses": "truth"})
+    assert read_header(path)["facts"] == {"poses": "truth"}
+    assert read_artifact(path).array.tolist() == [[0, 1, 2], [3, 4, 5]]  # type: ignore[attr-defined]
+    with np.load(path, allow_pickle=False) as archive:
+        assert archive["array"].tolist() == [[0, 1, 2], [3, 4, 5]]
+    first = path.read_bytes()
+    write_artifact(path, toys.Big(np.arange(6).reshape(2, 3)), {"poses": "truth"})
+    assert path.read_bytes() == first
+
+
+@given(st.data())
+def test_any_flipped_bit_and_any_cut_of_an_artifact_is_refused_by_name(tmp_path_factory, data: st.DataObject):
+    path = tmp_path_factory.mktemp("artifact") / "map.omap"
+    write_artifact(path, toys.Big(np.arange(6)), {})
+    content = bytearray(path.read_bytes())
+    if data.draw(st.booleans()):
+        content[data.draw(st.integers(0, len(content) - 1))] ^= 1 << data.draw(st.integers(0, 7))
+    else:
+        content = content[: data.draw(st.integers(0, len(content) - 1))]
+    path.write_bytes(content)
+    with pytest.raises(BadInput, match=r"map\.omap"):
+        read_artifact(path)
+
+
+def test_a_missing_or_foreign_file_is_refused_by_name(tmp_path: Path):
+    with pytest.raises(BadInput, match="there is no such file"):
+        read_artifact(tmp_path / "none.omap")
+    (tmp_path / "text.omap").write_text("not a map at all, but long enough to hold a sum " * 9)
+    with pytest.raises(BadInput, match="not a map file"):
+        read_artifact(tmp_path / "text.omap")

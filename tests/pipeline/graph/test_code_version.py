@@ -1,0 +1,64 @@
+"""Cached results are stale when code they follow from has changed, and only then."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+STAGE = """
+from omninav.pipeline import Context, Outputs, Stage
+import toys
+from . import near
+from pack.deep.far import FAR
+import pack.whole
+
+class Twice(Stage):
+    class Out(Outputs):
+        number: toys.Number
+    def step(self, ctx: Context, number: toys.Number) -> Out:
+        from .at_need import NEED
+        return self.Out(number=number)
+"""
+FILES = {
+    "pack/__init__.py": "",
+    "pack/stage.py": STAGE,
+    "pack/near.py": "x = 1",
+    "pack/deep/__init__.py": "",
+    "pack/deep/far.py": "from ..beyond import y\nFAR = 1",
+    "pack/beyond.py": "y = 1",
+    "pack/whole/__init__.py": "from .part import z",
+    "pack/whole/part.py": "z = 1",
+    "pack/at_need.py": "NEED = 1",
+    "pack/other.py": "w = 1",
+}
+
+
+def version(place: Path) -> str:
+    code = "import pack.stage as s; from omninav.pipeline.graph.code_version import code_version; print(code_version(s.Twice))"
+    tests = str(Path(__file__).parents[2])
+    environment = {"PYTHONPATH": f"{place}:{tests}", "PATH": "/usr/bin:/bin", "PYTHONDONTWRITEBYTECODE": "1"}
+    return subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    ).stdout
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    for name, text in FILES.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text + "\n")
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if name != "pack/other.py"])
+def test_a_change_in_what_a_stage_imports_is_another_version(package: Path, name: str) -> None:
+    before = version(package)
+    (package / name).write_text(FILES[name] + "\nchanged = True\n")
+    assert version(package) != before
+
+
+def test_a_change_elsewhere_in_its_package_is_not(package: Path) -> None:
+    before = version(package)
+    (package / "pack/other.py").write_text("w = 2\n")
+    assert version(package) == before

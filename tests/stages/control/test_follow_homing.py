@@ -1,0 +1,165 @@
+"""From homing vectors to commands."""
+
+import math
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.stages.control.clearance import free_ahead, way_through
+from omninav.stages.control.follow_homing import FollowHoming, FollowHomingState
+from omninav.stages.values.homing import HomingVector, PathProgress
+from omninav.stages.values.scan import Scan
+
+
+def vector(direction: float = 0.0, ratio: float = 0.8, **how) -> HomingVector:
+    known = {"turn": 0.0, "nearness": 0.3, "metres": None, "inliers": 20, "state": "tracking"}
+    return HomingVector(number=0, direction=direction, distance=ratio, ratio=ratio, **{**known, **how})
+
+
+def progress(**how) -> PathProgress:
+    return PathProgress(**{**dict(path=0, at=0, of=2, target=0, last=False, docking=False, arrived=False), **how})
+
+
+def scan(*blocks: tuple[float, float, float]) -> Scan:
+    """Nothing around but what stands at `metres` between two azimuths (degrees)."""
+    azimuths = np.radians(np.arange(-180.0, 180.0, 2.0))
+    ranges = np.full(180, np.inf)
+    for low, high, metres in blocks:
+        ranges[(np.degrees(azimuths) >= low) & (np.degrees(azimuths) <= high)] = metres
+    return Scan(ranges, -math.pi, math.radians(2.0), 0.05, 8.0)
+
+
+def drive(said, at=None, ring=None, patience: FollowHomingState | None = None, **parameters) -> FollowHoming.Out:
+    return FollowHoming(**parameters).step(Context("driving"), patience or FollowHomingState(), said, at, ring)
+
+
+def test_it_drives_where_the_vector_points_within_its_limits() -> None:
+    ahead = drive(vector(0.0), progress(), scan())
+    assert (ahead.command.speed, ahead.command.turning) == (0.4, 0.0)
+    left = drive(vector(0.3), progress(), scan())
+    assert left.command.speed == pytest.approx(0.4 * math.cos(0.3))
+    assert left.command.turning == pytest.approx(1.5 * 0.3)
+    behind = drive(vector(-2.8), progress(), scan())
+    assert (behind.command.speed, behind.command.turning) == (0.0, -0.8)
+    assert behind.status.state == "driving"
+
+
+def test_towards_the_last_view_it_slows_down_but_on_the_way_it_does_not() -> None:
+    assert drive(vector(metres=0.2), progress(last=True)).command.speed == pytest.approx(0.7 * 0.2)
+    assert drive(vector(ratio=0.15), progress(last=True)).command.speed == pytest.approx(0.2)
+    assert drive(vector(metres=0.01), progress(last=True)).command.speed == 0.05
+    assert drive(vector(metres=0.2), progress()).command.speed == 0.4
+
+
+def test_it_docks_by_turning_alone_and_then_stands() -> None:
+    docking = drive(vector(2.0, turn=-0.2), progress(last=True, docking=True), scan())
+    assert (docking.command.speed, docking.command.turning) == (0.0, pytest.approx(-0.3))
+    assert docking.status.state == "docking"
+    arrived = drive(None, progress(arrived=True), scan())
+    assert (arrived.command.speed, arrived.command.turning) == (0.0, 0.0)
+    assert arrived.status.state == "arrived"
+
+
+def test_around_what_stands_in_the_way() -> None:
+    # A post 1 m ahead, a little to the left: the way on its right is closer to where it wants to go.
+    around = drive(vector(0.0), progress(), scan((-4.0, 12.0, 0.6)))
+    assert around.command.turning < 0.0
+    assert around.status.state == "driving"
+
+
+def test_the_way_through_is_the_free_direction_closest_to_the_wanted_one() -> None:
+    ring = scan((-4.0, 12.0, 0.6))
+    ranges = np.minimum(ring.ranges, 8.0)
+    at = way_through(ranges, ring.azimuths(), 0.0, 0.8, 0.25, 0.1)
+    assert at is not None
+    assert free_ahead(ranges, ring.azimuths() - at, 0.25, 0.1) >= 0.8
+    nearer = np.arange(-abs(at) + 0.1, abs(at) - 0.01, math.radians(5.0))
+    assert all(free_ahead(ranges, ring.azimuths() - other, 0.25, 0.1) < 0.8 for other in nearer)
+    assert way_through(np.full(180, 0.4), ring.azimuths(), 0.0, 0.8, 0.25, 0.1) is None
+
+
+def test_a_blocked_way_stops_it_at_once_and_is_said_when_it_stays_so() -> None:
+    patience, closed = FollowHomingState(), scan((-180.0, 180.0, 0.4))
+    states = []
+    for _ in range(12):
+        out = drive(vector(0.0), progress(), closed, patience)
+        assert (out.command.speed, out.command.turning) == (0.0, 0.0)
+        states.append(out.status.state)
+    assert states == ["driving"] * 10 + ["blocked"] * 2
+    assert out.status.why == "nothing is free for 0.8 m towards the target"
+    assert drive(vector(0.0), progress(), scan(), patience).command.speed == 0.4
+
+
+def test_before_a_closed_door_it_goes_from_side_to_side_only_for_so_long() -> None:
+    # The target lies 1 m ahead, behind a wall that is free to the left and to the right: a way to everywhere but there.
+    patience, wall = FollowHomingState(), scan((-50.0, 50.0, 0.5))
+    said = [drive(vector(0.0, metres=1.0), progress(), wall, patience, detour=20) for _ in range(23)]
+    assert {out.status.state for out in said[:21]} == {"driving"}
+    assert all(out.command.turning for out in said[:21])
+    assert (said[-1].status.state, said[-1].command.speed, said[-1].command.turning) == ("blocked", 0.0, 0.0)
+    assert said[-1].status.why == "something stands in the way, and going around it for 20 ticks led no closer"
+    another = drive(HomingVector(1, 0.0, 0.0, 1.0, 1.0, 0.3, 1.0, 20, "new"), progress(), wall, patience, detour=20)
+    assert another.status.state == "driving"
+
+
+def test_who_comes_closer_on_the_way_around_is_not_blocked() -> None:
+    patience, wall = FollowHomingState(), scan((-50.0, 50.0, 0.5))
+    ratios = 0.95 ** np.arange(40)
+    said = [drive(vector(0.0, ratio, metres=ratio), progress(), wall, patience, detour=10) for ratio in ratios]
+    assert {out.status.state for out in said} == {"driving"}
+
+
+def test_if_nothing_else_is_planned_it_tries_again_after_a_while() -> None:
+    patience, wall = FollowHomingState(), scan((-50.0, 50.0, 0.5))
+    said = [drive(vector(0.0, metres=1.0), progress(), wall, patience, detour=20) for _ in range(80)]
+    states = [out.status.state for out in said]
+    assert states == ["driving"] * 21 + ["blocked"] * 20 + ["driving"] * 21 + ["blocked"] * 18
+
+
+def test_neither_may_it_turn_and_turn_in_the_open_for_ever() -> None:
+    patience = FollowHomingState()
+    said = [drive(vector(3.0), progress(), scan(), patience, idle=30) for _ in range(33)]
+    assert [out.status.state for out in said] == ["driving"] * 31 + ["blocked"] * 2
+    assert said[-1].status.why == "30 ticks have led no closer"
+
+
+def test_who_is_lost_for_long_wanders_until_the_target_is_seen() -> None:
+    patience = FollowHomingState()
+    lost = vector(state="lost", why="2 of 9 matches agree")
+    said = [drive(lost, progress(), scan((-20.0, 0.0, 0.6)), patience, restless=5) for _ in range(7)]
+    assert [(out.command.speed, out.command.turning) for out in said[:5]] == [(0.0, 0.0)] * 5
+    assert said[-1].command.turning > 0.0  # away from what stands ahead, a little to the right
+    assert (said[-1].status.state, said[-1].status.why) == ("lost", "it looks about: 2 of 9 matches agree")
+    assert drive(vector(), progress(), scan(), patience).status.state == "driving"
+    patient = [drive(lost, progress(), scan(), patience) for _ in range(60)]
+    assert {(out.command.speed, out.command.turning) for out in patient} == {(0.0, 0.0)}
+    blind = [drive(lost, progress(), None, patience, restless=5) for _ in range(7)]
+    assert blind[-1].command.turning == 0.0
+
+
+def test_a_target_close_before_a_wall_can_be_reached() -> None:
+    assert drive(vector(0.0, metres=0.2), progress(last=True), scan((-60.0, 60.0, 0.7))).command.speed > 0.0
+
+
+def test_through_a_door_that_is_hardly_wide_enough_it_goes_slowly() -> None:
+    azimuths = scan().azimuths()
+    beside = np.abs(np.sin(azimuths)) > 0.05
+    ranges = np.where(beside, 0.3 / np.maximum(np.abs(np.sin(azimuths)), 1e-9), np.inf)  # walls 0.3 m left and right
+    narrow = Scan(ranges, -math.pi, math.radians(2.0), 0.05, 8.0)
+    assert drive(vector(0.0), progress(), narrow).command.speed == pytest.approx(0.2)
+
+
+def test_a_lost_target_is_followed_a_little_where_metres_are_known_and_then_it_stands() -> None:
+    patience = FollowHomingState()
+    lost = vector(0.0, state="lost", metres=1.0, why="2 of 9 matches agree")
+    speeds = [drive(lost, progress(), scan(), patience) for _ in range(12)]
+    assert [out.command.speed > 0.0 for out in speeds] == [True] * 10 + [False] * 2
+    assert (speeds[-1].status.state, speeds[-1].status.why) == ("lost", "2 of 9 matches agree")
+    unknown = drive(vector(0.0, state="lost", why="none"), progress(), scan())
+    assert (unknown.command.speed, unknown.status.state) == (0.0, "lost")
+
+
+def test_without_a_target_it_waits() -> None:
+    out = drive(None, None, scan())
+    assert (out.command.speed, out.status.state) == (0.0, "waiting")

@@ -1,0 +1,114 @@
+"""Upright lines between edges: where they are found, what describes them, which one stands for its neighbours."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import fft
+from turned_robot import CAMERA, both_kinds, look, wrapped
+
+from omninav.pipeline import Context
+from omninav.stages.features.global_colours import GlobalColours
+from omninav.stages.features.vertical_segments import (
+    FindVerticalSegments,
+    Segments,
+    profile_basis,
+    prototypes,
+    segments_of,
+)
+from omninav.stages.geometry.appearance.visual_distance import Matching, match_columns
+from omninav.stages.values.image import Image, Panorama
+from omninav.stages.values.local_features import VerticalSegments
+
+
+def found(picture: Image | Panorama, **parameters: object) -> VerticalSegments:
+    stage, context = FindVerticalSegments(**parameters), Context("columns")
+    stage.setup(context)
+    columns = stage.step(context, image=picture, camera=CAMERA).vertical_segments
+    assert isinstance(columns, VerticalSegments)
+    return columns
+
+
+def banded(edges: list[int], greys: list[int], rows: int = 80, columns: int = 60) -> np.ndarray:
+    """A picture of bands, the same in all columns, with some colour."""
+    pixels = np.zeros((rows, columns, 3), np.uint8)
+    for first, last, grey in zip([0, *edges], [*edges, rows], greys, strict=True):
+        pixels[first:last] = (grey, grey // 2 + 30, 255 - grey)
+    return pixels
+
+
+def test_segments_lie_between_neighbouring_edges() -> None:
+    segments = segments_of(banded([20, 41, 60], [30, 120, 60, 200]), True, 1.0, 0.05, 5.0, 0.2)
+    one = segments.lines == 7
+    assert np.unique(segments.lines).tolist() == list(range(60))
+    assert segments.ends[one] == pytest.approx(np.array([[19.5, 40.5], [40.5, 59.5]]), abs=0.3)
+
+
+def test_the_profile_is_described_by_seven_coefficients_of_scipys_transform() -> None:
+    profile = np.random.default_rng(1).normal(size=8)
+    assert profile_basis() @ profile == pytest.approx(fft.dct(profile, norm="ortho")[1:], abs=1e-6)
+
+
+def test_a_descriptor_does_not_change_with_the_light() -> None:
+    panorama = look("panorama", 0.0).pixels
+    lit = (panorama * 0.5 + 40.0).round().astype(np.uint8)
+    one, other = (segments_of(pixels, True, 1.0, 0.1, 8.0, 0.2) for pixels in (panorama, lit))
+    assert abs(len(one.lines) - len(other.lines)) < 0.05 * len(one.lines)
+    keys = [[tuple(row) for row in np.column_stack([s.lines, s.ends.round()]).tolist()] for s in (one, other)]
+    places = {key: row for row, key in enumerate(keys[0])}
+    both = np.array([(places[key], row) for row, key in enumerate(keys[1]) if key in places])
+    apart = np.abs(one.descriptors[both[:, 0]] - other.descriptors[both[:, 1]])
+    assert len(both) > 0.7 * len(one.lines)
+    assert np.median(apart) < 0.03
+
+
+@both_kinds
+@pytest.mark.parametrize("turn", [0.7, 2.9])
+def test_a_robot_that_turns_sees_the_same_segments_turned_the_other_way(kind: str, turn: float) -> None:
+    one, other = found(look(kind, 0.0)), found(look(kind, turn))
+    pairs = match_columns(one, other, Matching(column_ratio=0.8))
+    off = np.abs(wrapped(other.azimuths[pairs.second] - one.azimuths[pairs.first] + turn))
+    assert len(off) > 60
+    assert (off < math.radians(4.0)).mean() > 0.85
+    right = off < math.radians(4.0)
+    higher = one.elevations[pairs.first][right] - other.elevations[pairs.second][right]
+    assert np.median(np.abs(higher)) < math.radians(1.0)
+
+
+@both_kinds
+def test_both_ends_are_given_as_bearings_the_upper_first(kind: str) -> None:
+    columns = found(look(kind, 0.3))
+    bearings = columns.bearings()
+    assert np.linalg.norm(bearings, axis=-1) == pytest.approx(np.ones((len(columns), 2)))
+    assert (columns.elevations[:, 0] > columns.elevations[:, 1]).all()
+    assert np.arctan2(bearings[:, 0, 1], bearings[:, 0, 0]) == pytest.approx(columns.azimuths)
+    assert (np.diff(columns.weights) <= 0.0).all()
+
+
+def test_neighbours_that_look_alike_become_the_one_in_their_middle() -> None:
+    rng = np.random.default_rng(3)
+    looks = rng.normal(size=(2, 10)).astype(np.float32)
+    lines = np.array([0, 1, 2, 3, 4, 58, 59, 20, 21, 20], np.int64)  # seven across the seam, two apart, one unlike
+    order = np.argsort(lines, kind="stable")
+    ends = np.tile([10.0, 30.0], (10, 1))
+    look_of = np.array([0, 0, 0, 0, 0, 0, 0, 0, 0, 1])
+    segments = Segments(lines[order], ends, looks[look_of[order]])
+    kept, weights = prototypes(segments, 60, 1.6, 2.0, True)
+    assert weights.tolist() == [7.0, 2.0, 1.0]
+    assert segments.lines[kept[0]] == 1
+    apart = Segments(lines[order], ends + 40.0 * (np.arange(10) % 2)[:, None], looks[look_of[order]])
+    assert len(prototypes(apart, 60, 1.6, 2.0, True)[0]) > 3  # one above the other are not the same
+
+
+def test_a_picture_of_nothing_has_no_segments() -> None:
+    assert len(found(Panorama(np.full((80, 360, 3), 90, np.uint8)))) == 0
+
+
+@both_kinds
+def test_colours_of_a_whole_view_stay_when_the_robot_turns(kind: str) -> None:
+    stage = GlobalColours()
+    one, other = (
+        stage.step(Context("moments"), image=look(kind, heading), camera=CAMERA).descriptor.values
+        for heading in (0.0, 2.0)
+    )
+    assert np.abs(one - other).max() < 0.01

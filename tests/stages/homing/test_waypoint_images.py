@@ -1,0 +1,121 @@
+"""From one picture of a path to the next, and how it ends."""
+
+import math
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.features.rotation_reduced_sift import none_found
+from omninav.stages.homing.remember_view import NoVector, RememberView, RememberViewState
+from omninav.stages.homing.waypoint_images import WaypointImages, WaypointImagesState
+from omninav.stages.metrics.homing_errors import HomingErrors
+from omninav.stages.values.homing import HomingVector, ImagePath, PathProgress
+from omninav.stages.values.pose import Pose
+
+PATH = ImagePath(4, tuple(none_found() for _ in range(3)), ("a", "b", "c"))
+
+
+def vector(number: int, ratio: float = 1.0, **how) -> HomingVector:
+    known = {"direction": 0.0, "turn": 0.5, "nearness": ratio, "metres": None, "inliers": 20, "state": "tracking"}
+    return HomingVector(number=number, distance=ratio, ratio=ratio, **{**known, **how})
+
+
+class Path:
+    def __init__(self) -> None:
+        self.stage, self.along, self.ctx = WaypointImages(), WaypointImagesState(), Context("path")
+
+    def step(self, said: HomingVector | None = None, path: ImagePath | None = PATH) -> WaypointImages.Out:
+        return self.stage.step(self.ctx, self.along, path, said)
+
+
+def test_a_path_is_gone_view_by_view_to_its_last() -> None:
+    path = Path()
+    first = path.step()
+    assert first.target is not None
+    assert (first.target.number, first.target.name, first.target.last) == (0, "a", False)
+    assert first.features is PATH.views[0]
+    assert path.step(vector(0, 0.4)).target.number == 0  # still far
+    assert path.step(vector(0, 0.15)).target.name == "b"
+    assert path.step(vector(0, 0.01)).target.name == "b"  # of the view before: says nothing of this one
+    assert path.step(vector(1, 0.1, state="lost")).target.name == "b"  # lost: nor this
+    assert path.step(vector(1, 0.45, direction=3.0)).target.name == "c"  # behind, more than half of the way on
+    out = path.step(vector(2, 0.1))
+    assert out.target.last
+    assert not out.progress.docking
+    out = path.step(vector(2, 0.005))
+    assert out.progress.docking
+    assert not out.progress.arrived
+    out = path.step(vector(2, 0.005, turn=math.radians(2.0)))
+    assert out.progress.arrived
+    assert out.progress.at == out.progress.of == 3
+    assert out.target is None
+
+
+@pytest.mark.parametrize(
+    "there",
+    [
+        {"ratio": 0.1, "nearness": 0.006},
+        {"ratio": 0.1, "nearness": 0.2, "metres": 0.03},
+        {"ratio": 0.1, "nearness": 0.02, "direction": 2.0},
+    ],
+)
+def test_the_last_view_is_reached_where_it_is_near_or_just_behind(there) -> None:
+    path, one = Path(), ImagePath(1, (none_found(),), ())
+    path.step(path=one)
+    assert not path.step(vector(0, **{**there, "nearness": 0.2, "metres": None}), one).progress.docking
+    assert path.step(vector(0, **there), one).progress.docking
+
+
+def test_a_view_that_hardly_differs_from_the_start_is_passed_at_once() -> None:
+    path = Path()
+    path.step()
+    assert path.step(vector(0, 1.0, nearness=0.01)).target.name == "b"
+
+
+def test_a_new_path_begins_anew_with_a_target_of_another_number() -> None:
+    path = Path()
+    path.step()
+    path.step(vector(0, 0.1))
+    other = ImagePath(5, PATH.views[:2], ("d", "e"))
+    out = path.step(vector(1, 0.1), other)
+    assert (out.target.name, out.progress.at, out.progress.path) == ("d", 0, 5)
+    assert out.target.number == 2
+
+
+def test_no_path_no_target() -> None:
+    path = Path()
+    assert path.step(path=None).target is None
+    assert path.step(path=ImagePath(1, (), ())).progress is None
+
+
+def test_the_first_view_is_given_once_a_second_later() -> None:
+    remember, kept, ctx, views = (
+        RememberView(),
+        RememberViewState(),
+        Context("remember"),
+        [none_found() for _ in range(9)],
+    )
+    given = [remember.step(ctx, kept, Tick(k, 200_000_000 * k, first_of_log=k == 0), views[k]).path for k in range(9)]
+    assert [path is not None for path in given] == [k == 5 for k in range(9)]
+    assert given[5].views == (views[0],)
+    assert NoVector().step(ctx).vector is None
+
+
+def test_errors_are_those_of_the_way_back_to_the_first_pose() -> None:
+    # Carried 2 m to +y; it looks along +x, so that the way back is at -90 degrees; the vector says -80.
+    poses = [Pose(0.0, 0.0, 0.0), Pose(0.0, 2.0, 0.0), Pose(0.0, 1.0, 0.0), Pose(0.03, 0.04, 0.1)]
+    ticks = [Tick(k, 10**9 * k) for k in range(4)]
+    said = [None, vector(0, direction=math.radians(-80.0), turn=0.0), vector(0, state="lost"), vector(0, 0.0)]
+    progress = [None, None, None, PathProgress(0, 1, 1, 0, True, True, True)]
+    values = HomingErrors().step(Context("errors"), ticks, poses, said, progress).metrics.values["homing"]
+    assert values["start_m"] == pytest.approx(2.0)
+    assert values["end_error_m"] == pytest.approx(0.05)
+    assert values["end_turn_deg"] == pytest.approx(math.degrees(0.1))
+    assert values["time_s"] == 2.0
+    assert values["arrived"] == 1
+    assert values["direction_error_deg"]["median"] == pytest.approx(10.0)
+    assert values["first"]["direction_error_deg"] == pytest.approx(10.0)
+    assert values["lost_rate"] == pytest.approx(1 / 3)
+    assert HomingErrors().step(Context("errors"), ticks, [None] * 4, said, progress).metrics is None
+    assert np.isfinite(values["inliers"])

@@ -1,0 +1,78 @@
+"""What became of a drive to a goal, on a corner of two legs."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from made_places import made_map
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.metrics.navigation import Navigation, shortest_metres
+from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.planned_route import PlannedRoute
+from omninav.stages.values.pose import Pose
+
+# 3 m east, then 4 m north; place 3 lies apart
+CORNER = made_map([(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (9.0, 9.0)], {(0, 1): 0, (1, 2): 0})
+PLACES = np.array([0, 1, 2])
+
+
+def ended(spots, states, collisions=0, driven=0.0, map=CORNER):
+    ways = [PlannedRoute(PLACES, state, 0, "tired" if state == "gave up" else "") for state in states]
+    ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(len(spots))]
+    truth = [Pose(x, y, 0.0) for x, y in spots]
+    tallies = [DriveTally(collisions, driven)] * len(spots)
+    metrics = Navigation().step(Context("navigation"), ticks, ways, truth, tallies, map).metrics
+    return metrics.values["navigation"]
+
+
+def test_a_drive_along_the_map_has_its_length_and_ends_when_it_says_so():
+    spots = [(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (3.0, 3.8)]
+    found = ended(spots, ["under way", "under way", "arrived", "arrived"], driven=7.2)
+    assert found["reached"]
+    assert found["end_error_m"] == pytest.approx(0.2)
+    assert found["path_length_m"] == pytest.approx(7.2)
+    assert found["shortest_m"] == pytest.approx(7.0)
+    assert found["time_s"] == 2.0
+    assert (found["reached_rate"], found["clean_rate"]) == (1.0, 1.0)
+    assert (found["detour"], found["pace"]) == pytest.approx((7.2 / 7.0, 2.0 / 7.0))
+    assert (found["goal"], found["ways"], found["collisions"]) == (2, 1, 0)
+
+
+@pytest.mark.parametrize(
+    ("last", "state"), [((3.0, 3.0), "arrived"), ((3.0, 4.0), "under way"), ((3.0, 4.0), "gave up")]
+)
+def test_who_stands_elsewhere_or_does_not_know_that_it_is_there_has_not_reached_it(last, state):
+    found = ended([(0.0, 0.0), last], ["under way", state])
+    assert not found["reached"]
+    assert (found["reached_rate"], found["clean_rate"]) == (0.0, 0.0)
+    assert "detour" not in found
+    assert found["why"] == ("tired" if state == "gave up" else "")
+
+
+def test_who_bumped_into_something_reached_it_but_not_cleanly():
+    found = ended([(0.0, 0.0), (3.0, 4.0)], ["under way", "arrived"], collisions=1)
+    assert (found["reached_rate"], found["clean_rate"]) == (1.0, 0.0)
+
+
+def test_of_a_map_of_odometry_it_is_not_said_where_its_places_are():
+    odometry = dataclasses.replace(CORNER, pose_source="odometry")
+    found = ended([(0.0, 0.0), (3.0, 4.0)], ["under way", "arrived"], driven=5.0, map=odometry)
+    assert "reached" not in found
+    assert (found["end_error_m"], found["shortest_m"]) == (None, None)
+    assert (found["path_length_m"], found["state"]) == (5.0, "arrived")
+
+
+def test_the_time_of_a_drive_ends_when_it_gives_up():
+    assert ended([(0.0, 0.0)] * 4, ["under way", "gave up", "gave up", "gave up"])["time_s"] == 1.0
+
+
+def test_the_shortest_way_begins_at_the_closest_view():
+    assert shortest_metres(CORNER, (0.0, -1.0), 2) == pytest.approx(8.0)
+    assert shortest_metres(CORNER, (3.0, 4.5), 2) == pytest.approx(0.5)
+    assert shortest_metres(CORNER, (9.0, 9.0), 2) == pytest.approx(7.81, abs=0.01)  # no way from there but straight
+
+
+def test_without_a_way_there_is_nothing_to_say():
+    tick = Tick(index=0, stamp=0, log=0, frame=0, first_of_log=True)
+    assert Navigation().step(Context("n"), [tick], [None], [Pose(0.0, 0.0, 0.0)], [None], CORNER).metrics is None

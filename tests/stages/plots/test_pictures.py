@@ -1,0 +1,130 @@
+import cv2
+import numpy as np
+import pytest
+from small_run import reference_graph, small_run
+
+from omninav.pipeline import Context
+from omninav.stages.plots.belief_snapshots import BeliefSnapshots
+from omninav.stages.plots.error_over_time import ErrorOverTime
+from omninav.stages.plots.map_plan import MapPlot
+from omninav.stages.plots.panorama_snapshot import PanoramaSnapshot
+from omninav.stages.plots.panorama_strip import PanoramaStrip
+from omninav.stages.plots.similarity_heat_map import SimilarityHeatMap
+from omninav.stages.plots.similarity_peaks import SimilarityPeaks
+from omninav.stages.plots.snapshot_times import geometric_moments, is_moment, spread_out
+from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap
+from omninav.stages.values.image import Panorama
+from omninav.stages.values.similarity import Similarities
+
+CTX = Context("view")
+
+
+def similarities(run):
+    rng = np.random.default_rng(0)
+    for tick in run.ticks:
+        near = None if tick.frame < 3 else np.array([3, 7, 20])
+        values = rng.random((len(run.map) if near is None else 3, 36), dtype=np.float32)
+        yield SimilarityPeaks().step(CTX, tick, Similarities(values, near)).peaks
+
+
+def panoramas(run):
+    rng = np.random.default_rng(0)
+    for tick in run.ticks:
+        pixels = rng.integers(0, 255, (8, 36, 3)).astype(np.uint8).repeat(10, axis=0).repeat(10, axis=1)
+        yield PanoramaSnapshot().step(CTX, tick, Panorama(pixels)).snapshot
+
+
+def all_figures(run):
+    yield TrajectoryOverMap().step(CTX, *run.drive, run.map).figure
+    yield ErrorOverTime().step(CTX, *run.drive).figure
+    yield MapPlot().step(CTX, run.ticks, run.map).figure
+    yield BeliefSnapshots().step(CTX, run.ticks, run.beliefs, run.estimates, run.truth, run.map).figure
+    yield SimilarityHeatMap().step(CTX, run.map, run.ticks, list(similarities(run)), run.truth).figure
+    yield PanoramaStrip().step(CTX, run.ticks, list(panoramas(run))).figure
+
+
+@pytest.fixture(scope="module")
+def figures():
+    return list(all_figures(small_run()))
+
+
+def test_every_picture_can_be_decoded_is_small_and_says_what_it_shows(figures):
+    for figure in figures:
+        pixels = cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR)
+        assert pixels.shape[1] > 500
+        assert pixels.std() > 5, f"{figure.name} is blank"
+        assert len(figure.content) < 150_000
+        assert figure.title
+        assert len(figure.caption) > 30
+
+
+def test_the_same_run_gives_the_same_pictures_byte_for_byte(figures):
+    assert [figure.content for figure in all_figures(small_run())] == [figure.content for figure in figures]
+
+
+def test_a_users_own_matplotlib_settings_change_nothing(figures):
+    import matplotlib
+
+    with matplotlib.rc_context({"font.size": 20, "lines.linewidth": 9, "figure.facecolor": "red"}):
+        again = ErrorOverTime().step(CTX, *small_run().drive).figure
+        assert matplotlib.rcParams["font.size"] == 20
+    assert again.content == figures[1].content
+
+
+def test_the_estimates_colour_is_in_the_picture_of_the_trajectory(figures):
+    pixels = cv2.imdecode(np.frombuffer(figures[0].content, np.uint8), cv2.IMREAD_COLOR)
+    blue = np.abs(pixels.astype(int) - [0xB2, 0x72, 0x00]).max(axis=2) < 8
+    assert blue.sum() > 300
+
+
+def test_several_logs_get_a_picture_of_the_earlier_ones():
+    out = TrajectoryOverMap().step(CTX, *small_run(frames=20, logs=3).drive, None)
+    assert out.figure is not None
+    assert out.earlier is not None
+
+
+def test_without_truth_there_is_a_trajectory_but_no_error():
+    run = small_run(frames=20)
+    blind = (run.ticks, run.estimates, [None] * 20, run.motion)
+    assert ErrorOverTime().step(CTX, *blind).figure is None
+    assert "no ground truth" in TrajectoryOverMap().step(CTX, *blind, run.map).figure.caption
+
+
+def test_an_empty_run_gives_no_pictures():
+    run = small_run(frames=0)
+    run.map = reference_graph(0)
+    assert list(all_figures(run)) == [None] * 6
+
+
+def test_a_run_whose_estimates_are_all_absent_still_gives_a_picture():
+    run = small_run(frames=12)
+    run.estimates = [None] * 12
+    assert TrajectoryOverMap().step(CTX, *run.drive, run.map).figure is not None
+    assert ErrorOverTime().step(CTX, *run.drive).figure is not None
+
+
+def test_only_a_few_frames_are_kept_and_their_best_headings():
+    run = small_run(frames=30)
+    kept = list(similarities(run))
+    assert [tick.frame for tick, peak in zip(run.ticks, kept, strict=True) if peak] == [0, 1, 2, 5, 10, 20]
+    values = np.zeros((2, 4), dtype=np.float32)
+    values[1, 3] = 0.9
+    peaks = SimilarityPeaks().step(CTX, run.ticks[0], Similarities(values, np.array([4, 9]))).peaks
+    assert peaks.reference == 9
+    assert peaks.profile.tolist() == pytest.approx([0, 0, 0, 0.9])
+
+
+def test_moments_follow_one_two_five():
+    assert [frame for frame in range(1001) if is_moment(frame)] == [0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000]
+
+
+def test_geometric_moments_hold_the_first_and_the_last_frame():
+    assert geometric_moments(244, 6) == [0, 2, 8, 26, 80, 243]  # 3^0 .. 3^5, less one
+    assert geometric_moments(1, 6) == [0]
+    assert geometric_moments(0, 6) == []
+
+
+def test_things_spread_out_hold_both_ends():
+    assert spread_out(10, 4) == [0, 3, 6, 9]
+    assert spread_out(2, 4) == [0, 1]
+    assert spread_out(0, 4) == []

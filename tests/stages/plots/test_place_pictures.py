@@ -1,0 +1,107 @@
+"""Pictures of drives over a topological map: the way planned over the floor plan, the belief in every place."""
+
+import cv2
+import numpy as np
+import pytest
+from made_places import made_map
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.plots.drive_over_plan import DriveOverPlan, planned_ways
+from omninav.stages.plots.place_belief_over_time import PlaceBeliefOverTime, binned, with_neighbours
+from omninav.stages.plots.style import broken_at_jumps
+from omninav.stages.plots.true_and_estimated_place import BESIDE, RIGHT, WRONG, TrueAndEstimatedPlace, judged
+from omninav.stages.values.belief import PlaceBelief
+from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.floor_plan import FloorPlan
+from omninav.stages.values.planned_route import PlannedRoute
+from omninav.stages.values.pose import Motion, Pose
+
+CTX = Context("view")
+MAP = made_map([(1.0, 1.0), (4.0, 1.0), (4.0, 4.0), (1.0, 4.0)], {(0, 1): 1, (1, 2): 0, (2, 3): 2})
+PLAN = FloorPlan(np.array([[(2.0, 2.0), (3.0, 2.0), (3.0, 3.0), (2.0, 3.0)]]), 6.0, 5.0)
+TICKS = [Tick(k, k * 200_000_000, 0, k, k == 0) for k in range(20)]
+TRUTH = [Pose(1.01 + 0.15 * k, 1.1, 0.0) for k in range(20)]
+
+
+def green(figure) -> int:
+    """Pixels of the colour in which ways and true places are drawn, over white more or less."""
+    blue, greens, red = (
+        cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR).astype(int).transpose(2, 0, 1)
+    )
+    return int(((greens - red > 60) & (greens - blue > 15)).sum())
+
+
+def drawn(**rest):
+    motion, tallies = [Motion(0.15, 0.0, 0.0)] * 20, [DriveTally(0, 0.15 * k) for k in range(20)]
+    return DriveOverPlan().step(CTX, TICKS, TRUTH, motion, tallies, PLAN, **rest).figure
+
+
+def test_the_way_planned_is_drawn_over_the_plan_with_its_goal():
+    ways = [None] * 3 + [PlannedRoute(np.array([0, 1, 2]), "under way", 0)] * 7
+    ways += [PlannedRoute(np.array([1, 2, 3]), "under way", 1)] * 10
+    plain, mapped, planned = drawn(), drawn(map=MAP), drawn(map=MAP, routes=ways)
+    assert green(planned) > 4 * green(plain) > 0  # the start
+    assert "map" not in plain.caption
+    assert "4 places" in mapped.caption
+    assert "It planned no way" in mapped.caption
+    assert "thin: the 1 before it" in planned.caption
+    assert planned.content == drawn(map=MAP, routes=ways).content
+    first, last = planned_ways(ways, MAP)
+    assert first.tolist() == [[1.0, 1.0], [1.0, 1.0], [4.0, 1.0], [4.0, 4.0]]  # path images lie at their owner's
+    assert len(last) == 5
+
+
+def test_a_path_is_broken_where_the_robot_was_carried():
+    path = np.array([(0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (3.0, 0.0, 0.0), (3.4, 0.0, 0.0)])
+    assert np.isnan(broken_at_jumps(path)).any(axis=1).tolist() == [False, False, True, False, False]
+    assert broken_at_jumps(path[:1]).tolist() == [[0.0, 0.0]]
+
+
+def believed() -> list[PlaceBelief | None]:
+    steps = np.linspace(0.0, 1.0, 20)
+    shares = np.column_stack([0.7 * (1 - steps) + 0.1, 0.7 * steps + 0.1, np.full(20, 0.06), np.full(20, 0.04)])
+    return [None, *(PlaceBelief(row, np.zeros((4, 3))) for row in shares[1:])]
+
+
+def test_the_belief_in_every_place_is_drawn_with_the_truth_beside_it():
+    stage = PlaceBeliefOverTime()
+    figure = stage.step(CTX, TICKS, believed(), TRUTH, MAP).figure
+    blind = stage.step(CTX, TICKS, believed(), [None] * 20, MAP).figure
+    assert figure.content == stage.step(CTX, TICKS, believed(), TRUTH, MAP).figure.content
+    assert green(figure) > 200 > green(blind)
+    assert "In 100 % of the pictures" in figure.caption  # the nearest place and the belief change at the same time
+    assert "truly nearest." not in blind.caption
+    assert stage.step(CTX, TICKS, [None] * 20, TRUTH, MAP).figure is None
+
+
+def test_a_places_neighbours_are_those_that_it_is_linked_with():
+    shares = np.array([[0.4, 0.3, 0.2, 0.1]] * 3)
+    alone, around = with_neighbours(shares, np.array([0, 2, -1]), MAP)
+    assert alone[:2] == pytest.approx([0.4, 0.2])
+    assert around[:2] == pytest.approx([0.7, 0.6])
+    assert np.isnan(alone[2])
+    assert np.isnan(around[2])
+
+
+def test_of_a_long_drive_the_most_that_was_believed_is_kept():
+    shares = np.zeros((1000, 2))
+    shares[777, 1] = 0.9
+    fewer = binned(shares, 100)
+    assert fewer.shape == (100, 2)
+    assert fewer[77].tolist() == [0.0, 0.9]
+    assert binned(shares, 5000) is shares
+
+
+def test_a_believed_place_is_the_nearest_or_beside_it_or_another():
+    path = np.array([(1.1, 1.0), (1.1, 1.0), (1.1, 1.0), (3.9, 3.8)])
+    assert judged(path, np.array([0, 1, 2, 2]), MAP).tolist() == [RIGHT, BESIDE, WRONG, RIGHT]
+
+
+def test_pictures_are_joined_with_the_places_believed():
+    stage = TrueAndEstimatedPlace()
+    figure = stage.step(CTX, TICKS, believed(), TRUTH, MAP).figure
+    wrong = stage.step(CTX, TICKS, believed(), TRUTH[::-1], MAP).figure
+    assert figure.content == stage.step(CTX, TICKS, believed(), TRUTH, MAP).figure.content
+    assert green(figure) > 2 * green(wrong)
+    assert "green, 100 % of the pictures" in figure.caption
+    assert stage.step(CTX, TICKS, believed(), [None] * 20, MAP).figure is None

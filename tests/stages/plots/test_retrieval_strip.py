@@ -1,0 +1,117 @@
+import cv2
+import numpy as np
+import pytest
+from small_run import small_run
+
+from omninav.pipeline import Context, Tick
+from omninav.pipeline.engine.codec import decode, encode
+from omninav.stages.mapping.thumbnails import CollectThumbnails, ReferenceSnapshot, ThumbnailsState
+from omninav.stages.plots.feature_matrix import FeatureMatrix
+from omninav.stages.plots.panorama_snapshot import PanoramaSnapshot
+from omninav.stages.plots.panorama_strip import PanoramaStrip
+from omninav.stages.plots.retrieval_strip import RetrievalStrip
+from omninav.stages.values.image import Panorama, Windows
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.similarity import Answers
+from omninav.stages.values.thumbnails import Thumbnails, decoded
+
+CTX = Context("view")
+
+
+def plain(*levels: int, rows: int = 30, columns: int = 40) -> np.ndarray:
+    return np.stack([np.full((rows, columns, 3), level, np.uint8) for level in levels])
+
+
+def windows(*levels: int) -> Windows:
+    return Windows(plain(*levels), 2 * np.pi * np.arange(len(levels)) / len(levels), 1.0)
+
+
+def an_album(map: ReferenceGraph) -> Thumbnails:
+    shots, state = [], ThumbnailsState()
+    grown = ReferenceGraph.empty()
+    for n in range(len(map)):
+        pose = Pose(*map.poses[n].tolist())
+        grown.insert(pose, map.features[n], map.kind)
+        shots.append(ReferenceSnapshot().step(CTX, Panorama(plain(5 * n, columns=160)[0]), grown, state).pictures)
+    return CollectThumbnails().step(CTX, [shot for shot in shots if shot is not None]).thumbnails
+
+
+def test_an_album_holds_a_picture_of_each_reference_and_can_be_kept() -> None:
+    run = small_run()
+    album = an_album(run.map)
+    assert len(album) == len(run.map)
+    kept = decode(encode(album))
+    for n in range(len(run.map)):
+        assert np.allclose(kept.picture(n), 5 * n, atol=2)
+
+
+def test_of_windows_each_has_its_picture_and_pictures_not_taken_have_none() -> None:
+    state, stage, map = ThumbnailsState(), ReferenceSnapshot(columns=20), ReferenceGraph.empty()
+    for pose in ((0, 0, 0), (0, 0, 1), (0, 0, 2)):
+        map.insert(Pose(*pose), np.zeros((1, 4), np.float32), "histograms")
+    first = stage.step(CTX, windows(10, 100, 200), map, state).pictures
+    assert first is not None
+    assert [round(decoded(jpeg).mean()) for jpeg in first.jpegs] == pytest.approx([10, 100, 200], abs=2)
+    assert decoded(first.jpegs[0]).shape == (15, 20, 3)
+    assert stage.step(CTX, windows(1, 2, 3), map, state).pictures is None
+
+
+def test_windows_are_kept_side_by_side_from_the_left_to_the_right() -> None:
+    # ahead, left, behind, right: as a panorama they are behind, left, ahead, right
+    shot = PanoramaSnapshot().step(CTX, Tick(0, 0), windows(0, 80, 160, 240)).snapshot
+    assert shot is not None
+    seen = [round(float(part.mean())) for part in np.split(decoded(shot.jpeg), 4, axis=1)]
+    assert seen == pytest.approx([160, 80, 0, 240], abs=3)
+    assert np.degrees(shot.headings) == pytest.approx([180, 90, 0, 270])
+    figure = PanoramaStrip().step(CTX, [Tick(0, 0)], [shot]).figure
+    assert figure is not None
+    assert "Windows" in figure.caption
+
+
+@pytest.mark.parametrize("with_album", [True, False])
+@pytest.mark.parametrize("kind", ["panorama", "windows"])
+def test_queries_and_their_answers_are_drawn(kind: str, with_album: bool) -> None:
+    run = small_run()
+    answers = Answers(np.arange(9), np.linspace(0.9, 0.5, 9).astype(np.float32), np.zeros(9))
+    seen = Panorama(plain(120, columns=160)[0]) if kind == "panorama" else windows(120, 40)
+    shots = [PanoramaSnapshot().step(CTX, tick, seen).snapshot for tick in run.ticks]
+    album = an_album(run.map) if with_album else None
+    drawn = [
+        RetrievalStrip().step(CTX, run.ticks, shots, [answers] * len(run.ticks), run.truth, run.map, album).figure
+        for _ in range(2)
+    ]
+    assert drawn[0] is not None
+    assert drawn[0].content == drawn[1].content
+    assert ("no album" in drawn[0].caption) is not with_album
+    pixels = cv2.imdecode(np.frombuffer(drawn[0].content, np.uint8), cv2.IMREAD_COLOR)
+    assert pixels.shape[1] == 1100
+    assert pixels.std() > 5
+    assert len(drawn[0].content) < 400_000
+
+
+def test_a_drive_without_answers_has_no_strip() -> None:
+    run = small_run()
+    nothing = [None] * len(run.ticks)
+    assert RetrievalStrip().step(CTX, run.ticks, nothing, nothing, run.truth, run.map).figure is None
+
+
+@pytest.mark.parametrize("kind", ["panorama", "windows"])
+def test_the_feature_matrix_of_one_frame_is_drawn(kind: str) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (60, 80, 3), dtype=np.uint8)
+    seen = Windows(pixels[None], np.zeros(1), 1.0) if kind == "windows" else Panorama(np.hstack([pixels] * 3))
+    stage = FeatureMatrix(frame=5)
+    assert stage.step(CTX, Tick(4, 4, frame=4), seen).figure is None
+    figure = stage.step(CTX, Tick(5, 5, frame=5), seen).figure
+    assert figure is not None
+    assert "frame 5" in figure.caption
+    assert cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR).std() > 5
+
+
+def test_pictures_that_look_one_way_stand_side_by_side() -> None:
+    shots = [PanoramaSnapshot().step(CTX, Tick(0, 0), windows(level)).snapshot for level in (40, 200)]
+    figure = PanoramaStrip().step(CTX, [Tick(0, 0), Tick(1, 1, frame=1)], shots).figure
+    assert figure is not None
+    assert "camera's picture" in figure.caption
+    drawn = cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR)
+    assert drawn.shape[1] > 2 * drawn.shape[0]

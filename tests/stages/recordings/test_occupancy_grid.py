@@ -1,0 +1,188 @@
+"""Occupancy grids from files, from the built-in world and from a tour's path."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import DATA, needs_data
+
+from omninav.pipeline import Context
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.recordings.occupancy_grid import coarser, read_occupancy
+from omninav.stages.simulator.config import WorldConfig
+from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.occupancy import write_grid
+from omninav.stages.simulator.world import World
+from omninav.stages.source.grid import PlaceGrid, along_path, free_space
+from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid
+from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.maps import ReferenceGraph
+
+YAML = "image: map.pgm\nresolution: 0.5\norigin: [-1.0, 2.0, 0.0]\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+CTX = Context("grid")
+
+
+def written(folder: Path, rows: list[list[int]], text: str = YAML) -> Path:
+    levels = np.array(rows, np.uint8)
+    folder.mkdir(exist_ok=True, parents=True)
+    (folder / "map.pgm").write_bytes(b"P5\n%d %d\n255\n" % levels.shape[::-1] + levels.tobytes())
+    (folder / "map.yaml").write_text(text)
+    return folder / "map.yaml"
+
+
+def a_map(*places: tuple[float, float]) -> ReferenceGraph:
+    poses = np.array([(*place, 0.0) for place in places], float)
+    edges = np.column_stack([np.arange(len(poses) - 1), np.arange(1, len(poses))])
+    return ReferenceGraph(poses, np.zeros((len(poses), 1, 1), np.float32), "histograms", edges, "truth")
+
+
+# map_server's rule: p = (255 - level) / 255 is compared with the thresholds; 205 is 0.1961, just above free_thresh.
+@pytest.mark.parametrize(
+    ("more", "levels", "states"),
+    [
+        ("", [0, 205, 206, 254], [OCCUPIED, UNKNOWN, FREE, FREE]),
+        ("negate: 1\n", [0, 49, 50, 255], [FREE, FREE, UNKNOWN, OCCUPIED]),
+        ("mode: raw\n", [0, 40, 66, 255], [FREE, UNKNOWN, OCCUPIED, UNKNOWN]),
+        ("mode: scale\n", [0, 128, 205, 254], [OCCUPIED, UNKNOWN, UNKNOWN, FREE]),
+    ],
+)
+def test_levels_are_read_as_map_server_reads_them(tmp_path, more, levels, states):
+    grid = read_occupancy(written(tmp_path, [levels], YAML + more))
+    assert grid.cells.tolist() == [states]
+    assert grid.made_from == "map"
+
+
+def test_row_0_is_the_pictures_last_and_cells_are_found_by_their_points(tmp_path):
+    grid = read_occupancy(written(tmp_path, [[254, 0], [205, 254]]))
+    assert grid.cells.tolist() == [[UNKNOWN, FREE], [FREE, OCCUPIED]]
+    assert grid.origin == (-1.0, 2.0)
+    points = np.array([[-0.9, 2.1], [-0.4, 2.9], [-0.4, 3.1]])
+    assert grid.cells_of(points).tolist() == [[0, 0], [1, 1], [2, 1]]
+    assert grid.states_at(points).tolist() == [UNKNOWN, OCCUPIED, UNKNOWN]
+    assert grid.centres(np.array([1]), np.array([0])).tolist() == [[-0.75, 2.75]]
+
+
+def test_a_coarser_cell_is_occupied_where_any_of_its_cells_is_else_unknown_where_any_is():
+    fine = np.zeros((4, 5), np.uint8)
+    fine[0, 0], fine[1, 1], fine[3, 0] = OCCUPIED, UNKNOWN, UNKNOWN
+    grid = coarser(OccupancyGrid(fine, 0.05, (1.0, 2.0)), 0.1)
+    # the last column is half a cell outside of the grid, which is unknown
+    assert grid.cells.tolist() == [[OCCUPIED, FREE, UNKNOWN], [UNKNOWN, FREE, UNKNOWN]]
+    assert (grid.resolution, grid.origin) == (0.1, (1.0, 2.0))
+    assert coarser(grid, 0.05) is grid
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("mode: pretty\n", "trinary, scale and raw"),
+        ("resolution: 0\n", "width of a cell"),
+        ("image: [\n", "map_server"),
+    ],
+)
+def test_a_map_that_cannot_be_read_is_one_line_that_names_the_file(tmp_path, text, said):
+    file = written(tmp_path, [[0]], YAML + text)
+    with pytest.raises(BadInput, match=said) as raised:
+        read_occupancy(file)
+    assert str(file) in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_the_files_grid_comes_in_cells_of_the_wanted_size(tmp_path):
+    file = written(tmp_path, [[254] * 8] * 6)
+    stage = PlaceGrid(grid=str(tmp_path), log="drive.mcap", resolution=1.0, clearance_m=0.0)
+    out = stage.step(CTX)
+    assert out.grid.cells.shape == (3, 4)
+    assert len(out.free.centres) == 12
+    assert stage.inputs_digest() == PlaceGrid(grid=str(file)).inputs_digest()
+
+
+def test_free_space_keeps_clear_of_obstacles_and_is_what_is_connected_to_the_references():
+    cells = np.full((7, 15), FREE, np.uint8)
+    cells[:, 7] = OCCUPIED
+    grid = OccupancyGrid(cells, 0.1, (0.0, 0.0))
+    assert len(free_space(grid, 0.0, None).centres) == 14 * 7
+    assert len(free_space(grid, 0.0, np.array([[0.25, 0.25]])).centres) == 7 * 7
+    # 0.25 m from the wall, whose face lies at x = 0.7: the centres 0.05 to 0.45
+    kept = free_space(grid, 0.25, np.array([[0.25, 0.25]])).centres
+    assert kept[:, 0].max() == pytest.approx(0.45)
+    assert free_space(grid, 5.0, None) is None
+    assert free_space(grid, 0.0, np.array([[9.0, 9.0]])) is None
+
+
+def test_poses_are_drawn_evenly_over_the_free_cells_with_all_headings():
+    space = FreeSpace(np.array([[0.5, 0.5], [2.5, 0.5]]), 1.0)
+    poses = space.draw(np.random.default_rng(0), 40_000)
+    x = poses[:, 0]
+    assert ((x < 1) | (x >= 2)).all()
+    # shares of quarters of the area and of the circle: 1/4 each, to four standard errors
+    error = 4 * (0.25 * 0.75 / 40_000) ** 0.5
+    for low in (0.0, 0.5, 2.0, 2.5):
+        assert ((x >= low) & (x < low + 0.5)).mean() == pytest.approx(0.25, abs=error)
+    for low in np.arange(4) * np.pi / 2 - np.pi:
+        assert ((poses[:, 2] >= low) & (poses[:, 2] < low + np.pi / 2)).mean() == pytest.approx(0.25, abs=error)
+
+
+def test_without_a_log_it_is_the_worlds_own_grid_as_it_would_be_written(tmp_path):
+    out = PlaceGrid(resolution=0.1).step(CTX)
+    read = read_occupancy(write_grid(World(DEMO, 0), tmp_path, 0.1))
+    assert out.grid.made_from == "world"
+    np.testing.assert_array_equal(out.grid.cells, read.cells)
+    assert PlaceGrid().inputs_digest() is None
+    assert isinstance(PlaceGrid().world, WorldConfig)
+
+
+def test_a_log_without_a_grid_says_what_is_missing_and_how_to_get_one(tmp_path):
+    with pytest.raises(BadInput, match=r"grid=FOLDER/map.yaml .* grid=from_tour") as raised:
+        PlaceGrid(log=str(tmp_path / "drive.mcap")).inputs_digest()
+    assert "\n" not in str(raised.value)
+    written(tmp_path / "tour.grid", [[0]])
+    with pytest.raises(BadInput, match=f"grid={tmp_path}/tour.grid/map.yaml"):
+        PlaceGrid(log=str(tmp_path / "drive.mcap"), tour=str(tmp_path / "tour.mcap")).step(CTX)
+
+
+def test_a_grid_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(BadInput, match=r"none.yaml is no file"):
+        PlaceGrid(grid=str(tmp_path / "none.yaml")).inputs_digest()
+
+
+def test_a_stand_in_is_free_along_the_tours_path_and_walled_around_it():
+    ctx = Context("grid")
+    stage = PlaceGrid(grid="from_tour", log="drive.mcap", around=2.0, resolution=0.1)
+    out = stage.step(ctx, a_map((0.0, 0.0), (4.0, 0.0), (4.0, 3.0)), LengthScale(0.25))
+    assert out.grid.made_from == "tour"
+    assert ctx.counts["grid_is_a_stand_in"] == 1
+    assert "stand-in" in ctx.facts["grid"]
+    # free to 2 reaches = 0.5 m from the path, a cell of wall behind, unknown beyond
+    found = out.grid.states_at(np.array([[2.0, 0.0], [2.0, 0.4], [2.0, 0.55], [2.0, 0.8], [3.6, 2.0], [-0.55, 0.0]]))
+    assert found.tolist() == [FREE, FREE, OCCUPIED, UNKNOWN, FREE, OCCUPIED]
+    # two straight pieces of 4 and 3 m, 1 m wide, and round ends: 7 + pi / 4, less half the corner they share
+    assert len(out.free.centres) * 0.01 == pytest.approx(7 + np.pi / 4 - 0.25, abs=0.25)
+    assert stage.inputs_digest() is None
+
+
+def test_a_stand_in_without_edges_is_free_around_the_references_alone():
+    poses = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0]])
+    grid = along_path(poses, np.zeros((0, 2), np.int64), 0.5, 0.1)
+    assert grid.states_at(np.array([[2.0, 0.0], [4.3, 0.0]])).tolist() == [UNKNOWN, FREE]
+
+
+def test_a_stand_in_without_a_map_is_refused():
+    with pytest.raises(BadInput, match="from_tour needs a map"):
+        PlaceGrid(grid="from_tour").step(CTX)
+
+
+def test_references_beside_the_free_space_leave_all_of_it_and_are_told_of(tmp_path):
+    ctx = Context("grid")
+    written(tmp_path, [[254] * 4] * 4)
+    out = PlaceGrid(grid=str(tmp_path), resolution=0.5, clearance_m=0.0).step(ctx, a_map((50.0, 50.0)))
+    assert len(out.free.centres) == 16
+    assert ctx.counts["references_off_the_free_space"] == 1
+
+
+@needs_data
+def test_the_whole_tour_of_a_real_recording_lies_in_its_free_cells():
+    house = DATA / "photoreal-house"
+    truth = np.loadtxt(house / "tour_truth.tum")[:, 1:3]
+    grid = coarser(read_occupancy(house / "map.yaml"), 0.1)
+    assert (grid.states_at(truth) == FREE).all()

@@ -1,0 +1,59 @@
+"""Image files as goals: which are read, and what is said of the others."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.plots.image_file import ImageFile
+from omninav.stages.simulator.config import MirrorCamera
+from omninav.stages.simulator.demo import DEMO
+from omninav.stages.source.goal_image import GoalImage
+from omninav.stages.values.image import Image
+
+WORLD = replace(DEMO, camera=MirrorCamera(width=16, height_px=12))
+PIXELS = np.random.default_rng(0).integers(0, 255, (12, 16, 3)).astype(np.uint8)
+
+
+def test_a_picture_that_was_written_is_read_again_pixel_by_pixel_with_the_robots_camera(tmp_path):
+    ImageFile().step(Context("picture_file", folder=tmp_path), [Image(PIXELS), Image(255 - PIXELS)])
+    stage = GoalImage(goal=str(tmp_path / "picture.png"), world=WORLD)
+    found = stage.step(Context("goal_picture"))
+    assert found.image is not None
+    assert found.image.pixels.tolist() == PIXELS.tolist()
+    assert (found.camera.width, found.camera.height_px) == (16, 12)
+    assert stage.inputs_digest() is not None
+
+
+@pytest.mark.parametrize("goal", [None, " "])
+def test_without_a_goal_nothing_runs(goal):
+    with pytest.raises(BadInput, match="no goal is named; type goal=PLACE"):
+        GoalImage(goal=goal, world=WORLD).inputs_digest()
+
+
+@pytest.mark.parametrize("goal", [3, "3", "kitchen", "png"])
+def test_a_place_is_no_picture(goal):
+    stage = GoalImage(goal=goal, world=WORLD)
+    assert stage.step(Context("goal_picture")).image is None
+    assert stage.inputs_digest() is None
+
+
+def test_a_file_that_is_not_there_is_said_before_anything_runs(tmp_path):
+    with pytest.raises(BadInput, match=r"goal: there is no file .*kitchen\.png; give a picture, or a place"):
+        GoalImage(goal=str(tmp_path / "kitchen.png"), world=WORLD).inputs_digest()
+
+
+@pytest.mark.parametrize("content", [b"", b"not an image"])
+def test_a_file_that_is_no_image_is_refused(tmp_path, content):
+    (tmp_path / "kitchen.jpg").write_bytes(content)
+    with pytest.raises(BadInput, match=r"goal: .*kitchen\.jpg cannot be read as an image"):
+        GoalImage(goal=str(tmp_path / "kitchen.jpg"), world=WORLD).step(Context("goal_picture"))
+
+
+def test_a_picture_of_another_camera_is_refused(tmp_path):
+    cv2.imwrite(str(tmp_path / "kitchen.png"), PIXELS[:6])
+    with pytest.raises(BadInput, match=r"has 16 x 6 pixels, and the robot's camera takes 16 x 12"):
+        GoalImage(goal=str(tmp_path / "kitchen.png"), world=WORLD).step(Context("goal_picture"))
