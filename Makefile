@@ -1,26 +1,37 @@
-# make demo: the built-in world, a map, a drive, a report.   make test: everything that must hold.   make bench: speed.
-# make soak: 100,000 steps of a map that forgets, where nothing may keep growing.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test bench soak lint clean
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint format bench soak clean
 
-demo: $(VENV)/.installed
+help:  ## list these targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+demo: $(VENV)/.installed  ## simulate a small world, map it, localise a drive, write a report
 	$(BIN)/omninav
 
-test: $(VENV)/.installed
+test: lint  ## lint, then run every test
+	$(BIN)/pytest -n 2 --dist loadfile
+
+lint: $(VENV)/.installed  ## check style, types and the layers of the code
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n 2 --dist loadfile
 
-bench: $(VENV)/.benchmarks
+format: $(VENV)/.installed  ## format the code and mend what can be mended automatically
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(VENV)/.benchmarks  ## measure speed, beside other libraries
 	$(BIN)/python benchmarks/run.py
 
-soak: $(VENV)/.installed
+soak: $(VENV)/.installed  ## drive 100,000 steps and check that memory and map stop growing
 	$(BIN)/python benchmarks/soak.py
+
+clean:  ## remove the virtual environment and all build and check caches
+	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "omninav needs Python 3.11: make PYTHON=python3.11 …"'
@@ -31,6 +42,3 @@ $(VENV)/.installed: pyproject.toml
 $(VENV)/.benchmarks: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
 	touch $@
-
-clean:
-	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -1,4 +1,7 @@
-"""Fusion of mixtures: equations 2 to 8 of Gross, Koenig & Mueller 2005 with ERRATA 1 to 5, against plain loops."""
+"""Fusion of mixtures: equations 2 to 8 of Gross, Koenig & Mueller 2005 against plain loops.
+
+Errata are numbered as in docs/papers.md.
+"""
 
 import math
 from random import Random

@@ -1,4 +1,7 @@
-"""Gaussians over poses, against scipy, numpy's own inverses, plain loops and the identities of ERRATA 1 to 7 and 16."""
+"""Gaussians over poses, against scipy, numpy's own inverses, plain loops and identities.
+
+Errata are numbered as in docs/papers.md.
+"""
 
 import itertools
 import math

@@ -1,0 +1,50 @@
+"""The documentation names files, classes and functions that exist."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), ROOT / "runs/README.md", ROOT / "examples/README.md"])
+PAPERS = ROOT / "docs/papers.md"
+
+
+def names_in(file: Path) -> set[str]:
+    nodes = ast.walk(ast.parse(file.read_text()))
+    return {node.name for node in nodes if isinstance(node, ast.ClassDef | ast.FunctionDef)}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_and_paths_of_a_page_exist(page: Path) -> None:
+    text = page.read_text()
+    links = [link for link in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text) if "://" not in link]
+    paths = re.findall(r"`((?:stages|pipeline|conf|docs|tests|examples|benchmarks)/[\w./]+)`", text)
+    missing = [link for link in links if not (page.parent / link).exists()]
+    missing += [path for path in paths if not (ROOT / path).exists()]
+    assert not missing
+
+
+def test_every_class_and_function_beside_a_file_is_defined_in_it() -> None:
+    rows = re.findall(r"`((?:stages|pipeline)/[\w/]+\.py)`((?:,? `\w+`)+)", PAPERS.read_text())
+    assert len(rows) > 40
+    missing = [
+        (file, name)
+        for file, names in rows
+        for name in re.findall(r"`(\w+)`", names)
+        if (ROOT / file).exists() and name not in names_in(ROOT / file)
+    ]
+    assert not missing
+
+
+def test_every_erratum_that_the_code_names_is_listed() -> None:
+    listed = set(re.findall(r"^\* \*\*(\d+a?)\.\*\*", PAPERS.read_text(), re.MULTILINE))
+    code = "\n".join(file.read_text() for file in ROOT.glob("stages/**/*.py"))
+    named = {
+        number
+        for group in re.findall(r"(?i)\berrat(?:um|a) ([\da, and]+)", code)
+        for number in re.findall(r"\d+a?", group)
+    }
+    assert len(named) > 30
+    assert named <= listed
