@@ -56,10 +56,14 @@ class Present(Sequence[Any]):
 
 
 class Channel:
-    """A delayed wire's memory; wires with the same origin, delay and initial value share one."""
+    """A delayed wire's memory; wires with the same origin, delay and initial value share one.
 
-    def __init__(self, wire: Wire) -> None:
-        self.origin, self.delay, self.initial, self.hold = wire.origin, wire.delay, wire.initial or "", wire.hold
+    A value that is updated in place is there to stay: a tick at which its writer is skipped does not lose it.
+    """
+
+    def __init__(self, wire: Wire, in_place: bool) -> None:
+        self.origin, self.delay, self.initial = wire.origin, wire.delay, wire.initial or ""
+        self.hold = wire.hold or in_place
         self.waiting: deque[Any] = deque(maxlen=wire.delay)
 
 
@@ -161,7 +165,13 @@ class Engine:
             wires = [wire for wire in graph.inputs_of(node.name) if not wire.collect]
             self.calls[node.name] = Call(node, wires, ctx, static)
         self.static = static
-        self.channels = {channel_key(wire): Channel(wire) for wire in graph.wires if wire.delay}
+        self.channels = {
+            channel_key(wire): Channel(
+                wire, bool(getattr(getattr(graph.port(wire.origin), "type", None), "in_place", False))
+            )
+            for wire in graph.wires
+            if wire.delay
+        }
         ticking = {node.name for node in graph.of_lifetime("tick")}
         after = {node.name for node in graph.of_lifetime("after")}
         self.kept = {

@@ -38,7 +38,10 @@ class Node:
 
 @dataclass(frozen=True)
 class Wire:
-    """A connection into a node's input port. `initial` is `node.port` or None."""
+    """A connection into a node's input port.
+
+    `initial` is the `node.port` of a delayed wire's first value; None where that is absent.
+    """
 
     to_node: str
     to_port: str
@@ -282,8 +285,12 @@ class _Builder:
         if given is None:
             return
         self._check_types(where, options["from"], given, node, port)
-        if delay and initial is None:
-            self._problem(where, f"a wire with delay {delay} needs a first value", f"type +{where}.initial=node.port")
+        if delay and "initial" not in options:
+            hint = f"type +{where}.initial={'null, or node.port' if port.optional else 'node.port'}"
+            self._problem(where, f"a wire with delay {delay} needs a first value", hint)
+        if delay and initial is None and "initial" in options and not port.optional:
+            what = f"{type(node.stage).__name__} needs '{port_name}' at every tick, and the first value is null"
+            self._problem(f"{where}.initial", what, self._givers(port))
         if initial is not None and not delay:
             self._problem(where, "only a delayed wire has an initial value", f"add delay: 1 to {where}")
         if initial is not None:

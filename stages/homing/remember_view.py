@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
-from omninav.stages.values.homing import HomingVector, ImagePath
+from omninav.stages.values.homing import ImagePath
 from omninav.stages.values.local_features import LocalFeatures
 
 
@@ -34,15 +34,4 @@ class RememberView(Stage):
             path = ImagePath(tick.log, kept.views, ("the start",))
             kept.views = ()
             return self.Out(path=path)
-        return self.Out()
-
-
-class NoVector(Stage):
-    """No homing vector: what there was before the first tick."""
-
-    class Out(Outputs):
-        vector: HomingVector | None = None
-
-    def step(self, ctx: Context) -> Out:
-        """Nothing."""
         return self.Out()

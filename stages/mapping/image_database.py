@@ -50,10 +50,11 @@ class ImageDatabase(Stage):
         features: SegmentFeatures,
         odometry: Pose | None,
         truth: Pose | None,
-        map: ReferenceGraph,
+        map: ReferenceGraph | None,
         last: ImageDatabaseState,
     ) -> Out:
-        """Take one picture into the map, or not."""
+        """Take one picture into the map, or not; without a map, begin one."""
+        map = ReferenceGraph.empty() if map is None else map
         if ctx.tick.first_of_log:
             last.reference = -1
         pose = pose_of_view(ctx, odometry, truth, map, self.supervised)

@@ -45,10 +45,11 @@ class LearnReferenceGraph(Stage):
         features: SegmentFeatures,
         odometry: Pose | None,
         truth: Pose | None,
-        map: ReferenceGraph,
+        map: ReferenceGraph | None,
         along: LearnReferenceGraphState,
     ) -> Out:
-        """Take one view into the map, or not."""
+        """Take one view into the map, or not; without a map, begin one."""
+        map = ReferenceGraph.empty() if map is None else map
         if ctx.tick.first_of_log:
             along.reference = -1
         pose = pose_of_view(ctx, odometry, truth, map, self.supervised)
@@ -72,7 +73,7 @@ class LearnReferenceGraph(Stage):
         self,
         features: SegmentFeatures,
         pose: Pose,
-        map: ReferenceGraph,
+        map: ReferenceGraph | None,
         near: np.ndarray[tuple[int], np.dtype[np.int64]],
     ) -> Literal["first", "far", "unlike"] | None:
         if not len(map):

@@ -54,13 +54,12 @@ def test_the_command_in_its_head_composes(path: Path):
 
 
 @each
-def test_it_names_every_parameter_of_its_stage_with_a_legal_value(path: Path):
+def test_it_sets_only_parameters_that_its_stage_has(path: Path):
     content = yaml.safe_load(path.read_text()) or {}
-    brought = content.get("nodes", {}).values() if group(path) not in ("variant", "results") else ()  # beside itself
-    for stage in (content, *brought):
-        if "_target_" in stage:
-            parameters = signature(resolve(stage.pop("_target_"))).parameters
-            assert set(stage) == set(parameters)
+    for stage in (content, *(content.get("nodes") or {}).values()):
+        if isinstance(stage, dict) and "_target_" in stage:
+            cls = resolve(stage.pop("_target_"))
+            assert set(stage) <= set(signature(cls).parameters), cls
 
 
 @pytest.mark.parametrize("path", sorted((CONF / "variant").glob("*.yaml")), ids=lambda path: path.stem)

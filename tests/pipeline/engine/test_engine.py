@@ -44,6 +44,22 @@ def test_a_delay_of_three_lags_three_ticks(tmp_path: Path):
     assert numbers(graph_of(SUM, wires), tmp_path) == [10, 10, 10, 5, 6, 7, 8, 9, 10, 11]
 
 
+def test_a_delayed_wire_whose_first_value_is_null_is_absent_at_the_first_tick(tmp_path: Path):
+    wires = {**SUM_WIRES, "sum": {**SUM_WIRES["sum"], "other": {"from": "sum.number", "delay": 1, "initial": None}}}
+    assert numbers(graph_of({k: v for k, v in SUM.items() if k != "start"}, wires), tmp_path)[:4] == [0, 1, 3, 6]
+
+
+def test_a_value_updated_in_place_is_not_lost_where_its_writer_is_skipped(tmp_path: Path):
+    delayed = {"from": "enter.ledger", "delay": 1, "initial": "new.ledger"}
+    nodes = {"source": {"_target_": "Count", "gap": 3}, "new": "NewLedger", "enter": "Enter", "look": "Look"}
+    wires = {
+        "enter": {"number": "source.number", "ledger": delayed},
+        "look": {"ledger": delayed},
+        "all": {"numbers": {"from": "look.number", "collect": True}},
+    }
+    assert numbers(graph_of({**nodes, "all": "Collected"}, wires), tmp_path) == [0, 1, 2, 2, 3, 4, 4, 5, 6, 6]
+
+
 def test_a_stage_that_lacks_a_required_input_is_skipped_and_counted(tmp_path: Path):
     graph = graph_of(
         {**SUM, "source": {"_target_": "Count", "gap": 3}, "sum": "Scale"},

@@ -128,7 +128,20 @@ def test_a_missing_artifact_is_a_problem_and_a_fitting_one_is_none():
 def test_a_delay_without_a_first_value_is_a_problem():
     problem = only(LOOP, {"sum": {"number": "source.number", "other": {"from": "sum.number", "delay": 1}}})
     assert "needs a first value" in problem.what
-    assert problem.hint == "type +wires.sum.other.initial=node.port"
+    assert problem.hint == "type +wires.sum.other.initial=null, or node.port"
+
+
+def test_a_first_value_of_null_is_for_optional_ports():
+    delayed = {"from": "scale.number", "delay": 1, "initial": None}
+    nodes = {"source": "Count", "scale": "Scale", "sum": "Add"}
+    scale = {"number": "source.number"}
+    build(config(nodes, {"scale": scale, "sum": {"number": "source.number", "other": delayed}}))
+    problem = only(nodes, {"scale": scale, "sum": {"number": delayed}})
+    assert (problem.where, problem.what) == (
+        "wires.sum.number.initial",
+        "Add needs 'number' at every tick, and the first value is null",
+    )
+    assert problem.hint == "what gives Number here: scale.number, source.number, sum.number"
 
 
 def test_a_loop_without_a_delay_shows_the_way_round():

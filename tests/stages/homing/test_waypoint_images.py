@@ -7,7 +7,7 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.features.rotation_reduced_sift import none_found
-from omninav.stages.homing.remember_view import NoVector, RememberView, RememberViewState
+from omninav.stages.homing.remember_view import RememberView, RememberViewState
 from omninav.stages.homing.waypoint_images import WaypointImages, WaypointImagesState
 from omninav.stages.metrics.homing_errors import HomingErrors
 from omninav.stages.values.homing import HomingVector, ImagePath, PathProgress
@@ -99,7 +99,6 @@ def test_the_first_view_is_given_once_a_second_later() -> None:
     given = [remember.step(ctx, kept, Tick(k, 200_000_000 * k, first_of_log=k == 0), views[k]).path for k in range(9)]
     assert [path is not None for path in given] == [k == 5 for k in range(9)]
     assert given[5].views == (views[0],)
-    assert NoVector().step(ctx).vector is None
 
 
 def test_errors_are_those_of_the_way_back_to_the_first_pose() -> None:

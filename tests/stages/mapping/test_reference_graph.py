@@ -3,7 +3,6 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.mapping.initial_reference_graph import InitialReferenceGraph
 from omninav.stages.mapping.reference_graph import LearnReferenceGraph, LearnReferenceGraphState
 from omninav.stages.values.features import SegmentColours, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
@@ -18,7 +17,7 @@ def view(bin_: int, segments: int = 8) -> SegmentHistograms:
 
 def drive(stage: LearnReferenceGraph, places: list[tuple[float, float, int]], **poses: bool) -> ReferenceGraph:
     ctx, along = Context("mapping"), LearnReferenceGraphState()
-    map = InitialReferenceGraph().step(ctx).map
+    map = ReferenceGraph.empty()
     for i, (x, y, looks) in enumerate(places):
         ctx.tick = Tick(index=i, stamp=i, first_of_log=i == 0)
         odometry, truth = Pose(x + 100, y, 0.0), Pose(x, y, 0.0) if poses.get("truth", True) else None
@@ -45,7 +44,7 @@ def test_edges_follow_the_drive_and_close_loops_once() -> None:
 
 def test_two_tours_are_not_joined_at_the_log_s_boundary() -> None:
     ctx, along, stage = Context("mapping"), LearnReferenceGraphState(), LearnReferenceGraph()
-    map = InitialReferenceGraph().step(ctx).map
+    map = ReferenceGraph.empty()
     for i, x in enumerate((0.0, 5.0)):
         ctx.tick = Tick(index=i, stamp=i, log=i, first_of_log=True)
         stage.step(ctx, view(1), None, Pose(x, 0.0, 0.0), map, along)
@@ -105,7 +104,7 @@ def test_a_reference_with_the_default_features_takes_less_than_4_kb() -> None:
 def test_two_logs_without_truth_make_no_map() -> None:
     stage, ctx, along = LearnReferenceGraph(), Context("mapping"), LearnReferenceGraphState()
     view = SegmentHistograms(np.full((4, 2), 0.5, np.float32))
-    map = InitialReferenceGraph().step(ctx).map
+    map = ReferenceGraph.empty()
     ctx.tick = Tick(0, 0, log=0, first_of_log=True)
     stage.step(ctx, view, Pose(0.0, 0.0, 0.0), None, map, along)
     ctx.tick = Tick(1, 1, log=1, first_of_log=True)
