@@ -11,7 +11,7 @@ from pathlib import Path
 def start(place: Path, *words: str) -> subprocess.Popen[bytes]:
     """Begins `omninav …` in a folder, which is made, in a process group of its own."""
     place.mkdir(exist_ok=True)
-    command = [sys.executable, "-m", "omninav.pipeline", *words]
+    command = [sys.executable, "-m", "omninav", *words]
     return subprocess.Popen(
         command, cwd=place, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
     )

@@ -32,7 +32,7 @@ def omninav(tmp_path: Path) -> Command:
     """Runs `omninav …` in an empty folder."""
 
     def run(*words: str, check: bool = False, **environment: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-m", "omninav.pipeline", *words]
+        command = [sys.executable, "-m", "omninav", *words]
         settings = {**os.environ, "COLUMNS": "120", **environment}
         ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env=settings, timeout=600)
         if check:
@@ -50,7 +50,7 @@ def demo(shared_cache: Path) -> Path:
     with (place / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not (place / "runs" / "latest" / "report.html").exists():
-            command = [sys.executable, "-m", "omninav.pipeline", f"cache={shared_cache}"]
+            command = [sys.executable, "-m", "omninav", f"cache={shared_cache}"]
             ended = subprocess.run(command, cwd=place, capture_output=True, text=True, timeout=600)
             assert ended.returncode == 0, ended.stdout + ended.stderr
     return place / "runs" / "latest"

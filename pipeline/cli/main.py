@@ -117,6 +117,9 @@ def _launch(arguments: list[str]) -> int:
     from hydra.errors import HydraException
 
     words, folders = _words(arguments)
+    listed = _listed(words, folders)
+    arguments = [listed[words.index(word)] if word in words else word for word in arguments]
+    words = listed
     of_conditions = _words_of_conditions(words)
 
     def job(config: Any) -> None:
@@ -146,6 +149,17 @@ def _launch(arguments: list[str]) -> int:
                 raise ProblemsFound(misfits(words, folders, str(error))) from None
         codes = [int(line) for line in outcomes.read_text().split()] if outcomes.exists() else []
     return max(codes, default=0)
+
+
+def _listed(words: Sequence[str], folders: Sequence[str]) -> list[str]:
+    from hydra import initialize_config_module
+
+    from .overrides import with_unlisted_parameters
+
+    if not any(word.startswith("nodes.") for word in words):
+        return list(words)
+    with initialize_config_module(CONF, version_base="1.3"):
+        return with_unlisted_parameters(words, folders)
 
 
 def _words_of_conditions(words: Sequence[str]) -> list[str]:
@@ -266,7 +280,7 @@ def _planned_experiment(
     from omninav.pipeline.experiment.runner import plan_experiment
     from omninav.pipeline.graph.problems import ProblemsFound
 
-    from .overrides import misfits
+    from .overrides import misfits, with_unlisted_parameters
 
     plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
     folders = _words(arguments)[1]
@@ -274,7 +288,7 @@ def _planned_experiment(
 
     def composed(words: Sequence[str]) -> dict[str, Any]:
         try:
-            return complete(compose("config", overrides=[*place, *words]), variants)
+            return complete(compose("config", overrides=[*place, *with_unlisted_parameters(words, folders)]), variants)
         except HydraException as error:
             raise ProblemsFound(misfits(words, folders, str(error))) from None
 
@@ -452,14 +466,14 @@ def _composed(arguments: Sequence[str], offer: bool = True) -> Iterator[Any]:
 
     from omninav.pipeline.graph.problems import ProblemsFound
 
-    from .overrides import misfits, search
+    from .overrides import misfits, search, with_unlisted_parameters
 
     words, folders = _words(arguments)
     if offer:
         _offer_plugins()
     with initialize_config_module(CONF, version_base="1.3"):
         try:
-            config = compose("config", overrides=[*search(folders), *words])
+            config = compose("config", overrides=[*search(folders), *with_unlisted_parameters(words, folders)])
         except HydraException as error:
             raise ProblemsFound(misfits(words, folders, str(error))) from None
         yield config

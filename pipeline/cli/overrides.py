@@ -27,6 +27,39 @@ def misfits(words: Sequence[str], folders: Sequence[str], said: str) -> list[Pro
 
     `folders` are those of `--config-dir`.
     """
+    problems, parsed = _parsed(words)
+    groups = {name: _options(name, folders) for name in _groups(folders)}
+    swaps = [word for word in parsed if word.key_or_group in groups]
+    unknown = [problem for word in swaps for problem in _unknown_option(word, groups[word.key_or_group])]
+    known = [word for word in swaps if not any(_unknown_option(word, groups[word.key_or_group]))]
+    plain = _plain(known, folders)
+    for word in parsed if plain else ():
+        # Which nodes there are, and what can be set of them, depends on the options: unknown ones come first.
+        if word not in swaps and not (unknown and word.key_or_group.startswith(WITHIN_GRAPH)):
+            unknown += _unknown_setting(word, plain, list(groups))
+    problems += unknown
+    return problems or [Problem("command line", " ".join(said.partition("Config search path")[0].split()))]
+
+
+def with_unlisted_parameters(words: Sequence[str], folders: Sequence[str]) -> list[str]:
+    """The words, in which a parameter that a stage has and its configuration does not list is added (`++nodes.…`).
+
+    A configuration lists only what differs from the stage's defaults, and Hydra sets only what is listed.
+    """
+    if not any(word.startswith("nodes.") for word in words):
+        return list(words)
+    _, parsed = _parsed(words)
+    groups = _groups(folders)
+    plain = _plain([word for word in parsed if word.key_or_group in groups], folders)
+    return [f"++{word}" if word.startswith("nodes.") and _unlisted(word, plain) else word for word in words]
+
+
+def _unlisted(word: str, config: Mapping[str, Any]) -> bool:
+    _, name, inside = _deepest(config, word.partition("=")[0])
+    return name is not None and isinstance(inside, Mapping) and name in _parameters_of(inside)[0]
+
+
+def _parsed(words: Sequence[str]) -> tuple[list[Problem], list[Override]]:
     problems: list[Problem] = []
     parsed: list[Override] = []
     for text in words:
@@ -35,21 +68,17 @@ def misfits(words: Sequence[str], folders: Sequence[str], said: str) -> list[Pro
         except HydraException:
             hint = "write name=value, and quotes within quotes around odd characters: \"camera='my=rig.yaml'\""
             problems.append(Problem(text, "cannot be read", hint))
-    groups = {name: _options(name, folders) for name in _groups(folders)}
-    swaps = [word for word in parsed if word.key_or_group in groups]
-    unknown = [problem for word in swaps for problem in _unknown_option(word, groups[word.key_or_group])]
-    known = [word for word in swaps if not any(_unknown_option(word, groups[word.key_or_group]))]
+    return problems, parsed
+
+
+def _plain(swaps: Sequence[Override], folders: Sequence[str]) -> dict[str, Any]:
+    """The configuration with these options of groups alone, the first of each that is swept; {} where there is none."""
     try:
-        config = compose("config", overrides=[*search(folders), *(_texts(word)[0] for word in known)])
+        config = compose("config", overrides=[*search(folders), *(text for word in swaps for text in _texts(word)[:1])])
         plain: Any = OmegaConf.to_container(config, resolve=False)
     except HydraException:
         plain = {}
-    for word in parsed if plain else ():
-        # Which nodes there are, and what can be set of them, depends on the options: unknown ones come first.
-        if word not in swaps and not (unknown and word.key_or_group.startswith(WITHIN_GRAPH)):
-            unknown += _unknown_setting(word, plain, list(groups))
-    problems += unknown
-    return problems or [Problem("command line", " ".join(said.partition("Config search path")[0].split()))]
+    return dict(plain)
 
 
 def jobs_to_try(words: Sequence[str], folders: Sequence[str]) -> Iterator[list[str]]:
@@ -136,8 +165,7 @@ def _unknown_setting(word: Override, config: Mapping[str, Any], groups: list[str
         yield Problem(path, "there is no such setting or group", _like(name, options, "", f"={value}"))
         return
     parameters, stage = _parameters_of(inside)
-    if name in parameters:  # of a stage whose configuration does not list it
-        yield Problem(path, f"the configuration does not list this parameter of {stage}", f"type +{path}={value}")
+    if name in parameters:
         return
     rest = path.removeprefix(f"{above}.{name}")
     what = f"{stage} has no parameter '{name}'" if stage else f"there is no '{name}' in '{above}'"

@@ -208,7 +208,7 @@ class Finished:
     said: str
 
     def go(self, *words: str) -> str:
-        command = [sys.executable, "-m", "omninav.pipeline", *words]
+        command = [sys.executable, "-m", "omninav", *words]
         ended = subprocess.run(command, cwd=self.place, capture_output=True, text=True, timeout=120)
         assert ended.returncode == 0, ended.stdout + ended.stderr
         return ended.stdout
