@@ -11,8 +11,11 @@ import pytest
 from hypothesis import settings
 
 ROOT = Path(__file__).resolve().parents[1]
+RECORDINGS = ROOT / "tests" / "data"
+"""Small recordings of a simulated home store, rendered by tests/data/make.py."""
+TOUR, DRIVE, GRID = RECORDINGS / "tour.mcap", RECORDINGS / "drive.mcap", RECORDINGS / "grid" / "map.yaml"
 DATA = ROOT.parent / "shared" / "data"
-needs_data = pytest.mark.skipif(not DATA.exists(), reason=f"no recordings: {DATA} does not exist")
+needs_data = pytest.mark.skipif(not DATA.exists(), reason=f"third parties' recordings are not here: {DATA}")
 
 settings.register_profile("omninav", deadline=None)  # the first call of a compiled function takes what it takes
 settings.load_profile("omninav")
