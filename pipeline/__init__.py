@@ -1,7 +1,7 @@
 """The framework: stages, graphs, runs and experiments. It knows no robot; that is what `omninav.stages` adds."""
 
 from .graph.problems import BadInput, Problem, ProblemsFound
-from .graph.results import Figure, Metrics, Table
+from .graph.results import Figure, Metrics, Quantity, Table
 from .graph.stage import Bounds, Context, Outputs, Source, Stage, State, Truth
 from .graph.value import Tick, Value
 
@@ -14,6 +14,7 @@ __all__ = [
     "Outputs",
     "Problem",
     "ProblemsFound",
+    "Quantity",
     "Source",
     "Stage",
     "State",

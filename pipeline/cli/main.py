@@ -238,7 +238,7 @@ def _job(config: Any, arguments: Sequence[str], of_conditions: Sequence[str]) ->
 
 def _run(config: Any, sweep: tuple[Path, str, str] | None) -> None:
     from omninav.pipeline.report.progress import Progress
-    from omninav.pipeline.report.report import results_table
+    from omninav.pipeline.report.terminal_tables import results_table
     from omninav.pipeline.run.run import execute, plan, start
 
     planned = plan(complete(config))
@@ -326,7 +326,7 @@ def _note_job(sweep: tuple[Path, str, str], code: int, error: str) -> None:
     import json
 
     from omninav.pipeline.files import write_whole
-    from omninav.pipeline.report.report import write_sweep_page
+    from omninav.pipeline.report.sweep_page import write_sweep_page
 
     folder, number, overrides = sweep
     own = folder / number
@@ -344,10 +344,12 @@ def _note_job(sweep: tuple[Path, str, str], code: int, error: str) -> None:
 def _sweep_rows(folder: Path) -> Iterator[dict[str, Any]]:
     import json
 
+    from omninav.pipeline.run.metrics_files import read_metrics
+
     for own in sorted((path for path in folder.iterdir() if path.name.isdigit()), key=lambda path: int(path.name)):
         if (own / "manifest.json").exists():
             manifest = json.loads((own / "manifest.json").read_text())
-            metrics = json.loads((own / "metrics.json").read_text()) if (own / "metrics.json").exists() else {}
+            metrics = read_metrics(own) if (own / "metrics.json").exists() else None
             yield {"job": own.name, "folder": own, "manifest": manifest, "metrics": metrics}
 
 
@@ -639,15 +641,14 @@ def _simulate(arguments: list[str]) -> int:
 
 
 def _report(arguments: list[str]) -> int:
-    import json
-
     from omninav.pipeline.graph.problems import BadInput
-    from omninav.pipeline.report.report import results_table
+    from omninav.pipeline.report.terminal_tables import results_table
+    from omninav.pipeline.run.metrics_files import read_metrics
 
     folder = Path(arguments[0] if arguments else "runs/latest")
     if not (folder / "report.html").is_file():
         raise BadInput(f"{folder}: no report.html in it; `omninav resume {folder}` goes on with a run that did not end")
-    _print(results_table(json.loads((folder / "metrics.json").read_text())))
+    _print(results_table(read_metrics(folder)))
     print(f"report: {folder / 'report.html'}")
     return 0
 
@@ -658,21 +659,21 @@ def _compare(arguments: list[str]) -> int:
     import yaml
 
     from omninav.pipeline.graph.problems import BadInput
-    from omninav.pipeline.report.report import compare_table
+    from omninav.pipeline.report.terminal_tables import compare_table
+    from omninav.pipeline.run.metrics_files import read_metrics
 
     if len(arguments) < 2:
         raise BadInput("compare: give two or more run folders: omninav compare runs/A runs/B")
     runs = []
     for word in arguments:
         folder = Path(word)
-        if not (folder / "metrics.json").is_file():
-            raise BadInput(f"{folder}: no metrics.json in it; is it a run that ended?")
+        metrics = read_metrics(folder)
         config = yaml.safe_load((folder / "config.yaml").read_text())
         manifest = json.loads((folder / "manifest.json").read_text())
         runs.append(
             {
                 "name": word.rstrip("/"),
-                "metrics": json.loads((folder / "metrics.json").read_text()),
+                "metrics": metrics,
                 "config": config,
                 "manifest": manifest,
             }
@@ -685,7 +686,7 @@ def _resume(arguments: list[str]) -> int:
     from omninav.pipeline.engine.engine import StageFailed
     from omninav.pipeline.graph.problems import BadInput
     from omninav.pipeline.report.progress import Progress
-    from omninav.pipeline.report.report import results_table
+    from omninav.pipeline.report.terminal_tables import results_table
     from omninav.pipeline.run.run import resume, status
 
     if len(arguments) != 1:

@@ -14,7 +14,7 @@ import numpy as np
 
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.report.plot_style import PALETTE, picture
-from omninav.pipeline.report.report import render
+from omninav.pipeline.report.rendering import render
 
 from .series import series_at
 from .specification import Condition, Curve, Experiment, Labels, Measure, figure_of, space_of

@@ -137,7 +137,7 @@ def repeat(given: Mapping[str, Any], tell: Tell) -> None:
             graph, artifacts, seed, place, cache if given["shared"] else None, shared, record, tell
         )
         shared = recorded or shared
-        result = {"key": given["key"], "seed": seed, "metrics": results_of(engine)[0]}
+        result = {"key": given["key"], "seed": seed, "metrics": results_of(engine)[0].values}
         result["timing"] = stage_times(engine, given.get("groups") or ())
         result |= notes_of(engine)
         result["artifacts"] = facts

@@ -1,23 +1,79 @@
-"""Results that any "after" stage may give: numbers for `metrics.json`, pictures and tables for the report."""
+"""Results that any "after" stage may give: numbers for `metrics.json`, plots and tables for the report."""
 
-from typing import Any
+from collections.abc import Iterable, Mapping
+from dataclasses import field
+from typing import Any, Literal
 
 from .value import Value
 
 
-class Metrics(Value):
-    """Figures of a run, merged into `metrics.json`. `values`: nested dicts of numbers, texts and None.
+class Quantity(Value):
+    """How one entry of the metrics is read. Whatever is not stated follows from the entry's name."""
 
-    The unit is the end of a name: `_m`, `_deg`, `_s`, `_px`, `_rate` (a share), `_bytes`.
+    title: str | None = None
+    """What it is called. None: its name in words (`position_error_m` is `Position error`)."""
+    unit: str | None = None
+    """Its unit as shown: shares are shown in `%` (times 100), bytes in `kB`. None: from the end of its name."""
+    better: Literal["lower", "higher"] | None = None
+    """Which numbers are better; None where neither is, so that a comparison marks none as best."""
+    absent: str = "–"
+    """What stands in its place where it is None (`never`)."""
+
+
+class Metrics(Value):
+    """Figures of a run, merged into `metrics.json`, and how they are to be read.
+
+    The unit is the end of a name: `_m`, `_deg`, `_s`, `_ms`, `_px`, `_rate` (a share), `_bytes`, `_frames`. A mapping
+    whose keys are all statistics (mean, std, median, p90, p95, max, rmse) is a distribution.
+
+    A stage that measures states the quantities once, beside its class, and passes them with the values::
+
+        QUANTITIES = {
+            "position_error_m": Quantity(better="lower"),
+            "success.at_end": Quantity(title="Final pose correct", better="higher"),
+        }
+        ...
+        return self.Out(metrics=Metrics(values, QUANTITIES, headlines=("position_error_m.median", "success.at_end")))
     """
 
     values: dict[str, Any]
+    """Nested mappings of numbers, texts, None and lists."""
+    quantities: dict[str, Quantity] = field(default_factory=dict)
+    """By path (`success.at_end`), or by name for all entries of that name (`position_error_m`). The title of a path is
+    shown as it stands; that of a name with its place (`Position error, after convergence`). Tables follow this order."""
+    headlines: tuple[str, ...] = ()
+    """Paths of what one looks for first, with the statistic of a distribution: tiles of a report, columns of a sweep.
+    Those that are not among the values are passed over."""
+    details: tuple[str, ...] = ()
+    """Paths, of entries or whole groups, that only the run's own page shows: no comparison, no table in the terminal."""
+
+
+def merged(parts: Iterable[Metrics]) -> Metrics:
+    """The metrics of several stages as one; what two of them state under one name comes from the later one."""
+    values: dict[str, Any] = {}
+    quantities: dict[str, Quantity] = {}
+    headlines: tuple[str, ...] = ()
+    details: tuple[str, ...] = ()
+    for part in parts:
+        _merge(values, part.values)
+        quantities |= part.quantities
+        headlines += part.headlines
+        details += part.details
+    return Metrics(values, quantities, tuple(dict.fromkeys(headlines)), tuple(dict.fromkeys(details)))
+
+
+def _merge(into: dict[str, Any], more: Mapping[str, Any]) -> None:
+    for key, value in more.items():
+        if isinstance(value, Mapping) and isinstance(into.get(key), dict):
+            _merge(into[key], value)
+        else:
+            into[key] = dict(value) if isinstance(value, Mapping) else value
 
 
 class Figure(Value):
-    """A picture for the report. `content`: PNG, JPEG or SVG bytes; `caption`: what it shows and what to look for.
+    """A plot for the report. `content`: PNG, JPEG or SVG bytes; `caption`: what it shows and what to look for.
 
-    `name` is its file name without suffix; pictures are shown in the order of `order`, then of their names. A film is
+    `name` is its file name without suffix; plots are shown in the order of `order`, then of their names. A video is
     one too (`media_type` video/mp4): `per_second`, its frames in a second, lets the reader step through it.
     """
 

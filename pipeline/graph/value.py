@@ -8,7 +8,7 @@ VALUE_TYPES: dict[str, type["Value"]] = {}
 never name a class that is not a value."""
 
 
-@dataclass_transform(frozen_default=True)
+@dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field,))
 class Value:
     """Base of everything that travels on a wire. A subclass becomes a frozen dataclass by itself.
 

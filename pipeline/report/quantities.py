@@ -1,16 +1,16 @@
-"""Metrics as people read them: names and units from the entries' names, numbers with as many digits as they carry."""
+"""Metrics as people read them: titles and units as their stages state them or as the entries' names say."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-STATISTICS = ("mean", "std", "median", "p90", "p95", "max", "rmse")
-BAD_SHARES = ("loss_rate", "lost_rate", "new_after_first_lap_rate")
-"""Shares of which less is better; of others, more."""
-FIRST = ("position_error_m", "heading_error_deg", "loss_rate", "converged_after_frames", "frames")
-"""Quantities that every run may have, in the order in which they are shown; others follow by name."""
+from omninav.pipeline.graph.results import Metrics, Quantity
 
-_UNITS = {
+STATISTICS = ("mean", "std", "median", "p90", "p95", "max", "rmse")
+"""An entry with no other keys than these is a distribution."""
+PER_LOG = "logs"
+"""The list of each log's own metrics, where there are several logs."""
+UNITS = {
     "_bytes": "kB",
     "_deg": "°",
     "_rate": "%",
@@ -20,35 +20,77 @@ _UNITS = {
     "_m": "m",
     "_s": "s",
 }
+"""The unit that the end of a name stands for."""
+SCALES = {"%": 100.0, "kB": 1e-3}
+"""What a value is multiplied by to be shown in a unit."""
 
 
 @dataclass(frozen=True)
-class Leaf:
-    """One entry of metrics.json: its place (`after_convergence`, …), name, and a number, text, None or statistics."""
+class Entry:
+    """One entry of metrics.json: its groups (`after_convergence`, …), its name, and a number, text, None or statistics.
 
-    place: tuple[str, ...]
+    `quantity` is how it is described, `titled` whether under its own path.
+    """
+
+    groups: tuple[str, ...]
     name: str
     value: Any
+    quantity: Quantity
+    titled: bool = False
+
+    @property
+    def path(self) -> str:
+        """Groups and name, joined by points."""
+        return ".".join((*self.groups, self.name))
 
     @property
     def statistics(self) -> dict[str, float] | None:
         """Mean, median and so on, where the entry is a distribution."""
         return self.value if isinstance(self.value, dict) else None
 
+    @property
+    def title(self) -> str:
+        """What it is called, without its groups."""
+        return self.quantity.title or title(self.name)
+
+    @property
+    def unit(self) -> str:
+        """The unit in which it is shown, '' where there is none."""
+        return unit(self.name) if self.quantity.unit is None else self.quantity.unit
+
+    @property
+    def where(self) -> str:
+        """Its groups in words; nothing where the title says it all."""
+        return "" if self.titled else ", ".join(words(part) for part in self.groups)
+
+    def text(self, value: Any) -> str:
+        """The value, or one of its statistics, as shown, without its unit."""
+        if value is None:
+            return self.quantity.absent
+        if isinstance(value, bool | str) or not isinstance(value, int | float):
+            return str(value)
+        scale = SCALES.get(self.unit)
+        return digits(value if scale is None else scale * value)
+
 
 @dataclass(frozen=True)
-class Measure:
-    """A single number of metrics.json by its full path; of a distribution each statistic is one."""
+class Number:
+    """A single number (or text) of metrics.json by its full path; of a distribution each statistic is one."""
 
     path: str
     name: str
-    unit: str
+    entry: Entry
     value: float | int | str | None
+
+    @property
+    def unit(self) -> str:
+        """The unit in which it is shown, '' where there is none."""
+        return self.entry.unit
 
     @property
     def text(self) -> str:
         """The number as shown, without its unit."""
-        return shown(self.path, self.value)
+        return self.entry.text(self.value)
 
     @property
     def head(self) -> str:
@@ -57,72 +99,101 @@ class Measure:
 
     @property
     def better(self) -> Literal["lower", "higher"] | None:
-        """Which numbers are better ones: small errors, losses, sizes and times, large shares of what went well."""
-        parts = self.path.split(".")
-        last = parts[-2] if parts[-1] in STATISTICS else parts[-1]
-        if last.endswith("_rate") and last not in BAD_SHARES:
-            return "higher"
-        return "lower" if "error" in last or last.endswith(("_rate", "_bytes", "_ms", "after_frames")) else None
+        """Which numbers are better, where that is known."""
+        return self.entry.quantity.better
 
 
-def leaves(metrics: Mapping[str, Any], place: tuple[str, ...] = ()) -> Iterator[Leaf]:
-    """All entries but those of single logs, the ones that lie less deep first."""
+def entries(metrics: Metrics) -> list[Entry]:
+    """All entries but those of single logs: described ones in their order, then by name; groups after what is in none.
+
+    Those of a group follow the same order.
+    """
+    return list(_entries(metrics, metrics.values, ()))
+
+
+def _entries(metrics: Metrics, values: Mapping[str, Any], groups: tuple[str, ...]) -> Iterator[Entry]:
+    ranks = {path: rank for rank, path in enumerate(metrics.quantities)}
+
+    def order(name: str) -> tuple[int, str]:
+        path = ".".join((*groups, name))
+        return ranks.get(path, ranks.get(name, len(ranks))), name
+
     deeper = []
-    for name in sorted(metrics, key=lambda name: (FIRST.index(name) if name in FIRST else len(FIRST), name)):
-        value = metrics[name]
+    for name in sorted(values, key=order):
+        value, path = values[name], ".".join((*groups, name))
+        quantity = metrics.quantities.get(path) or metrics.quantities.get(name) or Quantity()
+        titled = bool(groups) and path in metrics.quantities and quantity.title is not None
         if isinstance(value, Mapping):
             if value and all(key in STATISTICS for key in value):
-                yield Leaf(place, name, {key: value[key] for key in STATISTICS if key in value})
+                spread = {key: value[key] for key in STATISTICS if key in value}
+                yield Entry(groups, name, spread, quantity, titled)
             else:
                 deeper.append((name, value))
         elif not isinstance(value, list | tuple):
-            yield Leaf(place, name, value)
+            yield Entry(groups, name, value, quantity, titled)
     for name, value in deeper:
-        yield from leaves(value, (*place, name))
+        yield from _entries(metrics, value, (*groups, name))
 
 
-def measures(metrics: Mapping[str, Any]) -> list[Measure]:
-    """Every single number, flat."""
-    flat = []
-    for leaf in leaves(metrics):
-        path = ".".join((*leaf.place, leaf.name))
-        where = ", ".join(words(part) for part in leaf.place)
-        entries = leaf.statistics or {"": leaf.value}
-        for statistic, value in entries.items():
-            name = ", ".join(part for part in (title(leaf.name), statistic, where) if part)
-            flat.append(Measure(f"{path}.{statistic}" if statistic else path, name, unit(leaf.name), value))
+def numbers(metrics: Metrics) -> dict[str, Number]:
+    """Every single number by its path."""
+    flat = {}
+    for entry in entries(metrics):
+        for statistic, value in (entry.statistics or {"": entry.value}).items():
+            name = ", ".join(part for part in (entry.title, statistic, entry.where) if part)
+            path = f"{entry.path}.{statistic}" if statistic else entry.path
+            flat[path] = Number(path, name, entry, value)
     return flat
+
+
+def per_log(metrics: Metrics) -> list[dict[str, Number]]:
+    """The numbers of each log, where there are several; they are described as those of the run are."""
+    logs = metrics.values.get(PER_LOG)
+    if not isinstance(logs, list | tuple):
+        return []
+    return [numbers(Metrics(values, metrics.quantities)) for values in logs]
+
+
+def headlines(runs: Sequence[Metrics]) -> list[str]:
+    """Paths of what one looks for first in any of several runs, in the order in which their stages state them."""
+    return list(dict.fromkeys(path for run in runs for path in run.headlines))
+
+
+def is_detail(path: str, metrics: Metrics) -> bool:
+    """Whether only the run's own page shows what stands at a path."""
+    return any(f"{path}.".startswith(f"{detail}.") for detail in metrics.details)
+
+
+def best_of(path: str, runs: Sequence[Mapping[str, Number]]) -> set[int]:
+    """Which runs have the best number, where it is known which is; none where all have the same."""
+    better = next((run[path].better for run in runs if path in run), None)
+    found = {n: run[path].value for n, run in enumerate(runs) if path in run and better}
+    known = {n: float(value) for n, value in found.items() if isinstance(value, int | float)}
+    if len(set(known.values())) < 2:
+        return set()
+    best = min(known.values()) if better == "lower" else max(known.values())
+    return {number for number, value in known.items() if value == best}
+
+
+def head_of(path: str, runs: Sequence[Mapping[str, Number]]) -> str:
+    """Name and unit of what stands at a path of any of several runs."""
+    return next(run[path] for run in runs if path in run).head
 
 
 def unit(name: str) -> str:
     """The unit that the end of a name stands for, '' where there is none."""
-    return next((shown_as for end, shown_as in _UNITS.items() if name.endswith(end)), "")
+    return next((shown_as for end, shown_as in UNITS.items() if name.endswith(end)), "")
 
 
 def title(name: str) -> str:
     """`position_error_m` -> `Position error`."""
-    text = words(next((name.removesuffix(end) for end in _UNITS if name.endswith(end) and end != "_rate"), name))
+    text = words(next((name.removesuffix(end) for end in UNITS if name.endswith(end) and end != "_rate"), name))
     return text[:1].upper() + text[1:]
 
 
 def words(name: str) -> str:
     """`after_convergence` -> `after convergence`."""
     return name.replace("_", " ")
-
-
-def shown(name: str, value: Any) -> str:
-    """A value as text, in the unit that `unit` says; `name` may be a path with a statistic at its end."""
-    parts = name.split(".")
-    last = parts[-2] if parts[-1] in STATISTICS and len(parts) > 1 else parts[-1]
-    if value is None:
-        return "never" if last == "converged_after_frames" else "–"
-    if isinstance(value, bool | str) or not isinstance(value, int | float):
-        return str(value)
-    if last.endswith("_rate"):
-        return digits(100 * value)
-    if last.endswith("_bytes"):
-        return digits(value / 1000)
-    return digits(value)
 
 
 def digits(number: float) -> str:

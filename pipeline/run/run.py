@@ -24,8 +24,10 @@ from omninav.pipeline.files import digest_file, digest_text, write_whole
 from omninav.pipeline.graph.graph import ARTIFACTS, Graph, build
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import UnknownStage, entries, resolve
-from omninav.pipeline.graph.results import Figure, Metrics, Table
+from omninav.pipeline.graph.results import Figure, Metrics, Table, merged
 from omninav.pipeline.graph.value import VALUE_TYPES, Value
+
+from .metrics_files import read_metrics, write_metrics
 
 LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "numba", "networkx", "hydra-core", "mcap", "rosbags")
 log = logging.getLogger("omninav")
@@ -283,7 +285,7 @@ def start(planned: Plan, argv: Sequence[str], folder: Path | None = None) -> Run
     return run
 
 
-def execute(run: Run, planned: Plan, progress: Any = None) -> dict[str, Any]:
+def execute(run: Run, planned: Plan, progress: Any = None) -> Metrics:
     """Run a planned configuration in its folder, from its start or from where it was left, and return its metrics.
 
     Raises `StageFailed` or `BadInput`; by then the manifest says so and the traceback is in `run.log`.
@@ -303,7 +305,7 @@ def execute(run: Run, planned: Plan, progress: Any = None) -> dict[str, Any]:
             raise
 
 
-def _execute(run: Run, planned: Plan, progress: Any) -> dict[str, Any]:
+def _execute(run: Run, planned: Plan, progress: Any) -> Metrics:
     config, seed = planned.config, planned.seed
     cache = Cache(Path(str(config["cache"]))) if config.get("cache") else None
     every_s = float(config.get("checkpoint_s", 5.0))
@@ -471,13 +473,13 @@ def notes_of(engine: Engine, only: Container[str] | None = None) -> dict[str, An
     return {"dropped": dropped, "facts": facts}
 
 
-def _finish(run: Run, planned: Plan, engine: Engine, front: CachedPrefix | None) -> dict[str, Any]:
-    from omninav.pipeline.report.report import write_report
+def _finish(run: Run, planned: Plan, engine: Engine, front: CachedPrefix | None) -> Metrics:
+    from omninav.pipeline.report.run_page import write_report
 
     metrics, figures, tables = results_of(engine)
     notes = notes_of(engine)
     timing = stage_times(engine)
-    write_whole(run.folder / "metrics.json", json.dumps(metrics, indent=1, sort_keys=True) + "\n")
+    write_metrics(run.folder, metrics)
     write_whole(run.folder / "timing.json", json.dumps(timing, indent=1) + "\n")
     run.manifest |= {
         "ended": datetime.now().isoformat(timespec="seconds"),
@@ -504,9 +506,9 @@ def _finish(run: Run, planned: Plan, engine: Engine, front: CachedPrefix | None)
     return metrics
 
 
-def results_of(engine: Engine) -> tuple[dict[str, Any], list[Figure], list[Table]]:
+def results_of(engine: Engine) -> tuple[Metrics, list[Figure], list[Table]]:
     """What the stages of a graph that has run gave as results: metrics merged into one, figures, tables."""
-    metrics: dict[str, Any] = {}
+    metrics: list[Metrics] = []
     figures: list[Figure] = []
     tables: list[Table] = []
     for node in engine.graph.nodes.values():
@@ -514,12 +516,12 @@ def results_of(engine: Engine) -> tuple[dict[str, Any], list[Figure], list[Table
             origin = f"{node.name}.{port}"
             for value in _flat(engine.values.get(f"{origin}#held", engine.values.get(origin))):
                 if isinstance(value, Metrics):
-                    merge(metrics, value.values)
+                    metrics.append(value)
                 elif isinstance(value, Figure):
                     figures.append(value)
                 elif isinstance(value, Table):
                     tables.append(value)
-    return metrics, figures, tables
+    return merged(metrics), figures, tables
 
 
 def _map_facts(artifact: Mapping[str, Any]) -> dict[str, Any]:
@@ -532,15 +534,6 @@ def _flat(value: Any) -> Iterator[Any]:
             yield from _flat(item)
     elif value is not None:
         yield value
-
-
-def merge(into: dict[str, Any], more: Mapping[str, Any]) -> None:
-    """Merge nested figures; what two stages state under one name comes from the later one."""
-    for key, value in more.items():
-        if isinstance(value, Mapping) and isinstance(into.get(key), dict):
-            merge(into[key], value)
-        else:
-            into[key] = dict(value) if isinstance(value, Mapping) else value
 
 
 def stage_times(engine: Engine, groups: Sequence[Sequence[str]] = ()) -> dict[str, Any]:
@@ -586,7 +579,7 @@ def status(folder: Path) -> str | None:
     return str(json.loads(file.read_text()).get("status")) if file.is_file() else None
 
 
-def resume(folder: Path, progress: Any = None) -> tuple[Run, dict[str, Any]]:
+def resume(folder: Path, progress: Any = None) -> tuple[Run, Metrics]:
     """Go on with a run that was stopped, from its last checkpoint, to the bytes it would have given unbroken."""
     manifest_file, config_file = folder / "manifest.json", folder / "config.yaml"
     if not manifest_file.is_file() or not config_file.is_file():
@@ -596,7 +589,7 @@ def resume(folder: Path, progress: Any = None) -> tuple[Run, dict[str, Any]]:
         half_written.unlink()
     if run.manifest["status"] == "complete":
         shutil.rmtree(run.memory, ignore_errors=True)
-        return run, json.loads((folder / "metrics.json").read_text())
+        return run, read_metrics(folder)
     if Path(run.manifest["cwd"]).is_dir():
         os.chdir(run.manifest["cwd"])  # its paths are relative to where it was started
     planned = plan(yaml.safe_load(config_file.read_text()))

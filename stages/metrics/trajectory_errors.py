@@ -6,12 +6,20 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Tick
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.drives import Array, Drive, drives, known
 from omninav.stages.values.pose import Motion, Pose
+
+QUANTITIES = {
+    "position_error_m": Quantity(better="lower"),
+    "heading_error_deg": Quantity(better="lower"),
+    "loss_rate": Quantity(better="lower"),
+    "converged_after_frames": Quantity(title="Converged after", better="lower", absent="never"),
+    "frames": Quantity(),
+    "odometry_alone.final_error_m": Quantity(title="Odometry drift at the end", better="lower"),
+}
 
 
 class TrajectoryErrors(Stage):
@@ -51,10 +59,13 @@ class TrajectoryErrors(Stage):
         per_log = [drive_metrics(drive, self.lost_m, self.settle_steps) for drive in found]
         if not per_log:
             return self.Out(metrics=Metrics({"frames": 0}))
+        if not any(drive.has_truth for drive in found):
+            ctx.fact("errors", "not measured: the log has no ground truth")
         values = dict(per_log[-1])
         if len(per_log) > 1:
             values["logs"] = per_log
-        return self.Out(metrics=Metrics(values))
+        details = ("mean_pose", "odometry_alone.after_convergence")
+        return self.Out(metrics=Metrics(values, QUANTITIES, headlines(values), details))
 
 
 def drive_metrics(drive: Drive, lost_m: float, settle_steps: int | None = None) -> dict[str, Any]:
@@ -85,6 +96,13 @@ def drive_metrics(drive: Drive, lost_m: float, settle_steps: int | None = None) 
         result["odometry_alone"] = _errors_over(windows, odometry[scored], truth, lost_m)
         result["odometry_alone"]["final_error_m"] = float(position_errors(odometry[scored], truth)[-1])
     return result
+
+
+def headlines(values: Mapping[str, Any]) -> tuple[str, ...]:
+    """Errors after convergence where the estimate converged, else over all frames; then how often it was lost."""
+    window = "after_convergence." if values.get("after_convergence") else ""
+    errors = ("position_error_m.median", "position_error_m.p90", "heading_error_deg.median")
+    return (*(window + path for path in errors), "loss_rate", "converged_after_frames")
 
 
 def _errors_over(windows: Mapping[str, int | None], poses: Array, truth: Array, lost_m: float) -> dict[str, Any]:

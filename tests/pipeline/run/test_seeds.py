@@ -44,7 +44,7 @@ def repetitions(graph: Graph, place: Path, cache: Cache | None, sharing: bool) -
         folder.mkdir(parents=True)
         engine, recorded = _once(graph, {}, seed, folder, cache, shared, sharing and shared is None, lambda words: None)
         shared = recorded or shared
-        given.append(results_of(engine)[0]["numbers"]["all"])
+        given.append(results_of(engine)[0].values["numbers"]["all"])
         computed.append(len(engine.calls["scale"].times))
     return given, computed
 
@@ -109,5 +109,5 @@ def test_what_grows_in_place_starts_anew_for_each_seed(tmp_path: Path):
                 grown, {"ledger": ledger}, seed, folder, None, shared, shared is None, lambda words: None
             )
             shared = recorded or shared
-            sizes.append(results_of(engine)[0]["numbers"]["all"])
+            sizes.append(results_of(engine)[0].values["numbers"]["all"])
         assert sizes == [sizes[0]] * len(SEEDS), start

@@ -1,0 +1,54 @@
+"""A sweep as one page: a row per job."""
+
+import os
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from omninav.pipeline.files import write_whole
+
+from .quantities import best_of, head_of, headlines, numbers
+from .rendering import render
+
+
+def write_sweep_page(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
+    """Write `sweep.html`: a line per job with what it changed, how it ended, its main figures or its error.
+
+    A row holds `job`, `folder` (the job's run folder), `manifest` (with `overrides`, `status`, `error`) and `metrics`
+    (`Metrics`, None where the job has none).
+    """
+    runs = [row["metrics"] for row in rows]
+    measured = [{} if metrics is None else numbers(metrics) for metrics in runs]
+    paths = [p for p in headlines([each for each in runs if each is not None]) if any(p in run for run in measured)]
+    best = {path: best_of(path, measured) for path in paths}
+    lines = []
+    for number, (row, run) in enumerate(zip(rows, measured, strict=True)):
+        manifest, own = row["manifest"], Path(row["folder"])
+        cells = [{"text": run[path].text if path in run else "", "best": number in best[path]} for path in paths]
+        lines.append(
+            {
+                "job": row["job"],
+                "overrides": manifest.get("overrides", ""),
+                "status": manifest.get("status", ""),
+                "error": manifest.get("error", ""),
+                "cells": cells,
+                "report": _link(folder, own / "report.html"),
+                "log": _link(folder, own / "run.log"),
+            }
+        )
+    counts = Counter(str(line["status"]) for line in lines)
+    page = render(
+        "sweep.html",
+        title=folder.resolve().name,
+        counts=f"{len(lines)} jobs: " + ", ".join(f"{number} {status}" for status, number in sorted(counts.items())),
+        columns=[head_of(path, measured) for path in paths],
+        rows=lines,
+    )
+    path = folder / "sweep.html"
+    write_whole(path, page)
+    return path
+
+
+def _link(folder: Path, file: Path) -> str:
+    return Path(os.path.relpath(file, folder)).as_posix() if file.exists() else ""

@@ -1,0 +1,95 @@
+"""Results and comparisons as tables for the terminal."""
+
+from collections.abc import Mapping, Sequence
+from string import ascii_uppercase
+from typing import TYPE_CHECKING, Any
+
+from omninav.pipeline.graph.results import Metrics
+
+from .quantities import best_of, head_of, is_detail, numbers
+from .results import results
+
+if TYPE_CHECKING:
+    from rich.table import Table as TerminalTable
+
+MAX_HEAD_LENGTH = 24
+"""Of a run's name at the head of a column, in characters."""
+
+
+def results_table(metrics: Metrics) -> "TerminalTable":
+    """A run's figures with units, without their details."""
+    from rich.table import Table as TerminalTable
+
+    found = results(metrics, details=False)
+    table = TerminalTable(title="Results", title_justify="left", header_style="bold")
+    table.add_column("")
+    for column in found.columns or ("",):
+        table.add_column(column, justify="right")
+    for quantity in found.quantities:
+        name = f"{quantity.name} ({quantity.unit})" if quantity.unit else quantity.name
+        table.add_row(f"[bold]{name}[/bold]")
+        for row in quantity.rows:
+            table.add_row(f"  {row.condition}", *row.cells, style="bold cyan" if row.plain else "")
+        table.add_section()
+    for single in found.singles:
+        table.add_row(single.name, f"{single.value} {single.unit}".strip())
+    return table
+
+
+def compare_table(runs: Sequence[Mapping[str, Any]]) -> "TerminalTable":
+    """Several runs' figures side by side, the best of each marked with *, and the settings in which they differ.
+
+    A run holds `name`, `metrics` (`Metrics`), `config` and `manifest`.
+    """
+    from rich.table import Table as TerminalTable
+
+    heads, below = [str(run["name"]) for run in runs], ["* the best of its line"]
+    if max(map(len, heads)) > MAX_HEAD_LENGTH:  # folded names are hard to tell apart: letters, and what they stand for
+        letters = [ascii_uppercase[n % 26] * (n // 26 + 1) for n in range(len(runs))]
+        below = [*(f"{letter}: {name}" for letter, name in zip(letters, heads, strict=True)), *below]
+        heads = letters
+    table = TerminalTable(
+        title="Comparison",
+        title_justify="left",
+        header_style="bold",
+        caption="\n".join(below),
+        caption_justify="left",
+    )
+    table.add_column("")
+    for head in heads:
+        table.add_column(head, justify="right", overflow="fold")
+    table.add_row("variant", *(str(run["manifest"].get("variant", "")) for run in runs))
+    table.add_row("status", *(str(run["manifest"].get("status", "")) for run in runs))
+    table.add_section()
+    measured = [numbers(run["metrics"]) for run in runs]
+    shown = [
+        [path for path in found if not is_detail(path, run["metrics"])]
+        for run, found in zip(runs, measured, strict=True)
+    ]
+    for path in dict.fromkeys(path for paths in shown for path in paths):
+        best = best_of(path, measured)
+        cells = [found[path].text if path in found else "–" for found in measured]
+        marked = [f"[bold green]{cell} *[/]" if n in best else f"{cell}  " for n, cell in enumerate(cells)]
+        table.add_row(head_of(path, measured), *marked)
+    table.add_section()
+    for setting, values in differing_settings([run["config"] for run in runs]):
+        table.add_row(f"[dim]{setting}[/]", *values)
+    return table
+
+
+def differing_settings(configs: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[str]]]:
+    """Dotted names of settings that are not the same in all configurations, with each one's value ('–': not there)."""
+    flat = [dict(_flat(config)) for config in configs]
+    names = dict.fromkeys(name for settings in flat for name in settings)
+    found = [(name, [str(settings.get(name, "–")) for settings in flat]) for name in names]
+    return [(name, values) for name, values in found if len(set(values)) > 1]
+
+
+def _flat(config: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    flat: list[tuple[str, Any]] = []
+    for key, value in config.items():
+        if isinstance(value, Mapping) and value:
+            flat += _flat(value, f"{prefix}{key}.")
+        else:
+            flat.append((f"{prefix}{key}", value))
+    return flat

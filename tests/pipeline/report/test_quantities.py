@@ -1,0 +1,51 @@
+import pytest
+from sample_metrics import measured
+
+from omninav.pipeline import Metrics, Quantity
+from omninav.pipeline.report.quantities import digits, numbers, title, unit
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [(0.0731, "0.073"), (1.523, "1.52"), (12.34, "12.3"), (3500.2, "3500"), (0, "0"), (0.0, "0"), (0.00012, "1.2e-04")],
+)
+def test_numbers_have_the_digits_they_carry(number, text):
+    assert digits(number) == text
+
+
+def test_titles_and_units_follow_from_the_ends_of_names():
+    assert (title("position_error_m"), unit("position_error_m")) == ("Position error", "m")
+    assert (title("heading_error_deg"), unit("heading_error_deg")) == ("Heading error", "°")
+    assert (title("loss_rate"), unit("loss_rate")) == ("Loss rate", "%")
+    assert (title("frames"), unit("frames")) == ("Frames", "")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "quantity", "head", "text"),
+    [
+        ("loss_rate", 0.015, Quantity(), "Loss rate (%)", "1.50"),
+        ("size_bytes", 1234, Quantity(), "Size (kB)", "1.23"),
+        ("precision", 0.5, Quantity(title="Precision of loops", unit="%"), "Precision of loops (%)", "50.0"),
+        ("after_frames", None, Quantity(absent="never"), "After (frames)", "never"),
+        ("after_frames", None, Quantity(), "After (frames)", "–"),
+    ],
+)
+def test_a_description_takes_precedence_over_the_name(name, value, quantity, head, text):
+    found = numbers(Metrics({name: value}, {name: quantity}))[name]
+    assert (found.head, found.text) == (head, text)
+
+
+def test_every_number_has_its_path_and_a_readable_name():
+    found = {path: number.name for path, number in numbers(measured()).items()}
+    assert found["after_convergence.position_error_m.median"] == "Position error, median, after convergence"
+    assert found["map.references"] == "References, map"
+
+
+def test_a_title_given_for_a_path_is_shown_without_its_groups():
+    described = {"success.at_end": Quantity(title="Final pose correct")}
+    assert numbers(Metrics({"success": {"at_end": 1.0}}, described))["success.at_end"].name == "Final pose correct"
+
+
+def test_described_entries_come_first_in_their_order():
+    metrics = Metrics({"a": 1, "b": 2, "c": 3, "d": 4}, {"c": Quantity(), "b": Quantity()})
+    assert list(numbers(metrics)) == ["c", "b", "a", "d"]

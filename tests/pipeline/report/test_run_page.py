@@ -1,0 +1,148 @@
+import base64
+import html
+import re
+from html.parser import HTMLParser
+
+from sample_metrics import VALUES, measured
+
+from omninav.pipeline import Figure, Metrics, Quantity, Table
+from omninav.pipeline.report.run_page import write_report
+
+MANIFEST = {
+    "status": "complete",
+    "variant": "omniview_mcl",
+    "argv": ["omninav", "variant=omniview_mcl", "log=my drive.mcap"],
+    "started": "2026-01-01T10:00:00",
+    "seed": 3,
+    "dropped": {"source.duplicate_frame": {"count": 7, "first": "frame 12 <twice>"}},
+    "facts": {"odometry": "synthetic", "map_poses": "truth"},
+    "inputs": {"source": "ab" * 32},
+    "libraries": {"numpy": "2.0"},
+}
+TIMING = {
+    "ticks": 300,
+    "ticks_per_second": 212.4,
+    "stages": {"match": {"lifetime": "tick", "calls": 300, "p50_ms": 1.234, "p95_ms": 2.5, "max_ms": 31.0}},
+}
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="10" height="10"><title>graph</title></svg>'
+PICTURE = Figure("path", "The path", "Where it went & why.", b"\x89PNG not really", order=1)
+
+
+class Wellformed(HTMLParser):
+    """Raises where an element is closed that was not the last one opened."""
+
+    VOID = frozenset({"meta", "img", "br", "rect", "path", "circle", "link"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def report(tmp_path, metrics=None, manifest=MANIFEST, figures=(PICTURE,), tables=()):
+    manifest = {"cwd": str(tmp_path), **manifest}
+    folder = tmp_path / "runs" / "a run"
+    folder.mkdir(parents=True, exist_ok=True)
+    path = write_report(
+        folder,
+        manifest,
+        measured() if metrics is None else metrics,
+        TIMING,
+        SVG,
+        figures,
+        tables,
+        "seed: 3\nname: <x>\n",
+    )
+    return path.read_text()
+
+
+def text_of(page: str) -> str:
+    plain = re.sub(r"<style>.*?</style>", "", page, flags=re.S)
+    return " ".join(html.unescape(re.sub(r"<[^>]*>", " ", plain)).split())
+
+
+def test_a_page_refers_to_nothing_outside_itself(tmp_path):
+    page = report(tmp_path)
+    assert re.findall(r"https?://[^\"\s<]+", page.replace(SVG, "")) == []
+    assert not re.search(r"<(?:link|script|iframe)\b|@import|url\(", page)
+    assert set(re.findall(r'(?:src|href)="([^":]{4}):', page)) <= {"data"}
+
+
+def test_a_page_is_well_formed_html(tmp_path):
+    checker = Wellformed()
+    checker.feed(report(tmp_path))
+    assert checker.open == []
+
+
+def test_results_stand_with_units_and_the_estimate_beside_odometry_alone(tmp_path):
+    said = text_of(report(tmp_path))
+    assert "Position error (m) all frames 0.500 0.073 0.810 12.3 after convergence 0.500 0.050" in said
+    assert "odometry alone 0.500 1.70 0.810 12.3" in said
+    assert "Loss rate (%) all frames 12.5" in said
+    assert "Converged after 12 frames" in said
+    assert "Map: size 168 kB" in said
+
+
+def test_what_was_dropped_what_is_worth_knowing_and_how_to_run_it_again_are_said(tmp_path):
+    said = text_of(report(tmp_path))
+    assert "source.duplicate frame 7 frame 12 <twice>" in said
+    assert "odometry synthetic" in said
+    assert "omninav variant=omniview_mcl 'log=my drive.mcap'" in said
+    assert "omninav resume 'runs/a run'" in said
+    assert "match every tick 300 1.23 2.50 31.0" in said
+    assert "212 frames per second" in said
+    assert "name: <x>" in said
+
+
+def test_pictures_are_inside_the_page_in_their_order(tmp_path):
+    later = Figure("aaa", "Later", "Second.", b"<svg/>", media_type="image/svg+xml", order=2)
+    page = report(tmp_path, figures=(later, PICTURE))
+    assert f'src="data:image/png;base64,{base64.b64encode(PICTURE.content).decode()}"' in page
+    assert page.index("The path") < page.index("Later")
+    assert "Where it went &amp; why." in page
+    assert SVG in page
+
+
+def test_a_film_is_inside_the_page_and_can_be_stepped_through(tmp_path):
+    film = Figure("film", "The drive", "Frame by frame.", b"not really a film", "video/mp4", per_second=8.0)
+    page = report(tmp_path, figures=(PICTURE, film))
+    assert 'src="data:video/mp4;base64,' in page
+    assert 'data-per-second="8.0"' in page
+    assert page.count("<script>") == 1
+    assert "<script>" not in report(tmp_path, figures=(PICTURE,))
+    picture = Figure("film", "The drive", "Moving.", b"GIF89a not really", "image/gif", per_second=8.0)
+    assert "<script>" not in report(tmp_path, figures=(picture,))  # a browser plays it by itself
+
+
+def test_tables_of_stages_are_shown(tmp_path):
+    table = Table("places", "Places", "Where it has been.", ("place", "seen (s)"), (("hall", 1.234), ("<b>", None)))
+    page = report(tmp_path, tables=(table,))
+    assert "hall 1.23" in text_of(page)
+    assert "&lt;b&gt;" in page
+
+
+def test_a_filter_that_never_converged_is_said_to_have_never_done_so(tmp_path):
+    metrics = measured(converged_after_frames=None, after_convergence=None)
+    assert "Converged after never" in text_of(report(tmp_path, metrics=metrics))
+
+
+def test_several_logs_have_a_line_each(tmp_path):
+    said = text_of(report(tmp_path, metrics=measured(logs=[VALUES, {"frames": 7}])))
+    assert "Log by log" in said
+    assert "1 7 – –" in said
+
+
+def test_tiles_are_the_headlines_in_the_order_of_their_stages(tmp_path):
+    described = {"goal.reached": Quantity(title="Goal reached"), "goal.time_s": Quantity(title="Time to the goal")}
+    metrics = Metrics({"goal": {"time_s": 3.2, "reached": "yes"}}, described, ("goal.reached", "goal.time_s"))
+    assert text_of(report(tmp_path, metrics=metrics)).index("yes Goal reached 3.20 s Time to the goal") > 0
+
+
+def test_a_run_in_which_nothing_is_measured_says_so(tmp_path):
+    assert "No stage of this graph measures anything" in text_of(report(tmp_path, metrics=Metrics({})))

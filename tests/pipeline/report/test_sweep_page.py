@@ -1,0 +1,37 @@
+import re
+
+from sample_metrics import measured
+
+from omninav.pipeline.report.sweep_page import write_sweep_page
+
+
+def test_a_failed_job_stands_in_the_sweeps_page_with_its_error_and_log(tmp_path):
+    good, bad = tmp_path / "0", tmp_path / "1"
+    for folder, file in ((good, "report.html"), (bad, "run.log")):
+        folder.mkdir()
+        (folder / file).write_text("x")
+    rows = [
+        {"job": "0", "folder": good, "manifest": {"status": "complete", "overrides": "seed=0"}, "metrics": measured()},
+        {
+            "job": "1",
+            "folder": bad,
+            "manifest": {"status": "failed", "overrides": "seed=1", "error": "stage 'x' failed: <no>"},
+            "metrics": None,
+        },
+    ]
+    page = write_sweep_page(tmp_path, rows).read_text()
+    assert 'href="0/report.html"' in page
+    assert 'href="1/run.log"' in page
+    assert "stage &#39;x&#39; failed: &lt;no&gt;" in page
+    assert "2 jobs: 1 complete, 1 failed" in page
+    assert "0.050" in page
+    assert "http" not in page
+
+
+def test_a_sweeps_best_job_is_marked(tmp_path):
+    rows = [
+        {"job": str(n), "folder": tmp_path / str(n), "manifest": {"status": "complete"}, "metrics": metrics}
+        for n, metrics in enumerate((measured(loss_rate=0.5), measured()))
+    ]
+    page = write_sweep_page(tmp_path, rows).read_text()
+    assert re.findall(r'<td class="best">([^<]*)</td>', page) == ["12.5"]

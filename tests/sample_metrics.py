@@ -1,0 +1,26 @@
+"""A run's metrics as a stage states them, for the tests of pages and tables."""
+
+from omninav.pipeline import Metrics, Quantity
+
+ERRORS = {"mean": 0.5, "median": 0.073, "p90": 0.81, "max": 12.34}
+VALUES = {
+    "frames": 300,
+    "position_error_m": ERRORS,
+    "loss_rate": 0.125,
+    "converged_after_frames": 12,
+    "after_convergence": {"position_error_m": {**ERRORS, "median": 0.05}, "loss_rate": 0.0},
+    "odometry_alone": {"position_error_m": {**ERRORS, "median": 1.7}, "loss_rate": 0.5},
+    "map": {"size_bytes": 168_000, "references": 200},
+}
+QUANTITIES = {
+    "position_error_m": Quantity(better="lower"),
+    "loss_rate": Quantity(better="lower"),
+    "converged_after_frames": Quantity(title="Converged after", better="lower", absent="never"),
+    "frames": Quantity(),
+}
+HEADLINES = ("after_convergence.position_error_m.median", "loss_rate", "converged_after_frames")
+
+
+def measured(**changes):
+    """The sample metrics with some values changed."""
+    return Metrics({**VALUES, **changes}, QUANTITIES, HEADLINES, ("odometry_alone",))
