@@ -1,4 +1,4 @@
-"""A third party's stage: edge directions per segment, which do not change with the colour of the light."""
+"""Edge directions per segment, which do not change with the colour of the light."""
 
 from typing import Annotated
 
@@ -14,7 +14,10 @@ class EdgeHistogram(Stage):
     """Histogram of edge directions per segment of the panorama, each edge weighted by its strength."""
 
     segments: Annotated[int, Bounds(ge=1)] = 36
+    """Equal parts into which the panorama is divided around the circle."""
+
     directions: Annotated[int, Bounds(ge=2)] = 20
+    """Bins of a histogram over the full circle of edge directions."""
 
     class Out(Outputs):
         features: SegmentHistograms

@@ -1,4 +1,4 @@
-"""A stage that fails at one seed: what a sweep does with a failing job can be seen with it."""
+"""A stage that raises an error at one seed, to see what a sweep does with a failing job."""
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.features.hsv_histogram import hsv_histograms
@@ -7,15 +7,18 @@ from omninav.stages.values.image import Panorama
 
 
 class RaisesAtSeed(Stage):
-    """Colour histograms as ours, and an error where `seed` is `raises_at`."""
+    """The built-in colour histograms, and an error where `seed` is `raises_at`."""
 
     seed: int = 0
+    """The seed of the run."""
+
     raises_at: int = 1
+    """The seed at which the stage raises."""
 
     class Out(Outputs):
         features: SegmentHistograms
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:
         if self.seed == self.raises_at:
-            raise RuntimeError(f"this stage raises at seed {self.seed}, as it was told to")
+            raise RuntimeError(f"raises at seed {self.seed}, as configured")
         return self.Out(features=SegmentHistograms(hsv_histograms(panorama.pixels, 36)))
