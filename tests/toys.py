@@ -94,6 +94,7 @@ class Scale(Stage):
     """A number times a factor."""
 
     factor: Annotated[float, Bounds(gt=0, le=100)] = 1.0
+    """What the number is multiplied by."""
     mode: Literal["plain", "negative"] = "plain"
     weights: tuple[float, ...] = ()
 

@@ -562,51 +562,9 @@ def _graph(arguments: list[str]) -> int:
 
 
 def _stages(arguments: list[str]) -> int:
-    from omninav.pipeline.graph.ports import type_name
-    from omninav.pipeline.graph.problems import suggest
-    from omninav.pipeline.graph.registry import entries, resolve
-    from omninav.pipeline.graph.stage import signature
+    from .commands.stages import command
 
-    broken = 0
-    known = list(entries())
-    for word in arguments:
-        if word not in {entry.role for entry in known} | {entry.name for entry in known}:
-            print(suggest(word, {entry.role for entry in known}, "roles", prefix="omninav stages "), file=sys.stderr)
-            return 2
-    for entry in known:
-        if arguments and entry.role not in arguments and entry.name not in arguments:
-            continue
-        if entry.problem:
-            broken += 1
-            print(f"{entry.name}  [{entry.origin}, cannot be used]\n    {entry.problem}\n")
-            continue
-        cls = resolve(entry.target)
-        read = signature(cls)
-        lines = [f"{entry.name}  [{entry.origin}]  {entry.summary}"]
-        lines += [
-            f"    in   {p.name}: {'all ' if p.collects else ''}{type_name(p.type)}{' (optional)' if p.optional else ''}"
-            for p in read.inputs.values()
-        ]
-        lines += [
-            f"    out  {p.name}: {type_name(p.type)}{' (may be absent)' if p.optional else ''}"
-            for p in read.outputs.values()
-        ]
-        lines += [f"    set  {p.name}: {type_name(p.type)} = {p.default!r}" for p in read.parameters.values()]
-        lines += [f"    from {_papers(cls)}"] if _papers(cls) else []
-        lines += [f"    use  {entry.role}={entry.name.partition('.')[2]}  or  _target_: {entry.target}", ""]
-        print("\n".join(lines))
-    if broken:
-        print(f"{broken} plugin(s) cannot be used; everything else can", file=sys.stderr)
-    return 0
-
-
-def _papers(cls: type) -> str:
-    """The works that a stage's docstring names, with the sections it is from."""
-    import re
-
-    author, part = r"[A-Z][\w-]+", r"(?:section|equation|chapter|figure|table)s? [\w.]*\w"
-    pattern = rf"{author}(?:(?:, | & | and ){author}| et al\.)* (?:19|20)\d\d(?:, {part})*"
-    return "; ".join(dict.fromkeys(re.findall(pattern, " ".join((cls.__doc__ or "").split()))))
+    return command(arguments)
 
 
 def _variants(arguments: list[str]) -> int:

@@ -17,7 +17,7 @@ from omegaconf import OmegaConf
 
 from omninav.pipeline.graph.problems import Problem, nearest, suggest
 from omninav.pipeline.graph.registry import UnknownStage, resolve
-from omninav.pipeline.graph.stage import BadStage, signature
+from omninav.pipeline.graph.signature import BadStage, signature
 
 WITHIN_GRAPH = ("nodes.", "wires.", "artifacts.", "saves.")
 

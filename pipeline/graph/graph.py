@@ -15,7 +15,8 @@ from .ground_truth import truth_in_the_loop
 from .ports import compatible, convert_fields, type_name
 from .problems import Problem, ProblemsFound, nearest, suggest
 from .registry import UnknownStage, entries, resolve
-from .stage import BadStage, Port, Signature, Stage, signature
+from .signature import BadStage, Port, Signature, signature
+from .stage import Stage
 from .value import Tick
 
 Lifetime = Literal["before", "tick", "after"]

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from .problems import Problem, suggest
-from .stage import Bounds, read_parameters, split_optional
+from .signature import read_parameters, split_optional
+from .stage import Bounds
 
 
 def type_name(annotation: Any) -> str:

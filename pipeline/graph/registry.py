@@ -24,7 +24,8 @@ from typing import Any
 
 from omninav.pipeline.files import digest_text
 
-from .stage import Source, Stage, first_line
+from .signature import first_line
+from .stage import Source, Stage
 
 BUILT_IN = "omninav.stages"
 ENVIRONMENT = "OMNINAV_STAGES"

@@ -1,13 +1,10 @@
-"""A stage: a typed function with parameters. Ports and parameters are read off the class, and nowhere else."""
+"""A stage: a typed function with parameters."""
 
 import dataclasses
-import inspect
-import types
-import typing
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union, dataclass_transform, get_args, get_origin
+from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform
 
 from .value import Tick
 
@@ -151,7 +148,8 @@ class Context:
 class Stage:
     """Base of all stages. A subclass is a keyword-only dataclass of its parameters with a `step`.
 
-    * parameters: annotated fields with defaults (`headings: Annotated[int, Bounds(ge=1)] = 36`);
+    * parameters: annotated fields with defaults (`headings: Annotated[int, Bounds(ge=1)] = 36`), each with a docstring
+      directly below it that says what it means;
     * input ports: the arguments of `step` after `ctx`; `X | None` is optional; `Sequence[X]` takes a `collect` wire and
       gets every present value, `Sequence[X | None]` one entry per tick;
     * scratch: an argument of `step` whose type is a `State`;
@@ -187,148 +185,3 @@ class Source(Stage):
     def length(self) -> int | None:
         """Number of ticks to come in all, where it is known (for the progress line). Called after `setup`."""
         return None
-
-
-@dataclasses.dataclass(frozen=True)
-class Port:
-    """An input or output: its name, the type of its value, and what may be missing."""
-
-    name: str
-    type: Any
-    optional: bool = False
-    collects: bool = False
-    """True for an input declared `Sequence[X]`: `type` is then X."""
-    keeps_gaps: bool = False
-    """True for `Sequence[X | None]`: one entry per tick, None where the value was absent."""
-    truth: bool = False
-    """True for an output marked `Truth`."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Parameter:
-    """A parameter of a stage: name, type, bounds, default (`dataclasses.MISSING` where there is none)."""
-
-    name: str
-    type: Any
-    default: Any
-
-
-@dataclasses.dataclass(frozen=True)
-class Signature:
-    """Everything the graph needs to know of a stage class, read off the class itself."""
-
-    inputs: dict[str, Port]
-    outputs: dict[str, Port]
-    parameters: dict[str, Parameter]
-    state: tuple[str, type[State]] | None
-    summary: str
-    is_source: bool
-
-
-class BadStage(TypeError):
-    """A stage class that cannot be read: names the class, what is wrong with it, and what to write."""
-
-
-def split_optional(annotation: Any) -> tuple[Any, bool]:
-    """`X | None` -> (X, True); anything else -> (itself, False)."""
-    if get_origin(annotation) in (Union, types.UnionType):
-        rest = [a for a in get_args(annotation) if a is not type(None)]
-        if len(rest) < len(get_args(annotation)):
-            return (rest[0] if len(rest) == 1 else Union[tuple(rest)]), True  # noqa: UP007 - built at run time
-    return annotation, False
-
-
-def _hints(thing: Any, cls: type) -> dict[str, Any]:
-    try:
-        return typing.get_type_hints(thing, localns=dict(vars(cls)), include_extras=True)
-    except NameError as error:
-        raise BadStage(f"{cls.__module__}.{cls.__qualname__}: {error}; import the name at module level") from None
-
-
-_SIGNATURES: dict[type[Stage], Signature] = {}
-
-
-def signature(cls: type[Stage]) -> Signature:
-    """Ports, parameters and state of a stage class.
-
-    Raises `BadStage` where the class has no `step`, an argument without a type, or no readable `Out`.
-    """
-    if cls not in _SIGNATURES:
-        _SIGNATURES[cls] = _read_signature(cls)
-    return _SIGNATURES[cls]
-
-
-def _read_signature(cls: type[Stage]) -> Signature:
-    where = f"{cls.__module__}.{cls.__qualname__}"
-    step = inspect.getattr_static(cls, "step", None)
-    if not inspect.isfunction(step):
-        raise BadStage(f"{where} has no step method; write `def step(self, ctx: Context, …) -> Out:`")
-    hints = _hints(step, cls)
-    inputs: dict[str, Port] = {}
-    state: tuple[str, type[State]] | None = None
-    for name, argument in list(inspect.signature(step).parameters.items())[1:]:
-        if name == "ctx":
-            continue
-        if name not in hints:
-            raise BadStage(f"{where}.step: argument '{name}' has no type; write `{name}: SomeValue`")
-        annotation, optional = split_optional(hints[name])
-        if get_origin(annotation) is Annotated:
-            annotation = get_args(annotation)[0]
-        if inspect.isclass(annotation) and issubclass(annotation, State):
-            state = (name, annotation)
-            continue
-        optional = optional or argument.default is not inspect.Parameter.empty
-        collects, gaps = get_origin(annotation) is Sequence, False
-        if collects:
-            annotation, gaps = split_optional(get_args(annotation)[0])
-        inputs[name] = Port(name, annotation, optional, collects, gaps)
-    return Signature(
-        inputs=inputs,
-        outputs=_read_outputs(cls, hints.get("return"), where),
-        parameters=read_parameters(cls),
-        state=state,
-        summary=first_line(cls),
-        is_source=issubclass(cls, Source),
-    )
-
-
-def _read_outputs(cls: type[Stage], returned: Any, where: str) -> dict[str, Port]:
-    returned, _ = split_optional(returned)
-    if returned is None or returned is type(None):
-        return {}
-    if not (inspect.isclass(returned) and issubclass(returned, Outputs)):
-        raise BadStage(f"{where}.step returns {returned!r}; write a nested `class Out(Outputs)` and `-> Out`")
-    hints = _hints(returned, cls)
-    ports = {}
-    for field in dataclasses.fields(returned):  # type: ignore[arg-type]  # Outputs makes it a dataclass
-        annotation, *marks = get_args(hints[field.name]) if _is_annotated(hints[field.name]) else (hints[field.name],)
-        annotation, optional = split_optional(annotation)
-        truth = Truth in marks or bool(getattr(annotation, "is_truth", False))
-        truth = truth or (field.name == "truth" and issubclass(cls, Source))
-        optional = optional or field.default is not dataclasses.MISSING
-        ports[field.name] = Port(field.name, annotation, optional, truth=truth)
-    return ports
-
-
-def _is_annotated(annotation: Any) -> bool:
-    return get_origin(annotation) is Annotated
-
-
-def read_parameters(cls: type[Any]) -> dict[str, Parameter]:
-    """The typed fields of a dataclass with their defaults."""
-    hints = _hints(cls, cls)
-    found = {}
-    for field in dataclasses.fields(cls):
-        default = field.default
-        if default is dataclasses.MISSING and field.default_factory is not dataclasses.MISSING:
-            default = field.default_factory()
-        found[field.name] = Parameter(field.name, hints[field.name], default)
-    return found
-
-
-def first_line(thing: Any) -> str:
-    """The first sentence-line of a docstring written for that thing, '' where it has none of its own."""
-    text = vars(thing).get("__doc__") or ""
-    if text.startswith(f"{thing.__name__}("):  # the text dataclasses put in where there is none
-        return ""
-    return text.strip().split("\n")[0].strip()

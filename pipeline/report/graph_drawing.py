@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from html import escape
 from typing import Any, Protocol
 
-from omninav.pipeline.graph.stage import Signature
+from omninav.pipeline.graph.signature import Signature
 
 FONT = "Helvetica, Arial, 'DejaVu Sans', sans-serif"
 INK, QUIET, WIRE, TRUTH, DELAY = "#1d2733", "#5b6775", "#7b8896", "#b3261e", "#0072b2"

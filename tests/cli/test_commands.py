@@ -96,6 +96,7 @@ def test_a_log_of_ones_own_without_a_map_says_what_to_type(omninav, tmp_path: Pa
         (("match=null",), "'~nodes.match' '~wires.match'"),
         (("check", "tour=nowhere.mcap", "log=nowhere.mcap"), "nowhere.mcap"),
         (("stages", "matsch"), "did you mean 'omninav stages match'?"),
+        (("stages", "match.selektive"), "did you mean 'omninav stages match.selective'?"),
         (
             ("nodes.match.headngs=72",),
             "SelectiveMatch has no parameter 'headngs'\n      did you mean 'nodes.match.headings=72'?",
@@ -175,16 +176,21 @@ def test_a_map_of_other_features_is_refused_before_a_folder_is_made(
     omninav("check", f"map={demo / 'map.omap'}", *words, "artifacts.map.alike=[]", check=True)
 
 
-def test_stages_lists_ports_parameters_and_source(omninav):
-    listed = omninav("stages", check=True).stdout
-    selective = listed.partition("match.selective")[2].partition("\n\n")[0]
+def test_stages_lists_roles_in_lines_and_one_stage_with_ports_parameters_and_source(omninav):
+    lines = omninav("stages", "match", check=True).stdout.strip().split("\n")
+    assert len(lines) > 5
+    assert all(re.match(r"match\.\w+ +\S", line) for line in lines)
+    selective = omninav("stages", "match.selective", check=True).stdout
     for part in (
         "in   map: ReferenceGraph",
         "out  similarities: Similarities",
-        "headings: int >= 1 = 36",
+        "headings: int >= 1 = 36\n",
         "from Gross & Koenig 2004, section 2\n",
+        "use  match=selective\n",
+        "use  _target_: omninav.stages.match.selective.SelectiveMatch\n",
     ):
         assert part in selective, part
+    assert "use  _target_" in omninav("stages", "metrics.map_size", check=True).stdout
 
 
 def test_variants_and_doctor_answer(omninav):

@@ -12,7 +12,7 @@ from omegaconf import OmegaConf
 from omninav.pipeline.cli.main import complete
 from omninav.pipeline.experiment.specification import read_experiment
 from omninav.pipeline.graph.registry import resolve
-from omninav.pipeline.graph.stage import signature
+from omninav.pipeline.graph.signature import signature
 from omninav.pipeline.run.run import plan
 
 CONF = Path(__file__).resolve().parents[2] / "conf"

@@ -4,7 +4,8 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from omninav.pipeline.graph.graph import Graph, Node, Wire
-from omninav.pipeline.graph.stage import Parameter, Port, Signature, Stage
+from omninav.pipeline.graph.signature import Parameter, Port, Signature
+from omninav.pipeline.graph.stage import Stage
 from omninav.pipeline.report.graph_drawing import mermaid, svg
 
 

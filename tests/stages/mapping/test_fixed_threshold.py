@@ -1,7 +1,7 @@
 """A given limit between views."""
 
 from omninav.pipeline import Context
-from omninav.pipeline.graph.stage import signature
+from omninav.pipeline.graph.signature import signature
 from omninav.stages.mapping.calibrated_threshold import CalibratedThreshold
 from omninav.stages.mapping.fixed_threshold import FixedThreshold
 

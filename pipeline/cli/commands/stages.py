@@ -1,0 +1,74 @@
+"""`omninav stages`: all stages, those of a role, or everything about one."""
+
+import dataclasses
+import re
+import sys
+from collections.abc import Iterator
+
+from omninav.pipeline.cli.config_groups import options_with
+from omninav.pipeline.graph.ports import type_name
+from omninav.pipeline.graph.problems import suggest
+from omninav.pipeline.graph.registry import Entry, entries, resolve
+from omninav.pipeline.graph.signature import Parameter, signature
+
+
+def command(arguments: list[str]) -> int:
+    """List stages in one line each, by role; of a stage that is named, print ports, parameters, source and use."""
+    known = list(entries())
+    roles, names = {entry.role for entry in known}, {entry.name for entry in known}
+    for word in arguments:
+        if word not in roles | names:
+            options, kind = (names, "stages") if "." in word else (roles, "roles")
+            print(suggest(word, options, kind, prefix="omninav stages "), file=sys.stderr)
+            return 2
+    broken = 0
+    for entry in known:
+        if arguments and entry.role not in arguments and entry.name not in arguments:
+            continue
+        broken += bool(entry.problem)
+        print("\n".join(_described(entry) if entry.name in arguments else _listed(entry)))
+    if broken:
+        print(f"{broken} plugin(s) cannot be used; everything else can", file=sys.stderr)
+    return 0
+
+
+def _listed(entry: Entry) -> list[str]:
+    origin = "" if entry.origin == "built in" else f"[{entry.origin}] "
+    what = f"cannot be used: {entry.problem}" if entry.problem else entry.summary
+    return [f"{entry.name:38} {origin}{what}"]
+
+
+def _described(entry: Entry) -> Iterator[str]:
+    if entry.problem:
+        yield f"{entry.name}  [{entry.origin}, cannot be used]\n    {entry.problem}\n"
+        return
+    cls = resolve(entry.target)
+    read = signature(cls)
+    yield f"{entry.name}  [{entry.origin}]  {entry.summary}"
+    for port in read.inputs.values():
+        every, optional = "all " if port.collects else "", " (optional)" if port.optional else ""
+        yield f"    in   {port.name}: {every}{type_name(port.type)}{optional}"
+    for port in read.outputs.values():
+        yield f"    out  {port.name}: {type_name(port.type)}{' (may be absent)' if port.optional else ''}"
+    for parameter in read.parameters.values():
+        yield from _parameter(parameter)
+    if papers := _papers(cls):
+        yield f"    from {papers}"
+    for use in [*options_with(entry), f"_target_: {entry.target}"]:
+        yield f"    use  {use}"
+    yield ""
+
+
+def _parameter(parameter: Parameter) -> Iterator[str]:
+    needed = parameter.default is dataclasses.MISSING
+    default = "(needs a value)" if needed else f"= {parameter.default!r}"
+    yield f"    set  {parameter.name}: {type_name(parameter.type)} {default}"
+    if parameter.meaning:
+        yield f"           {parameter.meaning}"
+
+
+def _papers(cls: type) -> str:
+    """The works that a stage's docstring names, with the sections it is from."""
+    author, part = r"[A-Z][\w-]+", r"(?:section|equation|chapter|figure|table)s? [\w.]*\w"
+    pattern = rf"{author}(?:(?:, | & | and ){author}| et al\.)* (?:19|20)\d\d(?:, {part})*"
+    return "; ".join(dict.fromkeys(re.findall(pattern, " ".join((cls.__doc__ or "").split()))))

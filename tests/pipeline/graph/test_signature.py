@@ -1,0 +1,95 @@
+"""What is read off a stage class: parameters with their meaning, and what is wrong with a class that cannot be read."""
+
+from typing import Annotated
+
+import pytest
+
+import toys
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.graph.signature import BadStage, signature
+
+
+class Widened(toys.Scale):
+    """A number times a factor, and then some."""
+
+    offset: Annotated[float, Bounds(ge=0)] = 0.5
+    """What is added
+    in the end (m)."""
+    silent: int = 3
+
+
+class Overridden(Widened):
+    """Says anew what its base says."""
+
+    offset: float = 1.0
+    """Added first (m)."""
+
+
+def test_a_parameter_carries_its_type_bounds_default_and_meaning():
+    offset = signature(Widened).parameters["offset"]
+    assert (offset.default, offset.meaning) == (0.5, "What is added in the end (m).")
+    assert offset.type == Annotated[float, Bounds(ge=0)]
+    assert signature(Widened).parameters["silent"].meaning == ""
+
+
+def test_a_parameter_of_a_base_class_keeps_its_meaning_unless_it_is_said_anew():
+    assert signature(Widened).parameters["factor"].meaning == "What the number is multiplied by."
+    assert signature(Overridden).parameters["offset"].meaning == "Added first (m)."
+
+
+def test_a_class_without_source_has_parameters_without_meaning():
+    made = type("Made", (Stage,), {"__annotations__": {"size": int}, "size": 3, "step": toys.Constant.step})
+    assert signature(made).parameters["size"].meaning == ""
+
+
+class NoStep(Stage):
+    """Does nothing."""
+
+
+class Untyped(Stage):
+    """Takes anything."""
+
+    def step(self, ctx: Context, number) -> None:
+        """Nothing."""
+
+
+class Bare(Stage):
+    """Gives no Out."""
+
+    def step(self, ctx: Context) -> int:
+        """A number."""
+        return 3
+
+
+class Nameless(Stage):
+    """Names a type that is not there."""
+
+    def step(self, ctx: Context, number: "Nowhere") -> None:  # noqa: F821
+        """Nothing."""
+
+
+@pytest.mark.parametrize(
+    ("cls", "message"),
+    [
+        (NoStep, "has no step method; write `def step"),
+        (Untyped, "argument 'number' has no type; write `number: SomeValue`"),
+        (Bare, "write a nested `class Out\\(Outputs\\)`"),
+        (Nameless, "import the name at module level"),
+    ],
+)
+def test_a_class_that_cannot_be_read_says_what_to_write(cls: type[Stage], message: str):
+    with pytest.raises(BadStage, match=message):
+        signature(cls)
+
+
+def test_the_default_of_an_output_says_that_it_may_be_absent():
+    class Sometimes(toys.Constant):
+        class Out(Outputs):
+            number: toys.Number | None
+            other: toys.Number | None = None
+            always: toys.Number
+
+        def step(self, ctx: Context) -> Out:
+            return self.Out(number=None, always=toys.Number(1.0))
+
+    assert [port.optional for port in signature(Sometimes).outputs.values()] == [True, True, False]
