@@ -13,7 +13,7 @@ from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.two_views.absolute_pose import grunert, three_point_pose
 from omninav.stages.geometry.two_views.epipolar import planar_two_points
 from omninav.stages.geometry.two_views.relative_pose_ransac import relative_pose
-from omninav.stages.homing.visual_homing import VisualHomingState, VisualHoming
+from omninav.stages.homing.visual_homing import VisualHoming, VisualHomingState
 from omninav.stages.match.correspondences import MatchFeatures
 from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.config import MirrorCamera

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.stats import multivariate_normal
 
 from omninav.pipeline import Context
-from omninav.stages.fusion.covariance_intersection import CovarianceIntersection, fused
+from omninav.stages.fusion.covariance_intersection import CovarianceIntersection, fuse
 from omninav.stages.geometry.probability.gaussians import density, merged
 from omninav.stages.motion.gaussian import GaussianMotion
 from omninav.stages.sensor.superposition import Superposition
@@ -75,7 +75,7 @@ def _step() -> list[Row]:
         {
             "step": step,
             "intersection": lambda: fusion.step(ctx, belief, hypothesis),
-            "pairs": lambda: fused(a, b, 7.81),
+            "pairs": lambda: fuse(a, b, 7.81),
             "plainly": lambda: _fused_plainly(a, b, 7.81),
             "merging": lambda: merged(*crowded, 2.0),
         },

@@ -3,7 +3,7 @@
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Source, Stage, State, Tick
-from omninav.stages.geometry.plane.odometry_motion import turn_go_turn
+from omninav.stages.geometry.plane.odometry_motion import decompose_motion
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import UncertainMotion
@@ -23,7 +23,7 @@ def look(tick: int) -> np.ndarray:
 
 
 def way(tick: int) -> UncertainMotion:
-    return UncertainMotion(turn_go_turn(*map(float, between(place(tick - 1), place(tick)))), (0.02, 0.02, 0.02))
+    return UncertainMotion(decompose_motion(*map(float, between(place(tick - 1), place(tick)))), (0.02, 0.02, 0.02))
 
 
 class At(State):

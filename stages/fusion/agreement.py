@@ -1,4 +1,4 @@
-"""Keeps particles where belief and map agree; where they do not, follows both."""
+"""Resamples particles where belief and map agree; tracks both hypotheses where they do not."""
 
 from typing import Annotated, Literal
 
@@ -11,37 +11,37 @@ from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.pose import UncertainMotion
 
-from .auxiliary import auxiliary
+from .auxiliary import auxiliary_filter
 
 Array = npt.NDArray[np.float64]
 
 
 class Agreement(Stage):
-    """Resamples particles by the map's density where the two agree; else tracks both.
+    """Resamples particles by the map's density where belief and map agree; otherwise tracks both.
 
-    Porta & Kroese 2004, section 3.1. The map's hypothesis is p(y|x), equation 5: a mixture, whose weights, lambda w,
-    are made to sum to 1, so that it is a density over poses in 1/(m^2 rad). `agreement`, sum_i pi_i p(y|x_i), is then
-    one too; `agree_above` holds for metres and radians (the paper gives 10^-4 without units: erratum 14).
+    Porta & Kroese 2004, section 3.1. The map's hypothesis is p(y|x), equation 5: a mixture whose weights lambda w are
+    normalised to sum 1, so that it is a density over poses in 1/(m^2 rad). The agreement sum_i pi_i p(y|x_i) has the
+    same unit.
 
-    * Above it: all particles are drawn anew by pi_i p(y|x_i) and weigh 1/N. This is what the paper describes; it is
-      importance resampling (SIR, `sampling: importance`), although it cites the auxiliary filter (erratum 15).
-      `sampling: auxiliary` is that filter (`fusion/auxiliary.py`); it needs the belief before the motion, and `model`.
-    * Below it: the share `keep` of the particles, chosen at random and not by weight (erratum 17a), stays and weighs
-      `keep`; the others are drawn from the hypothesis, by lambda w, and weigh the rest, each alike (erratum 17).
-    * Without hypothesis the belief stays as it is.
-
-    `stray`: the chance that a view is like one it has nothing to do with. Then it says nothing about the pose, which
-    may be any the belief has: the density becomes (1 - stray) p(y|x) + stray sum_i pi_i p(y|x_i), and the belief that
-    one look-alike has spoken against is not lost at once. 0 is the paper's filter.
+    * Agreement above `agree_above`: all particles are resampled by pi_i p(y|x_i) and get weight 1/N. This is what the
+      paper describes. It is importance resampling (SIR), although the paper cites the auxiliary filter (erratum 15).
+    * Agreement below: a share `keep` of the particles, chosen at random and not by weight (erratum 17a), stays with
+      total weight `keep`; the others are drawn from the hypothesis by lambda w and share the rest equally (erratum 17).
+    * Without a hypothesis the belief stays as it is.
     """
 
     sampling: Literal["importance", "auxiliary"] = "importance"
+    """Resampling where both agree: `auxiliary` is Pitt & Shephard's filter (1999), which needs `before` and `model`."""
     agree_above: Annotated[float, Bounds(ge=0)] = 1e-4
+    """Agreement, 1/(m^2 rad), above which both agree; the paper gives 10^-4 without a unit (erratum 14)."""
     keep: Annotated[float, Bounds(ge=0, le=1)] = 0.8
-    stray: Annotated[float, Bounds(ge=0, le=1)] = 0.0
+    """Share of the particles that stays where belief and map disagree."""
+    outlier_probability: Annotated[float, Bounds(ge=0, le=1)] = 0.0
+    """Probability that a view matches one it has nothing to do with; the density becomes (1 - q) p(y|x) + q times the
+    agreement, so that one false match does not end a belief. 0 is the paper's filter."""
 
     class Out(Outputs):
-        """The belief after the picture."""
+        """The belief after the image."""
 
         belief: Particles
 
@@ -62,33 +62,38 @@ class Agreement(Stage):
         if agreement > self.agree_above:
             ctx.count("agreed")
             if self.sampling == "auxiliary" and before is not None and model is not None:
-                chosen = auxiliary(before, model, hypothesis, self.stray * agreement, ctx.rng)
+                chosen = auxiliary_filter(before, model, hypothesis, self.outlier_probability * agreement, ctx.rng)
                 if chosen is not None:
                     return self.Out(belief=chosen)
-            likelihood = (1.0 - self.stray) * likelihood + self.stray * agreement
+            likelihood = (1.0 - self.outlier_probability) * likelihood + self.outlier_probability * agreement
             rows = systematic(particles.weights * likelihood, len(particles.poses), float(ctx.rng.random()))
-            return self.Out(belief=equally(particles.poses[rows]))
+            return self.Out(belief=equally_weighted(particles.poses[rows]))
         ctx.count("disagreed")
-        return self.Out(belief=both(particles, hypothesis, self.keep, ctx.rng))
+        return self.Out(belief=mix_with_hypothesis(particles, hypothesis, self.keep, ctx.rng))
 
 
-def equally(poses: Array) -> Particles:
-    """Particles that weigh alike."""
+def equally_weighted(poses: Array) -> Particles:
+    """Particles of equal weights, sum 1."""
     return Particles(poses, np.full(len(poses), 1.0 / len(poses)))
 
 
-def both(particles: Particles, hypothesis: GaussianMixture, keep: float, rng: np.random.Generator) -> Particles:
-    """As many particles: the share `keep` of them, picked at random, and for the rest draws from the hypothesis.
+def mix_with_hypothesis(
+    particles: Particles, hypothesis: GaussianMixture, keep: float, rng: np.random.Generator
+) -> Particles:
+    """The share `keep` of the particles, chosen at random, and draws from the hypothesis for the rest.
 
-    The kept ones weigh `keep` in all, as they did among themselves; the others the rest, each alike.
+    The kept particles have the total weight `keep` and their relative weights; the others share the rest equally.
     """
     number = len(particles.poses)
     kept = np.sort(rng.permutation(number)[: round(keep * number)])
     old = particles.weights[kept]
-    fresh = drawn(hypothesis.means, hypothesis.covariances, hypothesis.weights, number - len(kept), rng)
+    drawn_poses = drawn(hypothesis.means, hypothesis.covariances, hypothesis.weights, number - len(kept), rng)
     share = len(kept) / number if old.sum() > 0.0 else 0.0
     weights = np.concatenate(
-        [old * (share / old.sum()) if share else np.zeros(len(old)), np.full(len(fresh), 1.0 / max(1, len(fresh)))]
+        [
+            old * (share / old.sum()) if share else np.zeros(len(old)),
+            np.full(len(drawn_poses), 1.0 / max(1, len(drawn_poses))),
+        ]
     )
     weights[len(old) :] *= 1.0 - share
-    return Particles(np.concatenate([particles.poses[kept], fresh]), weights / weights.sum())
+    return Particles(np.concatenate([particles.poses[kept], drawn_poses]), weights / weights.sum())

@@ -11,9 +11,9 @@ from omninav.stages.values.similarity import Similarities
 
 
 class BestMatch(Stage):
-    """The pose of the reference most like the view, turned by the heading at which it is so: no memory, no motion.
+    """Reports the pose of the most similar reference, turned by its best heading: no filter, no memory.
 
-    What plain image matching gives, to stand beside a filter.
+    Plain image matching, as a baseline for the filters.
     """
 
     class Out(Outputs):

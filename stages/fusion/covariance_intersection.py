@@ -1,4 +1,4 @@
-"""Mixtures from several sources into one belief, by weighted covariance intersection."""
+"""Fuses mixtures from several sources into one belief by weighted covariance intersection."""
 
 from typing import Annotated, Literal
 
@@ -15,7 +15,7 @@ Rule = Literal["det_ratio", "det_min"]
 
 
 def alpha_by_ratio(cov_a: Array, cov_b: Array, weight_a: float = 1.0, weight_b: float = 1.0) -> float:
-    """How much b counts: w_b det(C_a) / (w_b det(C_a) + w_a det(C_b)).
+    """The weight alpha of b: w_b det(C_a) / (w_b det(C_a) + w_a det(C_b)).
 
     Gross, Koenig & Mueller 2005, equation 5; with equal weights the form of Porta & Kroese. A heuristic: it does not
     minimise the result's determinant, and saturates (covariances 1 : 4 in three dimensions give 1 : 64; erratum 3).
@@ -23,33 +23,36 @@ def alpha_by_ratio(cov_a: Array, cov_b: Array, weight_a: float = 1.0, weight_b: 
     return float(_ratio(np.linalg.slogdet(cov_a)[1], np.linalg.slogdet(cov_b)[1], weight_a, weight_b))
 
 
-def alpha_of_least_determinant(cov_a: Array, cov_b: Array) -> float:
-    """How much b counts so that the intersection has the least determinant (Julier & Uhlmann 1997; erratum 3)."""
+def alpha_of_min_determinant(cov_a: Array, cov_b: Array) -> float:
+    """The weight alpha of b at which the intersection has the smallest determinant.
+
+    Julier & Uhlmann 1997; erratum 3.
+    """
     inverse = np.empty((3, 3))
     inverse_into(np.ascontiguousarray(cov_b, np.float64), inverse)
-    return float(_least(np.ascontiguousarray(cov_a, np.float64), inverse))
+    return float(_min_determinant(np.ascontiguousarray(cov_a, np.float64), inverse))
 
 
-def fused(
+def fuse(
     a: tuple[Array, Array, Array],
     b: tuple[Array, Array, Array],
     gamma: float,
     alpha: Rule = "det_ratio",
     weighted: bool = True,
 ) -> tuple[Array, Array, Array]:
-    """Two mixtures (means, covariances, weights > 0) fused; the weights still sum to those of both.
+    """Fuse two mixtures (means, covariances, weights > 0); the result's weights sum to those of both.
 
     Gross, Koenig & Mueller 2005, section 2.1: components whose squared Mahalanobis distance is below `gamma`
-    (equation 2, erratum 1) are intersected pair by pair (equations 3 and 4, erratum 2), with weight
-    w_a w_b / sum of the w_b that match a + w_b w_a / sum of the w_a that match b (equations 6 to 8); those that match
-    none are copied. So the sum of all weights is that of both mixtures (erratum 5), which is to be normalised only
-    after the last source. Raises ValueError where a covariance is not positive definite.
+    (equation 2, erratum 1) are intersected pairwise (equations 3 and 4, erratum 2), with weight
+    w_a w_b / sum of the w_b that match a + w_b w_a / sum of the w_a that match b (equations 6 to 8); unmatched
+    components are copied. So the sum of all weights is that of both mixtures (erratum 5); normalise only after the last
+    source. Raises ValueError where a covariance is not positive definite.
     """
     mean_a, cov_a, weight_a, mean_b, cov_b, weight_b = (np.ascontiguousarray(each, np.float64) for each in (*a, *b))
-    means, covariances, weights, fine = _fused(
+    means, covariances, weights, definite = _fuse(
         mean_a, cov_a, weight_a, mean_b, cov_b, weight_b, gamma, alpha == "det_ratio", weighted
     )
-    if not fine:
+    if not definite:
         raise ValueError("a covariance is not positive definite")
     return means, covariances, weights
 
@@ -61,7 +64,7 @@ def _ratio(log_det_a: float, log_det_b: float, weight_a: float, weight_b: float)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _least(cov_a: Array, inverse_b: Array) -> float:
+def _min_determinant(cov_a: Array, inverse_b: Array) -> float:
     # det(C^-1) over det(C_a^-1) is det(I + alpha E) with E = C_a C_b^-1 - I: a cubic in alpha, log-concave where C_a
     # and C_b are positive definite. Its slope's sign is followed to the one maximum in [0, 1].
     e = cov_a @ inverse_b
@@ -91,7 +94,7 @@ def _least(cov_a: Array, inverse_b: Array) -> float:
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _fused(
+def _fuse(
     mean_a: Array,
     cov_a: Array,
     weight_a: Array,
@@ -105,7 +108,7 @@ def _fused(
     size_a, size_b = len(weight_a), len(weight_b)
     match = np.zeros((size_a, size_b), np.bool_)
     matched_a, matched_b = np.zeros(size_a), np.zeros(size_b)
-    alone_a, alone_b = np.ones(size_a, np.bool_), np.ones(size_b, np.bool_)
+    unmatched_a, unmatched_b = np.ones(size_a, np.bool_), np.ones(size_b, np.bool_)
     number = 0
     for i in range(size_a):
         for j in range(size_b):
@@ -115,9 +118,9 @@ def _fused(
                 match[i, j] = True
                 matched_a[i] += weight_b[j]
                 matched_b[j] += weight_a[i]
-                alone_a[i] = alone_b[j] = False
+                unmatched_a[i] = unmatched_b[j] = False
                 number += 1
-    size = number + alone_a.sum() + alone_b.sum()
+    size = number + unmatched_a.sum() + unmatched_b.sum()
     means, covariances, weights = np.empty((size, 3)), np.empty((size, 3, 3)), np.empty(size)
     inverse = np.empty((3, 3))
     log_det_a, log_det_b = np.empty(size_a), np.empty(size_b)
@@ -125,56 +128,56 @@ def _fused(
         log_det_a[i] = inverse_into(cov_a[i], inverse)
     for j in range(size_b):
         log_det_b[j] = inverse_into(cov_b[j], inverse)
-    fine = not (np.isnan(log_det_a).any() or np.isnan(log_det_b).any())
+    definite = not (np.isnan(log_det_a).any() or np.isnan(log_det_b).any())
     at = 0
     for i in range(size_a):
-        if alone_a[i]:
+        if unmatched_a[i]:
             means[at], covariances[at], weights[at] = mean_a[i], cov_a[i], weight_a[i]
             at += 1
         for j in range(size_b):
             if not match[i, j]:
                 continue
-            heavy_a, heavy_b = (weight_a[i], weight_b[j]) if weighted else (1.0, 1.0)
+            share_a, share_b = (weight_a[i], weight_b[j]) if weighted else (1.0, 1.0)
             if by_ratio:
-                alpha = _ratio(log_det_a[i], log_det_b[j], heavy_a, heavy_b)
+                alpha = _ratio(log_det_a[i], log_det_b[j], share_a, share_b)
             else:
                 inverse_into(cov_b[j], inverse)
-                alpha = _least(cov_a[i], inverse)
-            fine &= intersect_into(mean_a[i], cov_a[i], mean_b[j], cov_b[j], alpha, means[at], covariances[at])
+                alpha = _min_determinant(cov_a[i], inverse)
+            definite &= intersect_into(mean_a[i], cov_a[i], mean_b[j], cov_b[j], alpha, means[at], covariances[at])
             weights[at] = weight_a[i] * weight_b[j] * (1.0 / matched_a[i] + 1.0 / matched_b[j])
             at += 1
     for j in range(size_b):
-        if alone_b[j]:
+        if unmatched_b[j]:
             means[at], covariances[at], weights[at] = mean_b[j], cov_b[j], weight_b[j]
             at += 1
-    return means, covariances, weights, fine
+    return means, covariances, weights, definite
 
 
 class CovarianceIntersection(Stage):
-    """Fuses prediction and hypotheses by covariance intersection; normalises once, after the last.
+    """Fuses prediction and hypotheses by covariance intersection; normalises once, after the last source.
 
-    Gross, Koenig & Mueller 2005, section 2.1, with errata 1 to 5: `fused` says how two mixtures become one. Sources are
-    taken in the order of the ports, each weighing what its weights sum to. Then weights are brought to sum 1, so that
-    what no source supports fades, near components are merged (closest first, with the spread of their means), those
-    lighter than `drop_below` times the heaviest go, and of the rest the `most` heaviest stay.
-
-    `gamma`: the squared Mahalanobis distance below which two components correspond; 7.81 holds 95 % with 3 degrees of
-    freedom. `alpha`: the paper's ratio of determinants, or what gives the least determinant; `weighted`: whether the
-    ratio takes the weights into account (Gross, Koenig & Mueller) or not (Porta & Kroese). `merge`: the squared
-    Mahalanobis distance below which components of the result are merged; two equal Gaussians closer than 2 have one
-    peak between them (two sigma apart); 0 merges none. `most` bounds the work where a view is seen everywhere (0: all
-    stay). Covariances do not shrink where sources agree (erratum 4).
+    Gross, Koenig & Mueller 2005, section 2.1, with errata 1 to 5: see `fuse`. The sources are fused in the order of the
+    ports, each with its own sum of weights. Then the weights are normalised, so that components without support fade,
+    close components are merged (closest first, with the spread of their means), light ones are dropped, and at most
+    `max_components` stay. Covariances do not shrink where sources agree (erratum 4).
     """
 
     gamma: Annotated[float, Bounds(gt=0)] = 7.81
+    """Squared Mahalanobis distance below which two components correspond; 7.81: 95 % with 3 degrees of freedom."""
     alpha: Rule = "det_ratio"
+    """Weight of the second covariance: `det_ratio` (the paper's), or `det_min`, the smallest determinant."""
     weighted: bool = True
-    merge: Annotated[float, Bounds(ge=0)] = 2.0
+    """Whether `det_ratio` uses the components' weights (Gross, Koenig & Mueller) or not (Porta & Kroese)."""
+    merge_below: Annotated[float, Bounds(ge=0)] = 2.0
+    """Squared Mahalanobis distance below which components of the result are merged; two equal Gaussians closer than 2
+    (two sigma) have a single peak. 0: none."""
     drop_below: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
-    most: Annotated[int, Bounds(ge=0)] = 200
+    """Components lighter than this share of the heaviest are dropped."""
+    max_components: Annotated[int, Bounds(ge=0)] = 200
+    """The heaviest components that stay, which bounds the work; 0: all."""
 
     class Out(Outputs):
-        """What is believed after all sources have been heard; weights sum to 1."""
+        """The belief after all sources; weights sum to 1."""
 
         belief: GaussianMixture
 
@@ -186,24 +189,24 @@ class CovarianceIntersection(Stage):
         fixes: GaussianMixture | None = None,
         other: GaussianMixture | None = None,
     ) -> Out:
-        """Fuse all that is there."""
-        belief = _heavy(prediction)
+        """Fuse all sources that are present."""
+        belief = _positive(prediction)
         for source in (hypothesis, fixes, other):
             if source is not None:
-                belief = fused(belief, _heavy(source), self.gamma, self.alpha, self.weighted)
+                belief = fuse(belief, _positive(source), self.gamma, self.alpha, self.weighted)
         if not len(belief[2]):
             return self.Out(belief=prediction)
         return self.Out(belief=GaussianMixture(*self._simplified(*belief)))
 
     def _simplified(self, means: Array, covariances: Array, weights: Array) -> tuple[Array, Array, Array]:
         weights = weights / weights.sum()
-        means, covariances, weights = merged(means, covariances, weights, self.merge)
+        means, covariances, weights = merged(means, covariances, weights, self.merge_below)
         kept = np.flatnonzero(weights >= self.drop_below * float(weights.max()))
-        if self.most and len(kept) > self.most:
-            kept = kept[np.sort(np.argsort(-weights[kept], kind="stable")[: self.most])]
+        if self.max_components and len(kept) > self.max_components:
+            kept = kept[np.sort(np.argsort(-weights[kept], kind="stable")[: self.max_components])]
         return means[kept], covariances[kept], weights[kept] / weights[kept].sum()
 
 
-def _heavy(mixture: GaussianMixture) -> tuple[Array, Array, Array]:
+def _positive(mixture: GaussianMixture) -> tuple[Array, Array, Array]:
     kept = mixture.weights > 0.0
     return mixture.means[kept], mixture.covariances[kept], mixture.weights[kept]

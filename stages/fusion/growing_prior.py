@@ -1,4 +1,4 @@
-"""The first belief of a log where the map is learned on the way."""
+"""The first belief of a log where the map is learned during the drive."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -20,48 +20,49 @@ Where = Literal["uniform", "truth", "origin"] | tuple[float, float, float, float
 
 @dataclass(kw_only=True, eq=False)
 class GrowingPrior:
-    """Where a log begins, at a known pose while the map is empty, anywhere in the map later: a mixin, beside `Stage`.
+    """The first pose of a log: known while the map is empty, uniform over the map later. A mixin, beside `Stage`.
 
-    All localisation is with respect to the pose at which a map is begun (Porta & Kroese 2004, section 3): with an empty
-    map, `uniform` means the log's first true pose where it has one, else the origin, and that pose is certain to
-    `begun_m` and `begun_deg`. With views in the map, `uniform` means anywhere that views were seen from. `truth`,
-    `origin`, and x, y, heading with the standard deviations of position and heading (m, m, rad, m, rad) hold for every
-    log; the first two with 0.1 m and 0.1 rad where there is a map. Raises BadInput where `truth` finds none.
+    All poses are relative to the pose at which a map is begun (Porta & Kroese 2004, section 3). Raises BadInput where
+    `at` is `truth` and the log has no true pose.
     """
 
     at: Where = "uniform"
-    begun_m: Annotated[float, Bounds(gt=0)] = 0.01
-    begun_deg: Annotated[float, Bounds(gt=0)] = 0.5
+    """First pose: `uniform` (with an empty map the log's first true pose, else the origin; later anywhere in the map),
+    `truth`, `origin`, or [x, y, heading, sigma_xy, sigma_heading] (m, rad)."""
+    initial_sigma_m: Annotated[float, Bounds(gt=0)] = 0.01
+    """Standard deviation of the pose at which a map is begun; 0.1 m where there is a map."""
+    initial_sigma_deg: Annotated[float, Bounds(gt=0)] = 0.5
+    """Standard deviation of the heading at which a map is begun; 0.1 rad where there is a map."""
 
     def known(self, map: ViewMixtures, truth: Pose | None) -> tuple[Array, Array] | None:
-        """The pose (3,) and its standard deviations (3,), or None where the log may begin anywhere in the map."""
+        """The pose (3,) and its standard deviations (3,), or None where the belief is uniform over the map."""
         at = self.at
         if at == "uniform":
             if len(map):
                 return None
             at = "origin" if truth is None else "truth"
-        metres, radians = (0.1, 0.1) if len(map) else (self.begun_m, float(np.radians(self.begun_deg)))
+        metres, radians = (0.1, 0.1) if len(map) else (self.initial_sigma_m, float(np.radians(self.initial_sigma_deg)))
         if at == "origin":
             return np.zeros(3), np.array([metres, metres, radians])
         if at == "truth":
             if truth is None:
-                raise BadInput("start: this log has no true pose at its first picture; use start=uniform")
+                raise BadInput("start: this log has no true pose at its first image; use start=uniform")
             return np.array([truth.x, truth.y, truth.heading]), np.array([metres, metres, radians])
         return np.array(at[:3]), np.array([at[3], at[3], at[4]])
 
 
 class ParticlesInMap(GrowingPrior, Stage):
-    """The first particles of a log: around a known pose, or drawn from the map so far with any heading.
+    """Draws the first particles of a log: around a known pose, or from the map with uniform headings.
 
-    With an empty map `start=uniform` begins at the log's first true pose, else at the origin (Porta & Kroese 2004,
-    section 3). With views in it, particles are drawn from the places of all views by their weights, and their
-    headings evenly. So in a fused map all views count alike, and in one that adapts those more that it trusts more.
+    Positions are drawn from the components of all views by their weights: in a fused map all views count equally, in an
+    adaptive one by their weights. Porta & Kroese 2004, section 3.
     """
 
     number: Annotated[int, Bounds(ge=1)] = 1000
+    """Particles."""
 
     class Out(Outputs):
-        """The belief to begin with; absent at all later pictures."""
+        """The belief to begin with; absent at all later images."""
 
         belief: Particles | None = None
 
@@ -80,15 +81,14 @@ class ParticlesInMap(GrowingPrior, Stage):
 
 
 class MixtureInMap(GrowingPrior, Stage):
-    """The first Gaussian of a log: a known pose, or one as wide as the map so far, with any heading.
+    """Gives the first Gaussian of a log: at a known pose, or with the map's moments and an unknown heading.
 
-    With an empty map `start=uniform` begins at the log's first true pose, else at the origin (Porta & Kroese 2004,
-    section 3). With views in it, it is the Gaussian with the x, y moments of the places of all views; a heading of
-    which nothing is known has the standard deviation of an even distribution, pi / sqrt(3).
+    Mean and covariance of x, y are those of the components of all views; the heading has the standard deviation of a
+    uniform distribution, pi / sqrt(3).
     """
 
     class Out(Outputs):
-        """The belief to begin with; absent at all later pictures."""
+        """The belief to begin with; absent at all later images."""
 
         belief: GaussianMixture | None = None
 
@@ -99,7 +99,9 @@ class MixtureInMap(GrowingPrior, Stage):
         known = self.known(map, truth)
         if known is None:
             mean, covariance, _ = moments(map.means, map.covariances, map.weights)
-            covariance = floored(covariance, (self.begun_m, self.begun_m, float(np.radians(self.begun_deg))))
+            covariance = floored(
+                covariance, (self.initial_sigma_m, self.initial_sigma_m, float(np.radians(self.initial_sigma_deg)))
+            )
             covariance[2, :2] = covariance[:2, 2] = 0.0
             covariance[2, 2] = np.pi**2 / 3.0
         else:

@@ -1,4 +1,4 @@
-"""Weighs predicted particles by the view and resamples them."""
+"""Weights predicted particles by the view and resamples them."""
 
 import math
 from typing import Annotated, Literal
@@ -15,7 +15,7 @@ Array = npt.NDArray[np.float64]
 
 
 def kld_number(cells: int, error: float, confidence: float) -> int:
-    """Samples needed that the belief lies within `error` (K-L distance) with `confidence`, given the cells it fills.
+    """Samples with which the belief is within `error` (K-L distance) with `confidence`, given its occupied cells.
 
     Fox 2001: n = (k - 1) / (2 error) (1 - 2 / (9 (k - 1)) + sqrt(2 / (9 (k - 1))) z)^3, z the normal quantile.
     """
@@ -26,76 +26,81 @@ def kld_number(cells: int, error: float, confidence: float) -> int:
 
 
 class ImportanceResampling(Stage):
-    """Importance weights, then systematic resampling where few particles carry the weight.
+    """Multiplies particle weights by the likelihood; resamples systematically where the effective size is small.
 
-    Gross & Koenig 2004, section 2 (5000 samples for global localisation, 500 for tracking). Weights are multiplied by
-    the likelihood; below an effective size of `resample_below` times the number, particles are resampled.
+    Gross & Koenig 2004, section 2 (5000 samples for global localisation, 500 for tracking).
 
-    Against kidnapping: with probability `kidnapped` per picture of fresh evidence the robot was put anywhere. What a
-    uniform belief would then get, kidnapped x fresh x `likelihood.anywhere`, goes to the `proposals`, poses that the
-    view itself suggests. They join the particles set `aside` (a share of `number`), which are resampled among
-    themselves, by how well they fit the view, so that a hypothesis lives however little it weighs, and evidence for it
-    adds up from picture to picture. As soon as they weigh more than their share, they are resampled with all others.
-    It is one mixture, with weights that are right throughout; only where the particles go is decided apart.
-
-    `adapt`: `kld` sets the number between `tracking` and `number` by the cells of `cell_m`, `cell_deg` the belief fills
-    (Fox 2001; `kld_error`, 99 % confidence); `none` keeps `number`.
+    Recovery from kidnapping: the weight that a uniform belief would get, `kidnapping_probability` x novelty x mean
+    likelihood, goes to the `proposals`, poses that the view itself suggests. They join the recovery particles, which
+    are resampled among themselves by how well they fit the view, so that evidence for a hypothesis accumulates over
+    images however small its weight. Once they outweigh their share they are resampled with all others. Weights are
+    those of one mixture throughout; only the allocation of particles differs.
     """
 
     number: Annotated[int, Bounds(ge=1)] = 5000
-    tracking: Annotated[int, Bounds(ge=1)] = 500
+    """Particles, at most."""
+    min_particles: Annotated[int, Bounds(ge=1)] = 500
+    """Particles, at least, with `adapt: kld`."""
     adapt: Literal["kld", "none"] = "none"
+    """`kld`: the number follows from the cells that the belief occupies (Fox 2001, 99 % confidence)."""
     resample_below: Annotated[float, Bounds(ge=0, le=1)] = 0.5
-    kidnapped: Annotated[float, Bounds(ge=0, lt=1)] = 1e-7
-    aside: Annotated[float, Bounds(ge=0, lt=1)] = 0.1
+    """Effective size, as a share of the number, below which particles are resampled."""
+    kidnapping_probability: Annotated[float, Bounds(ge=0, lt=1)] = 1e-7
+    """Probability per image of full novelty that the robot was kidnapped."""
+    recovery_share: Annotated[float, Bounds(ge=0, lt=1)] = 0.1
+    """Share of the particles that are recovery particles."""
     kld_error: Annotated[float, Bounds(gt=0)] = 0.05
+    """Kullback-Leibler distance allowed with `adapt: kld`."""
     cell_m: Annotated[float, Bounds(gt=0)] = 0.25
+    """Width of the cells counted with `adapt: kld`."""
     cell_deg: Annotated[float, Bounds(gt=0)] = 10.0
+    """Height of these cells in heading."""
 
     class Out(Outputs):
-        """The belief after the picture."""
+        """The belief after the image."""
 
         belief: Particles
 
     def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:
         """Fuse prediction and observation."""
-        poses, known = particles.poses, particles.weights * likelihood.values
-        total, new = float(known.sum()), 0.0
+        poses, weighted = particles.poses, particles.weights * likelihood.values
+        total, new = float(weighted.sum()), 0.0
         if not (math.isfinite(total) and total > 0.0):
-            ctx.count("belief_without_support", detail="fusion: no particle explains the picture; weights kept")
-            known, total, proposals = particles.weights, float(particles.weights.sum()), None
-        moved = self.kidnapped * likelihood.fresh
-        if proposals is not None and likelihood.anywhere is not None:
-            new = moved * likelihood.anywhere * float(particles.weights.sum())
-            known, total = known * (1.0 - moved), total * (1.0 - moved) + new
-        wanted, tracked = self._wanted(poses[: len(poses) - particles.aside]), len(poses) - particles.aside
-        weights = known / total
-        aside = int(self.aside * wanted) if new > 0.0 else 0
-        if float(weights[tracked:].sum()) * wanted > aside:  # it weighs enough to live among the others
+            ctx.count("belief_without_support", detail="fusion: no particle explains the image; weights kept")
+            weighted, total, proposals = particles.weights, float(particles.weights.sum()), None
+        moved = self.kidnapping_probability * likelihood.novelty
+        if proposals is not None and likelihood.mean_likelihood is not None:
+            new = moved * likelihood.mean_likelihood * float(particles.weights.sum())
+            weighted, total = weighted * (1.0 - moved), total * (1.0 - moved) + new
+        tracked = len(poses) - particles.recovery_particles
+        wanted = self._wanted(poses[:tracked])
+        weights = weighted / total
+        recovery = int(self.recovery_share * wanted) if new > 0.0 else 0
+        if float(weights[tracked:].sum()) * wanted > recovery:  # they weigh enough to be resampled with the others
             tracked = len(poses)
-        main = self._resampled(ctx, poses[:tracked], weights[:tracked], wanted - aside)
-        if proposals is None or not aside:
+        main = self._resampled(ctx, poses[:tracked], weights[:tracked], wanted - recovery)
+        if proposals is None or not recovery:
             return self.Out(belief=Particles(main[0], main[1] / main[1].sum()))
-        others = self._set_aside(
+        others = self._resample_recovery(
             ctx,
             np.concatenate([poses[tracked:], proposals.poses]),
             np.concatenate([weights[tracked:], proposals.weights * (new / total)]),
-            np.concatenate([likelihood.values[tracked:], np.full(len(proposals.poses), likelihood.fresh)]),
-            aside,
+            np.concatenate([likelihood.values[tracked:], np.full(len(proposals.poses), likelihood.novelty)]),
+            recovery,
         )
         both = np.concatenate([main[1], others[1]])
-        return self.Out(belief=Particles(np.concatenate([main[0], others[0]]), both / both.sum(), aside))
+        return self.Out(belief=Particles(np.concatenate([main[0], others[0]]), both / both.sum(), recovery))
 
-    def _set_aside(
+    def _resample_recovery(
         self, ctx: Context, poses: Array, weights: Array, fitness: Array, number: int
     ) -> tuple[Array, Array]:
-        # Drawn by how well they fit, not by what they weigh (the draw is in the weights): by weight, an old hypothesis
-        # would push out each new one before anything could speak for it.
+        # Drawn by fit and corrected in the weights: drawn by weight, old hypotheses would displace new ones before
+        # evidence for these could accumulate.
         drawn = systematic(fitness, number, float(ctx.rng.random()))
         return poses[drawn], weights[drawn] / fitness[drawn] * (fitness.sum() / number)
 
     def _resampled(self, ctx: Context, poses: Array, weights: Array, wanted: int) -> tuple[Array, Array]:
-        # The weights keep their sum, which is less than 1 where others are set aside.
+        # The weights keep their sum, which is below 1 where there are recovery particles.
         if wanted == len(weights) and effective_size(weights) >= self.resample_below * wanted:
             return poses, weights
         drawn = systematic(weights, wanted, float(ctx.rng.random()))
@@ -105,4 +110,4 @@ class ImportanceResampling(Stage):
         if self.adapt == "none":
             return self.number
         cells = occupied_cells(poses, self.cell_m, math.radians(self.cell_deg))
-        return min(max(kld_number(cells, self.kld_error, 0.99), self.tracking), self.number)
+        return min(max(kld_number(cells, self.kld_error, 0.99), self.min_particles), self.number)

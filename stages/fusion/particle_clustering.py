@@ -1,4 +1,4 @@
-"""Particles as a few Gaussians."""
+"""Summarises particles as a few Gaussians."""
 
 import math
 from typing import Annotated
@@ -16,41 +16,44 @@ Array = npt.NDArray[np.float64]
 
 
 class ParticleClustering(Stage):
-    """Particles that lie close together become one Gaussian: its mean, its spread, the sum of their weights.
+    """Replaces each cluster of particles by a Gaussian with its mean, covariance and weight.
 
-    Porta & Kroese 2004, section 3.2. Close means: in the same cell of `close_m` by `close_deg`, or in cells that touch,
-    and so on from cell to cell; so a cluster has any shape, and it takes an empty cell to part two. Gaussians below
-    `least_weight` are not considered (0.01); the others' weights are made to sum to 1. The heading's mean is circular.
-    Standard deviations are never less than `floor_m` and `floor_deg`: of particles that are all equal there is no
-    spread to compute (erratum 18). Where nothing weighs enough there is none: nobody knows where the robot is.
+    Porta & Kroese 2004, section 3.2. Particles belong to one cluster where their cells of `cell_m` x `cell_m` x
+    `cell_deg` touch, directly or over other occupied cells, so that a cluster has any shape. The heading's mean is
+    circular. Weights are normalised to sum 1. No Gaussian where no cluster is heavy enough: the pose is unknown.
     """
 
-    close_m: Annotated[float, Bounds(gt=0)] = 0.5
-    close_deg: Annotated[float, Bounds(gt=0, le=120)] = 30.0
-    least_weight: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
-    floor_m: Annotated[float, Bounds(gt=0)] = 0.01
-    floor_deg: Annotated[float, Bounds(gt=0)] = 0.5
+    cell_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """Width of a cell."""
+    cell_deg: Annotated[float, Bounds(gt=0, le=120)] = 30.0
+    """Height of a cell in heading."""
+    min_weight: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
+    """Weight below which a cluster is dropped."""
+    min_sigma_m: Annotated[float, Bounds(gt=0)] = 0.01
+    """Smallest standard deviation of a Gaussian: equal particles have no spread (erratum 18)."""
+    min_sigma_deg: Annotated[float, Bounds(gt=0)] = 0.5
+    """Smallest standard deviation of its heading."""
 
     class Out(Outputs):
-        """The belief as Gaussians; without any where none weighs enough."""
+        """The belief as Gaussians, none where no cluster is heavy enough."""
 
         state: GaussianMixture
 
     def step(self, ctx: Context, particles: Particles) -> Out:
-        """Gather the particles."""
-        floor = (self.floor_m, self.floor_m, math.radians(self.floor_deg))
-        close = (self.close_m, math.radians(self.close_deg))
-        return self.Out(state=gathered(particles, close, self.least_weight, floor))
+        """Cluster the particles."""
+        floor = (self.min_sigma_m, self.min_sigma_m, math.radians(self.min_sigma_deg))
+        close = (self.cell_m, math.radians(self.cell_deg))
+        return self.Out(state=cluster_gaussians(particles, close, self.min_weight, floor))
 
 
-def gathered(
-    particles: Particles, close: tuple[float, float], least_weight: float, floor: tuple[float, float, float]
+def cluster_gaussians(
+    particles: Particles, close: tuple[float, float], min_weight: float, floor: tuple[float, float, float]
 ) -> GaussianMixture:
-    """Clusters of particles as Gaussians, heaviest first; weights sum to 1 (see `Clusters`)."""
+    """Clusters of particles as Gaussians, heaviest first; weights sum to 1."""
     total = float(particles.weights.sum())
     labels = clusters(particles.poses, *close)
     weights = np.bincount(labels, weights=particles.weights) / total
-    chosen = [n for n in np.argsort(-weights, kind="stable") if weights[n] >= least_weight]
+    chosen = [n for n in np.argsort(-weights, kind="stable") if weights[n] >= min_weight]
     means, covariances = np.empty((len(chosen), 3)), np.empty((len(chosen), 3, 3))
     for row, cluster in enumerate(chosen):
         members = labels == cluster

@@ -16,21 +16,24 @@ from omninav.stages.values.pose import Pose
 
 
 class ParticlePrior(Stage):
-    """A belief at the first picture of each log, and none later.
+    """Draws the first particles of a log: uniform over the map or around a known pose.
 
-    `at`: `uniform` over the free space (port `area`), where that is wired, else over the area within `around` reaches
-    (port `reach`, else of `reach_m`) of the map's references, all headings; `truth`, the log's first true pose;
-    `origin`; or x, y, heading, sigma of position, sigma of heading (m, m, rad, m, rad). `truth` and `origin` are spread
-    by 0.1 m and 0.1 rad. Raises BadInput where `truth` or a map is asked for and there is none.
+    Absent at all later images. Raises BadInput where `at` is `truth` and the log has no true pose, or `uniform` and
+    there is neither free space nor a map.
     """
 
     at: Literal["uniform", "truth", "origin"] | tuple[float, float, float, float, float] = "uniform"
+    """First pose: `uniform` over the free space (port `area`) or around the map's references, with all headings;
+    `truth` or `origin`, with sigmas of 0.1 m and 0.1 rad; or [x, y, heading, sigma_xy, sigma_heading] (m, rad)."""
     number: Annotated[int, Bounds(ge=1)] = 5000
-    around: Annotated[float, Bounds(gt=0)] = 2.0
-    reach_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """Particles."""
+    radius: Annotated[float, Bounds(gt=0)] = 2.0
+    """Distance from a reference, in appearance length scales, up to which a uniform belief extends without `area`."""
+    length_scale_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """Appearance length scale where the port `length_scale` is not wired."""
 
     class Out(Outputs):
-        """The belief to begin with; absent at all later pictures."""
+        """The belief to begin with; absent at all later images."""
 
         belief: Particles | None = None
 
@@ -52,12 +55,12 @@ class ParticlePrior(Stage):
                 raise BadInput(
                     "start: `uniform` needs a map with references; use start=origin, start=truth, or give a map"
                 )
-            unit = self.reach_m if length_scale is None else length_scale.metres
-            poses = uniform_around(map.poses, self.around * unit, self.number, ctx.rng)
+            unit = self.length_scale_m if length_scale is None else length_scale.metres
+            poses = uniform_around(map.poses, self.radius * unit, self.number, ctx.rng)
         else:
             if self.at == "truth":
                 if truth is None:
-                    raise BadInput("start: this log has no true pose at its first picture; use start=uniform")
+                    raise BadInput("start: this log has no true pose at its first image; use start=uniform")
                 x, y, heading, metres, radians = truth.x, truth.y, truth.heading, 0.1, 0.1
             elif self.at == "origin":
                 x, y, heading, metres, radians = 0.0, 0.0, 0.0, 0.1, 0.1

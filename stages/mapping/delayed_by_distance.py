@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.stages.geometry.plane.odometry_motion import increment
+from omninav.stages.geometry.plane.odometry_motion import motion_gaussian
 from omninav.stages.geometry.plane.path_reconstruction import reconstructed
 from omninav.stages.geometry.probability.gaussians import squared_distances
 from omninav.stages.values.belief import GaussianMixture
@@ -89,7 +89,7 @@ class DelayedByDistance(Stage):
         map: ViewMixtures | None = None,
     ) -> Out:
         """Take one view in, and give out those that are left behind."""
-        behind.driven += 0.0 if model is None else math.fabs(model.way[1])
+        behind.driven += 0.0 if model is None else math.fabs(model.steps[1])
         lesson = MapUpdate(view, state, ctx.tick.index)
         again: list[MapUpdate] = []
         if self.retrace or self.back_propagate:
@@ -189,7 +189,7 @@ def led(behind: DelayedByDistanceState, row: int, end: tuple[Array, Array]) -> t
     """
     start = certain_state(behind.past[row].state)
     assert start is not None
-    steps = [increment(way.way, way.sigmas) for way in behind.ways[row:]]
+    steps = [motion_gaussian(way.steps, way.sigmas) for way in behind.ways[row:]]
     motions, noise = (np.stack(each) for each in zip(*steps, strict=True))
     return reconstructed(*start, motions, noise, *end)
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.stages.geometry.plane.odometry_motion import increment
+from omninav.stages.geometry.plane.odometry_motion import motion_gaussian
 from omninav.stages.geometry.plane.path_reconstruction import reconstructed
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
@@ -112,7 +112,7 @@ class UnimodalQueue(Stage):
         start, seen = waiting.certain, waiting.seen
         if start is None or not seen:
             return []
-        steps = [increment(way.way, way.sigmas) for way in waiting.ways]
+        steps = [motion_gaussian(way.steps, way.sigmas) for way in waiting.ways]
         means, covariances, missed = reconstructed(
             start.means[0],
             start.covariances[0],

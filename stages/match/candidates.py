@@ -32,7 +32,7 @@ class Candidates(NamedTuple):
     """
 
     chosen: Ints | None = None
-    stands_for: Array | None = None
+    sampling_weight: Array | None = None
 
 
 def near_belief(
@@ -42,25 +42,25 @@ def near_belief(
 
     Around particles set aside only those within `aside` metres are taken: such hypotheses lie all over the map, and
     what they are weighed by lies next to them. Strangers are taken at equal steps along the map, others at each `turn`,
-    so that all of them have their turn; each stands for as many as the step is long, and sums with `stands_for` are
+    so that all of them have their turn; each stands for as many as the step is long, and sums with `sampling_weight` are
     unbiased for the whole map. All references are compared where there is no belief, where `radius` is 0, where none is
     near, and where there are at most `whole`.
     """
     if near is None or radius <= 0.0 or len(poses) <= whole:
         return Candidates()
-    tracked = len(near.poses) - near.aside
+    tracked = len(near.poses) - near.recovery_particles
     near_any = within(poses, near.poses[:tracked], radius) | within(poses, near.poses[tracked:], aside)
     others = np.flatnonzero(~near_any)
     if len(others) == len(poses) or len(others) <= strangers:
         return Candidates()
-    stands_for = near_any.astype(np.float64)
+    sampling_weight = near_any.astype(np.float64)
     if strangers:
         step = len(others) / strangers
         first = (turn * GOLDEN % 1.0) * step
         taken = np.minimum((first + step * np.arange(strangers)).astype(np.int64), len(others) - 1)
-        stands_for[others[taken]] = step
-    chosen = np.flatnonzero(stands_for)
-    return Candidates(chosen, stands_for[chosen])
+        sampling_weight[others[taken]] = step
+    chosen = np.flatnonzero(sampling_weight)
+    return Candidates(chosen, sampling_weight[chosen])
 
 
 def within(poses: Array, places: Array, radius: float) -> npt.NDArray[np.bool_]:

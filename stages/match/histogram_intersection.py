@@ -28,6 +28,6 @@ class HistogramIntersection(NearBelief, Stage):
     ) -> NearBelief.Out:
         """Compare one view."""
         check_alike(features, map)
-        chosen, stands_for = self.candidates(ctx, map, near, length_scale)
+        chosen, sampling_weight = self.candidates(ctx, map, near, length_scale)
         values = similarities(map.features, features.values, self.headings, True, False, chosen=chosen)
-        return self.Out(similarities=Similarities(values, chosen, stands_for, exponent=0.0))
+        return self.Out(similarities=Similarities(values, chosen, sampling_weight, exponent=0.0))

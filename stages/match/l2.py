@@ -28,6 +28,6 @@ class L2Match(NearBelief, Stage):
     ) -> NearBelief.Out:
         """Compare one view."""
         histograms = check_alike(features, map)
-        chosen, stands_for = self.candidates(ctx, map, near, length_scale)
+        chosen, sampling_weight = self.candidates(ctx, map, near, length_scale)
         values = euclidean_similarities(map.features, features.values, self.headings, histograms, chosen)
-        return self.Out(similarities=Similarities(values, chosen, stands_for))
+        return self.Out(similarities=Similarities(values, chosen, sampling_weight))

@@ -133,9 +133,9 @@ class Retrieval(NearBelief, Stage):
         else:
             check_alike(SegmentHistograms(features.values[:1]), map)
             queries = features.values[window_turns(features.directions), None]
-        chosen, stands_for = self.candidates(ctx, map, near, length_scale)
+        chosen, sampling_weight = self.candidates(ctx, map, near, length_scale)
         values = normalised_intersections(map.features, queries, features.scales, chosen)
-        similarities = Similarities(values, chosen, stands_for)
+        similarities = Similarities(values, chosen, sampling_weight)
         if not len(map) or not ctx.is_read("answers"):
             return self.Out(similarities=similarities)
         return self.Out(similarities=similarities, answers=best_answers(similarities, self.best))

@@ -38,7 +38,7 @@ class SelectiveMatch(NearBelief, Stage):
     ) -> NearBelief.Out:
         """Compare one view."""
         histograms = check_alike(features, map)
-        chosen, stands_for = self.candidates(ctx, map, near, length_scale)
+        chosen, sampling_weight = self.candidates(ctx, map, near, length_scale)
         exponent, scale = EXPONENTS[self.penalty], self.colour_scale
         values = similarities(map.features, features.values, self.headings, histograms, True, exponent, chosen, scale)
-        return self.Out(similarities=Similarities(values, chosen, stands_for, exponent, scale))
+        return self.Out(similarities=Similarities(values, chosen, sampling_weight, exponent, scale))

@@ -1,42 +1,47 @@
-"""How uncertain a motion by odometry is: what all stages that move a belief have in common."""
+"""The noise of an odometry motion, shared by all stages that move a belief."""
 
 import math
 from dataclasses import dataclass
 from typing import Annotated
 
 from omninav.pipeline import Bounds
-from omninav.stages.geometry.plane.odometry_motion import turn_go_turn
+from omninav.stages.geometry.plane.odometry_motion import decompose_motion
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.pose import Motion, UncertainMotion
 
 
 @dataclass(kw_only=True, eq=False)
-class OdometryNoise:
-    """Noise of a turn, a way and a turn that grows with the way and with the turn: a mixin, beside `Stage`.
+class OdometryNoiseModel:
+    """Noise of a rotation, a translation and a rotation that grows with distance and turn: a mixin, beside `Stage`.
 
-    Variances grow with the way and the turn, so that many small motions are as uncertain as the one they make up,
-    whatever the camera's rate: each turn has sigma^2 = (rotation_per_rotation^2 |turn| + rotation_per_metre^2 way) / 2
-    + rotation_floor^2 / 2 (rad^2), the way sigma^2 = translation_per_metre^2 way + translation_per_rotation^2 |turn| +
-    translation_floor^2 (m^2). The parameters are the standard deviations after 1 m or 1 rad: rad, rad, m, m; the floors
-    hold per picture, also for a robot that stands. `turn` is the whole turn: a jitter of the wheels sideways
-    is no turn.
+    Variances are proportional to distance and turn, so that many small motions are as uncertain as their sum, whatever
+    the camera's rate. Each rotation has sigma^2 = (rotation_per_rotation^2 |turn| + rotation_per_metre^2 distance +
+    rotation_floor^2) / 2 (rad^2); the translation has sigma^2 = translation_per_metre^2 distance +
+    translation_per_rotation^2 |turn| + translation_floor^2 (m^2). `turn` is the sum of both rotations, so that wheel
+    jitter sideways is no turn.
     """
 
     rotation_per_rotation: Annotated[float, Bounds(ge=0)] = 0.05
+    """Standard deviation (rad) of the heading after a turn by 1 rad."""
     rotation_per_metre: Annotated[float, Bounds(ge=0)] = 0.05
+    """Standard deviation (rad) of the heading after 1 m."""
     translation_per_metre: Annotated[float, Bounds(ge=0)] = 0.1
+    """Standard deviation (m) of the distance after 1 m."""
     translation_per_rotation: Annotated[float, Bounds(ge=0)] = 0.01
+    """Standard deviation (m) of the distance after a turn by 1 rad."""
     rotation_floor: Annotated[float, Bounds(ge=0)] = 0.001
+    """Standard deviation (rad) added at each image, also where the robot stands."""
     translation_floor: Annotated[float, Bounds(ge=0)] = 0.001
+    """Standard deviation (m) added at each image, also where the robot stands."""
 
     def model(self, motion: Motion) -> UncertainMotion:
-        """A motion as turn, way, turn, with the standard deviation of each."""
-        way = turn_go_turn(motion.x, motion.y, motion.turn)
-        return UncertainMotion(way, self.sigmas(way))
+        """A motion as rotation, translation, rotation, with the standard deviation of each."""
+        steps = decompose_motion(motion.x, motion.y, motion.turn)
+        return UncertainMotion(steps, self.sigmas(steps))
 
-    def sigmas(self, way: tuple[float, float, float]) -> tuple[float, float, float]:
-        """Standard deviations of first turn (rad), way (m), second turn (rad)."""
-        distance, turn = abs(way[1]), abs(float(wrap(way[0] + way[2])))
+    def sigmas(self, steps: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Standard deviations of the first rotation (rad), the translation (m) and the second rotation (rad)."""
+        distance, turn = abs(steps[1]), abs(float(wrap(steps[0] + steps[2])))
         rotation = math.sqrt(
             0.5
             * (self.rotation_per_rotation**2 * turn + self.rotation_per_metre**2 * distance + self.rotation_floor**2)

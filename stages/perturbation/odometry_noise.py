@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.plane.odometry_noise import Triple, disturbed
+from omninav.stages.geometry.plane.odometry_noise import Triple, add_odometry_noise
 from omninav.stages.values.pose import Motion
 
 LEVELS: tuple[Triple, ...] = (
@@ -23,7 +23,7 @@ LEVELS: tuple[Triple, ...] = (
 class NoisyOdometry(Stage):
     """Adds noise to each increment of motion: rotation, translation, rotation, as strong as one of nine levels.
 
-    Wolf, Burgard & Burkhardt 2005, section VI-D, figures 16 to 19; erratum 46a: units are our reading, see `disturbed`.
+    Wolf, Burgard & Burkhardt 2005, section VI-D, figures 16 to 19; erratum 46a: units are our reading, see `add_odometry_noise`.
     Each of `levels` is <way in mm per sqrt(m), turn in degrees per sqrt(360 degrees), turn in degrees per sqrt(m)>.
     Raises ValueError where there is no such level.
     """
@@ -42,5 +42,5 @@ class NoisyOdometry(Stage):
     def step(self, ctx: Context, motion: Motion) -> Out:
         """One increment."""
         increment = [[motion.x, motion.y, motion.turn]]
-        row = disturbed(increment, self.levels[self.level], ctx.rng.normal(size=(1, 3)))[0]
+        row = add_odometry_noise(increment, self.levels[self.level], ctx.rng.normal(size=(1, 3)))[0]
         return self.Out(motion=Motion(*(float(value) for value in row)))

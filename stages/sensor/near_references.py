@@ -105,21 +105,21 @@ def weighted_quantile(values: Floats, weights: Array, quantile: float) -> float:
 
 
 def ordinary_match(
-    best: Floats, places: Array, strangers_from: float, quantile: float, stands_for: Array | None = None
+    best: Floats, places: Array, strangers_from: float, quantile: float, sampling_weight: Array | None = None
 ) -> float:
     """What a reference of some other place reaches at its best heading.
 
     `best` (R,): each reference's similarity at its best heading; `places` (R, >= 2) where they are (m). Of those
     farther than `strangers_from` metres from the best of all, the `quantile`; where there are none, the median of all.
-    `stands_for` (R,): how many references of the map each stands for; None: one each.
+    `sampling_weight` (R,): how many references of the map each stands for; None: one each.
     """
     gap = places[:, :2] - places[int(np.argmax(best)), :2]
     strange = gap[:, 0] ** 2 + gap[:, 1] ** 2 > strangers_from**2
     if not strange.any():
         return float(np.median(best))
-    if stands_for is None:
+    if sampling_weight is None:
         return float(np.quantile(best[strange], quantile, method="hazen"))  # the same, without sorting
-    return weighted_quantile(best[strange], stands_for[strange], quantile)
+    return weighted_quantile(best[strange], sampling_weight[strange], quantile)
 
 
 class NearReferences(Stage):
@@ -139,12 +139,12 @@ class NearReferences(Stage):
     `reach`, else `reach_m`): one configuration serves a room, a field and a lawn. `fade`: over which what a reference
     says is lost; `strangers`: from how far away a reference is of another place; `spread`: of proposals.
 
-    Where only some references were compared, those that stand for many (`Similarities.stands_for`) count as many, so
-    that power, ordinary match and `likelihood.anywhere` are estimates for the whole map.
+    Where only some references were compared, those that stand for many (`Similarities.sampling_weight`) count as many, so
+    that power, ordinary match and `likelihood.mean_likelihood` are estimates for the whole map.
 
     `proposals`: poses that a robot put down anywhere would likely be at, weighted by how likely: drawn by weight from
     the similarity field and spread around it (`propose: similarity`), or anywhere around the references, each with
-    its own likelihood (`uniform`). `likelihood.anywhere` says how well the view fits anywhere. For who has just been
+    its own likelihood (`uniform`). `likelihood.mean_likelihood` says how well the view fits anywhere. For who has just been
     put down the picture is the first of its place, so both take its whole evidence. Defaults:
     docs/experiments/omniview_mcl_defaults.md.
     """
@@ -191,7 +191,7 @@ class NearReferences(Stage):
             self._cells = nearest_cells(map.poses, self.neighbours, unit / CELLS_PER_REACH, FADED * self.fade * unit)
             self._map, self._length = map, len(map)
         candidates, rows = similarities.rows(len(map))
-        best, each = best_headings(np.ascontiguousarray(values)), similarities.stands_for
+        best, each = best_headings(np.ascontiguousarray(values)), similarities.sampling_weight
         floor = ordinary_match(best, map.poses[candidates], self.strangers * unit, self.ordinary, each)
         power, fresh, top = self._power(best, each), self._fresh(motion, unit), max(float(best.max()), 1e-12)
         field = Field(values, floor, top, power, each)
@@ -211,8 +211,8 @@ class NearReferences(Stage):
     ) -> Array:
         return expected_similarity(poses, map.poses, self._cells, rows, values, self.fade * unit, floor)
 
-    def _power(self, best: Floats, stands_for: Array | None = None) -> float:
-        return contrast_power(best, self.contrast, stands_for) if self.power is None else self.power
+    def _power(self, best: Floats, sampling_weight: Array | None = None) -> float:
+        return contrast_power(best, self.contrast, sampling_weight) if self.power is None else self.power
 
     def _fresh(self, motion: Motion | None, unit: float) -> float:
         """Share of the picture's evidence that is new."""
@@ -239,15 +239,17 @@ class NearReferences(Stage):
 class Field:
     """Weights (max(S, floor) / top)^power over references and headings, most of which lie on the floor.
 
-    Only what rises above the floor is raised to the power: in a large map that is a few in a hundred. `stands_for`
+    Only what rises above the floor is raised to the power: in a large map that is a few in a hundred. `sampling_weight`
     (references,): how many references of the map each stands for, and counts as; None: one each.
     """
 
-    def __init__(self, values: Floats, floor: float, top: float, power: float, stands_for: Array | None = None) -> None:
+    def __init__(
+        self, values: Floats, floor: float, top: float, power: float, sampling_weight: Array | None = None
+    ) -> None:
         flat = values.ravel()
         self.headings = values.shape[1]
         self._values, self._floor = values, floor
-        each = np.ones(len(values)) if stands_for is None else stands_for
+        each = np.ones(len(values)) if sampling_weight is None else sampling_weight
         self._above = np.flatnonzero(flat > floor)
         counted = each[self._above // self.headings]
         self._raised = np.cumsum(counted * (flat[self._above].astype(np.float64) / top) ** power)

@@ -379,9 +379,9 @@ class Visibility(Stage):
             seen = sees_any(particles.poses, self._cells).astype(np.float64)
             return self.Out(likelihood=Likelihood(seen), proposals=proposals)
         _, rows = similarities.rows(len(map))
-        each = np.ones(len(values)) if similarities.stands_for is None else similarities.stands_for
+        each = np.ones(len(values)) if similarities.sampling_weight is None else similarities.sampling_weight
         best = best_headings(np.ascontiguousarray(values))
-        power = contrast_power(best, self.contrast, similarities.stands_for) if self.power is None else self.power
+        power = contrast_power(best, self.contrast, similarities.sampling_weight) if self.power is None else self.power
         raised: Array = (values.astype(np.float64) / max(float(best.max()), 1e-12)) ** power
         anywhere = float(np.average(raised.mean(axis=1), weights=each))
         around = values.shape[1] > 1 if self.sees == "auto" else self.sees == "around"

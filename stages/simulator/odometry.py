@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.geometry.plane.odometry_noise import disturbed
+from omninav.stages.geometry.plane.odometry_noise import add_odometry_noise
 from omninav.stages.geometry.plane.se2 import between, chain, wrap
 
 from .config import OdometryNoise
@@ -39,7 +39,7 @@ def measured(motions: npt.ArrayLike, noise: OdometryNoise, bias: Bias, rng: np.r
     """True increments of motion (N, 3) as the wheels measure them.
 
     Each increment is taken as rotation, translation, rotation (Thrun, Burgard & Fox 2005, section 5.4) and each part is
-    disturbed: sigma_trans = translation sqrt(m), sigma_rot^2 = rotation^2 |rad| + drift^2 m; then comes the noise that
+    add_odometry_noise: sigma_trans = translation sqrt(m), sigma_rot^2 = rotation^2 |rad| + drift^2 m; then comes the noise that
     is `added`. A robot that turns on the spot or rolls back is not thought to swing round: the first rotation is split
     from the translation's sign.
     """
@@ -54,7 +54,7 @@ def measured(motions: npt.ArrayLike, noise: OdometryNoise, bias: Bias, rng: np.r
     second_seen = _misjudged(second, length, noise, half, bias, drawn[:, 2])
     rolled = forward * (length * (1.0 + bias.translation) + noise.translation * np.sqrt(length) * drawn[:, 1])
     seen = np.stack([rolled * np.cos(first_seen), rolled * np.sin(first_seen), first_seen + second_seen], axis=1)
-    return disturbed(seen, noise.added, drawn[:, 3:]) if any(noise.added) else seen
+    return add_odometry_noise(seen, noise.added, drawn[:, 3:]) if any(noise.added) else seen
 
 
 def odometry(

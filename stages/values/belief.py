@@ -37,13 +37,13 @@ class Belief(Value):
 class Particles(Belief):
     """Weighted samples of the pose. `poses`: (N, 3) x, y (m), heading (rad), map frame. `weights`: (N,), sum 1.
 
-    The last `aside` of them are hypotheses that the robot was put elsewhere: kept, however little they weigh, until the
-    evidence for them has added up.
+    The last `recovery_particles` of them are hypotheses of a kidnapped robot: they are kept, however small their
+    weights, until enough evidence for them has accumulated.
     """
 
     poses: Array
     weights: Array
-    aside: int = 0
+    recovery_particles: int = 0
 
     def estimate(self) -> PoseEstimate:
         mode, covariance, share = heaviest_mode(self.poses, self.weights)
@@ -73,7 +73,7 @@ class GaussianMixture(Belief):
 
 
 class SinglePose(Belief):
-    """A belief that is one pose, with no doubt expressed (nearest-image matching)."""
+    """A belief that is one pose without uncertainty (nearest-image matching)."""
 
     pose: Pose
 
@@ -84,8 +84,8 @@ class SinglePose(Belief):
 class PlaceBelief(Belief):
     """Which place of a topological map the robot is at. `probabilities`: (P,), sum 1.
 
-    `poses` (P, 3): x, y (m), heading (rad): the robot's pose if it were where each place's medoid was taken, turned as
-    the present view is against that. Places have no size in metres: the covariance is zero.
+    `poses` (P, 3): x, y (m), heading (rad) of the robot if it stood where each place's medoid was taken; the heading
+    includes the turn between the two views. Places have no size in metres: the covariance is zero.
     """
 
     probabilities: Array
@@ -101,11 +101,11 @@ class PlaceBelief(Belief):
 class Likelihood(Value):
     """How well each particle, or each place, explains the present view. `values`: (N,), not negative, any scale.
 
-    `anywhere`: on the same scale, the mean over all poses the map knows: what a robot put down anywhere would get.
-    None where it is not known. `fresh`: the share of the picture's evidence that is new, in [0, 1]; less than 1 where
-    the robot has hardly moved since the picture before.
+    `mean_likelihood`: on the same scale, the mean over all poses of the map: what a pose drawn uniformly would get.
+    None where it is not known. `novelty`: the share of the image's evidence that is new, in [0, 1]; below 1 where the
+    robot has hardly moved since the previous image.
     """
 
     values: Array
-    anywhere: float | None = None
-    fresh: float = 1.0
+    mean_likelihood: float | None = None
+    novelty: float = 1.0

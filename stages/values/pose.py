@@ -14,7 +14,7 @@ class Pose(Value):
 
 
 class Motion(Value):
-    """How the robot moved since the tick before, seen from where it stood then: SE(2) increment.
+    """The robot's motion since the previous tick: an SE(2) increment in the robot's frame at that tick.
 
     `x` forward, `y` left (metres), `turn` (radians, counter-clockwise).
     """
@@ -25,12 +25,12 @@ class Motion(Value):
 
 
 class UncertainMotion(Value):
-    """A motion as a turn (rad), a way (m, negative: backwards) and a turn (rad), and how uncertain each is.
+    """A motion as rotation (rad), translation (m, negative: backwards) and rotation (rad), with their uncertainty.
 
-    `sigmas`: their standard deviations. `geometry/odometry_motion.py` moves poses and Gaussians by it.
+    `steps`: the three; `sigmas`: their standard deviations. `geometry/plane/odometry_motion.py` applies them.
     """
 
-    way: tuple[float, float, float]
+    steps: tuple[float, float, float]
     sigmas: tuple[float, float, float]
 
 

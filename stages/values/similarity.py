@@ -1,4 +1,4 @@
-"""How alike the present view and the views of the map are."""
+"""Similarities of the current view to the views of the map."""
 
 import numpy as np
 import numpy.typing as npt
@@ -7,21 +7,22 @@ from omninav.pipeline import Value
 
 
 class Similarities(Value):
-    """Similarity of the present view to references at headings. `values`: (references, headings) float32 in [0, 1].
+    """Similarity of the current view to references at headings. `values`: (references, headings) float32 in [0, 1].
 
     Column h stands for a robot whose heading is the reference view's own heading turned counter-clockwise by
     2 pi h / headings. `candidates` (references,) holds the indices of the map's references that were compared, in
-    ascending order; None means all of them. `stands_for` (references,): how many references of the map each of them
-    stands for, where only some were compared; None: one each. Sums with it are estimates for the whole map.
+    ascending order; None means all of them. `sampling_weight` (references,): how many references of the map each
+    compared one represents, where only a sample was compared; None: one each. Sums weighted by it are unbiased
+    estimates for the whole map.
 
-    How they were compared, so that others can compare alike: S = max_k (sum of the k largest s_j) k^-exponent
-    n^-(1-exponent) over the n segments, with `exponent` None where S is something else; of colours,
+    How they were compared, so that other stages can compare in the same way: S = max_k (sum of the k largest s_j)
+    k^-exponent n^-(1-exponent) over the n segments, with `exponent` None where S is something else; of colours,
     s_j = 1 - |difference| / `colour_scale`.
     """
 
     values: npt.NDArray[np.float32]
     candidates: npt.NDArray[np.int64] | None = None
-    stands_for: npt.NDArray[np.float64] | None = None
+    sampling_weight: npt.NDArray[np.float64] | None = None
     exponent: float | None = None
     colour_scale: float | None = None
 
@@ -34,7 +35,7 @@ class Similarities(Value):
 
 
 class Answers(Value):
-    """The references of a map that are most similar to the present view, the most similar first.
+    """The references of a map that are most similar to the current view, the most similar first.
 
     `references` (k,): their indices in the map. `similarities` (k,) in [0, 1] and `turns` (k,): each at its best
     heading, and how far the robot is then turned from the reference's own (radians, counter-clockwise).

@@ -1,4 +1,4 @@
-"""Odometry as a turn, a way and a turn, each uncertain: how samples and Gaussians of the pose move by it."""
+"""The odometry motion model: rotation, translation, rotation, applied to samples and to Gaussians."""
 
 import math
 
@@ -12,38 +12,38 @@ Array = npt.NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 
-def turn_go_turn(x: float, y: float, turn: float) -> Triple:
-    """A motion as a turn towards its goal, a way along it (negative: backwards), and the rest of the turn.
+def decompose_motion(x: float, y: float, turn: float) -> Triple:
+    """A motion as a rotation towards its end, a translation (negative: backwards), and the rest of the rotation.
 
-    Going backwards is kept as such, so that the first turn stays within 90 degrees.
+    A motion backwards stays one, so that the first rotation is within 90 degrees.
     """
-    way = math.hypot(x, y)
-    if way < 1e-9:
+    translation = math.hypot(x, y)
+    if translation < 1e-9:
         return 0.0, 0.0, turn
     first = math.atan2(y, x)
     if abs(first) > math.pi / 2:
-        first, way = float(wrap(first + math.pi)), -way
-    return first, way, float(wrap(turn - first))
+        first, translation = float(wrap(first + math.pi)), -translation
+    return first, translation, float(wrap(turn - first))
 
 
 @numba.njit(cache=True, nogil=True)
-def moved(poses: Array, motion: Triple, sigmas: Triple, noise: Array) -> Array:
-    """Poses (N, 3) after turn, way, turn, with `noise` (3, N) of unit variance scaled by `sigmas`."""
+def move_poses(poses: Array, motion: Triple, sigmas: Triple, noise: Array) -> Array:
+    """Poses (N, 3) after rotation, translation, rotation, with `noise` (3, N) of unit variance scaled by `sigmas`."""
     out = np.empty_like(poses)
     for n in range(len(poses)):
         first = poses[n, 2] + motion[0] + sigmas[0] * noise[0, n]
-        way = motion[1] + sigmas[1] * noise[1, n]
+        translation = motion[1] + sigmas[1] * noise[1, n]
         last = first + motion[2] + sigmas[2] * noise[2, n]
-        out[n, 0] = poses[n, 0] + way * np.cos(first)
-        out[n, 1] = poses[n, 1] + way * np.sin(first)
+        out[n, 0] = poses[n, 0] + translation * np.cos(first)
+        out[n, 1] = poses[n, 1] + translation * np.sin(first)
         out[n, 2] = last - 2 * np.pi * np.floor((last + np.pi) / (2 * np.pi))
     return out
 
 
-def moved_gaussians(means: Array, covariances: Array, motion: Triple, sigmas: Triple) -> tuple[Array, Array]:
-    """Gaussians (K, 3), (K, 3, 3) after turn, way, turn with noise of `sigmas`, linearised around each mean.
+def move_gaussians(means: Array, covariances: Array, motion: Triple, sigmas: Triple) -> tuple[Array, Array]:
+    """Gaussians (K, 3), (K, 3, 3) after rotation, translation, rotation with noise of `sigmas`, linearised around each mean.
 
-    C' = F C F^T + G diag(sigmas^2) G^T with F, G the derivatives of `moved` by the pose and by the noise: positive
+    C' = F C F^T + G diag(sigmas^2) G^T with F, G the derivatives of `move_poses` by the pose and by the noise: positive
     definite where C is.
     """
     headings = means[:, 2] + motion[0]
@@ -57,20 +57,20 @@ def moved_gaussians(means: Array, covariances: Array, motion: Triple, sigmas: Tr
     return ends, 0.5 * (spread + np.swapaxes(spread, 1, 2))
 
 
-def increment(motion: Triple, sigmas: Triple) -> tuple[Array, Array]:
-    """Turn, way, turn as one motion (3,), x, y, turn, seen from where it began, with its covariance (3, 3) there.
+def motion_gaussian(motion: Triple, sigmas: Triple) -> tuple[Array, Array]:
+    """Rotation, translation, rotation as one motion (3,), x, y, turn, in the frame of its start, and its covariance (3, 3).
 
-    It has rank 3 as long as there is a way and all sigmas are above 0; a turn in place moves nothing sideways.
+    The rank is 3 where there is a translation and all sigmas are above 0; a turn in place moves nothing sideways.
     """
     end = compose((0.0, 0.0, motion[0]), (motion[1], 0.0, motion[2]))
     return end, _noise(np.array([motion[0]]), motion[1], sigmas)[0]
 
 
-def _noise(headings: Array, way: float, sigmas: Triple) -> Array:
-    # Covariance of the pose (K, 3, 3) by the noise alone, `headings` (K,) being those of the way.
+def _noise(headings: Array, translation: float, sigmas: Triple) -> Array:
+    # Covariance of the pose (K, 3, 3) by the noise alone, `headings` (K,) being those of the translation.
     cos, sin = np.cos(headings), np.sin(headings)
     by_noise = np.zeros((len(headings), 3, 3))
-    by_noise[:, 0, 0], by_noise[:, 1, 0], by_noise[:, 2, 0] = -way * sin, way * cos, 1.0
+    by_noise[:, 0, 0], by_noise[:, 1, 0], by_noise[:, 2, 0] = -translation * sin, translation * cos, 1.0
     by_noise[:, 0, 1], by_noise[:, 1, 1], by_noise[:, 2, 2] = cos, sin, 1.0
     by_noise *= np.asarray(sigmas, np.float64)
     spread: Array = by_noise @ np.swapaxes(by_noise, 1, 2)

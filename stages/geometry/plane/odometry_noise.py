@@ -1,4 +1,4 @@
-"""Odometry made worse: noise of a turn, a way and a turn."""
+"""Noise added to odometry motions."""
 
 import math
 
@@ -10,25 +10,24 @@ Array = npt.NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 
-def disturbed(motions: npt.ArrayLike, triple: Triple, drawn: npt.ArrayLike) -> Array:
-    """Motions (N, 3), x, y, turn, with noise as strong as a `triple` says, from standard normal numbers `drawn` (N, 3).
+def add_odometry_noise(motions: npt.ArrayLike, triple: Triple, drawn: npt.ArrayLike) -> Array:
+    """Motions (N, 3), x, y, turn, with noise of a `triple`, from standard normal numbers `drawn` (N, 3).
 
-    Each motion is a turn towards its end, a way, and the rest of the turn, and each of the three gets an error of its
-    own (Wolf, Burgard & Burkhardt 2005, section VI-D and figure 16; erratum 46a). The paper prints triples without
+    Each motion is a rotation, a translation and a rotation, and each of the three gets its own error (Wolf, Burgard & Burkhardt 2005, section VI-D and figure 16; erratum 46a). The paper prints triples without
     units. We read them as those of Gutmann, Burgard & Konolige (1998), whose model it says it follows: <a, b, c> are
-    the standard deviations of the way in mm per sqrt(m), of a turn in degrees per sqrt(360 degrees) turned, and in
-    degrees per sqrt(m) gone. Both turns share the latter two evenly. So the noise of a way does not depend on how many
-    motions it is cut into. A motion backwards is a negative way, not two half turns.
+    the standard deviations of the translation in mm per sqrt(m), of a turn in degrees per sqrt(360 degrees) turned, and in
+    degrees per sqrt(m) driven. Both rotations share the latter two evenly. So the noise does not depend on how many motions a path is
+    cut into. A motion backwards is a negative translation, not two half turns.
     """
     motions, drawn = np.asarray(motions, dtype=np.float64), np.asarray(drawn, dtype=np.float64)
-    way = np.hypot(motions[:, 0], motions[:, 1])
+    distance = np.hypot(motions[:, 0], motions[:, 1])
     forward = np.where(motions[:, 0] < 0.0, -1.0, 1.0)
-    towards = np.where(way > 1e-9, np.arctan2(forward * motions[:, 1], forward * motions[:, 0]), 0.0)
-    way_sigma = triple[0] * 1e-3 * np.sqrt(way)
+    towards = np.where(distance > 1e-9, np.arctan2(forward * motions[:, 1], forward * motions[:, 0]), 0.0)
+    distance_sigma = triple[0] * 1e-3 * np.sqrt(distance)
     turn_variance = math.radians(triple[1]) ** 2 * np.abs(motions[:, 2]) / (2 * math.pi)
-    turn_variance += math.radians(triple[2]) ** 2 * way
+    turn_variance += math.radians(triple[2]) ** 2 * distance
     turn_sigma = np.sqrt(turn_variance / 2)
     first = towards + turn_sigma * drawn[:, 0]
-    gone = forward * (way + way_sigma * drawn[:, 1])
+    translation = forward * (distance + distance_sigma * drawn[:, 1])
     turn = motions[:, 2] + turn_sigma * (drawn[:, 0] + drawn[:, 2])
-    return np.stack([gone * np.cos(first), gone * np.sin(first), turn], axis=1)
+    return np.stack([translation * np.cos(first), translation * np.sin(first), turn], axis=1)

@@ -22,15 +22,15 @@ def best_headings(values: Floats) -> Floats:
     return out
 
 
-def contrast_power(best: Floats, contrast: float, stands_for: Array | None = None) -> float:
+def contrast_power(best: Floats, contrast: float, sampling_weight: Array | None = None) -> float:
     """The power p at which S^p differs by `contrast` nats for each standard deviation of log S.
 
-    `best` (R,): each reference's similarity at its best heading. `stands_for` (R,): how many references of the map each
+    `best` (R,): each reference's similarity at its best heading. `sampling_weight` (R,): how many references of the map each
     stands for; None: one each.
     """
     logarithms = np.log(np.maximum(best, 1e-12)).astype(np.float64)
-    centre = np.average(logarithms, weights=stands_for)
-    spread = math.sqrt(float(np.average(np.square(logarithms - centre), weights=stands_for)))
+    centre = np.average(logarithms, weights=sampling_weight)
+    spread = math.sqrt(float(np.average(np.square(logarithms - centre), weights=sampling_weight)))
     return contrast / max(spread, 1e-6)
 
 

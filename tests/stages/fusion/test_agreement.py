@@ -91,9 +91,9 @@ def test_a_kidnapped_robot_is_found_again() -> None:
     assert shares[1] == pytest.approx(1.0)  # the next picture agrees with the fifth that went there
 
 
-def test_with_strays_a_belief_outlives_one_look_alike() -> None:
+def test_with_an_outlier_probability_a_belief_outlives_one_look_alike() -> None:
     # Views of 9 m that are really seen at 0: two in a row take all, unless a share of views may be strays.
-    lone, careful = kidnapped()[1], kidnapped(stray=0.2)
+    lone, careful = kidnapped()[1], kidnapped(outlier_probability=0.2)
     assert lone == pytest.approx(1.0)
     assert 0.5 < careful[1] < 0.95
     assert careful[-1] > 0.99

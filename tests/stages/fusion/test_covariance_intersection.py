@@ -18,8 +18,8 @@ from omninav.stages.fusion.covariance_intersection import (
     CovarianceIntersection,
     Rule,
     alpha_by_ratio,
-    alpha_of_least_determinant,
-    fused,
+    alpha_of_min_determinant,
+    fuse,
 )
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.gaussians import squared_distances
@@ -68,7 +68,7 @@ def test_fusion_is_the_papers_equations_written_as_loops(weighted: bool) -> None
     rng = np.random.default_rng(0)
     for sizes in ((1, 1), (3, 5), (12, 7), (20, 20)):
         a, b = (drawn_mixture(rng, size, extent=0.8) for size in sizes)
-        found = list(zip(*fused(a, b, 7.81, weighted=weighted), strict=True))
+        found = list(zip(*fuse(a, b, 7.81, weighted=weighted), strict=True))
         wanted = fused_plainly(a, b, 7.81, weighted)
         assert len(found) == len(wanted)
         for (mean, covariance, weight), (mean_w, covariance_w, weight_w) in zip(found, wanted, strict=True):
@@ -82,7 +82,7 @@ def test_fusion_conserves_the_sum_of_all_weights(
     a: Mixture, b: Mixture, rule: Rule, weighted: bool, mass: float
 ) -> None:
     # Erratum 5: matched pairs and unmatched copies together weigh what both mixtures weigh.
-    means, covariance, weights = fused(a, (b[0], b[1], mass * b[2]), 7.81, rule, weighted)
+    means, covariance, weights = fuse(a, (b[0], b[1], mass * b[2]), 7.81, rule, weighted)
     assert weights.sum() == pytest.approx(1.0 + mass, rel=1e-12)
     assert weights.min() > 0.0
     assert np.linalg.eigvalsh(covariance).min() > 0.0
@@ -93,7 +93,7 @@ def test_fusion_conserves_the_sum_of_all_weights(
 def test_the_sum_of_weights_is_conserved_match_by_match_too(a: Mixture, b: Mixture, rule: Rule) -> None:
     # Equations 6 to 8: what a matched component gives away adds up to its own weight, from either side.
     match = squared_distances(a[0], a[1], b[0], b[1]) < 7.81
-    found = fused(a, b, 7.81, rule)[2]
+    found = fuse(a, b, 7.81, rule)[2]
     alone = a[2][~match.any(axis=1)].sum() + b[2][~match.any(axis=0)].sum()
     assert len(found) == match.sum() + (~match.any(axis=1)).sum() + (~match.any(axis=0)).sum()
     assert found.sum() - alone == pytest.approx(
@@ -105,7 +105,7 @@ def test_weights_of_a_pair_and_of_two_on_one_worked_by_hand() -> None:
     # a = 0.6 at 0 and 0.4 at 9; b = 0.5 at 0, 0.3 at 0.01, 0.2 at 20. Of a at 0 the sum of matches is 0.8:
     # 0.6 0.5/0.8 + 0.5 0.6/0.6 = 0.875, 0.6 0.3/0.8 + 0.3 = 0.525; the rest are copies: in all 2.
     a, b = mixture((0.0, 0.6), (9.0, 0.4)), mixture((0.0, 0.5), (0.01, 0.3), (20.0, 0.2))
-    weights = fused(parts(a), parts(b), 7.81)[2]
+    weights = fuse(parts(a), parts(b), 7.81)[2]
     assert weights == pytest.approx([0.875, 0.525, 0.4, 0.2])
 
 
@@ -151,7 +151,7 @@ def test_fusion_does_not_see_the_seam(a: Mixture, b: Mixture, angle: float) -> N
     edge = squared_distances(*sides[0][:2], *sides[1][:2])
     if np.abs(edge - 7.81).min() < 1e-6:
         return
-    here, there = fused(*sides, 7.81), fused(*turned, 7.81)
+    here, there = fuse(*sides, 7.81), fuse(*turned, 7.81)
     assert there[2] == pytest.approx(here[2], rel=1e-9)
     for mean, other in zip(here[0], there[0], strict=True):
         assert np.abs(gap(mean + np.array([0, 0, angle]), other)).max() < 1e-7
@@ -183,7 +183,7 @@ def test_the_least_determinant_is_found(cov_a: np.ndarray, cov_b: np.ndarray) ->
     def size(alpha: float) -> float:
         return -float(np.linalg.slogdet((1 - alpha) * first + alpha * second)[1])
 
-    found = size(alpha_of_least_determinant(cov_a, cov_b))
+    found = size(alpha_of_min_determinant(cov_a, cov_b))
     best = minimize_scalar(size, bounds=(0, 1), method="bounded", options={"xatol": 1e-10}).fun
     assert found <= min(best, size(0.0), size(1.0)) + 1e-7
 
@@ -191,8 +191,8 @@ def test_the_least_determinant_is_found(cov_a: np.ndarray, cov_b: np.ndarray) ->
 def test_complementary_doubts_are_both_reduced_by_the_least_determinant() -> None:
     # One knows x well, the other y: by symmetry alpha is a half, and each of x, y gets twice the smaller variance / ~1.
     a, b = np.diag([0.01, 1.0, 0.1]), np.diag([1.0, 0.01, 0.1])
-    assert alpha_of_least_determinant(a, b) == pytest.approx(0.5)
-    assert alpha_of_least_determinant(UNIT, UNIT) == 0.5
+    assert alpha_of_min_determinant(a, b) == pytest.approx(0.5)
+    assert alpha_of_min_determinant(UNIT, UNIT) == 0.5
     out = CovarianceIntersection(alpha="det_min").step(
         CTX,
         GaussianMixture(np.zeros((1, 3)), a[None], np.ones(1)),
@@ -217,7 +217,7 @@ def test_near_components_become_one_and_light_ones_go() -> None:
     assert len(out) == 1
     assert out.weights.tolist() == [1.0]
     assert out.means[0, 0] == pytest.approx(0.12 * 0.48 / 0.98)
-    kept = CovarianceIntersection(drop_below=0.0, merge=0.0)
+    kept = CovarianceIntersection(drop_below=0.0, merge_below=0.0)
     assert len(kept.step(CTX, mixture((0.0, 0.5), (0.12, 0.48), (5.0, 0.02)), None).belief) == 3
 
 
@@ -232,11 +232,11 @@ def test_two_equal_gaussians_merge_where_they_have_one_peak() -> None:
 
 def test_where_many_places_are_as_likely_the_heaviest_stay() -> None:
     wide = mixture(*((3.0 * k, 1.0 + 0.001 * k) for k in range(50)))
-    out = CovarianceIntersection(most=20).step(CTX, wide, None).belief
+    out = CovarianceIntersection(max_components=20).step(CTX, wide, None).belief
     assert len(out) == 20
     assert out.means[:, 0].min() == pytest.approx(90.0)
     assert out.weights.sum() == pytest.approx(1.0)
-    assert len(CovarianceIntersection(most=0).step(CTX, wide, None).belief) == 50
+    assert len(CovarianceIntersection(max_components=0).step(CTX, wide, None).belief) == 50
 
 
 def test_a_prediction_of_nothing_takes_the_hypothesis_and_no_weight_changes_nothing() -> None:
@@ -258,7 +258,7 @@ def test_what_is_no_covariance_is_refused() -> None:
 def test_the_order_of_components_changes_nothing_but_rounding(
     a: Mixture, b: Mixture, rule: Rule, random: Random
 ) -> None:
-    stage = CovarianceIntersection(alpha=rule, merge=0.0, drop_below=0.0)
+    stage = CovarianceIntersection(alpha=rule, merge_below=0.0, drop_below=0.0)
     order = list(range(len(b[2])))
     random.shuffle(order)
     here = stage.step(CTX, GaussianMixture(*a), GaussianMixture(*b)).belief
@@ -270,7 +270,7 @@ def test_the_order_of_components_changes_nothing_but_rounding(
 
 @pytest.mark.parametrize(
     ("stage", "updates"),
-    [(CovarianceIntersection(), 10_000), (CovarianceIntersection(alpha="det_min", merge=0.5), 2_000)],
+    [(CovarianceIntersection(), 10_000), (CovarianceIntersection(alpha="det_min", merge_below=0.5), 2_000)],
 )
 def test_over_thousands_of_random_updates_covariances_stay_positive_definite_and_weights_in_0_to_1(
     stage: CovarianceIntersection, updates: int
@@ -289,4 +289,4 @@ def test_over_thousands_of_random_updates_covariances_stay_positive_definite_and
         assert abs(belief.weights.sum() - 1.0) < 1e-12
         most = max(most, len(belief))
     assert np.array_equal(belief.covariances, np.swapaxes(belief.covariances, 1, 2))
-    assert 1 < most <= stage.most
+    assert 1 < most <= stage.max_components

@@ -52,7 +52,7 @@ def share_of_proposals(anywhere: float, believed: float) -> float:
     proposals = Particles(np.full((100, 3), 77.0), np.full(100, 0.01))
     # A tenth of the particles explain the view, so that resampling is due.
     values = np.where(np.arange(10_000) % 10 == 0, believed, 0.0)
-    stage = ImportanceResampling(number=10_000, kidnapped=0.01)
+    stage = ImportanceResampling(number=10_000, kidnapping_probability=0.01)
     out = fuse(stage, belief(10_000), values, anywhere=anywhere, proposals=proposals)
     assert out.weights.sum() == pytest.approx(1.0)
     return float(out.weights[out.poses[:, 0] == 77.0].sum())
@@ -68,7 +68,7 @@ def test_a_kidnapped_robot_is_where_the_evidence_says() -> None:
 def test_a_belief_that_explains_nothing_anywhere_gives_way_to_the_evidence() -> None:
     # All particles alike unlikely: nothing would have to be resampled, were it not for the proposals' share.
     proposals = Particles(np.full((100, 3), 77.0), np.full(100, 0.01))
-    stage = ImportanceResampling(number=5000, kidnapped=1e-7)
+    stage = ImportanceResampling(number=5000, kidnapping_probability=1e-7)
     for believed, share in ((1e-3, 0.0), (1e-9, 0.1 / 1.1), (1e-12, 100 / 101)):
         out = fuse(stage, belief(5000), np.full(5000, believed), anywhere=1e-3, proposals=proposals)
         assert out.weights[out.poses[:, 0] == 77.0].sum() == pytest.approx(share, abs=1e-4)
@@ -77,11 +77,14 @@ def test_a_belief_that_explains_nothing_anywhere_gives_way_to_the_evidence() -> 
 def test_evidence_for_a_kidnapping_adds_up_from_picture_to_picture() -> None:
     # Each picture speaks 10:1 against the belief, for the proposals of the first; later ones propose nothing of worth.
     # Bayes by hand, with a prior of 1e-6 for "put there at the first picture": odds 1e-6 x 10^n after n more pictures.
-    stage, ctx = ImportanceResampling(number=5000, kidnapped=1e-6), Context("fusion", np.random.default_rng(0))
+    stage, ctx = (
+        ImportanceResampling(number=5000, kidnapping_probability=1e-6),
+        Context("fusion", np.random.default_rng(0)),
+    )
     there = Particles(np.full((50, 3), 77.0), np.full(50, 0.02))
     elsewhere = Particles(np.full((50, 3), -77.0), np.full(50, 0.02))
     now = stage.step(ctx, belief(5000), Likelihood(np.ones(5000), 1.0), there).belief
-    assert now.aside == 500
+    assert now.recovery_particles == 500
     for picture in range(1, 11):
         values = np.where(now.poses[:, 0] == 77.0, 1.0, 0.1)
         now = stage.step(ctx, now, Likelihood(values, 1e-9), elsewhere).belief
@@ -92,7 +95,7 @@ def test_evidence_for_a_kidnapping_adds_up_from_picture_to_picture() -> None:
 
 def test_a_robot_that_stands_is_kidnapped_less_often_per_picture() -> None:
     proposals, particles = Particles(np.full((50, 3), 77.0), np.full(50, 0.02)), belief(5000)
-    ctx, stage = Context("fusion"), ImportanceResampling(kidnapped=1e-3)
+    ctx, stage = Context("fusion"), ImportanceResampling(kidnapping_probability=1e-3)
     shares = []
     for fresh in (1.0, 0.1):
         out = stage.step(ctx, particles, Likelihood(np.ones(5000), 1.0, fresh), proposals).belief
@@ -101,7 +104,7 @@ def test_a_robot_that_stands_is_kidnapped_less_often_per_picture() -> None:
 
 
 def test_the_number_follows_the_cells_the_belief_fills() -> None:
-    stage = ImportanceResampling(number=5000, tracking=500, adapt="kld")
+    stage = ImportanceResampling(number=5000, min_particles=500, adapt="kld")
     narrow = fuse(stage, belief(5000, spread=0.01), np.ones(5000))
     wide = fuse(stage, belief(5000, spread=5.0), np.ones(5000))
     assert len(narrow.poses) == 500
@@ -142,7 +145,7 @@ def test_a_belief_is_given_at_the_first_picture_only() -> None:
 
 
 def test_the_uniform_start_covers_the_map() -> None:
-    particles = start(ParticlePrior(number=4000, around=2.0, reach_m=0.5), a_map())
+    particles = start(ParticlePrior(number=4000, radius=2.0, length_scale_m=0.5), a_map())
     assert particles is not None
     assert (particles.poses[:, 0] < 4).mean() == pytest.approx(0.5, abs=0.03)
 

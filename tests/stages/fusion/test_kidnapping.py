@@ -107,7 +107,7 @@ def test_tracking_near_the_belief_is_as_good_as_comparing_the_whole_map() -> Non
     assert np.median(all_.errors[5:]) < 0.25  # references stand 0.4 m and 0.7 m apart
     assert np.median(some.errors[5:]) < np.median(all_.errors[5:]) + 0.05
     # "Anywhere" is that of the whole map, on average over some pictures, to a factor of two.
-    ratio = [np.log(a.anywhere / b.anywhere) for a, b in zip(some.said[5:], all_.said[5:], strict=True)]  # type: ignore[operator]
+    ratio = [np.log(a.mean_likelihood / b.mean_likelihood) for a, b in zip(some.said[5:], all_.said[5:], strict=True)]  # type: ignore[operator]
     assert abs(np.mean(ratio)) < np.log(2)
 
 

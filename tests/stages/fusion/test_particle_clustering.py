@@ -54,7 +54,7 @@ def test_particles_all_over_the_place_tell_no_state() -> None:
 
 
 def test_equal_particles_have_a_spread_all_the_same() -> None:
-    state = gather(np.tile([1.0, 2.0, 3.0], (10, 1)), floor_m=0.05, floor_deg=2.0)
+    state = gather(np.tile([1.0, 2.0, 3.0], (10, 1)), min_sigma_m=0.05, min_sigma_deg=2.0)
     assert np.sqrt(np.diagonal(state.covariances[0])) == pytest.approx([0.05, 0.05, np.radians(2.0)])
 
 

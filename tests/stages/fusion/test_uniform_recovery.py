@@ -41,7 +41,7 @@ def test_the_others_are_drawn_by_weight_times_likelihood():
     # A Gaussian times a Gaussian likelihood: the posterior mean is worked by hand, (0 + 0.5 / 0.1^2) / (1 + 1 / 0.1^2).
     particles = belief(50_000)
     values = np.exp(-0.5 * ((particles.poses[:, 0] - 0.5) / 0.1) ** 2)
-    out, _ = fuse(UniformRecovery(random=0), particles, values, None)
+    out, _ = fuse(UniformRecovery(random_particles=0), particles, values, None)
     assert len(out.poses) == 5000
     assert out.poses[:, 0].mean() == pytest.approx(50 / 101, abs=0.01)
     assert out.poses[:, 0].std() == pytest.approx((1 / 101) ** 0.5, rel=0.1)
@@ -49,7 +49,7 @@ def test_the_others_are_drawn_by_weight_times_likelihood():
 
 @pytest.mark.parametrize("values", [np.zeros(1000), np.full(1000, np.nan), np.full(1000, np.inf)])
 def test_a_view_that_nothing_explains_is_passed_over_and_told_of(values: np.ndarray):
-    out, ctx = fuse(UniformRecovery(number=1000, random=0), belief(1000), values, None)
+    out, ctx = fuse(UniformRecovery(number=1000, random_particles=0), belief(1000), values, None)
     assert np.allclose(np.sort(out.poses[:, 0]), np.sort(belief(1000).poses[:, 0]))
     assert ctx.counts["belief_without_support"] == 1
 
@@ -68,7 +68,7 @@ def test_proposals_are_drawn_by_their_weights():
 
 
 def test_all_samples_may_be_random():
-    out, _ = fuse(UniformRecovery(number=40, random=50), belief(40), np.ones(40), anywhere())
+    out, _ = fuse(UniformRecovery(number=40, random_particles=50), belief(40), np.ones(40), anywhere())
     assert len(out.poses) == 40
     assert (out.poses[:, 0] > 40).all()
 

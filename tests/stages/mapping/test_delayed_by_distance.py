@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.geometry.plane.odometry_motion import moved_gaussians
+from omninav.stages.geometry.plane.odometry_motion import move_gaussians
 from omninav.stages.mapping.delayed_by_distance import DelayedByDistance, DelayedByDistanceState
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdates
@@ -77,7 +77,7 @@ def around_a_square(end: tuple[float, float, float], **options: Any) -> list[Map
         ctx.tick = Tick(n, n, 0, n, n == 0)
         model = None if n == 0 else UncertainMotion((np.pi / 2 if n % 5 == 1 and n > 1 else 0.0, 0.8, 0.0), (0.05,) * 3)
         if model is not None:
-            means, covariances = moved_gaussians(means, covariances, model.way, model.sigmas)
+            means, covariances = move_gaussians(means, covariances, model.steps, model.sigmas)
         state = GaussianMixture(means, covariances, np.ones(1))
         if n == 20:
             state = GaussianMixture(np.array([end]), certain, np.ones(1))

@@ -62,29 +62,29 @@ def gaps_to(map: ReferenceGraph, belief: Particles) -> np.ndarray:
 @pytest.mark.parametrize("radius", [0.4, 1.0, 3.0])
 def test_near_a_belief_every_reference_within_the_radius_is_compared_for_itself(radius: float) -> None:
     map, belief = a_map(400, 0.1), particles_at(8.0)
-    chosen, stands_for = near_belief(map.poses, belief, radius, 0.0, 0, 20, 3)
+    chosen, sampling_weight = near_belief(map.poses, belief, radius, 0.0, 0, 20, 3)
     assert chosen is not None
-    assert stands_for is not None
+    assert sampling_weight is not None
     gap = gaps_to(map, belief)
     near = np.flatnonzero(gap <= radius)
     assert set(near) <= set(chosen)
-    assert (stands_for[np.isin(chosen, near)] == 1).all()
+    assert (sampling_weight[np.isin(chosen, near)] == 1).all()
     assert (gap[chosen] > 1.36 * radius).sum() <= 20
     assert (np.diff(chosen) > 0).all()
 
 
-def test_around_particles_set_aside_only_the_next_references_are_compared() -> None:
+def test_around_recovery_particles_only_the_nearest_references_are_compared() -> None:
     map, tracked, hypotheses = a_map(400, 0.1), particles_at(8.0), particles_at(30.0)
     poses = np.concatenate([tracked.poses, hypotheses.poses])
-    belief = Particles(poses, np.full(len(poses), 1 / len(poses)), aside=len(hypotheses.poses))
-    chosen, stands_for = near_belief(map.poses, belief, 3.0, 0.5, 0, 0, 0)
+    belief = Particles(poses, np.full(len(poses), 1 / len(poses)), recovery_particles=len(hypotheses.poses))
+    chosen, sampling_weight = near_belief(map.poses, belief, 3.0, 0.5, 0, 0, 0)
     assert chosen is not None
-    assert stands_for is not None
+    assert sampling_weight is not None
     near = (gaps_to(map, tracked) <= 3.0) | (gaps_to(map, hypotheses) <= 0.5)
     assert set(np.flatnonzero(near)) <= set(chosen)
     farther = (gaps_to(map, tracked) <= 1.36 * 3.0) | (gaps_to(map, hypotheses) <= 1.36 * 0.5)
     assert set(chosen) <= set(np.flatnonzero(farther))
-    assert (stands_for == 1).all()
+    assert (sampling_weight == 1).all()
     alone, _ = near_belief(map.poses, belief, 3.0, 0.0, 0, 0, 0)
     without, _ = near_belief(map.poses, tracked, 3.0, 0.5, 0, 0, 0)
     assert alone is not None
@@ -96,10 +96,10 @@ def test_strangers_stand_for_the_whole_map_and_all_have_their_turn() -> None:
     map, belief = a_map(400, 0.1), particles_at(8.0)
     seen: set[int] = set()
     for turn in range(60):
-        chosen, stands_for = near_belief(map.poses, belief, 1.0, 0.0, 0, 20, turn)
+        chosen, sampling_weight = near_belief(map.poses, belief, 1.0, 0.0, 0, 20, turn)
         assert chosen is not None
-        assert stands_for is not None
-        assert stands_for.sum() == pytest.approx(400)
+        assert sampling_weight is not None
+        assert sampling_weight.sum() == pytest.approx(400)
         seen |= set(chosen)
     assert len(seen) == 400
     # A sum over the map, estimated turn by turn, is right on average.

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from made_mixtures import Mixture, gap, mixtures
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.plane.odometry_motion import increment, moved_gaussians, turn_go_turn
+from omninav.stages.geometry.plane.odometry_motion import decompose_motion, motion_gaussian, move_gaussians
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.motion.gaussian import GaussianMotion
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
@@ -44,7 +44,7 @@ def test_the_linearised_motion_has_the_moments_of_the_sampled_one() -> None:
     assert apart.mean(axis=0) == pytest.approx([0, 0, 0], abs=0.003)
     assert np.cov(apart.T) == pytest.approx(out.belief.covariances[0], abs=4e-4)
     assert out.model is not None
-    assert (out.model.way, out.model.sigmas) == (sampled.model.way, sampled.model.sigmas)
+    assert (out.model.steps, out.model.sigmas) == (sampled.model.steps, sampled.model.sigmas)
 
 
 def test_both_motion_stages_have_the_same_parameters() -> None:
@@ -59,10 +59,10 @@ def test_without_motion_the_mixture_stays_and_there_is_no_model() -> None:
 
 
 def test_a_motion_as_one_increment_moves_a_certain_pose_to_the_same_gaussian() -> None:
-    way, sigmas = turn_go_turn(-0.4, 0.1, 0.5), (0.03, 0.05, 0.02)
-    step, covariance = increment(way, sigmas)
+    way, sigmas = decompose_motion(-0.4, 0.1, 0.5), (0.03, 0.05, 0.02)
+    step, covariance = motion_gaussian(way, sigmas)
     start = np.array([[2.0, -1.0, 3.0]])
-    mean, wanted = moved_gaussians(start, np.zeros((1, 3, 3)), way, sigmas)
+    mean, wanted = move_gaussians(start, np.zeros((1, 3, 3)), way, sigmas)
     assert step == pytest.approx([-0.4, 0.1, 0.5])
     assert compose(start[0], step) == pytest.approx(mean[0])
     cos, sin = math.cos(3.0), math.sin(3.0)

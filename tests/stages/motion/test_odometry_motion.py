@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.plane.odometry_motion import moved, turn_go_turn
+from omninav.stages.geometry.plane.odometry_motion import decompose_motion, move_poses
 from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.values.belief import Particles
@@ -25,14 +25,14 @@ SILENT = {
 @given(st.floats(-2, 2), st.floats(-2, 2), st.floats(-3, 3), st.floats(-3, 3))
 def test_without_noise_the_motion_is_the_composition(x: float, y: float, turn: float, heading: float) -> None:
     start = np.array([[1.0, -2.0, heading]])
-    reached = moved(start, turn_go_turn(x, y, turn), (0.0, 0.0, 0.0), np.zeros((3, 1)))
+    reached = move_poses(start, decompose_motion(x, y, turn), (0.0, 0.0, 0.0), np.zeros((3, 1)))
     wanted = compose(start, (x, y, turn))
     assert np.allclose(reached[:, :2], wanted[:, :2], atol=1e-8)
     assert abs(float(wrap(reached[0, 2] - wanted[0, 2]))) < 1e-8
 
 
 def test_going_backwards_is_no_turn() -> None:
-    assert turn_go_turn(-0.5, 0.0, 0.0) == pytest.approx((0.0, -0.5, 0.0), abs=1e-12)
+    assert decompose_motion(-0.5, 0.0, 0.0) == pytest.approx((0.0, -0.5, 0.0), abs=1e-12)
 
 
 def test_samples_have_the_spread_that_the_parameters_say() -> None:
@@ -89,6 +89,6 @@ def test_many_small_motions_are_as_uncertain_as_the_one_they_make_up() -> None:
 
 
 def test_a_jitter_sideways_is_no_turn() -> None:
-    _, way, _ = sigmas = RotationTranslationRotation().sigmas(turn_go_turn(0.0, 1e-5, 0.0))
+    _, way, _ = sigmas = RotationTranslationRotation().sigmas(decompose_motion(0.0, 1e-5, 0.0))
     assert max(sigmas) < 0.0015
     assert way < 0.0015

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.plane.odometry_noise import disturbed
+from omninav.stages.geometry.plane.odometry_noise import add_odometry_noise
 from omninav.stages.geometry.plane.se2 import chain
 from omninav.stages.perturbation.odometry_noise import LEVELS, NoisyOdometry
 from omninav.stages.values.pose import Motion
@@ -18,12 +18,12 @@ def ends(motion: tuple[float, float, float], pieces: int, triple: tuple[float, f
     """Where many robots believe to be after the same motions (RUNS, 3)."""
     rng = np.random.default_rng(4)
     motions = np.tile(motion, (pieces, 1))
-    return np.array([chain(disturbed(motions, triple, rng.normal(size=(pieces, 3))))[-1] for _ in range(RUNS)])
+    return np.array([chain(add_odometry_noise(motions, triple, rng.normal(size=(pieces, 3))))[-1] for _ in range(RUNS)])
 
 
 def test_no_noise_leaves_every_motion_as_it_was():
     motions = np.random.default_rng(0).uniform(-1, 1, (50, 3))
-    np.testing.assert_allclose(disturbed(motions, (0, 0, 0), np.ones((50, 3))), motions, atol=1e-12)
+    np.testing.assert_allclose(add_odometry_noise(motions, (0, 0, 0), np.ones((50, 3))), motions, atol=1e-12)
 
 
 @pytest.mark.parametrize("pieces", [1, 20])
@@ -41,7 +41,9 @@ def test_a_full_turn_on_the_spot_costs_what_the_triple_says(pieces: int):
 
 
 def test_a_robot_that_rolls_back_is_not_swung_round():
-    noisy = disturbed([[-1.0, 0.0, 0.0]] * RUNS, (10.0, 0.0, 5.0), np.random.default_rng(1).normal(size=(RUNS, 3)))
+    noisy = add_odometry_noise(
+        [[-1.0, 0.0, 0.0]] * RUNS, (10.0, 0.0, 5.0), np.random.default_rng(1).normal(size=(RUNS, 3))
+    )
     assert noisy[:, 0].max() < -0.8
     assert np.abs(noisy[:, 1]).max() < 0.5
 

@@ -192,7 +192,7 @@ def test_uniform_proposals_carry_their_own_likelihood() -> None:
         NearReferences(propose="uniform", proposals=20_000, spread=0.05, reach_m=0.1), REFERENCES, one_good_match()
     )
     assert out.proposals is not None
-    assert out.likelihood.anywhere is not None
+    assert out.likelihood.mean_likelihood is not None
     gap = np.hypot(*(out.proposals.poses[:, :2] - REFERENCES[3, :2]).T)
     turn = np.angle(np.exp(1j * (out.proposals.poses[:, 2] - REFERENCES[3, 2] - np.pi / 2)))
     fits = (gap < 0.15) & (np.abs(turn) < 0.2)
@@ -200,8 +200,8 @@ def test_uniform_proposals_carry_their_own_likelihood() -> None:
     assert out.proposals.weights[fits].sum() > 100 * fits.mean()
     # Few draws may miss the place: then they must not carry what it would have carried.
     missed = step(NearReferences(propose="uniform", proposals=2, reach_m=0.1), REFERENCES, one_good_match())
-    assert missed.likelihood.anywhere is not None
-    assert missed.likelihood.anywhere < 0.1 * out.likelihood.anywhere
+    assert missed.likelihood.mean_likelihood is not None
+    assert missed.likelihood.mean_likelihood < 0.1 * out.likelihood.mean_likelihood
 
 
 def test_a_robot_that_stands_may_still_have_been_put_there() -> None:
@@ -209,8 +209,8 @@ def test_a_robot_that_stands_may_still_have_been_put_there() -> None:
     stage = NearReferences(independent=0.4, standing=0.1)
     moving = step(stage, REFERENCES, one_good_match(), Motion(0.5, 0.0, 0.0)).likelihood
     standing = step(stage, REFERENCES, one_good_match(), Motion(0.0, 0.0, 0.0)).likelihood
-    assert (moving.fresh, standing.fresh) == (1.0, 0.1)
-    assert standing.anywhere == moving.anywhere
+    assert (moving.novelty, standing.novelty) == (1.0, 0.1)
+    assert standing.mean_likelihood == moving.mean_likelihood
 
 
 def test_an_empty_comparison_says_nothing() -> None:

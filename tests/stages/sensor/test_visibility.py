@@ -114,7 +114,7 @@ def test_particles_that_see_all_around_take_each_view_turned_to_where_they_see_i
     ).likelihood
     words = [by_equation_7(areas, pose, values, float(values.mean()), None, True) for pose in poses]
     assert np.allclose(out.values * values.max(), words, atol=0.004)
-    assert out.anywhere * values.max() == pytest.approx(values.mean(), rel=1e-5)
+    assert out.mean_likelihood * values.max() == pytest.approx(values.mean(), rel=1e-5)
 
 
 @pytest.mark.parametrize(("sectors", "shape"), [(1, "step"), (1, "triangle"), (1, "gaussian"), (5, None)])
@@ -185,7 +185,7 @@ def test_k_of_0_weighs_the_mean_similarity_of_the_present_view_to_the_database()
     far = np.array([[50.0, 50.0, 0.0], [-0.95, 2.05, 0.0]])  # outside of the grid; in a wall
     out = weighed(Visibility(power=1.0), values, far, areas).likelihood
     assert np.allclose(out.values * values.max(), values.mean())
-    assert out.anywhere * values.max() == pytest.approx(values.mean(), rel=1e-6)
+    assert out.mean_likelihood * values.max() == pytest.approx(values.mean(), rel=1e-6)
 
 
 def test_without_a_power_it_is_taken_from_the_view():
@@ -226,10 +226,10 @@ def test_references_that_were_not_compared_count_nowhere_and_those_that_stand_fo
     held = np.zeros_like(values)
     held[some] = values[some]
     words = weighed(Visibility(power=1.0, near_m=None), held, poses, only).likelihood
-    known = np.abs(words.values - words.anywhere) > 1e-9
+    known = np.abs(words.values - words.mean_likelihood) > 1e-9
     assert np.allclose(found.values[known], words.values[known], atol=1e-6)
     twice = weighed(
-        Visibility(power=1.0, near_m=None), values[some], poses, areas, candidates=some, stands_for=np.full(4, 2.0)
+        Visibility(power=1.0, near_m=None), values[some], poses, areas, candidates=some, sampling_weight=np.full(4, 2.0)
     )
     assert np.allclose(twice.likelihood.values, found.values, atol=1e-6)
 
@@ -250,7 +250,7 @@ def test_a_standing_robots_pictures_are_little_evidence_where_that_is_asked_for(
         ).likelihood
 
     moving, standing = at(Motion(0.3, 0.0, 0.0)), at(Motion(0.0, 0.0, 0.1))
-    assert (moving.fresh, standing.fresh) == pytest.approx((1.0, 0.05))
+    assert (moving.novelty, standing.novelty) == pytest.approx((1.0, 0.05))
     assert np.allclose(standing.values, moving.values**0.05)
 
 
