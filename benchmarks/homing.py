@@ -13,15 +13,19 @@ from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.two_views.absolute_pose import grunert, three_point_pose
 from omninav.stages.geometry.two_views.epipolar import planar_two_points
 from omninav.stages.geometry.two_views.relative_pose_ransac import relative_pose
-from omninav.stages.homing.visual_homing import VisualHoming, VisualHomingState
+from omninav.stages.homing.feature_tracker import FeatureTracker, FeatureTrackerState
+from omninav.stages.homing.homing_vector import HomingVectorFromMap
+from omninav.stages.homing.local_mapping import LocalMapping, LocalMappingState
 from omninav.stages.match.correspondences import MatchFeatures
 from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.config import MirrorCamera
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.world import World
+from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.homing import HomingTarget
 from omninav.stages.values.image import Image
+from omninav.stages.values.local_features import LocalFeatures
 
 from .table import Row, medians
 
@@ -140,33 +144,34 @@ def _absolute() -> list[Row]:
 def _homing() -> list[Row]:
     camera, rays, scene = camera_of(SMALL), camera_rays(camera_of(SMALL)), World(DEMO).scene
     way = np.linspace((4.0, 4.2, -0.5), (4.8, 4.84, 0.3), 12)
-    pictures = [Image(render(scene, rays, tuple(pose), 0.9)) for pose in way]
+    images = [Image(render(scene, rays, tuple(pose), 0.9)) for pose in way]
     sift, match, ctx = RotationReducedSift(), MatchFeatures(), Context("homing")
     sift.setup(ctx)
     match.setup(ctx)
-    seen = [sift.step(ctx, picture, camera).features for picture in pictures]
+    seen = [sift.step(ctx, image, camera).features for image in images]
     goal = sift.step(ctx, Image(render(scene, rays, (5.0, 5.0, 0.4), 0.9)), camera).features
-    target, stage = HomingTarget(0, goal), VisualHoming()
+    target, tracker, mapping, homing = HomingTarget(0, goal), FeatureTracker(), LocalMapping(), HomingVectorFromMap()
     pairs = [match.step(ctx, features, goal).correspondences for features in seen]
 
-    def begin() -> None:
-        stage.step(
-            Context("h", np.random.default_rng(0)), VisualHomingState(), pictures[0], target, seen[0], pairs[0], camera
-        )
+    def begin(features: LocalFeatures = seen[0], found: Correspondences = pairs[0]) -> None:
+        own = Context("h", np.random.default_rng(0))
+        tracker.step(own, FeatureTrackerState(), images[0], camera)
+        out = mapping.step(own, LocalMappingState(), features, target, found)
+        homing.step(own, out.map)
 
     def begin_all() -> None:
-        features = sift.step(ctx, pictures[0], camera).features
-        found = match.step(ctx, features, goal).correspondences
-        stage.step(
-            Context("h", np.random.default_rng(0)), VisualHomingState(), pictures[0], target, features, found, camera
-        )
+        features = sift.step(ctx, images[0], camera).features
+        begin(features, match.step(ctx, features, goal).correspondences)
 
     def drive() -> None:
-        memory, own = VisualHomingState(), Context("h", np.random.default_rng(0))
-        for picture, features, found in zip(pictures, seen, pairs, strict=True):
-            out = stage.step(own, memory, picture, target, features, found, camera)
-        assert out.vector is not None
-        assert out.vector.state == "tracking"
+        tracked, mapped, own = FeatureTrackerState(), LocalMappingState(), Context("h", np.random.default_rng(0))
+        local_map = None
+        for image, features, found in zip(images, seen, pairs, strict=True):
+            tracks = tracker.step(own, tracked, image, camera, local_map).tracks
+            local_map = mapping.step(own, mapped, features, target, found, tracks).map
+            vector = homing.step(own, local_map).vector
+        assert vector is not None
+        assert vector.state == "tracking"
 
     taken = medians({"begin": begin, "begin_all": begin_all, "drive": drive}, rounds=15)
     return [

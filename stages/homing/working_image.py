@@ -1,4 +1,4 @@
-"""A picture as homing reads it: small, grey, with ways from its pixels to bearings and back."""
+"""An image as homing reads it: small, grey, with its pixels' bearings and back."""
 
 import math
 from typing import NamedTuple, cast
@@ -69,24 +69,21 @@ class WorkingImage(NamedTuple):
             return np.asarray((x >= margin) & (x <= columns - 1 - margin) & (y >= margin) & (y <= rows - 1 - margin))
 
 
-def working_picture(picture: Image | Panorama, camera: Camera | None, largest: int) -> WorkingImage:
-    """Make a picture ready; one of more than `largest` pixels is made smaller.
-
-    Raises BadInput for want of a camera, or of its elevations.
-    """
-    if isinstance(picture, Image):
+def working_image(image: Image | Panorama, camera: Camera | None, max_pixels: int) -> WorkingImage:
+    """A grey image of at most `max_pixels`. Raises BadInput without its camera, or without the camera's elevations."""
+    if isinstance(image, Image):
         if camera is None:
-            raise BadInput("homing: a camera's picture without its camera; wire it: wires.homing.camera=source.camera")
+            raise BadInput("homing: a camera's image without its camera; wire it: wires.tracker.camera=source.camera")
         pixels_of_rays(camera, np.empty((0, 3)))  # now, and not once something is tracked
-    grey = cast(Grey, cv2.cvtColor(picture.pixels, cv2.COLOR_BGR2GRAY))
+    grey = cast(Grey, cv2.cvtColor(image.pixels, cv2.COLOR_BGR2GRAY))
     rows, columns = grey.shape
     size = columns, rows
-    shrink = math.sqrt(rows * columns / largest)
+    shrink = math.sqrt(rows * columns / max_pixels)
     if shrink > 1.0:
         size = max(1, round(columns / shrink)), max(1, round(rows / shrink))
         grey = cast(Grey, cv2.resize(grey, size, interpolation=cv2.INTER_AREA))
-    circle = isinstance(picture, Panorama) or isinstance(camera, Cylindrical | Equirectangular)
+    circle = isinstance(image, Panorama) or isinstance(camera, Cylindrical | Equirectangular)
     seam = min(SEAM, size[0]) if circle else 0
     if seam:
         grey = np.concatenate([grey[:, -seam:], grey, grey[:, :seam]], axis=1)
-    return WorkingImage(grey, seam, (columns / size[0], rows / size[1]), picture, camera)
+    return WorkingImage(grey, seam, (columns / size[0], rows / size[1]), image, camera)

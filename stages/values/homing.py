@@ -1,15 +1,21 @@
 """Going where a picture was taken: which picture, where that was, how far along a path of pictures the robot is."""
 
+import math
+from dataclasses import field, replace
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
+from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 
 from .local_features import LocalFeatures
+from .pose import Motion
 
 Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 
 
 class ImagePath(Value):
@@ -57,17 +63,89 @@ class HomingVector(Value):
     why: str = ""
 
 
-class TrackedFeatures(Value):
-    """The features of the local map in the present picture, for people to look at.
+LOST, TRACKED, FOUND_AGAIN, MATCHED = range(4)
+"""Kinds of features in `TrackedFeatures` and `LocalMap`."""
 
-    `points` (N, 2): columns and rows, pixels of the picture; of lost ones, where they should be, NaN where that is
-    outside of it. `kinds` (N,): 0 lost, 1 tracked, 2 found again, 3 matched anew with the target view. `rows` (N,):
-    which of the target's features they are.
+
+class TrackedFeatures(Value):
+    """Features of the local map with this `number` in the present image, N of them.
+
+    `rows` (N,): which of the target's features they are. `kinds` (N,): LOST, TRACKED, FOUND_AGAIN (tracked from where
+    it was found again in the image before), MATCHED (not tracked, but matched with the target view). `points` (N, 2):
+    columns and rows, pixels of the image; of lost ones where they should be, NaN where that is outside of it.
+    `bearings` (N, 3): unit vectors in the robot's frame, and `places` (N, 3): positions in the local map of what is
+    tracked, which lies beside the feature.
     """
 
+    number: int
+    rows: Ints
+    kinds: Ints
     points: Array
-    kinds: npt.NDArray[np.int64]
-    rows: npt.NDArray[np.int64]
+    bearings: Array
+    places: Array
+
+
+class LocalMap(Value):
+    """Features around the robot, with the robot and the target view among them.
+
+    The frame is the robot's where the map was made, the unit the distance from there to the target. `number`: another
+    map has another; `target`: the number of the target it leads to. `state`: `new` (made of two views in this tick),
+    `tracking`, or `lost`, and then `why`; a lost map without features is no map.
+
+    `rows` (N,): the target's features; `places` (N, 3): where they are; `kinds` (N,): as in `TrackedFeatures`, LOST
+    where a track contradicts the robot's pose; `points` (N, 2): pixels of MATCHED ones in the image.
+    `rotation` (3, 3), `translation` (3,): the robot's pose; `goal_rotation`, `goal_translation`: the target's.
+    `inliers`: features that agree with the robot's pose; `first_inliers`: those that agreed when the map was made.
+    `unit`: in units of the first baseline of this target. `metres`: the same by odometry, 0 where it is not known.
+    `odometry` (3,): since the map was made (m, m, rad).
+    """
+
+    number: int
+    target: int
+    state: Literal["new", "tracking", "lost"]
+    inliers: int = 0
+    why: str = ""
+    rows: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    places: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    kinds: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    points: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+    translation: Array = field(default_factory=lambda: np.zeros(3))
+    goal_rotation: Array = field(default_factory=lambda: np.eye(3))
+    goal_translation: Array = field(default_factory=lambda: np.zeros(3))
+    first_inliers: int = 0
+    unit: float = 1.0
+    metres: float = 0.0
+    odometry: Array = field(default_factory=lambda: np.zeros(3))
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def depth(self) -> float:
+        """Typical distance of the features from the robot."""
+        return float(np.median(np.linalg.norm(self.places - self.translation, axis=1)))
+
+    def to_target(self) -> Array:
+        """From the robot to where the target view was taken, in the robot's frame: (3,)."""
+        return np.asarray(self.rotation.T @ (self.goal_translation - self.translation))
+
+    def distance(self) -> float:
+        """Over the floor to where the target view was taken."""
+        return math.hypot(*self.to_target()[:2])
+
+    def moved(self, motion: Motion | None) -> "LocalMap":
+        """The map after a motion increment; the robot's position moves only where the unit in metres is known."""
+        if motion is None:
+            return self
+        translation = self.translation
+        if self.metres > 0.0:
+            translation = translation + self.rotation @ np.array([motion.x, motion.y, 0.0]) / self.metres
+        return replace(
+            self,
+            odometry=compose(self.odometry, (motion.x, motion.y, motion.turn)),
+            rotation=self.rotation @ turn_about_vertical(motion.turn),
+            translation=translation,
+        )
 
 
 class PathProgress(Value):

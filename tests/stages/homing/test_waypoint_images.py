@@ -7,7 +7,7 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.features.rotation_reduced_sift import none_found
-from omninav.stages.homing.remember_view import RememberView, RememberViewState
+from omninav.stages.homing.first_view_path import FirstViewPath, FirstViewPathState
 from omninav.stages.homing.waypoint_images import WaypointImages, WaypointImagesState
 from omninav.stages.metrics.homing_errors import HomingErrors
 from omninav.stages.values.homing import HomingVector, ImagePath, PathProgress
@@ -91,8 +91,8 @@ def test_no_path_no_target() -> None:
 
 def test_the_first_view_is_given_once_a_second_later() -> None:
     remember, kept, ctx, views = (
-        RememberView(),
-        RememberViewState(),
+        FirstViewPath(),
+        FirstViewPathState(),
         Context("remember"),
         [none_found() for _ in range(9)],
     )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.homing.towards_first_view import TowardsFirstView, TowardsFirstViewState
+from omninav.stages.homing.first_view_target import FirstViewTarget, FirstViewTargetState
 from omninav.stages.metrics.homing_field import HomingFieldErrors
 from omninav.stages.plots.homing_vectors import ShowHomingVectors
 from omninav.stages.source.homing_grid import grid_around
@@ -66,7 +66,7 @@ def test_every_tick_but_the_first_has_a_target_of_its_own() -> None:
         LocalFeatures(*nothing, np.zeros((0, 3), np.float32), np.zeros(0, np.float32))
         for _ in grid_around((0, 0, 0), 1, 1)
     ]
-    stage, first = TowardsFirstView(), TowardsFirstViewState()
+    stage, first = FirstViewTarget(), FirstViewTargetState()
     outs = [stage.step(CTX, first, Tick(n, n, first_of_log=n == 0), view) for n, view in enumerate(views)]
     assert outs[0].target is None
     assert [out.target.number for out in outs[1:]] == [1, 2, 3]

@@ -1,7 +1,8 @@
-"""Homing in the built-in world: vectors against the poses that pictures were taken from."""
+"""Homing in the built-in world: tracker, local map and vector against the poses that images were taken from."""
 
 import functools
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -15,9 +16,11 @@ from omninav.stages.camera.models import Donut
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest
 from omninav.stages.geometry.plane.se2 import between
-from omninav.stages.homing.visual_homing import VisualHoming, VisualHomingState
+from omninav.stages.homing.feature_tracker import FeatureTracker, FeatureTrackerState
+from omninav.stages.homing.homing_vector import HomingVectorFromMap
+from omninav.stages.homing.local_mapping import LocalMapping, LocalMappingState
 from omninav.stages.values.correspondences import Correspondences
-from omninav.stages.values.homing import HomingTarget, HomingVector
+from omninav.stages.values.homing import HomingTarget, HomingVector, LocalMap
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Motion
@@ -39,24 +42,29 @@ def matched(features: LocalFeatures, other: LocalFeatures) -> Correspondences:
 
 
 class Homing:
-    """The stage with the memory that an engine would keep for it."""
+    """The three stages of homing, wired as in the variants."""
 
     def __init__(self, kind: str = "mirror", seed: int = 0, **parameters) -> None:
-        self.stage, self.kind = VisualHoming(**parameters), kind
-        self.ctx, self.memory = Context("homing", np.random.default_rng(seed)), VisualHomingState()
+        self.kind, self.ctx = kind, Context("local_map", np.random.default_rng(seed))
+        self.tracker, self.tracked = FeatureTracker(), FeatureTrackerState()
+        self.mapping, self.mapped = LocalMapping(**parameters), LocalMappingState()
+        self.map: LocalMap | None = None
         self.target = HomingTarget(3, described(kind, TARGET))
 
-    def at(self, pose, motion=None, matches=True, picture: Image | Panorama | None = None, share=1.0) -> HomingVector:
-        pairs = features = None
+    def at(self, pose, motion=None, matches=True, image: Image | Panorama | None = None, share=1.0) -> HomingVector:
+        features = described(self.kind, pose)
+        pairs = None
         if matches:
-            features = described(self.kind, pose)
             pairs = matched(features, self.target.features)
             kept = slice(0, round(share * len(pairs)))
             pairs = Correspondences(pairs.first[kept], pairs.second[kept], pairs.distance[kept])
-        picture = look(self.kind, pose[2], *pose[:2]) if picture is None else picture
-        self.out = self.stage.step(self.ctx, self.memory, picture, self.target, features, pairs, CAMERA, motion)
-        assert self.out.vector is not None
-        return self.out.vector
+        image = look(self.kind, pose[2], *pose[:2]) if image is None else image
+        tracks = self.tracker.step(self.ctx, self.tracked, image, CAMERA, self.map, motion).tracks
+        out = self.mapping.step(self.ctx, self.mapped, features, self.target, pairs, tracks, motion)
+        self.map, self.tracks = out.map, out.tracks
+        vector = HomingVectorFromMap().step(self.ctx, out.map).vector
+        assert vector is not None
+        return vector
 
 
 def off_deg(vector: HomingVector, pose) -> tuple[float, float]:
@@ -118,47 +126,54 @@ def test_nearness_tells_a_view_that_hardly_differs_from_the_first_tick_on() -> N
     assert Homing().at((4.0, 4.2, 1.4)).nearness > 0.1
 
 
-def test_a_map_that_says_the_target_is_reached_where_views_differ_is_thrown_away() -> None:
+def test_a_map_that_says_the_target_is_reached_where_views_differ_is_discarded() -> None:
     homing, pose = Homing(), (4.0, 4.2, -0.5)
     homing.at(pose)
-    memory = homing.memory
-    few = np.flatnonzero(memory.alive)[:8]  # a false map is one on which few agree by chance
-    for name in ("rows", "anchors", "corners", "points", "alive", "looks"):
-        setattr(memory, name, getattr(memory, name)[few])
-    memory.goal_translation = memory.translation + 0.01 * memory.depth
+    few = slice(0, 8)  # a false map is one on which few agree by chance
+    wrong = homing.map
+    homing.map = homing.mapped.map = replace(
+        wrong,
+        rows=wrong.rows[few],
+        places=wrong.places[few],
+        kinds=wrong.kinds[few],
+        goal_translation=np.full(3, 0.01 * wrong.depth()),
+    )
     vector = homing.at(pose)
     assert homing.ctx.counts["false_map"] == 1
     assert (vector.state, vector.ratio) == ("new", pytest.approx(1.0))
     assert off_deg(vector, pose)[0] < 3.0
 
 
-def test_what_was_covered_is_found_again() -> None:
+def covered(pose) -> Image:
+    """The view from a pose with a third of all azimuths hidden."""
+    pixels = look("mirror", pose[2], *pose[:2]).pixels.copy()
+    cv2.ellipse(pixels, (320, 240), (240, 240), 0, 0, 120, (90, 90, 90), -1)
+    return Image(pixels)
+
+
+def test_covered_features_are_found_again() -> None:
     homing, poses = Homing(), drive(13)
     for k, pose in enumerate(poses[:3]):
         homing.at(pose, matches=k == 0)
-    covered = look("mirror", poses[3][2], *poses[3][:2]).pixels.copy()
-    cv2.ellipse(covered, (320, 240), (240, 240), 0, 0, 120, (90, 90, 90), -1)  # a third of all azimuths
-    homing.at(poses[3], matches=False, image=Image(covered))
-    lost = np.bincount(homing.out.tracks.kinds, minlength=4)
-    assert lost[0] > 0.2 * lost.sum()
-    vector = homing.at(poses[4], matches=False)
-    again = np.bincount(homing.out.tracks.kinds, minlength=4)
-    assert again[0] < 0.5 * lost[0]
-    assert off_deg(vector, poses[4])[0] < 6.0
-    kinds, points = homing.out.tracks.kinds, homing.out.tracks.points
+    homing.at(poses[3], matches=False, image=covered(poses[3]))
+    lost = homing.tracks.kinds == 0
+    assert lost.mean() > 0.2
+    for pose in poses[4:6]:
+        vector = homing.at(pose, matches=False)
+    assert np.count_nonzero(homing.tracks.kinds[lost] == 2) >= 0.4 * np.count_nonzero(lost)
+    assert off_deg(vector, poses[5])[0] < 6.0
+    kinds, points = homing.tracks.kinds, homing.tracks.points
     assert np.isfinite(points[(kinds == 1) | (kinds == 2)]).all()
 
 
-def test_whoever_looks_is_told_where_lost_features_should_be_and_which_of_the_targets_they_are() -> None:
+def test_tracks_tell_where_lost_features_should_be_and_which_of_the_targets_they_are() -> None:
     homing, poses = Homing(), drive(13)
     for k, pose in enumerate(poses[:3]):
         homing.at(pose, matches=k == 0)
-    before = homing.out.tracks
-    covered = look("mirror", poses[3][2], *poses[3][:2]).pixels.copy()
-    cv2.ellipse(covered, (320, 240), (240, 240), 0, 0, 120, (90, 90, 90), -1)
-    homing.at(poses[3], matches=False, image=Image(covered))
-    tracks = homing.out.tracks
-    assert tracks.rows.tolist() == before.rows.tolist() == homing.memory.rows.tolist()
+    before = homing.tracks
+    homing.at(poses[3], matches=False, image=covered(poses[3]))
+    tracks = homing.tracks
+    assert tracks.rows.tolist() == before.rows.tolist() == homing.map.rows.tolist()
     gone = (tracks.kinds == 0) & (before.kinds == 1)
     moved = np.hypot(*(tracks.points - before.points)[gone].T)
     assert gone.sum() >= 5
@@ -166,12 +181,12 @@ def test_whoever_looks_is_told_where_lost_features_should_be_and_which_of_the_ta
 
 
 def test_a_map_is_made_anew_where_more_is_matched() -> None:
-    homing = Homing(too_near=0.02)
+    homing = Homing(min_rebuild_distance=0.02)
     homing.at((4.0, 4.2, -0.5), share=0.4)
-    few, ratio = homing.memory.made_of, []
+    few, ratio = homing.map.first_inliers, []
     for pose in drive(4)[1:]:
         ratio.append(homing.at(pose).ratio)
-    assert homing.memory.made_of > few
+    assert homing.map.first_inliers > few
     assert ratio[-1] == pytest.approx(
         math.dist(drive(4)[-1][:2], TARGET[:2]) / math.dist((4.0, 4.2), TARGET[:2]), abs=0.1
     )
@@ -196,30 +211,33 @@ def test_the_memory_of_a_killed_run_goes_on_to_the_same_vectors() -> None:
     poses, homing, other = drive(6), Homing(), Homing()
     for pose in poses[:3]:
         homing.at(pose)
-    restore_state(other.memory, decode(encode(encode_state(homing.memory))))
+    for one, two in ((homing.tracked, other.tracked), (homing.mapped, other.mapped)):
+        restore_state(two, decode(encode(encode_state(one))))
+    other.map = decode(encode(homing.map))
     other.ctx.rng.bit_generator.state = homing.ctx.rng.bit_generator.state
     for pose in poses[3:]:
         one, two = homing.at(pose), other.at(pose)
         assert (one.direction, one.turn, one.ratio, one.inliers) == (two.direction, two.turn, two.ratio, two.inliers)
 
 
-def test_without_a_target_there_is_nothing_to_say() -> None:
-    homing = Homing()
+def test_without_a_target_there_is_no_map_and_no_vector() -> None:
+    homing, features = Homing(), described("mirror", (4.2, 4.6, 0.4))
     homing.at((4.2, 4.6, 0.4))
-    out = homing.stage.step(homing.ctx, homing.memory, look("mirror", 0.4), None, camera=CAMERA)
-    assert out.vector is None
-    assert not homing.memory.mapped
+    out = homing.mapping.step(homing.ctx, homing.mapped, features, None)
+    assert out.map is None
+    assert homing.mapped.map is None
+    assert HomingVectorFromMap().step(homing.ctx, None).vector is None
+    assert homing.tracker.step(homing.ctx, homing.tracked, look("mirror", 0.4), CAMERA).tracks is None
 
 
-def test_what_is_not_wired_is_said() -> None:
-    homing = Homing()
-    with pytest.raises(BadInput, match=r"wires\.homing\.camera=source\.camera"):
-        homing.stage.step(homing.ctx, homing.memory, look("mirror", 0.4), homing.target)
+def test_missing_wires_are_reported() -> None:
+    ctx, state, image = Context("tracker"), FeatureTrackerState(), look("mirror", 0.4)
+    with pytest.raises(BadInput, match=r"wires\.tracker\.camera=source\.camera"):
+        FeatureTracker().step(ctx, state, image)
     donut = Donut(320, 240, 159.5, 119.5, 17.0, 119.0)
     with pytest.raises(BadInput, match=r"no elevations are known .* give its model in camera\.yaml"):
-        homing.stage.step(homing.ctx, homing.memory, look("mirror", 0.4), homing.target, camera=donut)
+        FeatureTracker().step(ctx, state, image, donut)
+    homing, features = Homing(), described("mirror", TARGET)
     alien = Correspondences(np.array([9999]), np.array([0]), np.zeros(1))
     with pytest.raises(BadInput, match="correspondences that are not those of the present features"):
-        homing.stage.step(
-            homing.ctx, homing.memory, look("mirror", 0.4), homing.target, described("mirror", TARGET), alien, CAMERA
-        )
+        homing.mapping.step(homing.ctx, homing.mapped, features, homing.target, alien)

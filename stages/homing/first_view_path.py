@@ -1,0 +1,37 @@
+"""The place where a log began, as one to come back to."""
+
+from typing import Annotated
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
+from omninav.stages.values.homing import ImagePath
+from omninav.stages.values.local_features import LocalFeatures
+
+
+class FirstViewPathState(State):
+    """The first view, until the path is given, and when it was seen (ns)."""
+
+    views: tuple[LocalFeatures, ...] = ()
+    stamp: int = 0
+
+
+class FirstViewPath(Stage):
+    """A path of one view, the first of the log, for a robot that has been carried away from there.
+
+    The path is given once; its reader holds it: `{from: first_view.path, hold: true}`.
+    """
+
+    delay_s: Annotated[float, Bounds(gt=0)] = 1.0
+    """Time after the first view at which the path is given, when the robot has been put elsewhere."""
+
+    class Out(Outputs):
+        path: ImagePath | None = None
+
+    def step(self, ctx: Context, state: FirstViewPathState, tick: Tick, features: LocalFeatures) -> Out:
+        """The path, once."""
+        if tick.first_of_log:
+            state.views, state.stamp = (features,), tick.stamp
+        elif state.views and tick.stamp - state.stamp >= self.delay_s * 1e9:
+            path = ImagePath(tick.log, state.views, ("the start",))
+            state.views = ()
+            return self.Out(path=path)
+        return self.Out()

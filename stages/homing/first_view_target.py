@@ -1,0 +1,32 @@
+"""The first view of a log as the target of every other view, for homing from two views alone."""
+
+from omninav.pipeline import Context, Outputs, Stage, State, Tick
+from omninav.stages.values.homing import HomingTarget
+from omninav.stages.values.local_features import LocalFeatures
+
+
+class FirstViewTargetState(State):
+    """The first view."""
+
+    views: tuple[LocalFeatures, ...] = ()
+
+
+class FirstViewTarget(Stage):
+    """The log's first view as a target that has another number at each tick.
+
+    For a new target homing makes a new local map, so that its vector is that of two views alone (Goedemé et al. 2007,
+    section 7.1).
+    """
+
+    class Out(Outputs):
+        """Absent at the first view itself. `features`: the target's, to match with."""
+
+        target: HomingTarget | None = None
+        features: LocalFeatures | None = None
+
+    def step(self, ctx: Context, state: FirstViewTargetState, tick: Tick, features: LocalFeatures) -> Out:
+        """The target of this tick."""
+        if tick.first_of_log:
+            state.views = (features,)
+            return self.Out()
+        return self.Out(target=HomingTarget(tick.index, state.views[0]), features=state.views[0])

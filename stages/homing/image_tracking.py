@@ -1,0 +1,128 @@
+"""Points from one image to the next: which can be tracked, where they are now, and where lost ones are found again.
+
+Goedemé et al. 2007, sections 7.2.1 and 7.2.2: the most trackable point close to a feature is followed (Shi and Tomasi,
+Lucas and Kanade: OpenCV's). A lost one is searched around its expected position by the histogram of its intensities,
+which does not change where a mirror image turns. Points are columns and rows without the repeated ones of a
+`WorkingImage`.
+"""
+
+from typing import Any, cast
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from .working_image import Grey, WorkingImage
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+Floats = npt.NDArray[np.float32]
+HISTOGRAM_BINS = 16
+"""Of the intensities around a point."""
+
+
+def trackability(image: WorkingImage) -> Floats:
+    """The smaller eigenvalue of the gradients' matrix around each pixel of `grey` (equation 18): (rows, columns)."""
+    return cast(Floats, cv2.cornerMinEigenVal(image.grey, blockSize=5, ksize=3))
+
+
+def best_nearby(strength: Floats, image: WorkingImage, points: Array, radius: int) -> Array:
+    """For points (N, 2) the most trackable pixels (N, 2) at most `radius` rows and columns away, if inside."""
+    offsets = np.stack(np.meshgrid(np.arange(-radius, radius + 1), np.arange(-radius, radius + 1)), axis=-1).reshape(
+        -1, 2
+    )
+    near = np.rint(points).astype(np.int64)[:, None, :] + offsets
+    rows, columns = strength.shape
+    x, y = near[..., 0] + image.seam, near[..., 1]
+    there = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
+    found = np.where(there, strength[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)], -1.0)
+    best: Array = near[np.arange(len(points)), np.argmax(found, axis=1)].astype(np.float64)
+    return best
+
+
+def histograms(image: WorkingImage, points: Array, radius: int) -> Floats:
+    """Intensity histograms (N, 16), each of sum 1, of the discs of `radius` pixels around points (N, 2) in the image.
+
+    Their parts outside `grey` repeat its edge.
+    """
+    grid = np.arange(-radius, radius + 1)
+    dx, dy = (d.ravel() for d in np.meshgrid(grid, grid))
+    disc = dx * dx + dy * dy <= (radius + 0.5) ** 2
+    near = np.rint(points).astype(np.int64)
+    rows, columns = image.grey.shape
+    x = np.clip(near[:, :1] + image.seam + dx[disc], 0, columns - 1)
+    y = np.clip(near[:, 1:] + dy[disc], 0, rows - 1)
+    bins = image.grey[y, x].astype(np.int64) * HISTOGRAM_BINS // 256 + HISTOGRAM_BINS * np.arange(len(points))[:, None]
+    counts = np.bincount(bins.ravel(), minlength=HISTOGRAM_BINS * len(points)).reshape(-1, HISTOGRAM_BINS)
+    return (counts / np.count_nonzero(disc)).astype(np.float32)
+
+
+def track(
+    before: Grey, image: WorkingImage, points: Array, guesses: Array, window: int, levels: int, max_error: float
+) -> tuple[Array, Bools]:
+    """Where points (N, 2) of the image before are now, and whether they were tracked: (N, 2) and (N,).
+
+    Forward from `guesses` (N, 2) by Lucas and Kanade in windows of `window` pixels over `levels` halvings, and backward
+    again: a point that does not come back within `max_error` pixels is lost.
+    """
+    if not len(points):
+        return points, np.zeros(0, np.bool_)
+    seam = np.array([image.seam, 0])
+    old = np.ascontiguousarray((points + seam)[:, None], np.float32)
+    guess = np.ascontiguousarray((guesses + seam)[:, None], np.float32)
+    how: dict[str, Any] = {
+        "winSize": (window, window),
+        "maxLevel": levels,
+        "criteria": (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 0.02),
+        "flags": cv2.OPTFLOW_USE_INITIAL_FLOW,
+    }
+    new, forth, _ = cv2.calcOpticalFlowPyrLK(before, image.grey, old, guess.copy(), **how)
+    back_from = old + (new - guess)  # as far from the old place as the guess was from the new one
+    again, back, _ = cv2.calcOpticalFlowPyrLK(image.grey, before, new, back_from, **how)
+    missed = np.linalg.norm((again - old)[:, 0], axis=1)
+    found = new[:, 0].astype(np.float64) - seam
+    if image.seam:
+        found[:, 0] = np.mod(found[:, 0] + 0.5, image.columns) - 0.5
+    kept = (forth.ravel() > 0) & (back.ravel() > 0) & (missed <= max_error) & image.inside(found, 2.0)
+    return found, np.asarray(kept)
+
+
+def find_again(
+    image: WorkingImage,
+    strength: Floats,
+    expected: Array,
+    histograms_before: Floats,
+    search_radius: float,
+    patch_radius: int,
+    max_difference: float,
+    min_trackability: float,
+) -> tuple[Array, Bools]:
+    """Lost points (N, 2) around where they are `expected` (N, 2), and which were found (N,).
+
+    Of the local maxima of trackability at most `search_radius` pixels away and above `min_trackability` of the image's
+    strongest, the one whose histogram differs least from `histograms_before` (N, 16), if by at most `max_difference`
+    (half the sum of differences, 0 to 1).
+    """
+    points, found = np.full_like(expected, np.nan), np.zeros(len(expected), np.bool_)
+    peaks = (strength >= cv2.dilate(strength, np.ones((3, 3), np.uint8))) & (
+        strength > min_trackability * strength.max()
+    )
+    y, x = np.nonzero(peaks[:, image.seam : peaks.shape[1] - image.seam])
+    if not len(x) or not len(expected):
+        return points, found
+    candidates = np.stack([x, y], axis=-1).astype(np.float64)
+    gap = np.abs(candidates[None] - expected[:, None])
+    if image.seam:
+        gap[..., 0] = np.minimum(gap[..., 0], image.columns - gap[..., 0])
+    with np.errstate(invalid="ignore"):
+        close = np.hypot(gap[..., 0], gap[..., 1]) <= search_radius
+    compared = np.flatnonzero(close.any(axis=0))
+    if not len(compared):
+        return points, found
+    around = histograms(image, candidates[compared], patch_radius)
+    difference = 0.5 * np.abs(around[None] - histograms_before[:, None]).sum(axis=2)
+    difference = np.where(close[:, compared], difference, np.inf)
+    best = np.argmin(difference, axis=1)
+    found = difference[np.arange(len(expected)), best] <= max_difference
+    points[found] = candidates[compared][best[found]]
+    return points, np.asarray(found)

@@ -1,0 +1,263 @@
+"""A local map of the features around the robot, and the robot's pose in it."""
+
+import math
+from dataclasses import replace
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.two_views.absolute_pose import three_point_pose
+from omninav.stages.geometry.two_views.relative_pose_ransac import Solver, false_alarms, relative_pose
+from omninav.stages.geometry.two_views.triangulation import parallax, triangulate
+from omninav.stages.values.correspondences import Correspondences
+from omninav.stages.values.homing import LOST, MATCHED, HomingTarget, LocalMap, TrackedFeatures
+from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.pose import Motion
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+MIN_MAP_MOTION, MIN_ODOMETRY_M = 0.1, 0.05
+"""Distances since the map was made, in its unit and in metres, from which they are compared for the unit in metres."""
+
+
+class Matches(NamedTuple):
+    """Features that were matched with the target view: bearings and pixels here, bearings and rows there."""
+
+    first: Array
+    points: Array
+    second: Array
+    rows: Ints
+
+
+class LocalMappingState(State):
+    """The local map of the tick before, and how many were made."""
+
+    map: LocalMap | None = None
+    made: int = 0
+
+
+class LocalMapping(Stage):
+    """Places the robot and the target view among the features that both views have in common.
+
+    Goedemé et al. 2007, section 7.2. At a new target the bearings of the matched features give the relative pose of
+    the two views, and the features' positions follow by triangulation. Only a pose on which more features agree than
+    by chance is accepted. From then on three-point resection in samples gives the robot's pose from tracked features
+    and from those that are matched with the target view again, which also start their tracks anew.
+
+    With fewer than `min_inliers` the map is made anew from the matches of the same tick, its unit by the old map, or
+    the target is lost. It is also made anew where many more matches agree, since more is matched from closer by. A map
+    that says the target is reached, where the two views still differ, is discarded.
+
+    Without `tracks` only matches count; without `motion` (odometry) the robot's pose is not predicted, and the unit in
+    metres is not known. Raises BadInput for correspondences of other features.
+    """
+
+    solver: Solver = "planar"
+    """Of the first relative pose; `eight_point` is the paper's. `planar` keeps the robot on the floor later too."""
+    max_epipolar_error_deg: Annotated[float, Bounds(gt=0)] = 1.0
+    """By which the two bearings of a feature may together miss the relative pose."""
+    max_resection_error_deg: Annotated[float, Bounds(gt=0)] = 2.0
+    """By which a bearing may miss its feature's position in the map."""
+    min_inliers: Annotated[int, Bounds(ge=4)] = 6
+    """Features that must agree with a pose."""
+    max_false_alarms: Annotated[float, Bounds(gt=0)] = 0.01
+    """Expected number of wrong relative poses with which as many features agree by chance."""
+    min_parallax_deg: Annotated[float, Bounds(ge=0)] = 1.0
+    """Features with less are not triangulated."""
+    rebuild_ratio: Annotated[float, Bounds(ge=1)] = 1.5
+    """The map is made anew where so many times as many matches agree as when it was made."""
+    min_rebuild_distance: Annotated[float, Bounds(ge=0)] = 0.1
+    """To the target, over the features' typical distance: closer the baseline is too short for a new map."""
+    arrival_distance: Annotated[float, Bounds(ge=0)] = 0.05
+    """To the target, over the features' typical distance: closer the two views must look alike."""
+    max_outlier_deg: Annotated[float, Bounds(gt=0)] = 10.0
+    """By which most matched bearings may differ at the target, after the turn."""
+
+    class Out(Outputs):
+        """Absent where there is no target; `tracks` are those of the tracker, with what the map says of them."""
+
+        map: LocalMap | None = None
+        tracks: TrackedFeatures | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        state: LocalMappingState,
+        features: LocalFeatures,
+        target: HomingTarget | None = None,
+        correspondences: Correspondences | None = None,
+        tracks: TrackedFeatures | None = None,
+        motion: Motion | None = None,
+    ) -> Out:
+        """Locate the robot; `correspondences` are of `features` with those of the target."""
+        if target is None:
+            state.map = None
+            return self.Out()
+        matches = matches_with(target, features, correspondences)
+        before = state.map if state.map is not None and state.map.target == target.number else None
+        local_map = LocalMap(-1, target.number, "lost") if before is None else before.moved(motion)
+        state.map = self._located(ctx, state, local_map, tracks, matches)
+        if not len(state.map):
+            return self.Out(map=state.map)
+        return self.Out(map=state.map, tracks=_labelled(state.map, tracks))
+
+    def _located(
+        self,
+        ctx: Context,
+        state: LocalMappingState,
+        local_map: LocalMap,
+        tracks: TrackedFeatures | None,
+        matches: Matches,
+    ) -> LocalMap:
+        """The map with the robot in it, or a new one."""
+        why = ""
+        if len(local_map):
+            local_map = self._resection(ctx, local_map, tracks, matches)
+            if local_map.state == "tracking":
+                if self._could_be_better(local_map, len(matches.rows)):
+                    more = round(self.rebuild_ratio * local_map.first_inliers)
+                    new, _ = self._made(ctx, state, local_map, matches, more)
+                    if new is not None:
+                        return new
+                if not self._contradicted(local_map, matches):
+                    return local_map
+                ctx.count("false_map")
+                local_map = LocalMap(-1, local_map.target, "lost")
+            else:
+                why = f"{local_map.why}; "
+        new, reason = self._made(ctx, state, local_map, matches, self.min_inliers)
+        if new is not None:
+            return new
+        ctx.count("lost_target")
+        return replace(local_map, state="lost", inliers=0, why=why + reason, kinds=np.full(len(local_map), LOST))
+
+    def _resection(
+        self, ctx: Context, local_map: LocalMap, tracks: TrackedFeatures | None, matches: Matches
+    ) -> LocalMap:
+        kinds, points = np.full(len(local_map), LOST), np.full((len(local_map), 2), np.nan)
+        tracked, bearings, places = np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3))
+        if tracks is not None and tracks.number == local_map.number:
+            kinds = tracks.kinds.copy()
+            tracked = np.flatnonzero(kinds != LOST)
+            bearings, places = tracks.bearings[tracked], tracks.places[tracked]
+        # A matched feature stands beside its track, at its own position.
+        row_of = {int(row): n for n, row in enumerate(local_map.rows)}
+        known = np.array([row_of.get(int(row), -1) for row in matches.rows], np.int64)
+        matched = np.flatnonzero(known >= 0)
+        owners = known[matched]
+        bearings = np.concatenate([bearings, matches.first[matched]])
+        places = np.concatenate([places, local_map.places[owners]])
+        usable = np.isfinite(bearings).all(axis=1)
+        threshold = math.radians(self.max_resection_error_deg)
+        found = three_point_pose(bearings[usable], places[usable], ctx.rng, threshold, planar=self.solver == "planar")
+        agrees = np.zeros(len(bearings), np.bool_)
+        if found is not None:
+            agrees[usable] = found.inliers
+        inliers = len(np.unique(np.append(tracked, owners)[agrees]))  # tracked and matched is one feature
+        if found is None or inliers < self.min_inliers:
+            why = f"{inliers} tracked features agree on where the robot is, {self.min_inliers} are needed"
+            return replace(local_map, state="lost", inliers=inliers, why=why)
+        kinds[tracked[~agrees[: len(tracked)]]] = LOST
+        started = agrees[len(tracked) :] & (kinds[owners] == LOST)
+        kinds[owners[started]], points[owners[started]] = MATCHED, matches.points[matched[started]]
+        moved, driven = math.hypot(*found.translation[:2]), math.hypot(*local_map.odometry[:2])
+        metres = driven / moved if moved > MIN_MAP_MOTION and driven > MIN_ODOMETRY_M else local_map.metres
+        return replace(
+            local_map,
+            state="tracking",
+            inliers=inliers,
+            why="",
+            kinds=kinds,
+            points=points,
+            rotation=found.rotation,
+            translation=found.translation,
+            metres=metres,
+        )
+
+    def _could_be_better(self, local_map: LocalMap, matches: int) -> bool:
+        # Closer to the target more is matched with it; at the target the baseline is too short.
+        far = local_map.distance() > self.min_rebuild_distance * local_map.depth()
+        return far and matches > self.rebuild_ratio * local_map.first_inliers
+
+    def _contradicted(self, local_map: LocalMap, matches: Matches) -> bool:
+        # At the target a matched feature has the target view's bearing, but for the turn.
+        near = local_map.distance() <= self.arrival_distance * local_map.depth()
+        if not near or local_map.inliers > len(matches.rows) / 3:
+            return False
+        turned = matches.second @ (local_map.rotation.T @ local_map.goal_rotation).T
+        chord = 2.0 * math.sin(math.radians(self.max_outlier_deg) / 2.0)
+        alike = np.linalg.norm(turned - matches.first, axis=1) < chord
+        return bool(np.count_nonzero(alike) < len(matches.rows) / 2)
+
+    def _made(
+        self, ctx: Context, state: LocalMappingState, old: LocalMap, matches: Matches, min_inliers: int
+    ) -> tuple[LocalMap | None, str]:
+        """A map of two views, or None with the reason."""
+        good = np.isfinite(matches.first).all(axis=1) & np.isfinite(matches.second).all(axis=1)
+        first, points, second, rows = (each[good] for each in matches)
+        threshold = math.radians(self.max_epipolar_error_deg)
+        found = relative_pose(first, second, ctx.rng, self.solver, threshold)
+        inliers = 0 if found is None else int(np.count_nonzero(found.inliers))
+        agree = f"{inliers} of {len(first)} matches with the target view agree"
+        if found is None or inliers < max(self.min_inliers, min_inliers):
+            return None, f"{agree}, {self.min_inliers} are needed"
+        if false_alarms(found, first, second, threshold) > self.max_false_alarms:
+            return None, f"{agree}, as they might by chance"
+        places = triangulate(first, second, found.rotation, found.translation)
+        wide = parallax(first, second, found.rotation) >= math.radians(self.min_parallax_deg)
+        chosen = found.inliers & wide & np.isfinite(places).all(axis=1)
+        if np.count_nonzero(chosen) < 3:  # the views are almost the same, and all features are far away
+            chosen = found.inliers
+            places = first / math.sin(math.radians(max(self.min_parallax_deg, 0.5)))
+        unit, metres = 1.0, 0.0
+        if len(old):
+            scale = max(old.distance(), 1e-3)
+            unit, metres = old.unit * scale, old.metres * scale
+        state.made += 1
+        new = LocalMap(
+            number=state.made,
+            target=old.target,
+            state="new",
+            inliers=inliers,
+            rows=rows[chosen],
+            places=places[chosen],
+            kinds=np.full(np.count_nonzero(chosen), MATCHED),
+            points=points[chosen],
+            goal_rotation=found.rotation,
+            goal_translation=found.translation,
+            first_inliers=inliers,
+            unit=unit,
+            metres=metres,
+        )
+        return new, ""
+
+
+def matches_with(target: HomingTarget, features: LocalFeatures, pairs: Correspondences | None) -> Matches:
+    """What of the present view is in the target view. Raises BadInput where the pairs are of other features."""
+    if pairs is None or not len(pairs):
+        return Matches(np.zeros((0, 3)), np.zeros((0, 2)), np.zeros((0, 3)), np.zeros(0, np.int64))
+    if pairs.first.max() >= len(features) or pairs.second.max() >= len(target.features):
+        raise BadInput(
+            "local_map: correspondences that are not those of the present features with the target's; match "
+            "local_map's own features with those of its target"
+        )
+    return Matches(
+        features.bearings[pairs.first],
+        features.points[pairs.first],
+        target.features.bearings[pairs.second],
+        pairs.second,
+    )
+
+
+def _labelled(local_map: LocalMap, tracks: TrackedFeatures | None) -> TrackedFeatures:
+    # The tracks with the kinds that the map gives them; matched features at their own pixels.
+    if tracks is None or tracks.number != local_map.number:
+        unknown = np.full((len(local_map), 3), np.nan)
+        return TrackedFeatures(
+            local_map.number, local_map.rows, local_map.kinds, local_map.points, unknown, local_map.places
+        )
+    shown = np.where((local_map.kinds == MATCHED)[:, None], local_map.points, tracks.points)
+    return replace(tracks, kinds=local_map.kinds, points=shown)
