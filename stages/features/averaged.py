@@ -1,4 +1,4 @@
-"""Whole views as they are, averaged to a small strip."""
+"""Whole views as an averaged strip, without compression."""
 
 from typing import Annotated
 
@@ -12,14 +12,13 @@ from .averaged_strip import AveragedStrip
 
 
 class AveragedView(AveragedStrip, Stage):
-    """The averaged panorama itself, not compressed: column by column from straight behind, clockwise.
+    """Describes a view by its averaged panorama, column by column clockwise from straight behind.
 
-    What a projection is learned from (`mapping=principal_components`), and the measure of what one loses: distances are
-    root sums of squares over `rows` x `columns` of brightness or colour. `contrast`: strip.averaged_strip. `headings`,
-    which must divide `columns`: at how many turns views are compared.
+    Projections are learned from it (`mapping.principal_components`). Distances are root sums of squares over the strip.
     """
 
     headings: Annotated[int, Bounds(ge=1)] = 1
+    """Headings at which views are compared; must divide `columns`. 1: as they are."""
 
     def step(self, ctx: Context, panorama: Panorama) -> AveragedStrip.Out:
         """Describe one panorama."""

@@ -1,4 +1,4 @@
-"""A panorama averaged to a small strip: what transforms of whole views begin with."""
+"""Averages a panorama to a small strip, the input of transforms of whole views."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal, cast
@@ -15,28 +15,29 @@ FloatArray = npt.NDArray[np.float32]
 Channels = Literal["brightness", "colour"]
 Contrast = Literal["none", "whole", "local"]
 
-WINDOW = 1.0 / 18.0
+LOCAL_CONTRAST_SIGMA = 1.0 / 18.0
 """Standard deviation of the window of local contrast, as a share of the circle: 20 degrees
 (docs/experiments/cml_view_limit.md)."""
 
-FAINT = 5.0
-"""Grey levels: what differs by less from its surroundings is rather noise than contrast."""
+NOISE_GREY_LEVELS = 5.0
+"""Differences from the surroundings below this are noise rather than contrast."""
 
 
 @dataclass(kw_only=True, eq=False)
 class AveragedStrip:
-    """What stages that describe a view by its averaged panorama have in common: a mixin, beside `Stage`.
-
-    The panorama is averaged to `rows` x `columns` of brightness or colour (`channels`), in grey levels (`contrast`
-    none) or in standard deviations (whole, local: see `averaged_strip`). `headings`, which must divide `columns`: at
-    how many turns views are compared; 1 compares them as they are.
-    """
+    """Parameters of stages that describe a view by its averaged panorama: a mixin, beside `Stage`."""
 
     rows: Annotated[int, Bounds(ge=1)] = 16
+    """Rows of the strip."""
     columns: Annotated[int, Bounds(ge=1)] = 72
+    """Columns of the strip."""
     channels: Channels = "brightness"
+    """`brightness`, or `colour` (blue, green, red)."""
     contrast: Contrast = "local"
+    """`none`: grey levels, the papers' form; `whole`, `local`: standard deviations from the mean of the image or of
+    the surroundings (see `averaged_strip`)."""
     headings: Annotated[int, Bounds(ge=1)] = 36
+    """Headings at which views are compared; must divide `columns`. 1: as they are, the papers' form."""
 
     class Out(Outputs):
         """The description of the view."""
@@ -56,12 +57,12 @@ class AveragedStrip:
 def averaged_strip(
     pixels: Pixels, rows: int, columns: int, channels: Channels, contrast: Contrast = "none"
 ) -> FloatArray:
-    """Means over equal parts of a panorama: (rows, columns, 1 or 3) float32. Columns run as the panorama's.
+    """Average a panorama over equal parts: (rows, columns, 1 or 3) float32, columns as in the panorama.
 
     `brightness`: grey as OpenCV weighs it; `colour`: blue, green, red. `contrast` none: grey levels, 0..255. whole:
-    less the channel's mean, over its standard deviation, so that neither exposure nor the lamps' brightness counts.
-    local: the same at each place with the mean and deviation of its surroundings, so that shadows and lamps that are
-    switched count as little.
+    minus the channel's mean, divided by its standard deviation, which removes exposure and brightness of the
+    lamps. local: the same with the mean and deviation of the surroundings, which also removes shadows and switched
+    lamps.
     """
     seen = cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY) if channels == "brightness" else pixels
     small = cv2.resize(seen.astype(np.float32), (columns, rows), interpolation=cv2.INTER_AREA)
@@ -70,21 +71,23 @@ def averaged_strip(
         case "none":
             return strip
         case "whole":
-            deviation = np.sqrt(strip.var(axis=(0, 1)) + FAINT**2)
+            deviation = np.sqrt(strip.var(axis=(0, 1)) + NOISE_GREY_LEVELS**2)
             return cast(FloatArray, (strip - strip.mean(axis=(0, 1))) / deviation)
         case "local":
-            return local_contrast(strip, WINDOW * columns, WINDOW * pixels.shape[1] * rows / pixels.shape[0])
+            return local_contrast(
+                strip, LOCAL_CONTRAST_SIGMA * columns, LOCAL_CONTRAST_SIGMA * pixels.shape[1] * rows / pixels.shape[0]
+            )
 
 
 def local_contrast(strip: FloatArray, across: float, down: float) -> FloatArray:
-    """Each value less the mean of its surroundings, over their standard deviation: (rows, columns, channels).
+    """Each value minus the mean of its surroundings, divided by their standard deviation: (rows, columns, channels).
 
     The surroundings are Gaussian, of `across` columns and `down` rows (standard deviations), and go around the circle.
     """
     columns = strip.shape[1]
     circle = np.concatenate([strip, strip, strip], axis=1)
     gap = circle - _blurred(circle, across, down)
-    contrast = gap / np.sqrt(_blurred(gap**2, across, down) + FAINT**2)
+    contrast = gap / np.sqrt(_blurred(gap**2, across, down) + NOISE_GREY_LEVELS**2)
     return np.ascontiguousarray(contrast[:, columns : 2 * columns], dtype=np.float32)
 
 
@@ -95,7 +98,7 @@ def _blurred(strip: FloatArray, across: float, down: float) -> FloatArray:
 def turned_copies(rows: FloatArray, headings: int) -> FloatArray:
     """Rows (D, P) that run column by column, turned: (headings, D, P).
 
-    A picture projected on turn h of the rows is what a robot turned counter-clockwise by 2 pi h / headings would see,
+    An image projected on turn h of the rows is what a robot turned counter-clockwise by 2 pi h / headings would see,
     projected on the rows themselves: its columns move right, which is the same as rows moved to the left.
     """
     step = rows.shape[1] // headings

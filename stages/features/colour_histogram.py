@@ -82,21 +82,23 @@ def colour_histograms(
 
 
 class ColourHistogram(Stage):
-    """Histogram of any colour space's channels per segment of the panorama.
+    """Describes a panorama by a histogram of a colour space's channels per segment.
 
-    Gross & Koenig 2004, section 2, "experimentally studied several color spaces" before they settled on HSV (stage
-    HsvHistogram, which also leaves out hues that are noise). `space`: rgb, lab, ycrcb or hsv, as OpenCV converts 8-bit
-    pictures; `bins` per channel, 0 leaves one out; `joint`: one histogram over all channels instead of one for each;
-    `ranges`: the lowest and the highest level that the bins of each channel share, where pictures hold only some of all
-    levels (Lab's a and b: of seven simulated worlds 96 % lie from 80 to 183). Each segment sums to 1, so that
-    intersections lie in [0, 1].
+    Gross & Koenig 2004, section 2: the authors "experimentally studied several color spaces" before they settled on HSV
+    (stage HsvHistogram, which also leaves out noisy hues). Each segment sums to 1, so that intersections lie in [0, 1].
     """
 
     segments: Annotated[int, Bounds(ge=1)] = 36
+    """Equal parts of the panorama."""
     space: ColourSpace = "rgb"
+    """rgb, lab, ycrcb or hsv, as OpenCV converts 8-bit images."""
     bins: tuple[BinCount, BinCount, BinCount] = (8, 8, 8)
+    """Bins per channel; 0 leaves a channel out."""
     joint: bool = False
+    """One histogram over all channels instead of one per channel."""
     ranges: Ranges | None = None
+    """[lowest, highest] level of each channel that the bins cover; null: all levels. In seven simulated worlds 96 % of
+    Lab's a and b lie from 80 to 183."""
 
     class Out(Outputs):
         """The description of the view."""

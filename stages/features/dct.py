@@ -1,4 +1,4 @@
-"""Whole views by the low frequencies of their cosine transform."""
+"""Whole views as the low frequencies of their cosine transform."""
 
 from typing import Annotated
 
@@ -35,19 +35,17 @@ def lowest_frequencies(rows: int, columns: int, number: int, mean: bool) -> tupl
 
 
 class CosineTransform(AveragedStrip, Stage):
-    """The first coefficients of the orthonormal discrete cosine transform of the averaged panorama.
+    """Describes a view by the first coefficients of the orthonormal discrete cosine transform of its averaged panorama.
 
-    Porta & Kröse 2004, section 3: a standard compression that needs no set of images to learn from. The panorama is
-    averaged to `rows` x `columns`, of brightness or colour, in grey levels (`contrast` none, the paper's form) or in
-    standard deviations (whole, local: strip.averaged_strip); distances are root sums of squares over that strip.
-    `coefficients` of each channel are kept, from the lowest frequencies; `mean` False leaves the first
-    (DC) out, which is the brightness of the whole picture (erratum 19). `headings` 1 is the paper's form, which
-    compares views as they are: a transform of an unturned panorama never matches another heading. More headings, which
-    must divide `columns`, compare at that many turns, and tell by which the view is turned.
+    Porta & Kröse 2004, section 3: a standard compression without training images. Distances are root sums of squares
+    over the strip. The paper compares views as they are (`headings` 1): the transform of a turned panorama never
+    matches. With more headings a view matches at any of them and tells the turn.
     """
 
     coefficients: Annotated[int, Bounds(ge=1)] = 128
+    """Coefficients of each channel, from the lowest frequency on."""
     mean: bool = False
+    """Whether the first coefficient (DC), the brightness of the whole image, is among them (erratum 19)."""
 
     def __post_init__(self) -> None:
         """Headings are whole columns apart, and there are as many coefficients as asked for."""
@@ -58,7 +56,7 @@ class CosineTransform(AveragedStrip, Stage):
             )
 
     def setup(self, ctx: Context) -> None:
-        """The waves, once for all."""
+        """Compute the basis."""
         self._down, self._across = lowest_frequencies(self.rows, self.columns, self.coefficients, self.mean)
         self._vertical = cosine_basis(self.rows)[: self._down.max() + 1]
         waves = cosine_basis(self.columns)[: self._across.max() + 1]

@@ -1,4 +1,4 @@
-"""Whole views by the spectrum of what stands around the robot."""
+"""Whole views as spectra around the robot."""
 
 from typing import Annotated
 
@@ -31,22 +31,24 @@ def spectrum_around(strip: FloatArray, frequencies: int, mean: bool = True) -> C
 
 
 class SegmentSpectrum(Stage):
-    """Fourier coefficients of the mean colours of segments around the robot.
+    """Describes a view by Fourier coefficients of segment colours around the robot.
 
-    Gross, Koenig & Müller 2005, section 2.2, "a Fourier transformation over averaged local view-segments"; the sizes of
-    the coefficients do not change when the robot turns, and the turn between two views is found by circular
-    cross-correlation. The panorama is averaged to `segments` around the robot in `bands` from top to bottom; each band
-    and channel is a signal of its own. `frequencies`: how many coefficients of each are kept, the mean among them;
-    `mean` False leaves that out (it is 0), which is the brightness of the band. `contrast` none: in grey levels, as the
-    paper may have had it; whole, local: in standard deviations (strip.averaged_strip).
+    Gross, Koenig & Müller 2005, section 2.2: "a Fourier transformation over averaged local view-segments". Magnitudes
+    do not change when the robot turns; the turn between two views follows from circular cross-correlation.
     """
 
     segments: Annotated[int, Bounds(ge=2)] = 36
+    """Segments around the robot, the samples of each signal."""
     bands: Annotated[int, Bounds(ge=1)] = 8
+    """Bands from top to bottom; each band and channel is a signal of its own."""
     frequencies: Annotated[int, Bounds(ge=2)] = 8
+    """Coefficients kept of each signal, with the mean."""
     mean: bool = True
+    """Whether the mean, the brightness of the band, counts; else it is 0."""
     channels: Channels = "colour"
+    """`brightness`, or `colour` (blue, green, red)."""
     contrast: Contrast = "local"
+    """`none`: grey levels, as perhaps in the paper; `whole`, `local`: standard deviations (`averaged_strip`)."""
 
     class Out(Outputs):
         """The description of the view."""

@@ -1,4 +1,4 @@
-"""Histograms of Haar integrals: how often which products of neighbours occur, wherever and however turned."""
+"""Histograms of Haar integrals: products of neighbouring pixels averaged over rotations."""
 
 from typing import Annotated, Literal, NamedTuple
 
@@ -88,7 +88,7 @@ def _count(values: Floats, usable: Bools, bins: int, joint: bool, weighted: bool
 
 
 def usable_pixels(shape: tuple[int, int], by: int, crop_rows: bool, crop_columns: bool, seen: Bools | None) -> Bools:
-    """Which pixels of a picture (rows, columns) have all their neighbours within `by` pixels in it, and `seen`."""
+    """Pixels of an image (rows, columns) whose neighbours within `by` pixels are all in it and `seen`."""
     usable = np.ones(shape, np.bool_)
     if crop_rows:
         usable[:by] = usable[max(shape[0] - by, 0) :] = False
@@ -101,53 +101,57 @@ def usable_pixels(shape: tuple[int, int], by: int, crop_rows: bool, crop_columns
 
 
 class HaarIntegral(Stage):
-    """Histograms of products of neighbouring pixels, averaged over rotations: invariant to turns and shifts.
+    """Describes a view by histograms of Haar integrals, invariant to rotation and shift.
 
-    Wolf, Burgard & Burkhardt 2005, section IV. A kernel (r1, r2) is f = M(0, r1) M(r2, at 90 degrees), in pixels; it is
-    averaged over `angles` rotations around each pixel, per colour channel, with bilinear interpolation (equation 4,
-    errata 40 and 42), and the averages are counted: `histogram` joint or separate over the channels, `bins` per
-    channel, `weighted` or not (Binning); null: 8 of windows, 5 of a panorama's segments, with either of which the
-    paper's 936 images stay below its 4 MB. The histograms of several kernels follow one another with equal shares of
-    the mass, and all of them once for each of the `scales` that kernels are enlarged by. `root`: of the square root of
-    the product, whose values fill the bins more evenly. `angular_weights` linear: weighted means against the
-    discretisation of the angle (geometry/rotation_means.py).
-
-    `borders` crop (erratum 41): pixels whose neighbours lie outside the picture count nowhere, so that histograms sum
-    to less than 1; a panorama goes on around the circle. wrap: the paper's "modulo N", both ways, of all pictures.
-    `integration` monte_carlo: at `samples` pixels of each segment only, drawn at random; what that costs is said
-    (metric `standard_error`: the expected distance of a segment's histogram from the full one, in the last picture).
-    A panorama is described in `segments` equal parts, windows one by one. Raises BadInput where a picture is smaller
-    than a kernel.
+    Wolf, Burgard & Burkhardt 2005, section IV. A kernel (r1, r2) is f = M(0, r1) M(r2, at 90 degrees); it is averaged
+    over rotations around each pixel, per colour channel, with bilinear interpolation (equation 4, errata 40 and 42),
+    and the averages are counted. The histograms of several kernels follow one another with equal shares of the mass,
+    repeated for each scale. A panorama is described in equal segments, windows one by one. Metric `standard_error`: the
+    expected distance of a segment's histogram from that of full integration, in the last image. Raises BadInput where
+    an image is smaller than a kernel.
     """
 
     kernels: tuple[tuple[Radius, Radius], ...] = ((3.0, 4.0),)
+    """Radii r1 and r2 (pixels) of each kernel."""
     scales: tuple[Scale, ...] = (1.0,)
+    """Factors by which the kernels are enlarged; [1.0, 1.41, 2.0] recognises views from up to half the distance."""
     angles: Annotated[int, Bounds(ge=1)] = 36
+    """Rotations of a kernel."""
     angular_weights: AngularWeights = "equal"
+    """`linear`: weighted means against the discretisation of the angle (`geometry/appearance/haar_integrals.py`)."""
     root: bool = True
+    """Take the square root of the product, whose values fill the bins more evenly."""
     histogram: Literal["joint", "separate"] = "joint"
+    """One histogram over the colour channels, or one for each."""
     bins: Annotated[int, Bounds(ge=1, le=64)] | None = None
+    """Bins per channel; null: 8 for windows, 5 for a panorama's segments (936 images then fit in the paper's 4 MB)."""
     weighted: bool = True
+    """Share a value between the two nearest bins, by its distance from them."""
     segments: Annotated[int, Bounds(ge=1)] = 8
+    """Equal parts of a panorama."""
     borders: Borders = "crop"
+    """`crop` (erratum 41): pixels with neighbours outside the image are left out, so that histograms sum to less than
+    1; panoramas continue around the circle. `wrap`: the paper's "modulo N", both ways, for all images."""
     integration: Literal["full", "monte_carlo"] = "full"
+    """`monte_carlo`: at random pixels only."""
     samples: Annotated[int, Bounds(ge=1)] = 2000
+    """Random pixels of each segment with `monte_carlo`."""
 
     class Out(Outputs):
-        """The description of the view; `metrics`: what random integration costs."""
+        """The description of the view; `metrics`: the error of Monte Carlo integration."""
 
         features: SegmentHistograms
         metrics: Metrics | None = None
 
     def __post_init__(self) -> None:
-        """There must be a kernel, and a size to take it at."""
+        """At least one kernel and one scale are needed."""
         if not self.kernels:
             raise ValueError("kernels: at least one is needed; write kernels: [[3, 4]]")
         if not self.scales:
             raise ValueError("scales: at least one is needed; write scales: [1.0]")
 
     def step(self, ctx: Context, panorama: Panorama | Windows) -> Out:
-        """Describe one panorama, or some windows."""
+        """Describe one panorama or several windows."""
         errors: list[float] = []
         if isinstance(panorama, Windows):
             seen = [None] * len(panorama.pixels) if panorama.seen is None else list(panorama.seen)
@@ -177,7 +181,7 @@ class HaarIntegral(Stage):
         errors: list[float],
         circle: bool = False,
     ) -> Floats:
-        """Histograms of a picture's segments: (segments, scales x kernels x bins)."""
+        """Histograms of an image's segments: (segments, scales x kernels x bins)."""
         kernels = [
             Kernel((scale * one, scale * other), self.angles, self.angular_weights, self.root)
             for scale in self.scales
@@ -189,13 +193,13 @@ class HaarIntegral(Stage):
         for k, kernel in enumerate(kernels):
             if kernel.margin >= min(rows, columns):
                 raise BadInput(
-                    f"features: a picture of {columns} x {rows} pixels is too small for a kernel of {kernel.margin}; "
+                    f"features: an image of {columns} x {rows} pixels is too small for a kernel of {kernel.margin}; "
                     "write nodes.features.kernels=[[3,4]] and nodes.features.scales=[1.0], or unwarp to a larger one"
                 )
-            picture = padded(pixels, kernel.margin + 1, wrap, wrap or circle)
+            image = padded(pixels, kernel.margin + 1, wrap, wrap or circle)
             usable = usable_pixels((rows, columns), kernel.margin, not wrap, not (wrap or circle), seen)
             if self.integration == "full":
-                means = kernel.means(picture)
+                means = kernel.means(image)
             for j in range(segments):
                 first, end = int(edges[j]), int(edges[j + 1])
                 if self.integration == "full":
@@ -204,7 +208,7 @@ class HaarIntegral(Stage):
                 else:
                     row = ctx.rng.integers(0, rows, self.samples)
                     column = ctx.rng.integers(first, end, self.samples)
-                    part = kernel.means_at(picture, row, column), usable[row, column]
+                    part = kernel.means_at(image, row, column), usable[row, column]
                     described[j, k], error = binning.shares(*part)
                     errors.append(error)
         return (described / len(self.kernels)).reshape(segments, -1).astype(np.float32)

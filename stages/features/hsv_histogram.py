@@ -25,8 +25,8 @@ def _count(
     hues: int,
     values: int,
     joint: bool,
-    least_saturation: int,
-    least_value: int,
+    min_saturation: int,
+    min_value: int,
 ) -> Floats:
     segments = len(edges) - 1
     bins = hues * values + values if joint else hues + values
@@ -42,7 +42,7 @@ def _count(
         for row in range(hsv.shape[0]):
             for column in range(edges[j], edges[j + 1]):
                 h, s, v = hsv[row, column, 0], hsv[row, column, 1], hsv[row, column, 2]
-                defined = s >= least_saturation and v >= least_value
+                defined = s >= min_saturation and v >= min_value
                 if joint:
                     joint_counts[(hue_bin[h] if defined else hues) * values + value_bin[v]] += 1
                 else:
@@ -69,13 +69,13 @@ def hsv_histograms(
     hue_bins: int = 16,
     value_bins: int = 4,
     joint: bool = False,
-    least_saturation: int = 0,
-    least_value: int = 0,
+    min_saturation: int = 0,
+    min_value: int = 0,
 ) -> Floats:
     """Histograms of hue and value per segment, each segment's summing to 1: (segments, bins) float32.
 
     `joint` False: `hue_bins` + `value_bins` bins, half of the mass in each part; a pixel whose hue is not defined
-    (saturation below `least_saturation` or value below `least_value`, of 255; S = 0 or V = 0 never is) gives its
+    (saturation below `min_saturation` or value below `min_value`, of 255; S = 0 or V = 0 never is) gives its
     share to V. `joint` True: `hue_bins` x `value_bins` bins, hue slowest, and behind them `value_bins` for such pixels
     (in all hues alike, grey would resemble noise of all colours). So grey segments compare by value in both: two of
     one value intersect by 1, white and black by 0.
@@ -92,26 +92,31 @@ def hsv_histograms(
         hue_bins,
         value_bins,
         joint,
-        max(1, least_saturation),
-        max(1, least_value),
+        max(1, min_saturation),
+        max(1, min_value),
     )
 
 
 class HsvHistogram(Stage):
-    """Histogram of hue (16 bins) and brightness (4 bins) per segment of the panorama.
+    """Describes a panorama by a histogram of hue and brightness per segment.
 
-    Gross & Koenig 2004, section 2. `bins`: the paper's "16 bins for H and 4 bins for V" can be two histograms (20
-    bins) or a joint one (64, and 4 for what has no hue), erratum 22; what has no hue counts by its value alone in
-    either. Each segment sums to 1, so that intersections lie in [0, 1] (erratum 20). `least_saturation` and
-    `least_value` (of 255): below them a pixel's hue is noise and does not count.
+    Gross & Koenig 2004, section 2. Pixels without a hue count by their value alone. Each segment sums to 1, so that
+    intersections lie in [0, 1] (erratum 20).
     """
 
     segments: Annotated[int, Bounds(ge=1)] = 36
+    """Equal parts of the panorama."""
     bins: Literal["separate", "joint"] = "separate"
+    """The paper's "16 bins for H and 4 bins for V": two histograms (20 bins) or a joint one (64, and 4 for pixels
+    without a hue), erratum 22."""
     hue_bins: Annotated[int, Bounds(ge=1, le=180)] = 16
+    """Bins of the hue."""
     value_bins: Annotated[int, Bounds(ge=1, le=256)] = 4
-    least_saturation: Annotated[int, Bounds(ge=0, le=255)] = 64
-    least_value: Annotated[int, Bounds(ge=0, le=255)] = 32
+    """Bins of the brightness."""
+    min_saturation: Annotated[int, Bounds(ge=0, le=255)] = 64
+    """Saturation below which a pixel's hue is noise and does not count."""
+    min_value: Annotated[int, Bounds(ge=0, le=255)] = 32
+    """Brightness below which a pixel's hue does not count."""
 
     class Out(Outputs):
         """The description of the view."""
@@ -126,7 +131,7 @@ class HsvHistogram(Stage):
             self.hue_bins,
             self.value_bins,
             self.bins == "joint",
-            self.least_saturation,
-            self.least_value,
+            self.min_saturation,
+            self.min_value,
         )
         return self.Out(features=SegmentHistograms(histograms))

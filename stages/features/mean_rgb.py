@@ -22,12 +22,13 @@ def mean_colours(pixels: Pixels, segments: int) -> npt.NDArray[np.float32]:
 
 
 class MeanRgb(Stage):
-    """Mean colour per segment: the simple appearance feature used before the histograms.
+    """Describes a panorama by the mean colour of each segment (blue-green-red, 0..255).
 
-    Gross & Koenig 2004, section 2 (there "mean RGB"); values 0..255 in blue-green-red.
+    Gross & Koenig 2004, section 2: "mean RGB", the feature used before the histograms.
     """
 
     segments: Annotated[int, Bounds(ge=1)] = 36
+    """Equal parts of the panorama."""
 
     class Out(Outputs):
         """The description of the view."""

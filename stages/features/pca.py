@@ -1,4 +1,4 @@
-"""Whole views by a projection that was learned from a tour."""
+"""Whole views as a projection learned from a tour."""
 
 import numpy as np
 
@@ -12,27 +12,26 @@ from .averaged_strip import AveragedStrip, turned_copies
 
 
 class PrincipalComponents(AveragedStrip, Stage):
-    """The averaged panorama projected on the principal components of a supervised tour's: y = W z.
+    """Describes a view by its averaged panorama projected on the principal components of a tour: y = W z.
 
-    Porta & Kröse 2004, section 2, equation 3. `rows`, `columns`, `channels` and `contrast` must be those of the strips
-    that W was learned from (stage AveragedView). `headings`, which must divide `columns`: at how many turns views are
-    compared; 1 is the paper's form. Raises BadInput where W is for strips of another size.
+    Porta & Kröse 2004, section 2, equation 3. `rows`, `columns`, `channels` and `contrast` must be those with which W
+    was learned (stage AveragedView). Raises BadInput where W is for strips of another size.
     """
 
     def setup(self, ctx: Context) -> None:
-        """No projection seen yet."""
+        """Forget the projection of an earlier run."""
         self._projection: Projection | None = None
 
     def step(self, ctx: Context, panorama: Panorama, projection: Projection) -> AveragedStrip.Out:
         """Describe one panorama."""
         strip = self.strip(panorama)
         if projection is not self._projection:
-            self._learned(projection, strip.size)
+            self._use(projection, strip.size)
         values = np.moveaxis(strip, 1, 0).ravel()
         turned = (self._turned @ values).reshape(self.headings, -1)
         return self.Out(view=Coefficients(turned[0].copy(), turned))
 
-    def _learned(self, projection: Projection, size: int) -> None:
+    def _use(self, projection: Projection, size: int) -> None:
         if projection.components.shape[1] != size:
             raise BadInput(
                 f"projection: learned from strips of {projection.components.shape[1]} numbers, the present ones have "

@@ -1,4 +1,4 @@
-"""Where a panorama's segments begin and end."""
+"""Cuts a panorama into segments."""
 
 import numpy as np
 import numpy.typing as npt

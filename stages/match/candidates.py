@@ -1,4 +1,4 @@
-"""Which references of a map are worth comparing, and whether they can be compared at all."""
+"""Selects the references of a map that are compared with the current view."""
 
 import math
 from dataclasses import dataclass
@@ -20,15 +20,15 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
-"""Multiples of it, less their whole part, fill an interval evenly from the first on."""
+"""Golden ratio: the fractional parts of its multiples fill an interval evenly."""
 
 CELLS_PER_RADIUS = 4
 
 
 class Candidates(NamedTuple):
-    """References to compare: their indices, ascending, and how many of the map's each stands for.
+    """References to compare: their indices, ascending, and how many of the map's references each represents.
 
-    Both None: all of them, each for itself.
+    Both None: all references are compared.
     """
 
     chosen: Ints | None = None
@@ -36,28 +36,34 @@ class Candidates(NamedTuple):
 
 
 def near_belief(
-    poses: Array, near: Particles | None, radius: float, aside: float, whole: int, strangers: int, turn: int
+    poses: Array,
+    near: Particles | None,
+    radius: float,
+    recovery_radius: float,
+    compare_all_up_to: int,
+    background: int,
+    turn: int,
 ) -> Candidates:
-    """The references within `radius` metres of any particle, and `strangers` of the others.
+    """The references within `radius` metres of any particle, and a sample of `background` others.
 
-    Around particles set aside only those within `aside` metres are taken: such hypotheses lie all over the map, and
-    what they are weighed by lies next to them. Strangers are taken at equal steps along the map, others at each `turn`,
-    so that all of them have their turn; each stands for as many as the step is long, and sums with `sampling_weight` are
-    unbiased for the whole map. All references are compared where there is no belief, where `radius` is 0, where none is
-    near, and where there are at most `whole`.
+    Around recovery particles only references within `recovery_radius` metres are taken: they lie all over the map, and
+    only the nearest references matter to them. The background is sampled at equal steps along the map, with another
+    offset at each `turn`, so that all references come up; each represents as many as the step is long, and sums with
+    `sampling_weight` are unbiased for the whole map. All references are compared where there is no belief, where
+    `radius` is 0, where none is near, and where there are at most `compare_all_up_to`.
     """
-    if near is None or radius <= 0.0 or len(poses) <= whole:
+    if near is None or radius <= 0.0 or len(poses) <= compare_all_up_to:
         return Candidates()
     tracked = len(near.poses) - near.recovery_particles
-    near_any = within(poses, near.poses[:tracked], radius) | within(poses, near.poses[tracked:], aside)
+    near_any = within(poses, near.poses[:tracked], radius) | within(poses, near.poses[tracked:], recovery_radius)
     others = np.flatnonzero(~near_any)
-    if len(others) == len(poses) or len(others) <= strangers:
+    if len(others) == len(poses) or len(others) <= background:
         return Candidates()
     sampling_weight = near_any.astype(np.float64)
-    if strangers:
-        step = len(others) / strangers
+    if background:
+        step = len(others) / background
         first = (turn * GOLDEN % 1.0) * step
-        taken = np.minimum((first + step * np.arange(strangers)).astype(np.int64), len(others) - 1)
+        taken = np.minimum((first + step * np.arange(background)).astype(np.int64), len(others) - 1)
         sampling_weight[others[taken]] = step
     chosen = np.flatnonzero(sampling_weight)
     return Candidates(chosen, sampling_weight[chosen])
@@ -80,13 +86,13 @@ def within(poses: Array, places: Array, radius: float) -> npt.NDArray[np.bool_]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _near_cells(points: Array, numbers: Ints, height: int, reach: float) -> npt.NDArray[np.bool_]:
+def _near_cells(points: Array, numbers: Ints, height: int, radius: float) -> npt.NDArray[np.bool_]:
     # In units of cells; cell (i, j) has the number i * height + j, and `numbers` ascend.
     out, columns = np.zeros(len(points), np.bool_), numbers[-1] // height + 1
     for n in range(len(points)):
         x, y = points[n, 0], points[n, 1]
-        for i in range(max(0, math.ceil(x - reach)), min(columns, math.floor(x + reach) + 1)):
-            half = math.sqrt(max(0.0, reach * reach - (x - i) * (x - i)))
+        for i in range(max(0, math.ceil(x - radius)), min(columns, math.floor(x + radius) + 1)):
+            half = math.sqrt(max(0.0, radius * radius - (x - i) * (x - i)))
             first, last = max(0, math.ceil(y - half)), min(height - 1, math.floor(y + half))
             if first <= last:
                 at = np.searchsorted(numbers, i * height + first)
@@ -98,42 +104,47 @@ def _near_cells(points: Array, numbers: Ints, height: int, reach: float) -> npt.
 
 @dataclass(kw_only=True, eq=False)
 class NearBelief:
-    """What stages that compare the references near a belief have in common: a mixin, beside `Stage`.
+    """Parameters of stages that compare the references near a belief: a mixin, beside `Stage`.
 
-    `headings`: how many turns of each reference are compared. `radius`: with `near` wired, references within so many
-    reaches (port `reach`, else of `reach_m`) of a particle are compared, within `radius_aside` of one that is set
-    aside, and `strangers` of the others, in turns, which stand for all of them; in maps of up to `whole_up_to`
-    references all are; 0 compares all. A sensor that looks farther than `radius` misses some.
+    Without `near` wired, all references are compared. Radii are in appearance length scales (port `length_scale`).
     """
 
     headings: Annotated[int, Bounds(ge=1)] = 36
+    """Headings at which each reference is compared, evenly spaced over the circle."""
     radius: Annotated[float, Bounds(ge=0)] = 4.5
-    radius_aside: Annotated[float, Bounds(ge=0)] = 1.0
-    strangers: Annotated[int, Bounds(ge=0)] = 256
-    whole_up_to: Annotated[int, Bounds(ge=0)] = 1000
-    reach_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """Distance from a particle, in length scales, within which references are compared; 0: all. A sensor that looks
+    farther misses some."""
+    recovery_radius: Annotated[float, Bounds(ge=0)] = 1.0
+    """The same around recovery particles."""
+    background_references: Annotated[int, Bounds(ge=0)] = 256
+    """References compared of all others, a different sample at each image."""
+    compare_all_up_to: Annotated[int, Bounds(ge=0)] = 1000
+    """References of a map up to which all are compared."""
+    length_scale_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """Appearance length scale where the port `length_scale` is not wired."""
 
     class Out(Outputs):
-        """How alike view and references are."""
+        """Similarities of view and references."""
 
         similarities: Similarities
 
     def candidates(
-        self, ctx: Context, map: ReferenceGraph, near: Particles | None, reach: LengthScale | None
+        self, ctx: Context, map: ReferenceGraph, near: Particles | None, length_scale: LengthScale | None
     ) -> Candidates:
         """The references to compare at this tick."""
-        unit = self.reach_m if reach is None else reach.metres
-        radius, aside = self.radius * unit, self.radius_aside * unit
-        return near_belief(map.poses, near, radius, aside, self.whole_up_to, self.strangers, ctx.tick.index)
+        unit = self.length_scale_m if length_scale is None else length_scale.metres
+        radius, recovery_radius = self.radius * unit, self.recovery_radius * unit
+        sample = self.compare_all_up_to, self.background_references, ctx.tick.index
+        return near_belief(map.poses, near, radius, recovery_radius, *sample)
 
 
-def check_alike(features: SegmentFeatures, map: ReferenceGraph) -> bool:
-    """Whether view and map are histograms (else colours). Raises BadInput where they do not describe views alike."""
+def check_same_kind(features: SegmentFeatures, map: ReferenceGraph) -> bool:
+    """Whether view and map are histograms (else colours). Raises BadInput where their features differ."""
     kind = kind_of(features)
     shape = tuple(map.features.shape[1:])
     if len(map) and (map.kind != kind or shape != features.values.shape):
         raise BadInput(
-            f"map: its views are {map.kind} of {shape[0]} segments x {shape[1]} bins, the present one is {kind} of "
+            f"map: its views are {map.kind} of {shape[0]} segments x {shape[1]} bins, the current one is {kind} of "
             f"{features.values.shape[0]} x {features.values.shape[1]}; learn the map anew with these features"
         )
     return kind == "histograms"

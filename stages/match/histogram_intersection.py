@@ -8,14 +8,13 @@ from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 
-from .candidates import NearBelief, check_alike
+from .candidates import NearBelief, check_same_kind
 
 
 class HistogramIntersection(NearBelief, Stage):
-    """Similarity as the mean intersection of all segments' histograms: nothing is left out.
+    """Similarity as the mean intersection of all segments' histograms; no segment is left out.
 
-    The non-selective rival of Gross & Koenig 2004, section 2, over histograms. What is
-    compared where: candidates.NearBelief. Raises BadInput where the map was learned with other features.
+    The non-selective alternative of Gross & Koenig 2004, section 2. Raises BadInput where the map has other features.
     """
 
     def step(
@@ -27,7 +26,7 @@ class HistogramIntersection(NearBelief, Stage):
         length_scale: LengthScale | None = None,
     ) -> NearBelief.Out:
         """Compare one view."""
-        check_alike(features, map)
+        check_same_kind(features, map)
         chosen, sampling_weight = self.candidates(ctx, map, near, length_scale)
         values = similarities(map.features, features.values, self.headings, True, False, chosen=chosen)
         return self.Out(similarities=Similarities(values, chosen, sampling_weight, exponent=0.0))

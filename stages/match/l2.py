@@ -8,14 +8,13 @@ from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 
-from .candidates import NearBelief, check_alike
+from .candidates import NearBelief, check_same_kind
 
 
 class L2Match(NearBelief, Stage):
     """Similarity by the L2 norm of the whole difference vector: 1 is equal, 0 the largest possible difference.
 
-    The non-selective method of Gross & Koenig 2004, section 2. What is compared where:
-    candidates.NearBelief. Raises BadInput where map and view are of other kinds.
+    The non-selective method of Gross & Koenig 2004, section 2. Raises BadInput where the map has other features.
     """
 
     def step(
@@ -27,7 +26,7 @@ class L2Match(NearBelief, Stage):
         length_scale: LengthScale | None = None,
     ) -> NearBelief.Out:
         """Compare one view."""
-        histograms = check_alike(features, map)
+        histograms = check_same_kind(features, map)
         chosen, sampling_weight = self.candidates(ctx, map, near, length_scale)
         values = euclidean_similarities(map.features, features.values, self.headings, histograms, chosen)
         return self.Out(similarities=Similarities(values, chosen, sampling_weight))

@@ -1,4 +1,4 @@
-"""The map's views that look like the present one."""
+"""Finds the map's views that look like the current one."""
 
 import math
 from typing import Annotated
@@ -12,25 +12,26 @@ from omninav.stages.values.views import Neighbours, NoveltyThreshold, WholeView
 
 
 class ViewNeighbours(Stage):
-    """The views of the map within the limit of the present one, with a similarity that falls to 0 there.
+    """Finds the views of the map within the novelty threshold of the current one, with their similarities.
 
-    Porta & Kröse 2004, equations 4 and 5 (lambda); Gross, Koenig & Müller 2005, section 2.2 (S, whose shape is not
-    given: erratum 12a). `shape` of S over distance: linear, quadratic (1 - d²/E²), cosine, or step (1 up to the limit).
-    `count` 0: all of them; else the nearest `count` of the whole map, limit or none, as in section 2 of the former: S
-    then falls to 0 at the one that follows them. Before there is a limit there are no neighbours.
-    Raises BadInput where the map's views are not of this kind.
+    Similarity is 1 at distance 0 and falls to 0 at the threshold: lambda of Porta & Kröse 2004, equations 4 and 5; S of
+    Gross, Koenig & Müller 2005, section 2.2 (its shape is not given: erratum 12a). Without a threshold or a map there
+    are no neighbours. Raises BadInput where the map's views are of another kind.
     """
 
     shape: Shape = "linear"
+    """Similarity over distance: linear, quadratic (1 - d²/E²), cosine, or step (1 up to the threshold)."""
     count: Annotated[int, Bounds(ge=0)] = 0
+    """The nearest views to take, whatever the threshold (section 2 of the former): similarity then falls to 0 at the
+    next view. 0: all views within the threshold."""
 
     class Out(Outputs):
-        """Who is near."""
+        """The similar views."""
 
         neighbours: Neighbours
 
     def step(self, ctx: Context, view: WholeView, map: ViewMixtures, threshold: NoveltyThreshold | None = None) -> Out:
-        """Look through the map."""
+        """Search the map."""
         map.check_kind(view)
         if not len(map):
             none = np.zeros(0)

@@ -1,4 +1,4 @@
-"""Similarity as image retrieval has it: the intersection of histograms over what the query holds."""
+"""Similarity of image retrieval: the intersection of histograms divided by the query's sum."""
 
 import math
 from typing import Annotated
@@ -17,7 +17,7 @@ from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Answers, Similarities
 
-from .candidates import NearBelief, check_alike
+from .candidates import NearBelief, check_same_kind
 
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
@@ -78,7 +78,7 @@ def normalised_intersections(
 
 
 def window_turns(directions: npt.NDArray[np.float64]) -> Ints:
-    """Which of some windows a robot sees a reference's picture in, if turned by 2 pi h / W from it: (W,) indices.
+    """The window in which a robot turned by 2 pi h / W from a reference sees its image: (W,) indices.
 
     `directions` (W,): where the windows look, evenly around the robot and one of them straight ahead. Raises BadInput
     where they do not.
@@ -90,7 +90,7 @@ def window_turns(directions: npt.NDArray[np.float64]) -> Ints:
     if np.abs(turns - nearest).max() > 0.01 * number or len(np.unique(columns)) < number:
         shown = ", ".join(f"{math.degrees(d):g}" for d in directions)
         raise BadInput(
-            f"match: pictures that look towards {shown} deg; they must lie evenly around the robot, one straight "
+            f"match: images that look towards {shown} deg; they must lie evenly around the robot, one straight "
             "ahead, to be told from its turns; use an ordinary camera with yaw: 0, or an omnidirectional one"
         )
     windows = np.empty(number, np.int64)
@@ -99,21 +99,21 @@ def window_turns(directions: npt.NDArray[np.float64]) -> Ints:
 
 
 class Retrieval(NearBelief, Stage):
-    """Similarity as image retrieval has it: the intersection of histograms, over what the query holds.
+    """Similarity of image retrieval: the intersection of histograms divided by the query's sum.
 
     Wolf, Burgard & Burkhardt 2005, section IV, equation 5: sum min(q, d) / sum q, the mean over a panorama's segments,
-    at `headings` turns; where features come at several scales, at the best one. Windows each look for themselves:
-    column h is the window that looks where a reference does if the robot is turned by 2 pi h / W from it; a single one
-    has one column. `answers`: the `best` most similar references, each at its best heading.
-    All references are compared; with a `radius`, those near the belief (candidates.NearBelief). Raises BadInput where
-    the map was learned with other features.
+    at `headings` turns; with features of several scales, the best. Windows are queries of their own: column h is the
+    window that sees a reference's view when the robot is turned by 2 pi h / W; a single window has one column. Raises
+    BadInput where the map has other features.
     """
 
     radius: Annotated[float, Bounds(ge=0)] = 0.0
+    """Distance from a particle, in length scales, within which references are compared; 0: all, as in the paper."""
     best: Annotated[int, Bounds(ge=1)] = 9
+    """References in `answers`, each at its best heading."""
 
     class Out(NearBelief.Out):
-        """How alike view and references are, and the answers to the query."""
+        """Similarities of view and references, and the most similar references."""
 
         answers: Answers | None = None
 
@@ -125,13 +125,13 @@ class Retrieval(NearBelief, Stage):
         near: Particles | None = None,
         length_scale: LengthScale | None = None,
     ) -> Out:
-        """Look one view up."""
+        """Query the map with one view."""
         if features.directions is None:
-            check_alike(features, map)
+            check_same_kind(features, map)
             headings = self.headings if len(features.values) > 1 else 1
             queries = turned_views(features.values, headings)
         else:
-            check_alike(SegmentHistograms(features.values[:1]), map)
+            check_same_kind(SegmentHistograms(features.values[:1]), map)
             queries = features.values[window_turns(features.directions), None]
         chosen, sampling_weight = self.candidates(ctx, map, near, length_scale)
         values = normalised_intersections(map.features, queries, features.scales, chosen)

@@ -1,4 +1,4 @@
-"""Similarity from the best segments only."""
+"""Similarity of the best segments only."""
 
 from typing import Annotated, Literal
 
@@ -10,23 +10,23 @@ from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 
-from .candidates import NearBelief, check_alike
+from .candidates import NearBelief, check_same_kind
 
 
 class SelectiveMatch(NearBelief, Stage):
-    """Similarity from the k best segments only, so that occluded ones do not count.
+    """Similarity of the k best segments only, so that occluded ones do not count.
 
-    Gross & Koenig 2004, section 2: S = max_k (sum of the k largest s_j) sqrt(1 / (k n)); s_j is the intersection of
-    segment j's histograms, or 1 - |difference| / `colour_scale` of its colours, not below 0. All k are tried (erratum
-    21). The paper gives s_j for histograms only; by default colours are 0 alike at the largest possible difference,
-    sqrt(3) 255, which leaves no segment out (experiment omniview_mcl/colour_scale).
-    `penalty`: sqrt as in the paper; cube_root: k^-1/3 n^-2/3, which wants more segments; three_quarters: k^-3/4 n^-1/4,
-    which is content with fewer; none: the mean of all.
-    What is compared where: candidates.NearBelief. Raises BadInput where map and view are of other kinds.
+    Gross & Koenig 2004, section 2: S = max_k (sum of the k largest s_j) sqrt(1 / (k n)) over all k (erratum 21); s_j is
+    the intersection of segment j's histograms. The paper gives s_j for histograms only; for colours it is
+    1 - |difference| / `colour_scale`, not below 0. Raises BadInput where the map has other features.
     """
 
     penalty: Literal["sqrt", "cube_root", "three_quarters", "none"] = "sqrt"
+    """Penalty on the number of segments: `sqrt` (the paper's), `cube_root` (k^-1/3 n^-2/3, wants more segments),
+    `three_quarters` (k^-3/4 n^-1/4, wants fewer), or `none` (the mean of all)."""
     colour_scale: Annotated[float, Bounds(gt=0)] = LARGEST_COLOUR_DISTANCE
+    """Difference of mean colours (blue-green-red, 0..255) at which segments have similarity 0; by default the largest
+    possible, sqrt(3) 255, which leaves no segment out (experiment omniview_mcl/colour_scale)."""
 
     def step(
         self,
@@ -37,7 +37,7 @@ class SelectiveMatch(NearBelief, Stage):
         length_scale: LengthScale | None = None,
     ) -> NearBelief.Out:
         """Compare one view."""
-        histograms = check_alike(features, map)
+        histograms = check_same_kind(features, map)
         chosen, sampling_weight = self.candidates(ctx, map, near, length_scale)
         exponent, scale = EXPONENTS[self.penalty], self.colour_scale
         values = similarities(map.features, features.values, self.headings, histograms, True, exponent, chosen, scale)

@@ -1,4 +1,4 @@
-"""Parts of the panorama covered by colour noise, as if someone stood before the camera."""
+"""Covers parts of the panorama by colour noise, a synthetic occlusion."""
 
 from typing import Annotated, Literal
 
@@ -13,9 +13,9 @@ Ints = npt.NDArray[np.int64]
 
 
 def random_parts(rng: np.random.Generator, whole: int, parts: int) -> Ints:
-    """`whole` split into `parts` whole numbers >= 0, each split as likely as any other: (parts,).
+    """Split `whole` at random into `parts` integers >= 0, all splits equally likely: (parts,).
 
-    A row of `whole` things and `parts` - 1 bars between them: each choice of the bars' places is one split.
+    A row of `whole` items and `parts` - 1 bars between them: each choice of the bars' positions is one split.
     """
     bars = np.sort(rng.choice(whole + parts - 1, size=parts - 1, replace=False))
     return np.diff(np.concatenate([[-1], bars, [whole + parts - 1]])) - 1
@@ -37,10 +37,10 @@ def sectors(rng: np.random.Generator, rows: int, columns: int, share: float, wid
 
 
 def rectangles(rng: np.random.Generator, rows: int, columns: int, share: float, width: float) -> Mask:
-    """Rectangles at random places, until they cover `share` of the picture: (rows, columns) bool.
+    """Rectangles at random places, until they cover `share` of the image: (rows, columns) bool.
 
-    Their mean width is `width` of the circle, their mean height half of the picture; the last one is cut to fit, to a
-    column of it. They may overlap and reach over the seam.
+    Their mean width is `width` of the circle, their mean height half of the image; the last one is cut to fit, to
+    one column. They may overlap and cross the seam.
     """
     mask = np.zeros((rows, columns), dtype=np.bool_)
     wanted = round(share * rows * columns)
@@ -61,21 +61,22 @@ class ColourNoise(Stage):
     """Covers a share of the panorama by artificial segments of Gaussian colour noise.
 
     Gross & Koenig 2004, section 3, occlusion experiments: views are "randomly occluded by artificial image segments
-    showing Gaussian-distributed color noise", from 0 to 80 % of the image. Their shape is not said. `sectors` reach
-    over the full height, as people before the camera do and as the paper uses the word segment; `rectangles` cover
-    parts of the height too. `width_deg`: their mean width. Every pixel's blue, green and red are drawn from a normal
-    distribution of `mean` and `sigma` (0..255).
-
-    Which parts are covered, and the noise, follow from `pattern` and the frame's number, so that all repetitions of
-    an experiment see the same pictures; with `pattern` null they follow from the run's seed.
+    showing Gaussian-distributed color noise", from 0 to 80 % of the image. The shape of the segments is not given.
     """
 
     share: Annotated[float, Bounds(ge=0, le=1)] = 0.4
+    """Share of the image that is covered."""
     shape: Literal["sectors", "rectangles"] = "sectors"
+    """`sectors`: over the full height, like people close to the camera, and as the paper uses the word segment."""
     width_deg: Annotated[float, Bounds(gt=0, le=360)] = 40.0
+    """Mean width of a segment."""
     mean: float = 128.0
+    """Mean of each pixel's blue, green and red (0..255)."""
     sigma: Annotated[float, Bounds(ge=0)] = 64.0
+    """Their standard deviation."""
     pattern: Annotated[int, Bounds(ge=0)] | None = 0
+    """Number from which, with the frame's, parts and noise follow: all repetitions see the same images. null: they
+    follow from the run's seed."""
 
     class Out(Outputs):
         """The panorama, covered in part."""

@@ -1,4 +1,4 @@
-"""Features that are not there."""
+"""Drops features at random."""
 
 from typing import Annotated
 
@@ -9,18 +9,16 @@ from omninav.stages.values.local_features import LocalFeatures
 
 
 class LostFeatures(Stage):
-    """Takes a random share of the features away, others at every tick: what occlusions and light leave of them.
-
-    `share` of 0: all stay, and nothing is drawn.
-    """
+    """Drops a random share of the features, different ones at every tick, as occlusion and light do."""
 
     share: Annotated[float, Bounds(ge=0, lt=1)] = 0.0
+    """Probability that a feature is dropped; 0: nothing is drawn."""
 
     class Out(Outputs):
         features: LocalFeatures
 
     def step(self, ctx: Context, features: LocalFeatures) -> Out:
-        """What is left of one view's."""
+        """Thin out one view's features."""
         if self.share == 0.0:
             return self.Out(features=features)
         kept = ctx.rng.random(len(features)) >= self.share

@@ -1,11 +1,11 @@
-"""No disturbance: the panorama as it is."""
+"""No perturbation: the panorama as it is."""
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.image import Panorama
 
 
 class NoPerturbation(Stage):
-    """Hands the panorama on as it is: the undisturbed end of an experiment."""
+    """Passes the panorama on unchanged: the reference condition of an experiment."""
 
     class Out(Outputs):
         """The same panorama."""

@@ -1,4 +1,4 @@
-"""Odometry made worse on purpose, in levels."""
+"""Adds noise to the odometry, in nine levels."""
 
 from typing import Annotated
 
@@ -17,25 +17,27 @@ LEVELS: tuple[Triple, ...] = (
     (15.0, 15.0, 15.0),
     (20.0, 20.0, 20.0),
 )
-"""Noise from none to that of figure 18. The paper prints only <10, 5, 5> and <20, 20, 20>: the others are ours."""
+"""Noise levels up to that of figure 18. The paper prints only <10, 5, 5> and <20, 20, 20>; the others are ours."""
 
 
 class NoisyOdometry(Stage):
-    """Adds noise to each increment of motion: rotation, translation, rotation, as strong as one of nine levels.
+    """Adds noise to each increment of motion: rotation, translation, rotation.
 
-    Wolf, Burgard & Burkhardt 2005, section VI-D, figures 16 to 19; erratum 46a: units are our reading, see `add_odometry_noise`.
-    Each of `levels` is <way in mm per sqrt(m), turn in degrees per sqrt(360 degrees), turn in degrees per sqrt(m)>.
-    Raises ValueError where there is no such level.
+    Wolf, Burgard & Burkhardt 2005, section VI-D, figures 16 to 19. Erratum 46a: the paper gives no units; ours are
+    those of `add_odometry_noise`. A simulated world takes a triple as `world.odometry.added=[10,5,5]`. Raises
+    ValueError where `level` is not one of `levels`.
     """
 
     level: Annotated[int, Bounds(ge=0)] = 4
+    """Which of `levels`, from 0, no noise."""
     levels: tuple[Triple, ...] = LEVELS
+    """Standard deviations: distance (mm per sqrt(m)), turn (deg per sqrt(360 deg)), turn (deg per sqrt(m))."""
 
     class Out(Outputs):
         motion: Motion
 
     def __post_init__(self) -> None:
-        """Refuse a level that is not there."""
+        """Refuse an unknown level."""
         if self.level >= len(self.levels):
             raise ValueError(f"there is no level {self.level}; the levels are 0 to {len(self.levels) - 1}")
 

@@ -73,7 +73,7 @@ class ViewMixtures(GrowableArrays, Value):
         kind, size = type(view).__name__, len(view.values)
         if len(self) and (self.kind != kind or self.views.shape[1] != size):
             raise BadInput(
-                f"map: its views are {self.kind} of {self.views.shape[1]} numbers, the present one is {kind} of "
+                f"map: its views are {self.kind} of {self.views.shape[1]} numbers, the current one is {kind} of "
                 f"{size}; use the features it was learned with, or learn it anew"
             )
 

@@ -24,7 +24,7 @@ def test_mean_colours_are_the_means_of_their_columns(segments: int) -> None:
 @pytest.mark.parametrize("limits", [(0, 0), (64, 32)])
 def test_every_segment_sums_to_one(joint: bool, limits: tuple[int, int]) -> None:
     # Erratum 20: without it the similarity's bound fails.
-    histograms = hsv_histograms(picture(), 9, joint=joint, least_saturation=limits[0], least_value=limits[1])
+    histograms = hsv_histograms(picture(), 9, joint=joint, min_saturation=limits[0], min_value=limits[1])
     assert histograms.shape == (9, 68 if joint else 20)
     assert np.allclose(histograms.sum(axis=1), 1.0, atol=1e-6)
 
@@ -41,14 +41,14 @@ def test_every_segment_sums_to_one_where_no_pixel_has_a_hue() -> None:
 def test_grey_segments_compare_by_their_brightness(joint: bool) -> None:
     greys = np.repeat(np.array([20, 30, 200, 250], np.uint8), 9)  # two of the lowest value bin, two of the highest
     pixels = np.repeat(np.tile(greys, (10, 1))[..., None], 3, axis=2)
-    histograms = hsv_histograms(pixels, 4, joint=joint, least_saturation=64, least_value=32)
+    histograms = hsv_histograms(pixels, 4, joint=joint, min_saturation=64, min_value=32)
     shared = np.minimum(histograms[:, None], histograms[None]).sum(axis=2)
     assert np.allclose(shared, np.kron(np.eye(2), np.ones((2, 2))))
 
 
 def test_in_a_joint_histogram_grey_does_not_resemble_noise_of_all_colours() -> None:
     grey, noise = np.full((40, 36, 3), 128, np.uint8), np.random.default_rng(0).integers(0, 256, (40, 36, 3), np.uint8)
-    one, other = (hsv_histograms(p, 1, joint=True, least_saturation=64, least_value=32) for p in (grey, noise))
+    one, other = (hsv_histograms(p, 1, joint=True, min_saturation=64, min_value=32) for p in (grey, noise))
     assert np.minimum(one, other).sum() < 0.1  # only what of the noise is grey itself
 
 
@@ -68,7 +68,7 @@ def test_histograms_agree_with_counting_by_numpy(joint: bool) -> None:
 
     pixels = picture(3)
     hsv = cv2.cvtColor(pixels, cv2.COLOR_BGR2HSV).reshape(20, 36, 3).astype(int)
-    for j, histogram in enumerate(hsv_histograms(pixels, 6, joint=joint, least_saturation=50, least_value=40)):
+    for j, histogram in enumerate(hsv_histograms(pixels, 6, joint=joint, min_saturation=50, min_value=40)):
         h, s, v = hsv[:, 6 * j : 6 * j + 6].reshape(-1, 3).T
         coloured = (s >= 50) & (v >= 40)
         if joint:

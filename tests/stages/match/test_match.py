@@ -92,7 +92,7 @@ def test_around_recovery_particles_only_the_nearest_references_are_compared() ->
     assert set(alone) == set(without)
 
 
-def test_strangers_stand_for_the_whole_map_and_all_have_their_turn() -> None:
+def test_background_references_represent_the_whole_map_and_all_come_up() -> None:
     map, belief = a_map(400, 0.1), particles_at(8.0)
     seen: set[int] = set()
     for turn in range(60):
@@ -112,7 +112,9 @@ def test_strangers_stand_for_the_whole_map_and_all_have_their_turn() -> None:
 def test_what_is_compared_near_the_belief_is_what_it_is_everywhere() -> None:
     map = a_map(400, 0.1)
     seen, ctx = SegmentHistograms(map.features[80]), Context("match")
-    stage = SelectiveMatch(headings=SEGMENTS, radius=2.0, reach_m=0.5, strangers=20, whole_up_to=0)
+    stage = SelectiveMatch(
+        headings=SEGMENTS, radius=2.0, length_scale_m=0.5, background_references=20, compare_all_up_to=0
+    )
     near, all_ = stage.step(ctx, seen, map, particles_at(8.0)).similarities, stage.step(ctx, seen, map).similarities
     assert near.candidates is not None
     assert len(near.candidates) < 50 + 20
@@ -122,9 +124,12 @@ def test_what_is_compared_near_the_belief_is_what_it_is_everywhere() -> None:
 
 
 @pytest.mark.parametrize("match", [SelectiveMatch, HistogramIntersection, L2Match])
-def test_how_far_is_near_follows_the_reach_of_the_views(match: type[SelectiveMatch]) -> None:
+def test_the_radius_is_in_length_scales_of_the_map(match: type[SelectiveMatch]) -> None:
     map, belief = a_map(800, 0.1), particles_at(30.0)
-    stage, seen = match(headings=SEGMENTS, strangers=10, whole_up_to=0), SegmentHistograms(map.features[80])
+    stage, seen = (
+        match(headings=SEGMENTS, background_references=10, compare_all_up_to=0),
+        SegmentHistograms(map.features[80]),
+    )
     compared = []
     for reach in (0.1, 0.5, 2.0):
         candidates = stage.step(Context("match"), seen, map, belief, LengthScale(reach)).similarities.candidates
@@ -135,7 +140,7 @@ def test_how_far_is_near_follows_the_reach_of_the_views(match: type[SelectiveMat
 
 
 def test_small_maps_are_always_compared_whole() -> None:
-    stage = SelectiveMatch(headings=SEGMENTS, whole_up_to=200)
+    stage = SelectiveMatch(headings=SEGMENTS, compare_all_up_to=200)
     map = a_map(200, 0.1)
     out = stage.step(Context("match"), SegmentHistograms(map.features[0]), map, particles_at(8.0))
     assert out.similarities.candidates is None

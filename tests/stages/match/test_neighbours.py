@@ -60,5 +60,5 @@ def test_every_shape_falls_from_one_to_zero_at_the_limit(shape: Shape, half: flo
 
 
 def test_a_map_of_other_views_is_refused_with_both_named() -> None:
-    with pytest.raises(BadInput, match=r"Coefficients of 2 numbers, the present one is Coefficients of 3"):
+    with pytest.raises(BadInput, match=r"Coefficients of 2 numbers, the current one is Coefficients of 3"):
         ViewNeighbours().step(Context("match"), view(1.0, 2.0, 3.0), map_of(1.0), None)

@@ -116,9 +116,9 @@ def test_a_query_that_holds_nothing_is_like_nothing() -> None:
 
 def test_a_map_of_other_features_is_refused() -> None:
     map = a_map(histograms(4, 8, 64))
-    with pytest.raises(BadInput, match=r"8 segments x 64 bins, the present one is histograms of 8 x 32"):
+    with pytest.raises(BadInput, match=r"8 segments x 64 bins, the current one is histograms of 8 x 32"):
         Retrieval().step(Context("match"), SegmentHistograms(histograms(8, 32)), map)
-    with pytest.raises(BadInput, match=r"8 segments x 64 bins, the present one is histograms of 1 x 64"):
+    with pytest.raises(BadInput, match=r"8 segments x 64 bins, the current one is histograms of 1 x 64"):
         Retrieval().step(Context("match"), SegmentHistograms(histograms(2, 64), np.array([0.0, math.pi])), map)
     colours = ReferenceGraph(np.zeros((1, 3)), np.zeros((1, 8, 3), np.float32), "colours", np.zeros((0, 2)), "truth")
     with pytest.raises(BadInput, match="colours"):
