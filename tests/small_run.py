@@ -4,9 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from omninav.pipeline import Tick
+from omninav.pipeline import Context, Tick
 from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.metrics.collect_drive import CollectDrive
 from omninav.stages.values.belief import GaussianMixture, Particles, PoseEstimate
+from omninav.stages.values.drive import Drive
+from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
@@ -22,8 +25,25 @@ class SmallRun:
     map: ReferenceGraph
 
     @property
-    def drive(self):
-        return self.ticks, self.estimates, self.truth, self.motion
+    def drive(self) -> Drive:
+        return collected(self.ticks, self.truth, self.motion, self.estimates)
+
+    @property
+    def blind(self) -> Drive:
+        """The same drive without ground truth."""
+        return collected(self.ticks, [None] * len(self.ticks), self.motion, self.estimates)
+
+
+def collected(
+    ticks: list[Tick],
+    truth: list[Pose | None],
+    motion: list[Motion | None] | None = None,
+    estimates: list[PoseEstimate | None] | None = None,
+    tallies: list[DriveTally | None] | None = None,
+) -> Drive:
+    """Sequences as a graph would collect them."""
+    still = [None] * len(ticks)
+    return CollectDrive().step(Context("drive"), ticks, truth, motion or still, estimates, tallies).drive
 
 
 def eight(frames: int) -> np.ndarray:

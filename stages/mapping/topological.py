@@ -21,7 +21,7 @@ from omninav.stages.geometry.appearance.visual_distance import (
     match_patches,
 )
 from omninav.stages.geometry.probability import dempster_shafer
-from omninav.stages.values.drives import pose_row
+from omninav.stages.values.drive import pose_row
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, VerticalSegments
 from omninav.stages.values.pose import Pose, PoseSource
 from omninav.stages.values.rooms import Rooms

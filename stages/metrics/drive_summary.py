@@ -1,10 +1,8 @@
 """How a robot fared that drove by itself."""
 
-from collections.abc import Sequence
-
-from omninav.pipeline import Context, Outputs, Stage, Tick
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Metrics
-from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.drive import Drive
 
 
 class DriveSummary(Stage):
@@ -15,13 +13,11 @@ class DriveSummary(Stage):
 
         metrics: Metrics
 
-    def step(self, ctx: Context, ticks: Sequence[Tick], tallies: Sequence[DriveTally]) -> Out:
+    def step(self, ctx: Context, drive: Drive) -> Out:
         """The whole run at once."""
-        seconds = (ticks[-1].stamp - ticks[0].stamp) / 1e9 if len(ticks) else 0.0
-        distance, collisions = (tallies[-1].distance, tallies[-1].collisions) if len(tallies) else (0.0, 0)
-        drive = {
-            "collisions": collisions,
-            "distance_m": distance,
-            "duration_s": seconds,
+        values = {
+            "collisions": int(drive.collisions[-1]) if len(drive) else 0,
+            "distance_m": float(drive.distance[-1]) if len(drive) else 0.0,
+            "duration_s": float(drive.seconds[-1]) if len(drive) else 0.0,
         }
-        return self.Out(metrics=Metrics({"frames": len(ticks), "drive": drive}))
+        return self.Out(metrics=Metrics({"frames": len(drive), "drive": values}))

@@ -1,17 +1,14 @@
 """Errors along a drive: lap by lap, over the steps, and over the distance from the start."""
 
-from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Metrics
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
-from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.drives import Array, Drive, drives, known
-from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.drive import Array, Drive, known
 
 Index = npt.NDArray[np.int64]
 
@@ -42,13 +39,10 @@ class ErrorCurves(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
-        estimates: Sequence[PoseEstimate | None],
-        truth: Sequence[Pose | None],
-        motion: Sequence[Motion | None],
+        drive: Drive,
     ) -> Out:
         """The whole run at once."""
-        logs = [drive for drive in drives(ticks, estimates, truth, motion) if drive.has_truth]
+        logs = [log for log in drive.by_log if log.has_truth]
         return self.Out(
             metrics=Metrics(error_curves(logs[-1], self.home_m, self.points, self.distance_m) if logs else {})
         )

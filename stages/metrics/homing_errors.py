@@ -6,12 +6,11 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Metrics
 from omninav.stages.geometry.plane.se2 import between, wrap
-from omninav.stages.values.drives import pose_rows
+from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.homing import HomingVector, PathProgress
-from omninav.stages.values.pose import Pose
 
 
 class HomingErrors(Stage):
@@ -35,14 +34,13 @@ class HomingErrors(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
-        truth: Sequence[Pose | None],
+        drive: Drive,
         vectors: Sequence[HomingVector | None],
         progress: Sequence[PathProgress | None],
     ) -> Out:
         """The whole run at once."""
-        poses = pose_rows(truth)
-        if not len(poses) or not np.isfinite(poses).all():
+        poses = drive.truth
+        if not len(poses) or not known(poses).all():
             return self.Out()
         ways = between(poses, poses[0])
         away = int(np.argmax(np.hypot(ways[:, 0], ways[:, 1])))  # where it was carried to, or drove to
@@ -60,7 +58,7 @@ class HomingErrors(Stage):
             "end_error_m": float(math.hypot(*ways[-1, :2])),
             "end": {"error_m": {"mean": float(math.hypot(*ways[-1, :2])), "std": 0.0}, "frames": 1},
             "end_turn_deg": abs(math.degrees(ways[-1, 2])),
-            "time_s": None if arrived is None else (ticks[arrived].stamp - ticks[away].stamp) / 1e9,
+            "time_s": None if arrived is None else float(drive.seconds[arrived] - drive.seconds[away]),
             "lost_rate": 1.0 - len(found) / len(after),
             "direction_error_deg": {
                 "median": float(np.median(far)) if far else None,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Metrics
 from omninav.stages.geometry.plane.se2 import between, wrap
-from omninav.stages.values.drives import pose_rows
+from omninav.stages.values.drive import pose_rows
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.homing_field import HomingField
 from omninav.stages.values.pose import Pose

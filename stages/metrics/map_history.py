@@ -6,12 +6,10 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Metrics
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
-from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.drives import Array, Drive, drives, known
-from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.view_mixtures import ViewEvent
 
 from .error_curves import lap_ends
@@ -48,15 +46,12 @@ class MapHistory(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
-        estimates: Sequence[PoseEstimate | None],
-        truth: Sequence[Pose | None],
-        motion: Sequence[Motion | None],
+        drive: Drive,
         events: Sequence[ViewEvent | None],
         after_last: ViewEvent | None = None,
     ) -> Out:
         """The whole run at once."""
-        logs = drives(ticks, estimates, truth, motion)
+        logs = drive.by_log
         counts = counted(events, after_last)
         if not len(counts):
             return self.Out(metrics=Metrics({}))

@@ -9,11 +9,10 @@ import networkx
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Metrics
-from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.pose import Pose
 from omninav.stages.values.topological_map import TopologicalMap
 
 
@@ -40,32 +39,32 @@ class Navigation(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
+        drive: Drive,
         routes: Sequence[PlannedRoute | None],
-        truth: Sequence[Pose | None],
-        tallies: Sequence[DriveTally | None],
         map: TopologicalMap,
     ) -> Out:
         """The whole drive at once."""
         said = [way for way in routes if way is not None]
-        spots = [(pose.x, pose.y) for pose in truth if pose is not None]
-        if not said or not spots:
+        spots = drive.truth[known(drive.truth)][:, :2]
+        if not said or not len(spots):
             return self.Out()
         last = said[-1]
         ends = (k for k, way in enumerate(routes) if way is not None and way.state in ("arrived", "gave up"))
-        ended = next(ends, len(ticks) - 1)
-        tally = next((each for each in reversed(tallies) if each is not None), None)
+        ended = next(ends, len(drive) - 1)
+        tallied = np.flatnonzero(np.isfinite(drive.distance))
+        collisions = int(drive.collisions[-1]) if len(tallied) else None
+        driven = float(drive.distance[tallied[-1]]) if len(tallied) else None
         goal = int(last.places[-1]) if len(last.places) else None
         apart = shortest = None
         if goal is not None and map.pose_source == "truth":
             apart = math.dist(spots[-1], map.poses[map.places[goal]][:2])
             shortest = shortest_metres(map, spots[0], goal)
         found: dict[str, Any] = {
-            "collisions": None if tally is None else tally.collisions,
+            "collisions": collisions,
             "end_error_m": apart,
-            "path_length_m": None if tally is None else tally.distance,
+            "path_length_m": driven,
             "shortest_m": shortest,
-            "time_s": (ticks[ended].stamp - ticks[0].stamp) / 1e9,
+            "time_s": float(drive.seconds[ended]),
             "ways": last.number + 1,
             "goal": goal,
             "state": last.state,
@@ -74,14 +73,14 @@ class Navigation(Stage):
         if map.pose_source == "truth":
             reached = last.state == "arrived" and apart is not None and apart <= self.within_m
             found |= {"reached": reached, "reached_rate": float(reached)}
-            if tally is not None:
-                found["clean_rate"] = float(reached and tally.collisions == 0)
+            if collisions is not None:
+                found["clean_rate"] = float(reached and collisions == 0)
             if reached:
                 found["reached_error_m"] = apart
             if reached and shortest:
                 found["pace"] = found["time_s"] / shortest
-                if tally is not None:
-                    found["detour"] = tally.distance / shortest
+                if driven is not None:
+                    found["detour"] = driven / shortest
         return self.Out(metrics=Metrics({"navigation": found}))
 
 

@@ -5,11 +5,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Metrics
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.topological_map import TopologicalMap
 
 
@@ -36,10 +36,9 @@ class PlaceAccuracy(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
+        drive: Drive,
         beliefs: Sequence[PlaceBelief | None],
         begun: Sequence[PlaceBelief | None],
-        truth: Sequence[Pose | None],
         map: TopologicalMap,
     ) -> Out:
         """The whole run at once."""
@@ -48,12 +47,12 @@ class PlaceAccuracy(Stage):
         if map.pose_source != "truth":
             return self.Out()
         rows, since = [], 0
-        for belief, begins, true in zip(beliefs, begun, truth, strict=True):
+        for belief, begins, true, there in zip(beliefs, begun, drive.truth[:, :2], known(drive.truth), strict=True):
             since = 1 if begins is not None else since + 1
-            if belief is not None and true is not None:
-                metres = np.hypot(*(medoids - (true.x, true.y)).T)
+            if belief is not None and there:
+                metres = np.hypot(*(medoids - true).T)
                 place, closest = int(np.argmax(belief.probabilities)), int(np.argmin(metres))
-                owner = int(map.owner[np.argmin(np.hypot(*(images - (true.x, true.y)).T))])
+                owner = int(map.owner[np.argmin(np.hypot(*(images - true).T))])
                 right, near = place == closest, apart[place, closest] <= 1
                 rows.append((since, right, near, right or place == owner, metres[place], metres[closest]))
         if not rows:

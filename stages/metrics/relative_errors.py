@@ -1,17 +1,14 @@
 """Trajectory errors as the SLAM literature counts them: ATE and RPE."""
 
-from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Metrics
 from omninav.stages.geometry.plane.se2 import between
-from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.drives import Array, Drive, drives, known
-from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.drive import Array, Drive, known
 
 
 class RelativeErrors(Stage):
@@ -34,14 +31,10 @@ class RelativeErrors(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
-        estimates: Sequence[PoseEstimate | None],
-        truth: Sequence[Pose | None],
-        motion: Sequence[Motion | None],
+        drive: Drive,
     ) -> Out:
         """The whole run at once."""
-        logs = drives(ticks, estimates, truth, motion)
-        return self.Out(metrics=Metrics(trajectory_metrics(logs[-1], self.distance_m) if logs else {}))
+        return self.Out(metrics=Metrics(trajectory_metrics(drive.last_log, self.distance_m)))
 
 
 def trajectory_metrics(drive: Drive, distance_m: float) -> dict[str, Any]:

@@ -1,18 +1,15 @@
 """How often the estimate is good enough, and how soon after it was not."""
 
-from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Metrics
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import compose
-from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.drives import Array, Drive, drives, known
-from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.drive import Drive, known
 
 
 class SuccessRate(Stage):
@@ -40,26 +37,18 @@ class SuccessRate(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
-        estimates: Sequence[PoseEstimate | None],
-        truth: Sequence[Pose | None],
-        motion: Sequence[Motion | None],
+        drive: Drive,
     ) -> Out:
         """The whole run at once."""
-        found = drives(ticks, estimates, truth, motion)
-        if not found or not found[-1].has_truth:
-            return self.Out()
-        drive = found[-1]
-        of_drive = (each for tick, each in zip(ticks, estimates, strict=True) if tick.log == drive.log)
-        modes = np.array([0.0 if each is None else each.mode_weight for each in of_drive])
-        return self.Out(metrics=Metrics({"success": self._of(drive, modes)}))
+        last = drive.last_log
+        return self.Out(metrics=Metrics({"success": self._of(last)}) if last.has_truth else None)
 
-    def _of(self, drive: Drive, modes: Array) -> dict[str, Any]:
+    def _of(self, drive: Drive) -> dict[str, Any]:
         scored = known(drive.truth)
         truth, estimate, frames = drive.truth[scored], drive.estimate[scored], np.flatnonzero(scored)
         position, heading = position_errors(estimate, truth), heading_errors_deg(estimate, truth)
         good = (position <= self.within_m) & (heading <= self.within_deg)  # a frame without estimate is not
-        single = good & (modes[scored] >= self.one_mode)
+        single = good & (drive.mode_weight[scored] >= self.one_mode)
         result: dict[str, Any] = {
             "within_rate": float(good.mean()),
             "at_end": float(good[-1]),

@@ -1,16 +1,14 @@
 """Position and heading errors against ground truth, frame by frame."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Tick
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
-from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.drives import Array, Drive, drives, known
-from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.drive import Array, Drive, known
 
 QUANTITIES = {
     "position_error_m": Quantity(better="lower"),
@@ -49,17 +47,13 @@ class TrajectoryErrors(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
-        estimates: Sequence[PoseEstimate | None],
-        truth: Sequence[Pose | None],
-        motion: Sequence[Motion | None],
+        drive: Drive,
     ) -> Out:
         """The whole run at once."""
-        found = drives(ticks, estimates, truth, motion)
-        per_log = [drive_metrics(drive, self.lost_m, self.settle_steps) for drive in found]
+        per_log = [drive_metrics(drive, self.lost_m, self.settle_steps) for drive in drive.by_log]
         if not per_log:
             return self.Out(metrics=Metrics({"frames": 0}))
-        if not any(drive.has_truth for drive in found):
+        if not drive.has_truth:
             ctx.fact("errors", "not measured: the log has no ground truth")
         values = dict(per_log[-1])
         if len(per_log) > 1:

@@ -1,7 +1,6 @@
 """How much a map of views takes, and how densely it covers what was visited."""
 
 import dataclasses
-from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
@@ -9,8 +8,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Metrics
-from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 Array = npt.NDArray[np.float64]
@@ -36,14 +34,13 @@ class ViewMapSize(Stage):
     def step(
         self,
         ctx: Context,
+        drive: Drive,
         map: ViewMixtures,
-        estimates: Sequence[PoseEstimate | None],
-        truth: Sequence[Pose | None],
     ) -> Out:
         """The map at the end of the run."""
         ctx.fact("map_poses", map.pose_source)
-        poses = [pose for pose in truth if pose] or [estimate.pose for estimate in estimates if estimate]
-        path = np.array([(pose.x, pose.y) for pose in poses]).reshape(-1, 2)
+        poses = drive.truth if drive.has_truth else drive.estimate
+        path = poses[known(poses)][:, :2]
         size, area = stored_bytes(map), visited_area(path, self.near_m)
         figures = {
             "size_bytes": size,

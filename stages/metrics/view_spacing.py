@@ -1,14 +1,14 @@
 """How evenly the views of a map lie, among views and on the floor."""
 
 import dataclasses
-from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Metrics
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import WholeView
 
@@ -32,8 +32,8 @@ class ViewSpacing(Stage):
 
         metrics: Metrics
 
-    def step(self, ctx: Context, ticks: Sequence[Tick], map: ViewMixtures, view: WholeView) -> Out:
-        """The map at the end of the run, which `ticks` wait for; `view`: the last one seen, for how to compare."""
+    def step(self, ctx: Context, drive: Drive, map: ViewMixtures, view: WholeView) -> Out:
+        """The map at the end of the run, which `drive` waits for; `view`: the last one seen, for how to compare."""
         if len(map) < 3:
             return self.Out(metrics=Metrics({}))
         rows = np.unique(np.linspace(0, len(map) - 1, min(self.most, len(map))).round().astype(np.int64))

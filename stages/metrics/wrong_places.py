@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Metrics
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 
 Array = npt.NDArray[np.float64]
@@ -39,12 +39,12 @@ class WrongPlaces(Stage):
     def step(
         self,
         ctx: Context,
+        drive: Drive,
         events: Sequence[ViewEvent | None],
         mixtures: Sequence[MixturesNow | None],
-        truth: Sequence[Pose | None],
     ) -> Out:
         """The whole run at once."""
-        path = np.array([(np.nan, np.nan) if pose is None else (pose.x, pose.y) for pose in truth]).reshape(-1, 2)
+        path = drive.truth[:, :2]
         seen, came, shares = wrong_shares(events, mixtures, path, self.wrong_m)
         values: dict[str, Any] = {"references": len(seen)}
         if len(seen):

@@ -5,15 +5,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
 from omninav.stages.geometry.probability.gaussians import moments
 from omninav.stages.geometry.probability.particles import weighted_moments
-from omninav.stages.values.belief import GaussianMixture, Particles, PlaceBelief, PoseEstimate
-from omninav.stages.values.drives import Array, pose_rows
+from omninav.stages.values.belief import GaussianMixture, Particles, PlaceBelief
+from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.map_places import AnyMap, map_poses
-from omninav.stages.values.pose import Pose
 
 from .snapshot_times import geometric_moments
 from .style import (
@@ -55,25 +54,18 @@ class BeliefSnapshots(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
+        drive: Drive,
         beliefs: Sequence[Shown | None],
-        estimates: Sequence[PoseEstimate | None],
-        truth: Sequence[Pose | None],
         map: AnyMap | None = None,
         grid: OccupancyGrid | None = None,
     ) -> Out:
         """The whole run at once."""
-        last = [tick for tick in ticks]
-        rows = [row for row, tick in enumerate(last) if tick.log == last[-1].log]
+        last = drive.last_log
         panels = []
-        for moment in geometric_moments(len(rows), self.moments):
-            row = rows[moment]
-            belief, estimate = beliefs[row], estimates[row]
+        for k in geometric_moments(len(last), self.moments):
+            belief = beliefs[last.row[k]]
             if belief is not None:
-                seconds = (last[row].stamp - last[rows[0]].stamp) / 1e9
-                panels.append(
-                    (last[row].frame, seconds, belief, *pose_rows([estimate.pose if estimate else None, truth[row]]))
-                )
+                panels.append((int(last.frames[k]), last.seconds[k], belief, last.estimate[k], last.truth[k]))
         if not panels:
             return self.Out()
         return self.Out(

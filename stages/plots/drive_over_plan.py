@@ -4,13 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Outputs, Stage, Tick
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
-from omninav.stages.values.drive_tally import DriveTally
-from omninav.stages.values.drives import Array, drives
+from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.topological_map import TopologicalMap
 
 from .style import (
@@ -42,28 +40,23 @@ class DriveOverPlan(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
-        truth: Sequence[Pose | None],
-        motion: Sequence[Motion | None],
-        tallies: Sequence[DriveTally | None],
+        drive: Drive,
         plan: FloorPlan,
         map: TopologicalMap | None = None,
         routes: Sequence[PlannedRoute | None] | None = None,
     ) -> Out:
         """The whole run at once."""
-        logs = drives(ticks, [None] * len(ticks), truth, motion)
-        if not logs or not logs[-1].has_truth:
+        if not drive.has_truth:
             return self.Out()
-        counts = np.array([0 if tally is None else tally.collisions for tally in tallies])
-        contacts = np.flatnonzero(np.diff(counts, prepend=0) > 0)
-        path, dead_reckoning = logs[-1].truth, logs[-1].odometry_alone()
+        contacts = np.flatnonzero(np.diff(drive.collisions, prepend=0) > 0)
+        path, dead_reckoning = drive.truth, drive.odometry_alone()
         planned = planned_ways(routes or (), map)
         return self.Out(
             figure=Figure(
                 name="drive_over_plan",
                 title="Where it drove",
                 caption=f"The true path of {len(path)} ticks over the floor plan, which the robot does not know. "
-                f"It came into contact with something {int(counts.max())} times (orange crosses). "
+                f"It came into contact with something {int(drive.collisions.max())} times (orange crosses). "
                 f"Dashed: where its wheels say it went.{_said(map, planned)}",
                 content=_draw(path, dead_reckoning, path[contacts], plan, map, planned),
                 order=4,

@@ -9,16 +9,15 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.graph.results import Figure
 from omninav.stages.values.belief import PlaceBelief
-from omninav.stages.values.drives import pose_rows
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing import DrivingStatus, PathProgress
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.pose import Pose
 from omninav.stages.values.thumbnails import Thumbnails, decoded
 from omninav.stages.values.topological_map import TopologicalMap
 
@@ -111,11 +110,10 @@ class DriveVideo(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
+        drive: Drive,
         snapshots: Sequence[HomingGlance | None],
         progress: Sequence[PathProgress | None],
         statuses: Sequence[DrivingStatus | None],
-        truth: Sequence[Pose | None],
         plan: FloorPlan | None = None,
         beliefs: Sequence[PlaceBelief | None] | None = None,
         routes: Sequence[PlannedRoute | None] | None = None,
@@ -123,8 +121,7 @@ class DriveVideo(Stage):
         thumbnails: Thumbnails | None = None,
     ) -> Out:
         """The whole run at once."""
-        path = pose_rows(truth)
-        stamps = np.array([tick.stamp for tick in ticks])
+        path, stamps = drive.truth, drive.stamps
         last = _last_tick(list(statuses), None if routes is None else list(routes), stamps, round(1e9 * self.after_s))
         there = [row for row, glance in enumerate(snapshots) if glance is not None and row <= last]
         if not there:
@@ -136,10 +133,20 @@ class DriveVideo(Stage):
             goal, shown = target_of(progress[row], way, map, path[0], thumbnails)
             if glance.vector is None:
                 goal = np.full(3, np.nan)
-            seconds = (int(stamps[row]) - int(stamps[0])) / 1e9
             belief = None if beliefs is None else beliefs[row]
             scenes.append(
-                Scene(row, seconds, glance, shown, path[row], goal, belief, way, progress[row], statuses[row])
+                Scene(
+                    row,
+                    float(drive.seconds[row]),
+                    glance,
+                    shown,
+                    path[row],
+                    goal,
+                    belief,
+                    way,
+                    progress[row],
+                    statuses[row],
+                )
             )
         frames = Frames(scenes, path, plan, map, self.around_m)
         ctx.doing(f"drawing a film of {len(frames)} frames")

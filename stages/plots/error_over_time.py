@@ -5,12 +5,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from omninav.pipeline import Context, Outputs, Stage, Tick
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
-from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.drives import Array, Drive, drives
-from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.drive import Array, Drive
 
 from .style import ESTIMATE, MARK, ODOMETRY, picture
 
@@ -33,13 +31,10 @@ class ErrorOverTime(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
-        estimates: Sequence[PoseEstimate | None],
-        truth: Sequence[Pose | None],
-        motion: Sequence[Motion | None],
+        drive: Drive,
     ) -> Out:
         """The whole run at once."""
-        logs = [drive for drive in drives(ticks, estimates, truth, motion) if drive.has_truth]
+        logs = [log for log in drive.by_log if log.has_truth]
         if not logs:
             return self.Out()
         return self.Out(
@@ -90,7 +85,7 @@ def _draw(logs: Sequence[Drive]) -> bytes:
             converged = "never converged" if settled is None else f"converged after {settled} frames"
             ends = f"at the end {_last(drive.estimate, drive):.2f} m off"
             beside = "" if odometry is None else f", odometry {_last(odometry, drive):.2f} m"
-            upper.set_title(f"log {drive.log}: {converged}\n{ends}{beside}", fontsize=8.5)
+            upper.set_title(f"log {drive.log[0]}: {converged}\n{ends}{beside}", fontsize=8.5)
         named = {label: handle for axes in drawn.canvas.axes for handle, label in zip(*_legend(axes), strict=True)}
         drawn.canvas.legend(named.values(), named.keys(), loc="outside lower center", ncols=3)
     return drawn.content

@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
-from omninav.stages.values.drives import Array, pose_rows
+from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing import HomingVector, PathProgress
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.pose import Pose
 from omninav.stages.values.thumbnails import Thumbnails, decoded
 from omninav.stages.values.topological_map import TopologicalMap
 
@@ -71,17 +70,16 @@ class HomingSnapshots(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
+        drive: Drive,
         snapshots: Sequence[HomingGlance | None],
         progress: Sequence[PathProgress | None],
-        truth: Sequence[Pose | None],
         routes: Sequence[PlannedRoute | None] | None = None,
         map: TopologicalMap | None = None,
         thumbnails: Thumbnails | None = None,
         plan: FloorPlan | None = None,
     ) -> Out:
         """The whole run at once."""
-        path = pose_rows(truth)
+        path = drive.truth
         told = [(row, g) for row, g in enumerate(snapshots) if g is not None and g.vector is not None]
         if not told:
             return self.Out()
@@ -89,9 +87,17 @@ class HomingSnapshots(Stage):
         for row, glance in (told[n] for n in chosen([g for _, g in told], self.moments)):
             assert glance.vector is not None
             goal, shown = target_of(progress[row], None if routes is None else routes[row], map, path[0], thumbnails)
-            seconds = (ticks[row].stamp - ticks[0].stamp) / 1e9
             found.append(
-                Moment(ticks[row].frame, seconds, glance, glance.vector, shown, path[row], goal, path[: row + 1])
+                Moment(
+                    int(drive.frames[row]),
+                    drive.seconds[row],
+                    glance,
+                    glance.vector,
+                    shown,
+                    path[row],
+                    goal,
+                    path[: row + 1],
+                )
             )
         return self.Out(
             figure=Figure(

@@ -5,12 +5,10 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
-from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.drives import Array, drives, known
+from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.floor_plan import FloorPlan
-from omninav.stages.values.pose import Pose
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 from .style import (
@@ -45,18 +43,15 @@ class MapEllipses(Stage):
     def step(
         self,
         ctx: Context,
+        drive: Drive,
         map: ViewMixtures,
-        ticks: Sequence[Tick],
-        estimates: Sequence[PoseEstimate | None],
-        truth: Sequence[Pose | None],
         plan: FloorPlan | None = None,
     ) -> Out:
         """The map at the end of the run."""
         if not len(map.weights):
             return self.Out()
-        logs = drives(ticks, estimates, truth, [None] * len(ticks))
-        true = any(drive.has_truth for drive in logs)
-        paths = [drive.truth if true else drive.estimate for drive in logs]
+        true = drive.has_truth
+        paths = [log.truth if true else log.estimate for log in drive.by_log]
         per_view = len(map.weights) / max(len(map), 1)
         said = (
             f"{len(map)} views seen from {len(map.weights)} places ({per_view:.2f} each), learned in {map.steps} steps."

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Outputs, Stage, Tick
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import ViewEvent
 
 from .style import ESTIMATE, MARK, ODOMETRY, REFERENCE, picture
@@ -22,7 +23,7 @@ class MapGrowth(Stage):
 
         figure: Figure | None = None
 
-    def step(self, ctx: Context, ticks: Sequence[Tick], events: Sequence[ViewEvent | None]) -> Out:
+    def step(self, ctx: Context, drive: Drive, events: Sequence[ViewEvent | None]) -> Out:
         """The whole run at once."""
         rows = [row for row, event in enumerate(events) if event is not None]
         found = [event for event in events if event is not None]
@@ -31,7 +32,7 @@ class MapGrowth(Stage):
         at = np.array(rows)
         came = np.array([len(event.inserted) for event in found])
         went = np.array([len(event.removed) for event in found])
-        starts = [row for row, tick in enumerate(ticks) if tick.first_of_log]
+        starts = [int(log.row[0]) for log in drive.by_log]
         reasons = {why: sum(len(e.removed) for e in found if e.why == why) for why in ("forgotten", "merged", "full")}
         told = ", ".join(f"{number} {why}" for why, number in reasons.items() if number)
         return self.Out(
@@ -40,10 +41,10 @@ class MapGrowth(Stage):
                 title="The map over time",
                 caption=f"{came.sum()} references came, {went.sum()} went{f' ({told})' if told else ''}; "
                 f"{found[-1].views} with {found[-1].components} components were left. Below, how many came and went "
-                f"per {_width(len(ticks))} frames, by when it was learned, some way behind where it was seen. Dotted "
+                f"per {_width(len(drive))} frames, by when it was learned, some way behind where it was seen. Dotted "
                 "lines: a new log begins.",
                 content=_draw(
-                    len(ticks),
+                    len(drive),
                     starts,
                     at,
                     np.array([event.views for event in found]),

@@ -1,11 +1,10 @@
 """A map by itself: where its reference views were taken."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from omninav.pipeline import Context, Outputs, Stage, Tick
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.maps import ReferenceGraph
 
 from .style import ESTIMATE, draw_map, extent_of, fitting_height, picture, plan_axes
@@ -19,15 +18,15 @@ class MapPlot(Stage):
 
         figure: Figure | None = None
 
-    def step(self, ctx: Context, ticks: Sequence[Tick], map: ReferenceGraph) -> Out:
-        """The map at the end of the run; `ticks`, collected, make it wait until then."""
+    def step(self, ctx: Context, drive: Drive, map: ReferenceGraph) -> Out:
+        """The map at the end of the run; `drive` makes it wait until then."""
         if not len(map):
             return self.Out()
         return self.Out(
             figure=Figure(
                 name="map_plan",
                 title="The map",
-                caption=f"{len(map)} reference views and {len(map.edges)} edges, from {len(ticks)} frames. Arrows "
+                caption=f"{len(map)} reference views and {len(map.edges)} edges, from {len(drive)} frames. Arrows "
                 f"point along the robot's heading when the view was taken. The poses are taken from {map.pose_source}.",
                 content=_draw(map),
                 order=8,

@@ -6,8 +6,9 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.thumbnails import decoded
 
@@ -26,14 +27,18 @@ class PanoramaStrip(Stage):
 
         figure: Figure | None = None
 
-    def step(self, ctx: Context, ticks: Sequence[Tick], snapshots: Sequence[EncodedPanorama | None]) -> Out:
+    def step(self, ctx: Context, drive: Drive, snapshots: Sequence[EncodedPanorama | None]) -> Out:
         """The whole run at once."""
-        kept = [(tick, shot) for tick, shot in zip(ticks, snapshots, strict=True) if shot is not None]
-        kept = [entry for entry in kept if entry[0].log == kept[-1][0].log]
+        last = drive.last_log
+        kept = [
+            (frame, shot)
+            for frame, row in zip(last.frames.tolist(), last.row.tolist(), strict=True)
+            if (shot := snapshots[row]) is not None
+        ]
         if not kept:
             return self.Out()
         chosen = [kept[i] for i in spread_out(len(kept), self.frames)]
-        pictures = [(tick.frame, decoded(shot.jpeg)) for tick, shot in chosen]
+        pictures = [(frame, decoded(shot.jpeg)) for frame, shot in chosen]
         headings = chosen[0][1].headings
         shown = (
             "Windows cut from its pictures, from the left to the right: where each looks stands below it."

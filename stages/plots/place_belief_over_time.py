@@ -5,13 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Outputs, Stage, Tick
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
-from omninav.stages.values.drives import Array, pose_rows
-from omninav.stages.values.drives import known as poses_known
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.drive import Array, Drive
+from omninav.stages.values.drive import known as poses_known
 from omninav.stages.values.topological_map import TopologicalMap
 
 from .style import ESTIMATE, MARK, ODOMETRY, PARTICLE, TRUTH, picture
@@ -35,20 +34,18 @@ class PlaceBeliefOverTime(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
+        drive: Drive,
         beliefs: Sequence[PlaceBelief | None],
-        truth: Sequence[Pose | None],
         map: TopologicalMap,
     ) -> Out:
         """The whole run at once."""
-        rows = [row for row, tick in enumerate(ticks) if tick.log == ticks[-1].log]
-        seconds = np.array([ticks[row].stamp - ticks[rows[0]].stamp for row in rows]) / 1e9
-        shares = np.full((len(rows), len(map)), np.nan)
-        for k, row in enumerate(rows):
+        last = drive.last_log
+        shares = np.full((len(last), len(map)), np.nan)
+        for k, row in enumerate(last.row):
             belief = beliefs[row]
             if belief is not None:
                 shares[k] = belief.probabilities
-        path = pose_rows([truth[row] for row in rows])
+        path = last.truth
         nearest = np.where(poses_known(path), map.nearest_places(np.nan_to_num(path)), -1)
         if not np.isfinite(shares).any():
             return self.Out()
@@ -66,7 +63,7 @@ class PlaceBeliefOverTime(Stage):
                 caption=f"Above: {len(map)} places, numbered as the map has them, as dark as they were believed.{truly}"
                 f"{right} Below: how probable the most probable place was, and how probable the truly nearest, alone "
                 "and with the places linked to it.",
-                content=_draw(seconds, shares, nearest, map),
+                content=_draw(last.seconds, shares, nearest, map),
                 order=28,
             )
         )

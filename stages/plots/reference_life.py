@@ -6,10 +6,10 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.floor_plan import FloorPlan
-from omninav.stages.values.pose import Pose
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 
 from .style import (
@@ -47,10 +47,9 @@ class ReferenceLife(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
+        drive: Drive,
         events: Sequence[ViewEvent | None],
         mixtures: Sequence[MixturesNow | None],
-        truth: Sequence[Pose | None],
         plan: FloorPlan | None = None,
     ) -> Out:
         """The whole run at once."""
@@ -59,10 +58,8 @@ class ReferenceLife(Stage):
             return self.Out()
         moments: list[Moment] = []
         seen = []
-        path = np.full((len(ticks), 2), np.nan)
-        for row, (now, true) in enumerate(zip(mixtures, truth, strict=True)):
-            if true is not None:
-                path[row] = true.x, true.y
+        path = drive.truth[:, :2]
+        for row, now in enumerate(mixtures):
             if now is not None and (mine := now.names == name).any():
                 moments.append((row, now.means[mine, :2].astype(np.float64), now.weights[mine].astype(np.float64)))
                 seen.append(row)

@@ -5,14 +5,13 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.mcap.log import LogWriter, standard_types
-from omninav.stages.values.belief import GaussianMixture, Particles, PoseEstimate
+from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.command import Command
-from omninav.stages.values.drives import Array, Drive, drives, known
+from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.map_places import AnyMap
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 from .thin_belief import heaviest, thin
@@ -48,10 +47,7 @@ class ResultLog(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
-        truth: Sequence[Pose | None],
-        motion: Sequence[Motion | None],
-        estimates: Sequence[PoseEstimate | None] | None = None,
+        drive: Drive,
         beliefs: Sequence[Shown | None] | None = None,
         map: AnyMap | None = None,
         commands: Sequence[Command | None] | None = None,
@@ -59,21 +55,19 @@ class ResultLog(Stage):
         """The whole run at once."""
         if ctx.folder is None:
             return self.Out()
-        if estimates is None:
-            estimates = [None] * len(ticks)
         remaining: Iterator[Shown | None] = iter(beliefs if beliefs is not None else [])
         with LogWriter(ctx.folder / "result.mcap") as log:
             stamp = 0
-            for drive in drives(ticks, estimates, truth, motion):
-                self._write_drive(log, drive, remaining, map)
-                stamp = int(drive.stamps[-1])
+            for part in drive.by_log:
+                self._write_drive(log, part, remaining, map)
+                stamp = int(part.stamps[-1])
             if isinstance(map, ViewMixtures) and len(map):
                 log.write("/map", "visualization_msgs/msg/MarkerArray", stamp, mixture_markers(map, stamp))
-            for tick, command in zip(ticks, commands or (), strict=bool(commands)):
+            for at, command in zip(drive.stamps.tolist(), commands or (), strict=bool(commands)):
                 if command is not None:
                     twist = {"linear": {"x": command.speed}, "angular": {"z": command.turning}}
-                    fields = {"header": header(tick.stamp, "base_link"), "twist": twist}
-                    log.write("/command", "geometry_msgs/msg/TwistStamped", tick.stamp, fields)
+                    fields = {"header": header(at, "base_link"), "twist": twist}
+                    log.write("/command", "geometry_msgs/msg/TwistStamped", at, fields)
         return self.Out()
 
     def _write_drive(self, log: LogWriter, drive: Drive, beliefs: Iterator[Shown | None], map: AnyMap | None) -> None:

@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
 from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import Pose
 from omninav.stages.values.similarity import Answers
 from omninav.stages.values.thumbnails import Thumbnails, decoded
 
@@ -34,7 +34,7 @@ class Query(NamedTuple):
     frame: int
     seen: EncodedPanorama
     answers: Answers
-    truth: Pose | None
+    truth: Array
 
 
 class RetrievalStrip(Stage):
@@ -54,20 +54,19 @@ class RetrievalStrip(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
+        drive: Drive,
         snapshots: Sequence[EncodedPanorama | None],
         answers: Sequence[Answers | None],
-        truth: Sequence[Pose | None],
         map: ReferenceGraph,
         thumbnails: Thumbnails | None = None,
     ) -> Out:
         """The whole run at once."""
-        kept = [
-            (tick.log, Query(tick.frame, seen, found, true))
-            for tick, seen, found, true in zip(ticks, snapshots, answers, truth, strict=True)
-            if seen is not None and found is not None
+        last = drive.last_log
+        queries = [
+            Query(frame, seen, found, true)
+            for frame, row, true in zip(last.frames.tolist(), last.row.tolist(), last.truth, strict=True)
+            if (seen := snapshots[row]) is not None and (found := answers[row]) is not None
         ]
-        queries = [query for log, query in kept if log == kept[-1][0]]
         if not queries:
             return self.Out()
         pictures = thumbnails is not None and len(thumbnails) == len(map)
@@ -132,9 +131,9 @@ def _label(axes: "Axes", query: Query, map: ReferenceGraph, n: int, left: float,
     words, colour = [f"{100 * query.answers.similarities[n]:.1f} %"], TRUTH
     if not pictures:
         words.append(f"({x:.1f}, {y:.1f}) m {np.degrees(wrap(heading)):.0f}°")
-    if query.truth is not None:
-        apart = float(np.hypot(x - query.truth.x, y - query.truth.y))
-        turned = abs(np.degrees(float(wrap(heading + query.answers.turns[n] - query.truth.heading))))
+    if np.isfinite(query.truth).all():
+        apart = float(np.hypot(*(map.poses[query.answers.references[n]] - query.truth)[:2]))
+        turned = abs(np.degrees(float(wrap(heading + query.answers.turns[n] - query.truth[2]))))
         words.append(f"{apart:.1f} m, {turned:.0f}°")
         colour = MARK if apart <= NEAR_M and turned <= NEAR_DEG else ODOMETRY
     if not pictures:

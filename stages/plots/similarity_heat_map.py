@@ -5,12 +5,11 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.values.drives import pose_rows
+from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import Pose
 
 from .similarity_peaks import Peaks
 from .snapshot_times import spread_out
@@ -39,14 +38,17 @@ class SimilarityHeatMap(Stage):
     def step(
         self,
         ctx: Context,
-        map: ReferenceGraph,
-        ticks: Sequence[Tick],
+        drive: Drive,
         peaks: Sequence[Peaks | None],
-        truth: Sequence[Pose | None],
+        map: ReferenceGraph,
     ) -> Out:
         """The whole run at once; frames of the last log are shown."""
-        kept = [(tick, peak, true) for tick, peak, true in zip(ticks, peaks, truth, strict=True) if peak is not None]
-        kept = [entry for entry in kept if entry[0].log == kept[-1][0].log]
+        last = drive.last_log
+        kept = [
+            (frame, peak, true)
+            for frame, row, true in zip(last.frames.tolist(), last.row.tolist(), last.truth, strict=True)
+            if (peak := peaks[row]) is not None
+        ]
         if not kept:
             return self.Out()
         panels = [kept[i] for i in spread_out(len(kept), self.frames)]
@@ -64,8 +66,8 @@ class SimilarityHeatMap(Stage):
         )
 
 
-def _draw(panels: Sequence[tuple[Tick, Peaks, Pose | None]], map: ReferenceGraph) -> bytes:
-    truths = pose_rows([pose for _, _, pose in panels])
+def _draw(panels: Sequence[tuple[int, Peaks, Array]], map: ReferenceGraph) -> bytes:
+    truths = np.array([pose for _, _, pose in panels])
     extent = extent_of(map.poses, truths)
     columns = len(panels)
     arrow = 0.1 * (extent[1] - extent[0] + extent[3] - extent[2]) / 2 if extent else 1.0
@@ -76,7 +78,7 @@ def _draw(panels: Sequence[tuple[Tick, Peaks, Pose | None]], map: ReferenceGraph
         high = max(float(peak.best.max()) for _, peak, _ in panels)
         size = float(np.clip(6000 / len(map), 3, 26))
         dots = None
-        for number, (tick, peak, _) in enumerate(panels):
+        for number, (frame, peak, _) in enumerate(panels):
             plan, profile = axes[0, number], axes[1, number]
             where = map.poses if peak.candidates is None else map.poses[peak.candidates]
             plan.scatter(map.poses[:, 0], map.poses[:, 1], s=size / 3, color=REFERENCE, alpha=0.4, linewidths=0)
@@ -103,7 +105,7 @@ def _draw(panels: Sequence[tuple[Tick, Peaks, Pose | None]], map: ReferenceGraph
             )
             draw_pose(plan, truths[number], arrow, TRUTH)
             plan_axes(plan, extent)
-            plan.set_title(f"frame {tick.frame}")
+            plan.set_title(f"frame {frame}")
             headings = len(peak.profile)
             turned = np.degrees(wrap(2 * np.pi * np.arange(headings) / headings))
             order = np.argsort(turned, kind="stable")

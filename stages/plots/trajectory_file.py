@@ -1,13 +1,10 @@
 """Trajectories in the TUM format, which evo and others read."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from omninav.pipeline import Context, Outputs, Stage, Tick
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.files import write_whole
-from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.drive import Array, Drive, known
 
 
 class TrajectoryFile(Stage):
@@ -20,25 +17,25 @@ class TrajectoryFile(Stage):
     class Out(Outputs):
         """Nothing: the files are the result."""
 
-    def step(self, ctx: Context, ticks: Sequence[Tick], estimates: Sequence[PoseEstimate | None]) -> Out:
+    def step(self, ctx: Context, drive: Drive) -> Out:
         """The whole run at once."""
-        logs: dict[int, list[str]] = {}
-        for tick, estimate in zip(ticks, estimates, strict=True):
-            rows = logs.setdefault(tick.log, [])
-            if estimate is None:
-                ctx.count("frame_without_estimate", detail=f"frame {tick.frame} of log {tick.log} has no estimate")
-            else:
-                rows.append(tum_row(tick.stamp, estimate.pose))
+        logs = {}
+        for log in drive.by_log:
+            number, estimated = int(log.log[0]), known(log.estimate)
+            for frame in log.frames[~estimated]:
+                ctx.count("frame_without_estimate", detail=f"frame {frame} of log {number} has no estimate")
+            rows = zip(log.stamps[estimated].tolist(), log.estimate[estimated], strict=True)
+            logs[number] = "".join(tum_row(stamp, pose) for stamp, pose in rows)
         if ctx.folder is not None:
-            for log, rows in logs.items():
+            for number, text in logs.items():
                 if len(logs) > 1:
-                    write_whole(ctx.folder / f"trajectory_{log}.tum", "".join(rows))
-            write_whole(ctx.folder / "trajectory.tum", "".join(logs[max(logs)]) if logs else "")
+                    write_whole(ctx.folder / f"trajectory_{number}.tum", text)
+            write_whole(ctx.folder / "trajectory.tum", logs[max(logs)] if logs else "")
         return self.Out()
 
 
-def tum_row(stamp: int, pose: Pose) -> str:
+def tum_row(stamp: int, pose: Array) -> str:
     """One line of a TUM file: `stamp` in nanoseconds is written in seconds with all its digits."""
-    half = pose.heading / 2
-    numbers = (pose.x, pose.y, 0.0, 0.0, 0.0, float(np.sin(half)), float(np.cos(half)))
+    x, y, heading = pose.tolist()
+    numbers = (x, y, 0.0, 0.0, 0.0, float(np.sin(heading / 2)), float(np.cos(heading / 2)))
     return f"{stamp // 10**9}.{stamp % 10**9:09d} " + " ".join(f"{number:.9f}" for number in numbers) + "\n"

@@ -4,13 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Outputs, Stage, Tick
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
-from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.drives import Array, Drive, drives, known
+from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.map_places import AnyMap, map_poses
-from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.topological_map import TopologicalMap
 
 from .style import (
@@ -42,15 +40,12 @@ class TrajectoryOverMap(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
-        estimates: Sequence[PoseEstimate | None],
-        truth: Sequence[Pose | None],
-        motion: Sequence[Motion | None],
+        drive: Drive,
         map: AnyMap | None = None,
         grid: OccupancyGrid | None = None,
     ) -> Out:
         """The whole run at once."""
-        logs = drives(ticks, estimates, truth, motion)
+        logs = drive.by_log
         if not logs:
             return self.Out()
         last = Figure(
@@ -120,7 +115,7 @@ def _draw(logs: Sequence[Drive], map: AnyMap | None, grid: OccupancyGrid | None)
             axes.plot(start[:, 0], start[:, 1], "s", color=MARK, markersize=7, zorder=7, label="start")
             plan_axes(axes, extent)
             if len(logs) > 1:
-                axes.set_title(f"log {drive.log}")
+                axes.set_title(f"log {drive.log[0]}")
         handles, labels = drawn.canvas.axes[0].get_legend_handles_labels()
         drawn.canvas.legend(handles, labels, loc="outside lower center", ncols=5)
     return drawn.content

@@ -5,12 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Outputs, Stage, Tick
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
-from omninav.stages.values.drives import Array
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.topological_map import TopologicalMap
 
 from .style import (
@@ -45,18 +44,18 @@ class TrueAndEstimatedPlace(Stage):
     def step(
         self,
         ctx: Context,
-        ticks: Sequence[Tick],
+        drive: Drive,
         beliefs: Sequence[PlaceBelief | None],
-        truth: Sequence[Pose | None],
         map: TopologicalMap,
     ) -> Out:
         """The whole run at once."""
-        last = [row for row, tick in enumerate(ticks) if tick.log == ticks[-1].log]
+        last = drive.last_log
+        last = last.at(known(last.truth))
         spots, places, shares = [], [], []
-        for row in last:
-            belief, true = beliefs[row], truth[row]
-            if belief is not None and true is not None:
-                spots.append((true.x, true.y))
+        for row, true in zip(last.row, last.truth, strict=True):
+            belief = beliefs[row]
+            if belief is not None:
+                spots.append(true[:2])
                 places.append(int(np.argmax(belief.probabilities)))
                 shares.append(float(belief.probabilities.max()))
         if not spots:

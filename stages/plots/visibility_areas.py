@@ -1,6 +1,5 @@
 """From where the views of a map can be seen."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -8,9 +7,9 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.stages.values.drive import Drive
 from omninav.stages.values.grid import FREE, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import Pose
 from omninav.stages.values.visibility import VisibilityAreas
 
 from .style import (
@@ -42,7 +41,7 @@ class ShowVisibilityAreas(Stage):
 
     As Figure 6 of Wolf, Burgard & Burkhardt 2005: a circle where the picture was taken, its axis, the point lambda and
     the area from which that is visible; of a view all around, of every sector. `examples` references are taken at equal
-    steps along the map. With `truth` wired the drive is drawn over the last panel.
+    steps along the map. With `drive` wired its true path is drawn over the last panel.
     """
 
     examples: Annotated[int, Bounds(ge=1, le=11)] = 5
@@ -58,7 +57,7 @@ class ShowVisibilityAreas(Stage):
         map: ReferenceGraph,
         areas: VisibilityAreas,
         grid: OccupancyGrid,
-        truth: Sequence[Pose] = (),
+        drive: Drive | None = None,
     ) -> Out:
         """Draw all panels."""
         seen = np.flatnonzero((areas.target >= 0).any(axis=1))
@@ -68,7 +67,7 @@ class ShowVisibilityAreas(Stage):
         sectors = len(areas.axes)
         ways = "its point lambda" if sectors == 1 else f"its {sectors} points lambda"
         made = " The grid is a stand-in, made from the tour's free path." if grid.made_from == "tour" else ""
-        driven = np.array([(pose.x, pose.y) for pose in truth]).reshape(-1, 2)
+        driven = np.empty((0, 2)) if drive is None else drive.truth[:, :2]
         return self.Out(
             figure=Figure(
                 name="visibility_areas",

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from small_run import collected
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.geometry.plane.se2 import wrap
@@ -56,7 +57,7 @@ def told(request):
         motion = Motion(radius * step, 0.0, step) if n else None
         model = UncertainMotion((step / 2, radius * step, step / 2), (0.01, 0.03, 0.01)) if n else None
         due = lessons.step(ctx, view, state, model, waiting).updates
-        event = mapping.step(ctx, due, limit.step(ctx, view, motion, first).limit, map, learned).events
+        event = mapping.step(ctx, due, limit.step(ctx, view, motion, first).threshold, map, learned).events
         ticks.append(ctx.tick)
         truth.append(Pose(*pose))
         motions.append(motion)
@@ -68,16 +69,16 @@ def told(request):
 def test_no_reference_is_new_after_the_first_lap_where_all_laps_are_alike(told):
     ticks, truth, motions, events, _ = told
     estimates = [PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in truth]
-    found = MapHistory().step(Context("history"), ticks, estimates, truth, motions, events).metrics.values
+    found = MapHistory().step(Context("history"), collected(ticks, truth, motions, estimates), events).metrics.values
     assert found["map_per_lap"]["frames"][0] < LAP + 5
     assert found["map"]["inserted"] > 20
     assert found["map"]["new_after_first_lap_rate"] == 0.0
 
 
 def test_no_place_is_wrong_where_every_state_was_right_however_many_are_learned_in_one_tick(told):
-    _, truth, _, events, mixtures = told
+    ticks, truth, _, events, mixtures = told
     assert max(len(event.inserted) for event in events if event is not None) > 3
-    found = WrongPlaces(wrong_m=2.0).step(Context("wrong"), events, mixtures, truth).metrics.values
+    found = WrongPlaces(wrong_m=2.0).step(Context("wrong"), collected(ticks, truth), events, mixtures).metrics.values
     assert found["wrong_places"] == {"references": 0}
 
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from small_run import collected
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.features.rotation_reduced_sift import none_found
@@ -107,7 +108,7 @@ def test_errors_are_those_of_the_way_back_to_the_first_pose() -> None:
     ticks = [Tick(k, 10**9 * k) for k in range(4)]
     said = [None, vector(0, direction=math.radians(-80.0), turn=0.0), vector(0, state="lost"), vector(0, 0.0)]
     progress = [None, None, None, PathProgress(0, 1, 1, 0, True, True, True)]
-    values = HomingErrors().step(Context("errors"), ticks, poses, said, progress).metrics.values["homing"]
+    values = HomingErrors().step(Context("errors"), collected(ticks, poses), said, progress).metrics.values["homing"]
     assert values["start_m"] == pytest.approx(2.0)
     assert values["end_error_m"] == pytest.approx(0.05)
     assert values["end_turn_deg"] == pytest.approx(math.degrees(0.1))
@@ -116,5 +117,5 @@ def test_errors_are_those_of_the_way_back_to_the_first_pose() -> None:
     assert values["direction_error_deg"]["median"] == pytest.approx(10.0)
     assert values["first"]["direction_error_deg"] == pytest.approx(10.0)
     assert values["lost_rate"] == pytest.approx(1 / 3)
-    assert HomingErrors().step(Context("errors"), ticks, [None] * 4, said, progress).metrics is None
+    assert HomingErrors().step(Context("errors"), collected(ticks, [None] * 4), said, progress).metrics is None
     assert np.isfinite(values["inliers"])

@@ -3,6 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from omegaconf import OmegaConf
+from small_run import collected
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.ports import convert
@@ -31,7 +32,7 @@ def curves(truth: np.ndarray, errors: np.ndarray, stretched: float = 1.0, logs: 
         for pose, error in zip(poses, errors, strict=True)
     ]
     ticks = [Tick(i, i * 10**9, log, i) for i, log in enumerate(logs or [0] * len(truth))]
-    return ErrorCurves(**parameters).step(Context("curves"), ticks, estimates, poses, steps).metrics.values
+    return ErrorCurves(**parameters).step(Context("curves"), collected(ticks, poses, steps, estimates)).metrics.values
 
 
 def test_a_lap_ends_where_the_path_is_nearest_to_its_start_again():
@@ -93,4 +94,4 @@ def test_the_last_log_is_drawn_and_nothing_without_truth():
     found = curves(circle(2), np.repeat([1.0, 0.5], 40), logs=[0] * 40 + [1] * 40)
     assert [lap["position_error_m"]["max"] for lap in found["laps"]] == pytest.approx([0.5])
     ticks = [Tick(i, i, 0, i) for i in range(3)]
-    assert ErrorCurves().step(Context("curves"), ticks, [None] * 3, [None] * 3, [None] * 3).metrics.values == {}
+    assert ErrorCurves().step(Context("curves"), collected(ticks, [None] * 3)).metrics.values == {}

@@ -3,9 +3,9 @@ import itertools
 
 import numpy as np
 import pytest
-from small_run import mixture_run, small_run
+from small_run import collected, mixture_run, small_run
 
-from omninav.pipeline import Context
+from omninav.pipeline import Context, Tick
 from omninav.stages.geometry.plane.se2 import chain, compose
 from omninav.stages.metrics.map_history import MapHistory, counted, last_new_ground
 from omninav.stages.metrics.view_map_size import ViewMapSize, stored_bytes, visited_area
@@ -27,7 +27,7 @@ def learned(run):
 
 @pytest.fixture(scope="module")
 def history(run, learned):
-    return MapHistory(points=7).step(CTX, *run.drive, learned[2]).metrics.values
+    return MapHistory(points=7).step(CTX, run.drive, learned[2]).metrics.values
 
 
 def test_what_came_less_what_went_is_what_is_in_the_map(history, learned):
@@ -81,7 +81,7 @@ def test_laps_of_the_first_log_are_parts_of_their_own():
     run.truth += twice.truth
     run.motion += twice.motion
     events = mixture_run(run)[2]
-    found = MapHistory(home_m=1.0).step(CTX, *run.drive, events).metrics.values
+    found = MapHistory(home_m=1.0).step(CTX, run.drive, events).metrics.values
     assert found["map_per_lap"]["frames"] == [60, 60]
     assert found["first_map"]["frames"] == 59  # the last of the first lap is within a metre of the start
 
@@ -117,11 +117,10 @@ def test_the_drift_of_the_first_part_is_that_of_odometry_from_its_first_true_pos
 
 
 def test_without_truth_there_are_counts_but_no_errors(run, learned):
-    ticks, estimates, truth, motion = run.drive
-    found = MapHistory().step(CTX, ticks, estimates, [None] * len(truth), motion, learned[2]).metrics.values
+    found = MapHistory().step(CTX, run.blind, learned[2]).metrics.values
     assert "first_map" not in found
     assert found["map_per_lap"]["inserted"] == [30, 30]
-    assert MapHistory().step(CTX, [], [], [], [], []).metrics.values == {}
+    assert MapHistory().step(CTX, collected([], []), []).metrics.values == {}
 
 
 def test_the_size_of_a_map_is_that_of_its_arrays(learned, run):
@@ -129,7 +128,7 @@ def test_the_size_of_a_map_is_that_of_its_arrays(learned, run):
     views, components = 48, len(map.weights)
     # float32 values, names and births as 8 bytes; owner, mean, covariance, weight, count: 8 * (1 + 3 + 9 + 1 + 1)
     assert stored_bytes(map) == views * (4 * 6 + 16) + components * 120
-    found = ViewMapSize().step(CTX, map, run.estimates, run.truth).metrics.values["map"]
+    found = ViewMapSize().step(CTX, run.drive, map).metrics.values["map"]
     assert found["references"] == 48
     assert found["reference_size_bytes"] == stored_bytes(map) / 48
     assert found["references_per_m2"] == pytest.approx(48 / found["visited_area_m2"])
@@ -143,7 +142,7 @@ def test_the_area_along_a_line_is_a_strip_with_round_ends():
 
 
 def test_an_empty_map_has_no_density_and_an_unseen_path_no_area():
-    found = ViewMapSize().step(CTX, ViewMixtures.empty(), [None], [Pose(0.0, 0.0, 0.0)]).metrics.values["map"]
+    found = ViewMapSize().step(CTX, collected([Tick(0, 0)], [Pose(0.0, 0.0, 0.0)]), ViewMixtures.empty()).metrics.values["map"]
     assert found["references"] == 0
     assert found["reference_size_bytes"] is None
     assert found["references_per_m2"] == 0.0

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from made_places import made_map
+from small_run import collected
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.navigation import Navigation, shortest_metres
@@ -22,7 +23,7 @@ def ended(spots, states, collisions=0, driven=0.0, map=CORNER):
     ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(len(spots))]
     truth = [Pose(x, y, 0.0) for x, y in spots]
     tallies = [DriveTally(collisions, driven)] * len(spots)
-    metrics = Navigation().step(Context("navigation"), ticks, ways, truth, tallies, map).metrics
+    metrics = Navigation().step(Context("navigation"), collected(ticks, truth, tallies=tallies), ways, map).metrics
     return metrics.values["navigation"]
 
 
@@ -75,4 +76,4 @@ def test_the_shortest_way_begins_at_the_closest_view():
 
 def test_without_a_way_there_is_nothing_to_say():
     tick = Tick(index=0, stamp=0, log=0, frame=0, first_of_log=True)
-    assert Navigation().step(Context("n"), [tick], [None], [Pose(0.0, 0.0, 0.0)], [None], CORNER).metrics is None
+    assert Navigation().step(Context("n"), collected([tick], [Pose(0.0, 0.0, 0.0)]), [None], CORNER).metrics is None

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from made_places import made_map
+from small_run import collected
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
@@ -27,10 +28,9 @@ def believed(place: int) -> PlaceBelief:
 def hits(places, xs, begun):
     out = PlaceAccuracy(updates=3).step(
         Context("hits"),
-        [tick(k) for k in range(len(xs))],
+        collected([tick(k) for k in range(len(xs))], [None if x is None else Pose(x, 0.0, 0.0) for x in xs]),
         [believed(place) for place in places],
         [believed(0) if k in begun else None for k in range(len(xs))],
-        [None if x is None else Pose(x, 0.0, 0.0) for x in xs],
         ROW,
     )
     return out.metrics
@@ -55,7 +55,9 @@ def test_a_long_place_is_right_where_one_of_its_images_was_taken_closest():
     poses[2, 0] = 1.2  # the path image on the way, which belongs to the first place
     long = dataclasses.replace(made, poses=poses)
     beliefs = [PlaceBelief(np.eye(2)[0], long.poses[:2])]
-    out = PlaceAccuracy(updates=1).step(Context("hits"), [tick(0)], beliefs, beliefs, [Pose(1.25, 0.0, 0.0)], long)
+    out = PlaceAccuracy(updates=1).step(
+        Context("hits"), collected([tick(0)], [Pose(1.25, 0.0, 0.0)]), beliefs, beliefs, long
+    )
     found = out.metrics.values["localisation"]
     assert found["right_after"] == [0.0]
     assert found["within_after"] == [1.0]

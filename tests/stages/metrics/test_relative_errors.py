@@ -75,14 +75,14 @@ def test_odometry_five_percent_too_long_errs_by_five_centimetres_per_metre_and_i
 
 def test_the_stage_names_its_figures_and_gives_none_without_truth():
     run = small_run(frames=40)
-    found = RelativeErrors().step(Context("relative"), *run.drive).metrics.values
+    found = RelativeErrors().step(Context("relative"), run.drive).metrics.values
     assert set(found) == {
         "absolute_trajectory_error_m",
         "relative_position_error_m",
         "relative_heading_error_deg",
         "relative_error_distance_m",
     }
-    blind = RelativeErrors().step(Context("relative"), run.ticks, run.estimates, [None] * 40, run.motion)
+    blind = RelativeErrors().step(Context("relative"), run.blind)
     assert blind.metrics.values == {}
 
 

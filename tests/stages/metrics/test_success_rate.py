@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from small_run import collected
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.geometry.plane.se2 import compose
@@ -26,7 +27,7 @@ def success(
         estimates.append(PoseEstimate(pose, np.eye(3), 1.0 if modes is None else modes[n], pose))
     motion = [None] + [Motion(0.5, 0.0, 0.0)] * (len(off) - 1)
     poses = [Pose(*(float(v) for v in each)) for each in truth]
-    out = SuccessRate(**options).step(Context("success"), ticks, estimates, poses, motion)
+    out = SuccessRate(**options).step(Context("success"), collected(ticks, poses, motion, estimates))
     assert out.metrics is not None
     return out.metrics.values["success"]
 
@@ -51,4 +52,4 @@ def test_a_carried_robot_is_found_again_after_as_many_frames_as_it_was_not() -> 
 
 def test_without_truth_there_is_nothing_to_say() -> None:
     ticks = [Tick(n, n, 0, n, n == 0) for n in range(2)]
-    assert SuccessRate().step(Context("success"), ticks, [None, None], [None, None], [None, None]).metrics is None
+    assert SuccessRate().step(Context("success"), collected(ticks, [None, None])).metrics is None

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from small_run import small_run
+from small_run import collected, small_run
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.trajectory_errors import TrajectoryErrors
@@ -16,7 +16,11 @@ def measured(estimates, truth, motion=None, logs=None, **parameters):
     logs = logs or [0] * len(truth)
     ticks = [Tick(i, i * 10**9, log, i) for i, log in enumerate(logs)]
     motion = motion or [None] * len(truth)
-    return TrajectoryErrors(**parameters).step(Context("errors"), ticks, estimates, truth, motion).metrics.values
+    return (
+        TrajectoryErrors(**parameters)
+        .step(Context("errors"), collected(ticks, truth, motion, estimates))
+        .metrics.values
+    )
 
 
 def test_errors_of_five_frames_worked_by_hand():
@@ -113,6 +117,6 @@ def test_an_empty_run_has_no_frames():
 
 def test_a_filter_that_finds_itself_converges():
     run = small_run(frames=60)
-    found = TrajectoryErrors().step(Context("errors"), *run.drive).metrics.values
+    found = TrajectoryErrors().step(Context("errors"), run.drive).metrics.values
     assert found["converged_after_frames"] < 20
     assert found["after_convergence"]["position_error_m"]["median"] < 0.2

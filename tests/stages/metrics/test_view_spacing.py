@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from small_run import collected
 
 from omninav.pipeline import Context
 from omninav.stages.metrics.view_spacing import ViewSpacing, spaced
@@ -20,7 +21,7 @@ def a_map(views, places):
 
 def spacing(known, **parameters):
     view = Coefficients(np.zeros(2, np.float32), np.zeros((36, 2), np.float32))
-    return ViewSpacing(**parameters).step(CTX, [], known, view).metrics.values
+    return ViewSpacing(**parameters).step(CTX, collected([], []), known, view).metrics.values
 
 
 def test_each_view_is_as_far_as_its_nearest_other_one_in_views_and_in_metres():

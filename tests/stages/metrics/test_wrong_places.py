@@ -3,8 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from small_run import collected
 
-from omninav.pipeline import Context
+from omninav.pipeline import Context, Tick
 from omninav.pipeline.experiment.series import figure_at
 from omninav.stages.metrics.wrong_places import WrongPlaces
 from omninav.stages.values.pose import Pose
@@ -27,6 +28,10 @@ def mixture(*parts):
     return MixturesNow(np.array(names, np.int64), means, np.array(weights, np.float32))
 
 
+def driven(truth):
+    return collected([Tick(k, k) for k in range(len(truth))], truth)
+
+
 @pytest.fixture
 def life():
     # The robot goes from x = 0 by 1 m a frame. Reference 0 comes where it is; 1 and 2 come 10 m off.
@@ -39,7 +44,8 @@ def life():
         mixture((1, 1.0, 1.0)),
         mixture((2, 12.0, 0.2), (2, 2.0, 0.6)),
     ]
-    return events, mixtures, [Pose(float(x), 0.0, 0.0) for x in range(6)]
+    truth = [Pose(float(x), 0.0, 0.0) for x in range(6)]
+    return driven(truth), events, mixtures
 
 
 def test_the_share_of_the_weight_at_a_wrong_place_is_followed_until_it_is_gone(life):
@@ -54,32 +60,32 @@ def test_the_share_of_the_weight_at_a_wrong_place_is_followed_until_it_is_gone(l
 
 
 def test_a_reference_that_is_removed_holds_no_place(life):
-    events, mixtures, truth = life
+    drive, events, mixtures = life
     events[3] = event(removed=[1, 2])
     mixtures[3:] = [None, None, None]
-    found = WrongPlaces(points=6).step(CTX, events, mixtures, truth).metrics.values["wrong_places"]
+    found = WrongPlaces(points=6).step(CTX, drive, events, mixtures).metrics.values["wrong_places"]
     assert found["kept"] == 0
     assert found["gone_after_steps"] == [2, 1]
 
 
 def test_a_map_without_wrong_places_says_only_that(life):
-    events, mixtures, truth = life
-    found = WrongPlaces().step(CTX, events[:1], mixtures[:1], truth[:1]).metrics.values
+    drive, events, mixtures = life
+    found = WrongPlaces().step(CTX, drive.at(slice(1)), events[:1], mixtures[:1]).metrics.values
     assert found == {"wrong_places": {"references": 0}}
 
 
 def test_what_is_learned_late_is_held_against_where_it_was_seen(life):
-    truth = life[2]
+    drive = life[0]
     late = [event()] * 4 + [event([0], seen=[1]), event()]
     parts = [None] * 4 + [mixture((0, 1.0, 1.0)), None]
-    near = WrongPlaces(wrong_m=2.0).step(CTX, late, parts, truth).metrics.values["wrong_places"]
+    near = WrongPlaces(wrong_m=2.0).step(CTX, drive, late, parts).metrics.values["wrong_places"]
     assert near["references"] == 0
 
 
 def test_points_lie_along_the_way_where_they_were_seen_however_late_they_came(life):
     late = [event()] * 4 + [event([0, 1], seen=[3, 1]), event()]
     parts = [None] * 4 + [mixture((0, 20.0, 1.0), (1, 20.0, 1.0)), None]
-    found = WrongPlaces().step(CTX, late, parts, life[2]).metrics.values["wrong_places"]
+    found = WrongPlaces().step(CTX, life[0], late, parts).metrics.values["wrong_places"]
     assert found["along_m"] == [0.0, 2.0]
 
 
@@ -93,7 +99,7 @@ def corrected(later_by_a_lap_each: int, points: int = 12, laps: int = 9):
             events[frame] = event([point], seen=[frame]) if lap == 0 else event()
             mixtures[frame] = mixture((point, 50.0 if wrong else 2.0 * point, 1.0))
     truth = [Pose(float(frame % 40 - 10), 0.0, 0.0) for frame in range(40 * laps)]
-    return WrongPlaces().step(CTX, events, mixtures, truth).metrics.values
+    return WrongPlaces().step(CTX, driven(truth), events, mixtures).metrics.values
 
 
 def test_the_measure_of_the_order_of_correction_is_0_where_all_are_corrected_alike_and_positive_where_it_travels():

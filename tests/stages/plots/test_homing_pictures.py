@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from made_places import made_map
+from small_run import collected
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
@@ -78,10 +79,12 @@ def drive(camera: HyperbolicMirror | Equirectangular = MIRROR) -> dict:
     way = PlannedRoute(np.array([0, 1, 2]), "under way", 0)
     over = PlannedRoute(np.array([0, 1, 2]), "arrived", 0)
     return {
-        "ticks": [Tick(k, k * 200_000_000, 0, k, k == 0) for k in range(TICKS)],
+        "drive": collected(
+            [Tick(k, k * 200_000_000, 0, k, k == 0) for k in range(TICKS)],
+            [Pose(1.0 + 0.2 * k, 1.1, 0.1 * k) for k in range(TICKS)],
+        ),
         "snapshots": glances(camera),
         "progress": [None if k == 0 else PathProgress(0, 1, 4, 1, False, False, False) for k in range(TICKS)],
-        "truth": [Pose(1.0 + 0.2 * k, 1.1, 0.1 * k) for k in range(TICKS)],
         "routes": [way] * 10 + [over] * 2,
         "map": MAP,
         "plan": PLAN,

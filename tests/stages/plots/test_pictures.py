@@ -35,12 +35,12 @@ def panoramas(run):
 
 
 def all_figures(run):
-    yield TrajectoryOverMap().step(CTX, *run.drive, run.map).figure
-    yield ErrorOverTime().step(CTX, *run.drive).figure
-    yield MapPlot().step(CTX, run.ticks, run.map).figure
-    yield BeliefSnapshots().step(CTX, run.ticks, run.beliefs, run.estimates, run.truth, run.map).figure
-    yield SimilarityHeatMap().step(CTX, run.map, run.ticks, list(similarities(run)), run.truth).figure
-    yield PanoramaStrip().step(CTX, run.ticks, list(panoramas(run))).figure
+    yield TrajectoryOverMap().step(CTX, run.drive, run.map).figure
+    yield ErrorOverTime().step(CTX, run.drive).figure
+    yield MapPlot().step(CTX, run.drive, run.map).figure
+    yield BeliefSnapshots().step(CTX, run.drive, run.beliefs, run.map).figure
+    yield SimilarityHeatMap().step(CTX, run.drive, list(similarities(run)), run.map).figure
+    yield PanoramaStrip().step(CTX, run.drive, list(panoramas(run))).figure
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def test_a_users_own_matplotlib_settings_change_nothing(figures):
     import matplotlib
 
     with matplotlib.rc_context({"font.size": 20, "lines.linewidth": 9, "figure.facecolor": "red"}):
-        again = ErrorOverTime().step(CTX, *small_run().drive).figure
+        again = ErrorOverTime().step(CTX, small_run().drive).figure
         assert matplotlib.rcParams["font.size"] == 20
     assert again.content == figures[1].content
 
@@ -78,16 +78,15 @@ def test_the_estimates_colour_is_in_the_picture_of_the_trajectory(figures):
 
 
 def test_several_logs_get_a_picture_of_the_earlier_ones():
-    out = TrajectoryOverMap().step(CTX, *small_run(frames=20, logs=3).drive, None)
+    out = TrajectoryOverMap().step(CTX, small_run(frames=20, logs=3).drive, None)
     assert out.figure is not None
     assert out.earlier is not None
 
 
 def test_without_truth_there_is_a_trajectory_but_no_error():
     run = small_run(frames=20)
-    blind = (run.ticks, run.estimates, [None] * 20, run.motion)
-    assert ErrorOverTime().step(CTX, *blind).figure is None
-    assert "no ground truth" in TrajectoryOverMap().step(CTX, *blind, run.map).figure.caption
+    assert ErrorOverTime().step(CTX, run.blind).figure is None
+    assert "no ground truth" in TrajectoryOverMap().step(CTX, run.blind, run.map).figure.caption
 
 
 def test_an_empty_run_gives_no_pictures():
@@ -99,8 +98,8 @@ def test_an_empty_run_gives_no_pictures():
 def test_a_run_whose_estimates_are_all_absent_still_gives_a_picture():
     run = small_run(frames=12)
     run.estimates = [None] * 12
-    assert TrajectoryOverMap().step(CTX, *run.drive, run.map).figure is not None
-    assert ErrorOverTime().step(CTX, *run.drive).figure is not None
+    assert TrajectoryOverMap().step(CTX, run.drive, run.map).figure is not None
+    assert ErrorOverTime().step(CTX, run.drive).figure is not None
 
 
 def test_only_a_few_frames_are_kept_and_their_best_headings():

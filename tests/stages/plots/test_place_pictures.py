@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from made_places import made_map
+from small_run import collected
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.plots.drive_over_plan import DriveOverPlan, planned_ways
@@ -21,6 +22,7 @@ MAP = made_map([(1.0, 1.0), (4.0, 1.0), (4.0, 4.0), (1.0, 4.0)], {(0, 1): 1, (1,
 PLAN = FloorPlan(np.array([[(2.0, 2.0), (3.0, 2.0), (3.0, 3.0), (2.0, 3.0)]]), 6.0, 5.0)
 TICKS = [Tick(k, k * 200_000_000, 0, k, k == 0) for k in range(20)]
 TRUTH = [Pose(1.01 + 0.15 * k, 1.1, 0.0) for k in range(20)]
+DRIVE, BLIND = collected(TICKS, TRUTH), collected(TICKS, [None] * 20)
 
 
 def green(figure) -> int:
@@ -33,7 +35,7 @@ def green(figure) -> int:
 
 def drawn(**rest):
     motion, tallies = [Motion(0.15, 0.0, 0.0)] * 20, [DriveTally(0, 0.15 * k) for k in range(20)]
-    return DriveOverPlan().step(CTX, TICKS, TRUTH, motion, tallies, PLAN, **rest).figure
+    return DriveOverPlan().step(CTX, collected(TICKS, TRUTH, motion, tallies=tallies), PLAN, **rest).figure
 
 
 def test_the_way_planned_is_drawn_over_the_plan_with_its_goal():
@@ -65,13 +67,13 @@ def believed() -> list[PlaceBelief | None]:
 
 def test_the_belief_in_every_place_is_drawn_with_the_truth_beside_it():
     stage = PlaceBeliefOverTime()
-    figure = stage.step(CTX, TICKS, believed(), TRUTH, MAP).figure
-    blind = stage.step(CTX, TICKS, believed(), [None] * 20, MAP).figure
-    assert figure.content == stage.step(CTX, TICKS, believed(), TRUTH, MAP).figure.content
+    figure = stage.step(CTX, DRIVE, believed(), MAP).figure
+    blind = stage.step(CTX, BLIND, believed(), MAP).figure
+    assert figure.content == stage.step(CTX, DRIVE, believed(), MAP).figure.content
     assert green(figure) > 200 > green(blind)
     assert "In 100 % of the pictures" in figure.caption  # the nearest place and the belief change at the same time
     assert "truly nearest." not in blind.caption
-    assert stage.step(CTX, TICKS, [None] * 20, TRUTH, MAP).figure is None
+    assert stage.step(CTX, DRIVE, [None] * 20, MAP).figure is None
 
 
 def test_a_places_neighbours_are_those_that_it_is_linked_with():
@@ -99,9 +101,9 @@ def test_a_believed_place_is_the_nearest_or_beside_it_or_another():
 
 def test_pictures_are_joined_with_the_places_believed():
     stage = TrueAndEstimatedPlace()
-    figure = stage.step(CTX, TICKS, believed(), TRUTH, MAP).figure
-    wrong = stage.step(CTX, TICKS, believed(), TRUTH[::-1], MAP).figure
-    assert figure.content == stage.step(CTX, TICKS, believed(), TRUTH, MAP).figure.content
+    figure = stage.step(CTX, DRIVE, believed(), MAP).figure
+    wrong = stage.step(CTX, collected(TICKS, TRUTH[::-1]), believed(), MAP).figure
+    assert figure.content == stage.step(CTX, DRIVE, believed(), MAP).figure.content
     assert green(figure) > 2 * green(wrong)
     assert "green, 100 % of the pictures" in figure.caption
-    assert stage.step(CTX, TICKS, believed(), [None] * 20, MAP).figure is None
+    assert stage.step(CTX, BLIND, believed(), MAP).figure is None

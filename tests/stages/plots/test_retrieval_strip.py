@@ -1,7 +1,7 @@
 import cv2
 import numpy as np
 import pytest
-from small_run import small_run
+from small_run import collected, small_run
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
@@ -64,7 +64,7 @@ def test_windows_are_kept_side_by_side_from_the_left_to_the_right() -> None:
     seen = [round(float(part.mean())) for part in np.split(decoded(shot.jpeg), 4, axis=1)]
     assert seen == pytest.approx([160, 80, 0, 240], abs=3)
     assert np.degrees(shot.headings) == pytest.approx([180, 90, 0, 270])
-    figure = PanoramaStrip().step(CTX, [Tick(0, 0)], [shot]).figure
+    figure = PanoramaStrip().step(CTX, collected([Tick(0, 0)], [None]), [shot]).figure
     assert figure is not None
     assert "Windows" in figure.caption
 
@@ -78,7 +78,7 @@ def test_queries_and_their_answers_are_drawn(kind: str, with_album: bool) -> Non
     shots = [PanoramaSnapshot().step(CTX, tick, seen).snapshot for tick in run.ticks]
     album = an_album(run.map) if with_album else None
     drawn = [
-        RetrievalStrip().step(CTX, run.ticks, shots, [answers] * len(run.ticks), run.truth, run.map, album).figure
+        RetrievalStrip().step(CTX, run.drive, shots, [answers] * len(run.ticks), run.map, album).figure
         for _ in range(2)
     ]
     assert drawn[0] is not None
@@ -93,7 +93,7 @@ def test_queries_and_their_answers_are_drawn(kind: str, with_album: bool) -> Non
 def test_a_drive_without_answers_has_no_strip() -> None:
     run = small_run()
     nothing = [None] * len(run.ticks)
-    assert RetrievalStrip().step(CTX, run.ticks, nothing, nothing, run.truth, run.map).figure is None
+    assert RetrievalStrip().step(CTX, run.drive, nothing, nothing, run.map).figure is None
 
 
 @pytest.mark.parametrize("kind", ["panorama", "windows"])
@@ -110,7 +110,7 @@ def test_the_feature_matrix_of_one_frame_is_drawn(kind: str) -> None:
 
 def test_pictures_that_look_one_way_stand_side_by_side() -> None:
     shots = [PanoramaSnapshot().step(CTX, Tick(0, 0), windows(level)).snapshot for level in (40, 200)]
-    figure = PanoramaStrip().step(CTX, [Tick(0, 0), Tick(1, 1, frame=1)], shots).figure
+    figure = PanoramaStrip().step(CTX, collected([Tick(0, 0), Tick(1, 1, frame=1)], [None, None]), shots).figure
     assert figure is not None
     assert "camera's picture" in figure.caption
     drawn = cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR)

@@ -2,7 +2,7 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
-from small_run import small_run
+from small_run import collected, small_run
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.plots.result_log import ResultLog, covariance_6x6
@@ -18,7 +18,9 @@ def estimate(x, y, heading):
 
 def test_a_trajectory_file_has_a_row_per_image_with_all_digits_of_its_stamp(tmp_path):
     ticks = [Tick(0, 1_700_000_000_123_456_789), Tick(1, 1_700_000_001_000_000_001)]
-    TrajectoryFile().step(Context("t", folder=tmp_path), ticks, [estimate(1.0, -2.5, np.pi / 2), estimate(0, 0, 0)])
+    estimates = [estimate(1.0, -2.5, np.pi / 2), estimate(0, 0, 0)]
+    drive = collected(ticks, [None, None], estimates=estimates)
+    TrajectoryFile().step(Context("t", folder=tmp_path), drive)
     first, second = (tmp_path / "trajectory.tum").read_text().splitlines()
     half = "0.707106781"  # sin and cos of 45 degrees
     assert first == f"1700000000.123456789 1.000000000 -2.500000000 0.000000000 0.000000000 0.000000000 {half} {half}"
@@ -27,22 +29,22 @@ def test_a_trajectory_file_has_a_row_per_image_with_all_digits_of_its_stamp(tmp_
 
 def test_every_log_has_its_trajectory_and_the_last_has_the_plain_name(tmp_path):
     run = small_run(frames=5, logs=2)
-    TrajectoryFile().step(Context("t", folder=tmp_path), run.ticks, run.estimates)
+    TrajectoryFile().step(Context("t", folder=tmp_path), run.drive)
     assert {path.name for path in tmp_path.iterdir()} == {"trajectory.tum", "trajectory_0.tum", "trajectory_1.tum"}
     assert (tmp_path / "trajectory.tum").read_bytes() == (tmp_path / "trajectory_1.tum").read_bytes()
 
 
 def test_frames_without_an_estimate_are_counted(tmp_path):
     ctx = Context("t", folder=tmp_path)
-    TrajectoryFile().step(ctx, [Tick(0, 0), Tick(1, 10)], [None, estimate(0, 0, 0)])
+    ticks = [Tick(0, 0), Tick(1, 10)]
+    TrajectoryFile().step(ctx, collected(ticks, [None, None], estimates=[None, estimate(0, 0, 0)]))
     assert ctx.counts == {"frame_without_estimate": 1}
     assert len((tmp_path / "trajectory.tum").read_text().splitlines()) == 1
 
 
 def write_result(folder, run, **parameters):
     stage = ResultLog(**parameters)
-    ticks, estimates, truth, motion = run.drive
-    stage.step(Context("log", folder=folder), ticks, truth, motion, estimates, run.beliefs, run.map)
+    stage.step(Context("log", folder=folder), run.drive, run.beliefs, run.map)
     return folder / "result.mcap"
 
 

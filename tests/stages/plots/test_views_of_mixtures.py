@@ -36,12 +36,12 @@ def learned(run):
 def all_figures(run, learned):
     map, beliefs, events, after = learned
     kept = [ChangedMixtures().step(CTX, now, event).mixtures for now, event in zip(after, events, strict=True)]
-    ticks, estimates, truth, _ = run.drive
-    yield TrajectoryOverMap().step(CTX, *run.drive, map).figure
-    yield BeliefSnapshots().step(CTX, ticks, beliefs, estimates, truth, map).figure
-    yield MapEllipses().step(CTX, map, ticks, estimates, truth, PLAN).figure
-    yield MapGrowth().step(CTX, ticks, events).figure
-    yield ReferenceLife().step(CTX, ticks, events, kept, truth, PLAN).figure
+    drive = run.drive
+    yield TrajectoryOverMap().step(CTX, drive, map).figure
+    yield BeliefSnapshots().step(CTX, drive, beliefs, map).figure
+    yield MapEllipses().step(CTX, drive, map, PLAN).figure
+    yield MapGrowth().step(CTX, drive, events).figure
+    yield ReferenceLife().step(CTX, drive, events, kept, PLAN).figure
 
 
 def test_every_picture_can_be_decoded_is_small_and_the_same_each_time(run, learned):
@@ -56,17 +56,15 @@ def test_every_picture_can_be_decoded_is_small_and_the_same_each_time(run, learn
 
 
 def test_an_empty_map_and_a_run_without_events_give_no_pictures(run):
-    ticks, estimates, truth, _ = run.drive
-    nothing = [None] * len(ticks)
-    assert MapEllipses().step(CTX, ViewMixtures.empty(), ticks, estimates, truth).figure is None
-    assert MapGrowth().step(CTX, ticks, nothing).figure is None
-    assert ReferenceLife().step(CTX, ticks, nothing, nothing, truth).figure is None
-    assert TrajectoryOverMap().step(CTX, *run.drive, ViewMixtures.empty()).figure is not None
+    drive, nothing = run.drive, [None] * len(run.ticks)
+    assert MapEllipses().step(CTX, drive, ViewMixtures.empty()).figure is None
+    assert MapGrowth().step(CTX, drive, nothing).figure is None
+    assert ReferenceLife().step(CTX, drive, nothing, nothing).figure is None
+    assert TrajectoryOverMap().step(CTX, drive, ViewMixtures.empty()).figure is not None
 
 
 def test_without_truth_the_maps_picture_has_the_estimates_path_and_no_plan(run, learned):
-    ticks, estimates, _, _ = run.drive
-    caption = MapEllipses().step(CTX, learned[0], ticks, estimates, [None] * len(ticks), PLAN).figure.caption
+    caption = MapEllipses().step(CTX, run.blind, learned[0], PLAN).figure.caption
     assert "line is the estimate" in caption
 
 
@@ -125,8 +123,7 @@ def test_a_mixture_is_kept_as_it_is_or_in_its_heaviest_gaussians():
 @pytest.fixture(scope="module")
 def result(run, learned, tmp_path_factory):
     folder = tmp_path_factory.mktemp("result")
-    ticks, estimates, truth, motion = run.drive
-    ResultLog().step(Context("log", folder=folder), ticks, truth, motion, estimates, learned[1], learned[0])
+    ResultLog().step(Context("log", folder=folder), run.drive, learned[1], learned[0])
     return folder / "result.mcap"
 
 

@@ -1,8 +1,8 @@
 import cv2
 import numpy as np
-from small_run import small_run
+from small_run import collected, small_run
 
-from omninav.pipeline import Context
+from omninav.pipeline import Context, Tick
 from omninav.stages.plots.belief_snapshots import BeliefSnapshots
 from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap
 from omninav.stages.plots.visibility_areas import ShowVisibilityAreas, views_by_cell
@@ -37,12 +37,12 @@ def test_views_are_counted_cell_by_cell():
 
 def test_areas_are_drawn_over_the_grid_the_same_every_time():
     areas = visibility_areas(POSES, ROOM, axes_of(3))
-    truth = [Pose(1.0 + 0.1 * k, 1.0, 0.0) for k in range(10)]
-    figure = ShowVisibilityAreas(examples=2).step(CTX, MAP, areas, ROOM, truth).figure
+    driven = collected([Tick(k, k) for k in range(10)], [Pose(1.0 + 0.1 * k, 1.0, 0.0) for k in range(10)])
+    figure = ShowVisibilityAreas(examples=2).step(CTX, MAP, areas, ROOM, driven).figure
     assert pixels(figure.content).std() > 20
     assert "2 of 4 references" in figure.caption
     assert "3 points lambda" in figure.caption
-    again = ShowVisibilityAreas(examples=2).step(CTX, MAP, areas, ROOM, truth).figure
+    again = ShowVisibilityAreas(examples=2).step(CTX, MAP, areas, ROOM, driven).figure
     assert again.content == figure.content
     without = ShowVisibilityAreas(examples=2).step(CTX, MAP, areas, ROOM).figure
     assert without.content != figure.content
@@ -56,11 +56,9 @@ def test_a_stand_in_is_called_one():
 
 def test_a_grid_lies_under_paths_and_beliefs_where_it_is_wired():
     run = small_run()
-    paths = [TrajectoryOverMap().step(CTX, *run.drive, run.map, grid).figure for grid in (None, ROOM)]
+    paths = [TrajectoryOverMap().step(CTX, run.drive, run.map, grid).figure for grid in (None, ROOM)]
     assert paths[0].content != paths[1].content
-    ticks, estimates, truth, _ = run.drive
     beliefs = [
-        BeliefSnapshots(moments=2).step(CTX, ticks, run.beliefs, estimates, truth, run.map, grid).figure
-        for grid in (None, ROOM)
+        BeliefSnapshots(moments=2).step(CTX, run.drive, run.beliefs, run.map, grid).figure for grid in (None, ROOM)
     ]
     assert beliefs[0].content != beliefs[1].content
