@@ -142,7 +142,8 @@ def test_the_area_along_a_line_is_a_strip_with_round_ends():
 
 
 def test_an_empty_map_has_no_density_and_an_unseen_path_no_area():
-    found = ViewMapSize().step(CTX, collected([Tick(0, 0)], [Pose(0.0, 0.0, 0.0)]), ViewMixtures.empty()).metrics.values["map"]
+    drive = collected([Tick(0, 0)], [Pose(0.0, 0.0, 0.0)])
+    found = ViewMapSize().step(CTX, drive, ViewMixtures.empty()).metrics.values["map"]
     assert found["references"] == 0
     assert found["reference_size_bytes"] is None
     assert found["references_per_m2"] == 0.0
