@@ -1,0 +1,27 @@
+"""Every variant gives the figures that golden.json holds; `python tests/variants/renew_golden.py` renews them."""
+
+from pathlib import Path
+
+import pytest
+from golden_figures import RUNS, measured, read_golden
+
+VARIANTS = Path(__file__).resolve().parents[2] / "conf" / "variant"
+RELATIVE = 0.01
+"""On one machine figures are exactly equal; other versions of libraries round otherwise."""
+
+
+def test_every_variant_is_run():
+    assert sorted(RUNS) == sorted(path.stem for path in VARIANTS.glob("*.yaml"))
+    assert sorted(read_golden()) == sorted(RUNS)
+
+
+@pytest.mark.parametrize("variant", sorted(RUNS))
+def test_its_figures_are_as_before(variant: str, tmp_path: Path, shared_cache: Path):
+    found, golden = measured(variant, tmp_path, shared_cache), read_golden()[variant]
+    assert found.keys() == golden.keys()
+    different = {
+        name: (value, found[name])
+        for name, value in golden.items()
+        if found[name] != (pytest.approx(value, rel=RELATIVE, abs=1e-4) if isinstance(value, float) else value)
+    }
+    assert not different, f"golden and found; python tests/variants/renew_golden.py {variant} renews them"
