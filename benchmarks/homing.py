@@ -2,6 +2,7 @@
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -18,7 +19,7 @@ from omninav.stages.homing.homing_vector import HomingVectorFromMap
 from omninav.stages.homing.local_mapping import LocalMapping, LocalMappingState
 from omninav.stages.match.correspondences import MatchFeatures
 from omninav.stages.simulator.cameras import camera_of, camera_rays
-from omninav.stages.simulator.config import MirrorCamera
+from omninav.stages.simulator.config import mirror
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.world import World
@@ -33,9 +34,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from two_views import angle_deg, two_views, unit
 
 SCENES = 200
-SMALL = MirrorCamera(
-    width=320, height_px=240, focal=248.5, centre=(159.5, 119.5), inner_radius_px=17.0, outer_radius_px=119.0
-)
+CAMERA = camera_of(replace(DEMO, camera=mirror(columns=320)))
 
 
 def rows() -> list[Row]:
@@ -142,7 +141,7 @@ def _absolute() -> list[Row]:
 
 
 def _homing() -> list[Row]:
-    camera, rays, scene = camera_of(SMALL), camera_rays(camera_of(SMALL)), World(DEMO).scene
+    camera, rays, scene = CAMERA, camera_rays(CAMERA), World(DEMO).scene
     way = np.linspace((4.0, 4.2, -0.5), (4.8, 4.84, 0.3), 12)
     images = [Image(render(scene, rays, tuple(pose), 0.9)) for pose in way]
     sift, match, ctx = RotationReducedSift(), MatchFeatures(), Context("homing")

@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 
 from omninav.pipeline import Context
-from omninav.stages.camera.models import HyperbolicMirror
+from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.features.hsv_histogram import HsvHistogram
 from omninav.stages.geometry.appearance.segments import selective_similarity
 from omninav.stages.match.selective import SelectiveMatch
-from omninav.stages.unwarp.hyperbolic import HyperbolicUnwarp
+from omninav.stages.unwarp.panorama import UnwarpPanorama
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Image
@@ -35,7 +35,7 @@ def _unwarp() -> list[Row]:
     ctx = Context("unwarp")
     picture = np.random.default_rng(0).integers(0, 255, (480, 640, 3), dtype=np.uint8)
     picture = cv2.GaussianBlur(picture, (9, 9), 3)
-    stage = HyperbolicUnwarp()
+    stage = UnwarpPanorama()
     stage.setup(ctx)
     image = Image(picture)
     panorama = stage.step(ctx, image, CAMERA).panorama.pixels

@@ -8,7 +8,7 @@ import numpy as np
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import encode
-from omninav.stages.camera.models import HyperbolicMirror
+from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.features.vertical_segments import FindVerticalSegments
 from omninav.stages.geometry.appearance.visual_distance import Matching, match_columns, match_patches
@@ -39,13 +39,13 @@ def rows() -> list[Row]:
 
 def two_views() -> tuple[list[Pixels], HyperbolicMirror]:
     """Two views of the built-in world, 320 x 240, half a metre apart and turned, and their camera."""
-    camera = camera_of(DEMO.camera)
+    camera = camera_of(DEMO)
     assert isinstance(camera, HyperbolicMirror)
     scene, rays = World(DEMO).scene, camera_rays(camera)
     seen = [render(scene, rays, pose, 0.9) for pose in ((5.0, 5.0, 0.0), (5.5, 5.2, 0.6))]
     half = HyperbolicMirror(
         320, 240, camera.focal_x / 2, camera.focal_y / 2, 159.5, 119.5, camera.a, camera.b,
-        camera.inner_radius_px / 2, camera.outer_radius_px / 2, 0.0, camera.height, camera.yaw,
+        camera.inner_radius_px / 2, camera.outer_radius_px / 2, height=camera.height, yaw=camera.yaw,
     )  # fmt: skip
     return [cv2.resize(pixels, (320, 240), interpolation=cv2.INTER_AREA) for pixels in seen], half
 

@@ -12,10 +12,10 @@ from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.world import World
-from omninav.stages.unwarp.by_camera import UnwarpByCamera
+from omninav.stages.unwarp.panorama import UnwarpPanorama
 from omninav.stages.values.image import Image, Panorama
 
-CAMERA = camera_of(DEMO.camera)
+CAMERA = camera_of(DEMO)
 Look = Callable[[str, float], Image | Panorama]
 
 
@@ -36,7 +36,7 @@ def look(kind: str, heading: float, x: float = 5.0, y: float = 5.0) -> Image | P
     picture = Image(render(*scene(), (x, y, heading), 0.9))
     if kind == "mirror":
         return picture
-    unwarp, context = UnwarpByCamera(columns=720, rows=160), Context("unwarp")
+    unwarp, context = UnwarpPanorama(columns=720, rows=160), Context("unwarp")
     unwarp.setup(context)
     panorama: Panorama = unwarp.step(context, image=picture, camera=CAMERA).panorama
     return panorama

@@ -1,4 +1,4 @@
-"""A camera's picture made small, for people to look at."""
+"""A camera's image made small, for people to look at."""
 
 import math
 from typing import NamedTuple
@@ -7,21 +7,21 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from .models import Camera, Fisheye, HyperbolicMirror
+from .model import Camera
 
 Pixels = npt.NDArray[np.uint8]
 Array = npt.NDArray[np.float64]
 
 
 class Thumbnail(NamedTuple):
-    """`pixels` of the part of a picture that begins at `corner` (column, row), `scale` times as large."""
+    """`pixels` of the part of an image that begins at `corner` (column, row), `scale` times as large."""
 
     pixels: Pixels
     scale: float
     corner: tuple[int, int]
 
     def points(self, points: Array) -> npt.NDArray[np.float32]:
-        """Points (N, 2) of the whole picture, columns and rows, in this one's pixels."""
+        """Points (N, 2) of the whole image, columns and rows, in this one's pixels."""
         there: npt.NDArray[np.float32] = ((points - self.corner + 0.5) * self.scale - 0.5).astype(np.float32)
         return there
 
@@ -31,8 +31,8 @@ class Thumbnail(NamedTuple):
         return encoded.tobytes()
 
 
-def small_picture(pixels: Pixels, camera: Camera | None, columns: int) -> Thumbnail:
-    """A picture (rows, columns, 3) of at most so many columns; of a mirror's or a lens's the disc alone."""
+def thumbnail(pixels: Pixels, camera: Camera | None, columns: int) -> Thumbnail:
+    """An image (rows, columns, 3) of at most so many columns; of a mirror's or a lens's the disc alone."""
     left, right, top, bottom = used_part(camera, pixels.shape)
     part = pixels[top:bottom, left:right]
     scale = min(1.0, columns / part.shape[1])
@@ -45,9 +45,10 @@ def small_picture(pixels: Pixels, camera: Camera | None, columns: int) -> Thumbn
 def used_part(camera: Camera | None, shape: tuple[int, ...]) -> tuple[int, int, int, int]:
     """Columns from, to and rows from, to (ends excluded) that show anything: a mirror's or a lens's disc, else all."""
     rows, columns = shape[:2]
-    if not isinstance(camera, HyperbolicMirror | Fisheye):
+    ring = None if camera is None else camera.ring
+    if ring is None:
         return 0, columns, 0, rows
-    x, y, radius = camera.centre_x, camera.centre_y, camera.outer_radius_px
+    x, y, radius = ring.centre_x, ring.centre_y, ring.outer
     low_x, high_x = max(0, math.floor(x - radius)), min(columns, math.ceil(x + radius) + 1)
     low_y, high_y = max(0, math.floor(y - radius)), min(rows, math.ceil(y + radius) + 1)
     return (low_x, high_x, low_y, high_y) if low_x < high_x and low_y < high_y else (0, columns, 0, rows)

@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.camera.models import Camera
+from omninav.stages.camera.model import Camera
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import GlobalDescriptor
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.camera.models import Camera
+from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.feature_matching import spreads
 from omninav.stages.values.image import Image, Panorama, Pixels
 from omninav.stages.values.local_features import VerticalSegments

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.stages.camera.models import Camera
+from omninav.stages.camera.model import Camera
 from omninav.stages.values.homing import FOUND_AGAIN, LOST, MATCHED, TRACKED, LocalMap, TrackedFeatures
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.pose import Motion

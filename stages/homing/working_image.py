@@ -7,10 +7,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.camera.bearings import camera_bearings, panorama_bearings
-from omninav.stages.camera.models import Camera, Cylindrical, Equirectangular
-from omninav.stages.camera.rays import panorama_points, pixels_of_rays
+from omninav.pipeline import BadInput
+from omninav.stages.camera.model import Camera, require_elevations, seen_at
+from omninav.stages.camera.panorama import camera_behind
 from omninav.stages.values.image import Image, Panorama
 
 Array = npt.NDArray[np.float64]
@@ -22,14 +21,13 @@ SEAM = 32
 class WorkingImage(NamedTuple):
     """`grey` (rows, columns), with `seam` columns repeated on both sides; points are columns and rows without them.
 
-    `scale`: pixels of the original per pixel of this one, along columns and rows. `original`: what it was made of.
+    `scale`: pixels of the original per pixel of this one, along columns and rows. `camera`: of the original.
     """
 
     grey: Grey
     seam: int
     scale: tuple[float, float]
-    original: Image | Panorama
-    camera: Camera | None
+    camera: Camera
 
     @property
     def columns(self) -> int:
@@ -38,20 +36,11 @@ class WorkingImage(NamedTuple):
 
     def bearings(self, points: Array) -> Array:
         """Unit vectors (N, 3) in the robot's frame of points (N, 2)."""
-        there = self.to_original(points)
-        if isinstance(self.original, Panorama):
-            panorama = self.original
-            return panorama_bearings(there, panorama.pixels.shape, panorama.elevation_top, panorama.elevation_bottom)
-        return camera_bearings(there, cast(Camera, self.camera))
+        return self.camera.unproject(self.to_original(points))[0]
 
     def points(self, rays: Array) -> Array:
         """Points (N, 2) at which rays (N, 3) of any length in the robot's frame are seen; NaN where they are not."""
-        if isinstance(self.original, Panorama):
-            panorama = self.original
-            there = panorama_points(rays, panorama.pixels.shape, panorama.elevation_top, panorama.elevation_bottom)
-        else:
-            there = np.stack(pixels_of_rays(cast(Camera, self.camera), rays), axis=-1)
-        return self.from_original(there)
+        return self.from_original(seen_at(self.camera, rays))
 
     def to_original(self, points: Array) -> Array:
         """Points (N, 2) in pixels of the original."""
@@ -71,10 +60,11 @@ class WorkingImage(NamedTuple):
 
 def working_image(image: Image | Panorama, camera: Camera | None, max_pixels: int) -> WorkingImage:
     """A grey image of at most `max_pixels`. Raises BadInput without its camera, or without the camera's elevations."""
+    seen_by = camera_behind(image, camera)
+    if seen_by is None:
+        raise BadInput("homing: a camera's image without its camera; wire it: wires.tracker.camera=source.camera")
     if isinstance(image, Image):
-        if camera is None:
-            raise BadInput("homing: a camera's image without its camera; wire it: wires.tracker.camera=source.camera")
-        pixels_of_rays(camera, np.empty((0, 3)))  # now, and not once something is tracked
+        require_elevations(seen_by)
     grey = cast(Grey, cv2.cvtColor(image.pixels, cv2.COLOR_BGR2GRAY))
     rows, columns = grey.shape
     size = columns, rows
@@ -82,8 +72,7 @@ def working_image(image: Image | Panorama, camera: Camera | None, max_pixels: in
     if shrink > 1.0:
         size = max(1, round(columns / shrink)), max(1, round(rows / shrink))
         grey = cast(Grey, cv2.resize(grey, size, interpolation=cv2.INTER_AREA))
-    circle = isinstance(image, Panorama) or isinstance(camera, Cylindrical | Equirectangular)
-    seam = min(SEAM, size[0]) if circle else 0
+    seam = min(SEAM, size[0]) if seen_by.wraps else 0
     if seam:
         grey = np.concatenate([grey[:, -seam:], grey, grey[:, :seam]], axis=1)
-    return WorkingImage(grey, seam, (columns / size[0], rows / size[1]), image, camera)
+    return WorkingImage(grey, seam, (columns / size[0], rows / size[1]), seen_by)

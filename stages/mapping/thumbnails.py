@@ -6,8 +6,8 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick, Value
-from omninav.stages.camera.models import Camera
-from omninav.stages.camera.thumbnail import small_picture
+from omninav.stages.camera.model import Camera
+from omninav.stages.camera.thumbnail import thumbnail
 from omninav.stages.values.image import Image, Panorama, Windows
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.thumbnails import Thumbnails
@@ -47,7 +47,7 @@ class ReferenceSnapshot(Stage):
         seen = list(panorama.pixels) if isinstance(panorama, Windows) else [panorama.pixels]
         new = len(map) - thumbnails.references
         thumbnails.references = len(map)
-        jpegs = (small_picture(pixels, None, self.columns).jpeg(self.quality) for pixels in seen[:new])
+        jpegs = (thumbnail(pixels, None, self.columns).jpeg(self.quality) for pixels in seen[:new])
         return self.Out(pictures=ReferenceThumbnails(tuple(jpegs)))
 
 
@@ -80,7 +80,7 @@ class TourSnapshot(Stage):
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
         """One tick."""
-        jpeg = small_picture(image.pixels, camera, self.columns).jpeg(self.quality)
+        jpeg = thumbnail(image.pixels, camera, self.columns).jpeg(self.quality)
         return self.Out(pictures=ReferenceThumbnails((jpeg,)))
 
 

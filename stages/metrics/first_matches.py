@@ -10,8 +10,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
-from omninav.stages.camera.bearings import camera_bearings
-from omninav.stages.camera.models import Camera
+from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, one_way_matches
 from omninav.stages.geometry.appearance.visual_distance import Matching, match_patches
 from omninav.stages.geometry.plane.se2 import between
@@ -178,7 +177,7 @@ def half_widths(features: LocalFeatures, camera: Camera) -> Array:
     """Half of each patch's diameter as an angle (N,), rad: the less of across and down the picture."""
     reach = features.sizes[:, None].astype(np.float64) / 2.0
     widths = [
-        angles_between(features.bearings, camera_bearings(features.points + reach * np.array(step), camera))
+        angles_between(features.bearings, camera.unproject(features.points + reach * np.array(step))[0])
         for step in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
     ]
     widest = np.nanmin(np.where(np.isfinite(widths), widths, math.inf), axis=0)

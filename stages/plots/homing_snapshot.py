@@ -7,9 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick, Value
-from omninav.stages.camera.models import Camera
-from omninav.stages.camera.rays import panorama_points, pixels_of_rays
-from omninav.stages.camera.thumbnail import small_picture
+from omninav.stages.camera.model import Camera, seen_at
+from omninav.stages.camera.panorama import camera_behind
+from omninav.stages.camera.thumbnail import thumbnail
 from omninav.stages.values.homing import HomingTarget, HomingVector, TrackedFeatures
 from omninav.stages.values.image import Image, Panorama
 
@@ -76,15 +76,17 @@ class HomingSnapshot(Stage):
         if not tick.first_of_log and tick.stamp - looked.stamp < 0.99e9 * self.every_s:
             return self.Out()
         looked.stamp = tick.stamp
-        small = small_picture(image.pixels, camera, self.columns)
+        small = thumbnail(image.pixels, camera, self.columns)
         points, way, there = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2))
         kinds, of_target = np.zeros(0, np.int64), np.zeros(0, np.int8)
         if tracks is not None:
             points, kinds = tracks.points, tracks.kinds
-        if vector is not None:
-            way = seen_at(image, camera, floor_ahead(vector, getattr(camera, "height", None)))
+        seen_by = camera_behind(image, camera)
+        if vector is not None and seen_by is not None:
+            way = seen_at(seen_by, floor_ahead(vector, None if camera is None else camera.height))
         if target is not None:
-            there = seen_at(image, camera, target.features.bearings)
+            rays = target.features.bearings
+            there = np.full((len(rays), 2), np.nan) if seen_by is None else seen_at(seen_by, rays)
             of_target = np.full(len(there), -1, np.int8)
             if tracks is not None:
                 of_target[tracks.rows] = tracks.kinds
@@ -108,12 +110,3 @@ def floor_ahead(vector: HomingVector, height: float | None) -> Array:
     metres = np.linspace(NEAREST, length, 24)
     below = np.full(len(metres), -(height or 1.0))
     return np.stack([metres * math.cos(vector.direction), metres * math.sin(vector.direction), below], axis=-1)
-
-
-def seen_at(picture: Image | Panorama, camera: Camera | None, rays: Array) -> Array:
-    """Columns and rows (N, 2) of a picture at which rays (N, 3) are seen; NaN where they are not."""
-    if isinstance(picture, Panorama):
-        return panorama_points(rays, picture.pixels.shape, picture.elevation_top, picture.elevation_bottom)
-    if camera is None:
-        return np.full((len(rays), 2), np.nan)
-    return np.stack(pixels_of_rays(camera, rays), axis=-1)

@@ -1,346 +1,187 @@
-"""`camera.yaml`: how a camera's pictures are to be read, as a file.
+"""`camera.yaml`: how a camera's images are to be read, as a file.
 
-projection: hyperbolic | donut | cylindrical | equirectangular | fisheye | perspective
-image: {width: 640, height: 480}
-K: [[fx, skew, cx], [0, fy, cy], [0, 0, 1]]           hyperbolic, perspective; fisheye (or focal_px and centre)
-mirror: {a: 28.095, b: 23.4125, unit: mm}             hyperbolic
-mask: {inner_radius_px: 34, outer_radius_px: 238}     hyperbolic, fisheye; donut: optional
-centre: {x: 319.5, y: 239.5}                          donut: optional
-focal_px: 300                                         fisheye: pixels per radian
-column_of_forward: 360                                cylindrical, equirectangular
-elevation: {top: 0.5, bottom: -0.5}                   equirectangular; cylindrical: optional (radians)
-sense: clockwise | counter_clockwise                  all but hyperbolic and perspective
-height: 0.9                                           metres, optional
-yaw: 0.3                                              radians, optional
+`projection:` names the model; the other keys are what the model's class declares (`stages/camera/`): some at the top
+(height, yaw, sense), some in a section (image, mirror, mask, centre, elevation), and the matrix
+K: [[fx, skew, cx], [0, fy, cy], [0, 0, 1]].
 """
 
-from collections.abc import Callable, Mapping
-from typing import Any, Literal, cast
+import dataclasses
+import math
+from typing import Annotated, Any, get_args, get_origin
 
 import yaml
 
+from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.problems import nearest
-from omninav.stages.camera.models import (
-    Camera,
-    Cylindrical,
-    Donut,
-    Equirectangular,
-    Fisheye,
-    HyperbolicMirror,
-    Perspective,
-    Sense,
-)
+from omninav.pipeline.graph.signature import Parameter, read_parameters
+from omninav.stages.camera.model import Camera, Key, camera_models
 
 from .recording import UnreadableRecording
+
+Keys = dict[str, set[str]]
+MATRIX = "must be [[fx, skew, cx], [0, fy, cy], [0, 0, 1]], with focal lengths above 0"
 
 
 def parse_camera(text: str | bytes, where: str) -> Camera:
     """The camera that a file describes. Raises `UnreadableRecording` naming `where` and the key that is wrong."""
     try:
         content = yaml.safe_load(text)
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
         raise UnreadableRecording(f"{where}: not readable as YAML ({' '.join(str(error).split())})") from None
     return camera_from(content, where)
 
 
 def camera_from(content: Any, where: str, size: tuple[int, int] | None = None) -> Camera:
     """The camera of an already loaded description; `size` (width, height) where the description leaves it out."""
-    section = _Section(content, where)
-    if size is not None and isinstance(content, dict) and "image" not in content:
-        section = _Section({**content, "image": {"width": size[0], "height": size[1]}}, where)
-    projection = section.text("projection", tuple(_READERS))
-    camera = _READERS[projection](section)
-    section.misspelt()
-    return camera
+    if not isinstance(content, dict):
+        raise UnreadableRecording(f"{where}: must hold keys (projection: …)")
+    if size is not None and "image" not in content:
+        content = {**content, "image": {"width": size[0], "height": size[1]}}
+    model = _model(content, where)
+    known = _known_keys(model)
+    found = {name: _value(content, parameter, known, where) for name, parameter in read_parameters(model).items()}
+    _refuse_misspelt(content, known, where)
+    try:
+        return model(**{name: value for name, value in found.items() if value is not None})
+    except ValueError as error:
+        raise UnreadableRecording(f"{where}: {error}") from None
 
 
 def write_camera(camera: Camera) -> str:
     """The text of a `camera.yaml` that reads back as the same camera."""
-    return yaml.safe_dump(_WRITERS[type(camera)](camera), sort_keys=False)
+    return yaml.safe_dump(camera_section(camera), sort_keys=False)
+
+
+def camera_section(camera: Camera) -> dict[str, Any]:
+    """What a `camera.yaml` holds."""
+    content: dict[str, Any] = {"projection": camera.projection}
+    for name, parameter in read_parameters(type(camera)).items():
+        value, key = getattr(camera, name), keys_of(parameter)[0]
+        if value is None:
+            continue
+        if isinstance(key.name, int):
+            matrix = content.setdefault(key.section, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+            matrix[key.name // 3][key.name % 3] = value
+        else:
+            (content.setdefault(key.section, {}) if key.section else content)[key.name] = value
+    return content
 
 
 def camera_from_info(info: Any, where: str) -> Camera:
-    """A camera from a CameraInfo message, where there is no camera.yaml.
+    """A camera from a CameraInfo message, where there is no camera.yaml, by the first model that knows its distortion.
 
-    `distortion_model: hyperbolic_mirror` has d = [a, b]; nothing is said of mask, height and yaw: the whole circle that
-    fits the picture is used, and yaw is 0. Undistorted perspective cameras are read as such.
-    Raises `UnreadableRecording` for any other model.
+    Nothing is said in it of mask, height and yaw. Raises `UnreadableRecording` where no model knows it.
     """
     k = [float(number) for number in (info.k if hasattr(info, "k") else info.K)]
     d = [float(number) for number in (info.d if hasattr(info, "d") else info.D)]
-    width, height = int(info.width), int(info.height)
     if k[0] <= 0 or k[4] <= 0:
         raise UnreadableRecording(
             f"{where}: its focal length is {k[0]:g}: not calibrated; give camera=PATH/camera.yaml"
         )
-    if info.distortion_model == "hyperbolic_mirror" and len(d) >= 2:
-        outer = min(k[2], width - 1 - k[2], k[5], height - 1 - k[5])
-        return HyperbolicMirror(
-            width=width,
-            height_px=height,
-            focal_x=k[0],
-            focal_y=k[4],
-            centre_x=k[2],
-            centre_y=k[5],
-            skew=k[1],
-            a=d[0],
-            b=d[1],
-            inner_radius_px=0.0,
-            outer_radius_px=outer,
-        )
-    if info.distortion_model in ("", "plumb_bob", "rational_polynomial") and not any(d):
-        return Perspective(
-            width=width, height_px=height, focal_x=k[0], focal_y=k[4], centre_x=k[2], centre_y=k[5], skew=k[1]
-        )
+    for model in camera_models().values():
+        camera = model.from_camera_info(info.distortion_model, (int(info.width), int(info.height)), k, d)
+        if camera is not None:
+            return camera
     raise UnreadableRecording(
         f"{where}: distortion model '{info.distortion_model}' does not describe an omnidirectional camera; "
         "give camera=PATH/camera.yaml"
     )
 
 
-class _Section:
-    """A mapping in a file, read key by key; what is wrong names the file and the key."""
+def keys_of(parameter: Parameter) -> list[Key]:
+    """Where camera.yaml may hold a parameter of a camera."""
+    found = [extra for extra in _annotations(parameter.type) if isinstance(extra, Key)]
+    return found or [Key("", parameter.name)]
 
-    def __init__(self, content: Any, where: str, path: str = "") -> None:
-        if not isinstance(content, dict):
-            what = f"'{path.rstrip('.')}' must hold keys" if path else "must hold keys (projection: …)"
-            raise UnreadableRecording(f"{where}: {what}")
-        self.content, self.where, self.path = content, where, path
-        self.read: set[str] = set()
 
-    def raw(self, key: str) -> Any:
-        self.read.add(key)
-        if self.content.get(key) is None:
-            near = nearest(key, [str(name) for name in self.content if name not in self.read])
-            hint = f"; did you mean it by '{self.path}{near}'?" if near else ""
-            raise UnreadableRecording(f"{self.where}: key '{self.path}{key}' is missing{hint}")
-        return self.content[key]
+def _annotations(kind: Any) -> list[Any]:
+    """What is annotated to a type, or to a part of it (`Annotated[float, …] | None`)."""
+    arguments = get_args(kind)
+    if get_origin(kind) is Annotated:
+        return list(arguments[1:])
+    return [extra for argument in arguments if get_args(argument) for extra in _annotations(argument)]
 
-    def has(self, key: str) -> bool:
-        self.read.add(key)
-        return self.content.get(key) is not None
 
-    def number(self, key: str) -> float:
-        value = self.raw(key)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise UnreadableRecording(f"{self.where}: '{self.path}{key}' must be a number, not {value!r}")
-        return float(value)
+def _model(content: dict[str, Any], where: str) -> type[Camera]:
+    models, name = camera_models(), content.get("projection")
+    if name is None:
+        raise UnreadableRecording(f"{where}: {_missing(content, Key('', 'projection'), {'': {'projection'}})}")
+    if name not in models:
+        near = nearest(str(name), models)
+        hint = f"did you mean '{near}'?" if near else f"one of {', '.join(sorted(models))}"
+        raise UnreadableRecording(f"{where}: 'projection' cannot be {_shown(name)}; {hint}")
+    return models[name]
 
-    def optional(self, key: str) -> float | None:
-        return self.number(key) if self.has(key) else None
 
-    def positive(self, key: str) -> float:
-        value = self.number(key)
-        if value <= 0:
-            raise UnreadableRecording(f"{self.where}: '{self.path}{key}' must be above 0, not {value:g}")
-        return value
+def _value(content: dict[str, Any], parameter: Parameter, known: Keys, where: str) -> Any:
+    """A parameter's value; None where it is left out and may be."""
+    for key in keys_of(parameter):
+        path = f"{key.section}.{key.name}".strip(".")
+        section: Any = content.get(key.section) if key.section else content
+        if section is None:
+            continue
+        if isinstance(key.name, int):
+            value: Any = _matrix(section, where)[key.name]
+            path = key.section
+        elif not isinstance(section, dict):
+            raise UnreadableRecording(f"{where}: '{key.section}' must hold keys")
+        else:
+            value = section.get(key.name)
+        if value is None:
+            continue
+        if isinstance(value, dict | list) or (isinstance(value, float) and not math.isfinite(value)):
+            raise UnreadableRecording(f"{where}: '{path}' must be a number or a word, not {_shown(value)}")
+        converted, problems = convert(value, parameter.type, path)
+        if problems:
+            what = MATRIX if isinstance(key.name, int) else f"is {problems[0].what}"
+            raise UnreadableRecording(f"{where}: '{path}' {what}")
+        return converted
+    if parameter.default is dataclasses.MISSING:
+        raise UnreadableRecording(f"{where}: {_missing(content, keys_of(parameter)[0], known)}")
+    return None
 
-    def text(self, key: str, options: tuple[str, ...]) -> str:
-        value = self.raw(key)
-        if value not in options:
-            near = nearest(str(value), options)
-            hint = f"; did you mean '{near}'?" if near else f"; one of {', '.join(options)}"
-            raise UnreadableRecording(f"{self.where}: '{self.path}{key}' cannot be {value!r}{hint}")
-        return str(value)
 
-    def section(self, key: str) -> "_Section":
-        return _Section(self.raw(key), self.where, f"{self.path}{key}.")
+def _matrix(rows: Any, where: str) -> list[float]:
+    try:
+        flat = [float(number) for row in rows for number in (row if isinstance(row, list) else [row])]
+    except (TypeError, ValueError):
+        flat = []
+    if len(flat) != 9:
+        raise UnreadableRecording(f"{where}: 'K' {MATRIX}")
+    return flat
 
-    def misspelt(self) -> None:
-        """Refuse keys that look like an optional one that is not there; other unknown keys are remarks."""
-        for key in self.content:
-            near = nearest(str(key), sorted(self.read - set(self.content))) if key not in self.read else None
+
+def _known_keys(model: type[Camera]) -> Keys:
+    """Keys that a camera.yaml of this model may hold, by section."""
+    keys = [key for parameter in read_parameters(model).values() for key in keys_of(parameter)]
+    known: Keys = {"": {"projection"} | {key.section for key in keys if key.section}}
+    for key in keys:
+        known.setdefault(key.section, set()).add(str(key.name))
+    return known
+
+
+def _missing(content: dict[str, Any], key: Key, known: Keys) -> str:
+    """What to say of a key that is not there, or whose section is not."""
+    if key.section and content.get(key.section) is None:
+        key = Key("", key.section)
+    part, prefix = (content[key.section], f"{key.section}.") if key.section else (content, "")
+    near = nearest(str(key.name), [str(name) for name in part if name not in known[key.section]])
+    hint = f"; did you mean it by '{prefix}{near}'?" if near else ""
+    return f"key '{prefix}{key.name}' is missing{hint}"
+
+
+def _refuse_misspelt(content: dict[str, Any], known: Keys, where: str) -> None:
+    """Refuse keys that look like an optional one that is not there; other unknown keys are remarks."""
+    for section, names in known.items():
+        part = content.get(section) if section else content
+        if not isinstance(part, dict):
+            continue
+        for name in part:
+            near = nearest(str(name), sorted(names - set(part))) if name not in names else None
             if near:
-                raise UnreadableRecording(f"{self.where}: key '{self.path}{key}' is not known; did you mean '{near}'?")
-
-    def size(self) -> dict[str, Any]:
-        image = self.section("image")
-        return {"width": int(image.positive("width")), "height_px": int(image.positive("height"))}
-
-    def pinhole(self) -> dict[str, Any]:
-        rows = self.raw("K")
-        try:
-            flat = [float(number) for row in rows for number in (row if isinstance(row, list) else [row])]
-        except (TypeError, ValueError):
-            flat = []
-        if len(flat) != 9 or flat[0] <= 0 or flat[4] <= 0:
-            raise UnreadableRecording(
-                f"{self.where}: '{self.path}K' must be [[fx, skew, cx], [0, fy, cy], [0, 0, 1]], "
-                "with focal lengths above 0"
-            )
-        names = ("focal_x", "skew", "centre_x", None, "focal_y", "centre_y")
-        return {name: number for name, number in zip(names, flat, strict=False) if name}
-
-    def sense(self) -> Sense:
-        options = ("clockwise", "counter_clockwise")
-        return (
-            cast(Literal["clockwise", "counter_clockwise"], self.text("sense", options))
-            if self.has("sense")
-            else "clockwise"
-        )
-
-    def yaw(self) -> float:
-        return self.optional("yaw") or 0.0
+                path = f"{section}.{name}".strip(".")
+                raise UnreadableRecording(f"{where}: key '{path}' is not known; did you mean '{near}'?")
 
 
-def _hyperbolic(section: _Section) -> Camera:
-    mirror, mask = section.section("mirror"), section.section("mask")
-    camera = HyperbolicMirror(
-        **section.size(),
-        **section.pinhole(),
-        a=mirror.positive("a"),
-        b=mirror.positive("b"),
-        inner_radius_px=mask.number("inner_radius_px"),
-        outer_radius_px=mask.positive("outer_radius_px"),
-        height=section.optional("height"),
-        yaw=section.yaw(),
-    )
-    if camera.inner_radius_px >= camera.outer_radius_px:
-        raise UnreadableRecording(f"{section.where}: 'mask.inner_radius_px' must be below 'mask.outer_radius_px'")
-    return camera
-
-
-def _donut(section: _Section) -> Camera:
-    centre = section.section("centre") if section.has("centre") else None
-    mask = section.section("mask") if section.has("mask") else None
-    return Donut(
-        **section.size(),
-        centre_x=centre.number("x") if centre else None,
-        centre_y=centre.number("y") if centre else None,
-        inner_radius_px=mask.number("inner_radius_px") if mask else None,
-        outer_radius_px=mask.positive("outer_radius_px") if mask else None,
-        sense=section.sense(),
-        yaw=section.yaw(),
-    )
-
-
-def _cylindrical(section: _Section) -> Camera:
-    elevation = section.section("elevation") if section.has("elevation") else None
-    return Cylindrical(
-        **section.size(),
-        column_of_forward=section.number("column_of_forward"),
-        sense=section.sense(),
-        height=section.optional("height"),
-        elevation_top=elevation.number("top") if elevation else None,
-        elevation_bottom=elevation.number("bottom") if elevation else None,
-    )
-
-
-def _equirectangular(section: _Section) -> Camera:
-    elevation = section.section("elevation")
-    return Equirectangular(
-        **section.size(),
-        column_of_forward=section.number("column_of_forward"),
-        elevation_top=elevation.number("top"),
-        elevation_bottom=elevation.number("bottom"),
-        sense=section.sense(),
-        height=section.optional("height"),
-    )
-
-
-def _fisheye(section: _Section) -> Camera:
-    mask = section.section("mask")
-    if section.has("K"):
-        k = section.pinhole()
-        lens = {"focal_px": k["focal_x"], "centre_x": k["centre_x"], "centre_y": k["centre_y"]}
-    else:
-        centre = section.section("centre")
-        lens = {
-            "focal_px": section.positive("focal_px"),
-            "centre_x": centre.number("x"),
-            "centre_y": centre.number("y"),
-        }
-    return Fisheye(
-        **section.size(),
-        **lens,
-        outer_radius_px=mask.positive("outer_radius_px"),
-        inner_radius_px=mask.optional("inner_radius_px") or 0.0,
-        sense=section.sense(),
-        height=section.optional("height"),
-        yaw=section.yaw(),
-    )
-
-
-def _perspective(section: _Section) -> Camera:
-    return Perspective(**section.size(), **section.pinhole(), height=section.optional("height"), yaw=section.yaw())
-
-
-_READERS: Mapping[str, Callable[[_Section], Camera]] = {
-    "hyperbolic": _hyperbolic,
-    "donut": _donut,
-    "cylindrical": _cylindrical,
-    "equirectangular": _equirectangular,
-    "fisheye": _fisheye,
-    "perspective": _perspective,
-}
-
-
-def _head(projection: str, camera: Camera) -> dict[str, Any]:
-    return {"projection": projection, "image": {"width": camera.width, "height": camera.height_px}}
-
-
-def _pinhole(camera: HyperbolicMirror | Perspective) -> list[list[float]]:
-    return [
-        [camera.focal_x, camera.skew, camera.centre_x],
-        [0.0, camera.focal_y, camera.centre_y],
-        [0.0, 0.0, 1.0],
-    ]
-
-
-def _known(**values: Any) -> dict[str, Any]:
-    """The entries that have a value; of the sections among them, those that hold one."""
-    kept = {key: _known(**value) if isinstance(value, dict) else value for key, value in values.items()}
-    return {key: value for key, value in kept.items() if value is not None and value != {}}
-
-
-def _write_hyperbolic(camera: HyperbolicMirror) -> dict[str, Any]:
-    return _head("hyperbolic", camera) | _known(
-        K=_pinhole(camera),
-        mirror={"a": camera.a, "b": camera.b, "unit": "mm"},
-        mask={"inner_radius_px": camera.inner_radius_px, "outer_radius_px": camera.outer_radius_px},
-        height=camera.height,
-        yaw=camera.yaw,
-    )
-
-
-def _write_donut(camera: Donut) -> dict[str, Any]:
-    return _head("donut", camera) | _known(
-        centre={"x": camera.centre_x, "y": camera.centre_y},
-        mask={"inner_radius_px": camera.inner_radius_px, "outer_radius_px": camera.outer_radius_px},
-        sense=camera.sense,
-        yaw=camera.yaw,
-    )
-
-
-def _write_strip(camera: Cylindrical | Equirectangular) -> dict[str, Any]:
-    return _head("cylindrical" if isinstance(camera, Cylindrical) else "equirectangular", camera) | _known(
-        column_of_forward=camera.column_of_forward,
-        elevation={"top": camera.elevation_top, "bottom": camera.elevation_bottom},
-        sense=camera.sense,
-        height=camera.height,
-    )
-
-
-def _write_fisheye(camera: Fisheye) -> dict[str, Any]:
-    return _head("fisheye", camera) | _known(
-        focal_px=camera.focal_px,
-        centre={"x": camera.centre_x, "y": camera.centre_y},
-        mask={"inner_radius_px": camera.inner_radius_px, "outer_radius_px": camera.outer_radius_px},
-        sense=camera.sense,
-        height=camera.height,
-        yaw=camera.yaw,
-    )
-
-
-def _write_perspective(camera: Perspective) -> dict[str, Any]:
-    return _head("perspective", camera) | _known(K=_pinhole(camera), height=camera.height, yaw=camera.yaw)
-
-
-_WRITERS: Mapping[type[Camera], Callable[[Any], dict[str, Any]]] = {
-    HyperbolicMirror: _write_hyperbolic,
-    Donut: _write_donut,
-    Cylindrical: _write_strip,
-    Equirectangular: _write_strip,
-    Fisheye: _write_fisheye,
-    Perspective: _write_perspective,
-}
+def _shown(value: Any) -> str:
+    return f"a {type(value).__name__}" if isinstance(value, dict | list) else repr(value)[:60]

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds
 from omninav.pipeline.files import digest_file
-from omninav.stages.camera.models import Camera
+from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.image import Pixels
 

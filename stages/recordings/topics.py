@@ -14,7 +14,7 @@ import numpy.typing as npt
 from omninav.pipeline.files import digest_file
 from omninav.pipeline.graph.problems import nearest
 from omninav.pipeline.mcap.log import BadMessage, Record
-from omninav.stages.camera.models import Camera
+from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import interpolate
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.camera.catadioptric import back_project
-from omninav.stages.camera.models import Camera, Cylindrical, Equirectangular, HyperbolicMirror, Perspective
+from omninav.stages.camera.model import Camera
+from omninav.stages.recordings.camera_yaml import camera_from
+from omninav.stages.recordings.recording import UnreadableRecording
 
-from .config import CameraConfig, CylinderCamera, EquirectangularCamera, MirrorCamera, Sensor
+from .config import Sensor, WorldConfig
 
 F64 = npt.NDArray[np.float64]
 
@@ -41,43 +42,12 @@ class Rays:
     own: npt.NDArray[np.float32]
 
 
-def camera_of(config: CameraConfig) -> Camera:
-    """A world's camera as the value that travels on wires."""
-    if isinstance(config, MirrorCamera):
-        return HyperbolicMirror(
-            width=config.width,
-            height_px=config.height_px,
-            focal_x=config.focal,
-            focal_y=config.focal,
-            centre_x=config.centre[0],
-            centre_y=config.centre[1],
-            a=config.a,
-            b=config.b,
-            inner_radius_px=config.inner_radius_px,
-            outer_radius_px=config.outer_radius_px,
-            height=config.height,
-            yaw=config.yaw,
-        )
-    if isinstance(config, CylinderCamera | EquirectangularCamera):
-        strip = Cylindrical if isinstance(config, CylinderCamera) else Equirectangular
-        return strip(
-            width=config.width,
-            height_px=config.height_px,
-            column_of_forward=config.width / 2,
-            elevation_top=config.elevation_top,
-            elevation_bottom=config.elevation_bottom,
-            height=config.height,
-        )
-    return Perspective(
-        width=config.width,
-        height_px=config.height_px,
-        focal_x=config.focal,
-        focal_y=config.focal,
-        centre_x=config.centre[0],
-        centre_y=config.centre[1],
-        height=config.height,
-        yaw=config.yaw,
-    )
+def camera_of(world: WorldConfig) -> Camera:
+    """A world's camera. Raises `UnreadableRecording` for a description that is wrong, or says no height."""
+    camera = camera_from(world.camera, "world.camera")
+    if camera.height is None:
+        raise UnreadableRecording("world.camera: key 'height' is missing: metres of the camera above the floor")
+    return camera
 
 
 def shutter_times(sensor: Sensor, at: float) -> F64:
@@ -99,46 +69,22 @@ HANGS = 0.073
 def camera_rays(camera: Camera, vignetting: float = 0.0, robot_radius: float = 0.0) -> Rays:
     """The rays of a camera; `vignetting` is the share of light that is lost in the corners of the picture.
 
-    A robot of `robot_radius` (m) is seen in the picture where the camera's height is known; there is none if that is 0.
-    Raises `TypeError` for a projection whose rays are not known (a donut without a mirror model).
+    A robot of `robot_radius` (m) is seen in the image where the camera's height is known; there is none if that is 0.
+    Raises BadInput for a donut whose ring is not known.
     """
-    v, u = np.mgrid[0 : camera.height_px, 0 : camera.width].astype(np.float64)
-    seen = np.ones(u.shape, dtype=bool)
-    if isinstance(camera, HyperbolicMirror):
-        directions = turn(mirror_directions(camera, np.stack([u, v], axis=-1)), camera.yaw)
-        radius = np.hypot(u - camera.centre_x, v - camera.centre_y)
-        seen = radius <= camera.outer_radius_px
-        ring = seen & (radius >= camera.inner_radius_px)
-    elif isinstance(camera, Cylindrical):
-        if camera.elevation_top is None or camera.elevation_bottom is None:
-            raise TypeError("a cylindrical camera without elevation_top and elevation_bottom has no rays; give both")
-        top, bottom = math.tan(camera.elevation_top), math.tan(camera.elevation_bottom)
-        slope = top + (bottom - top) * (v + 0.5) / camera.height_px
-        directions = from_angles(strip_azimuths(camera, u), np.arctan(slope))
-    elif isinstance(camera, Equirectangular):
-        span = camera.elevation_bottom - camera.elevation_top
-        directions = from_angles(strip_azimuths(camera, u), camera.elevation_top + span * (v + 0.5) / camera.height_px)
-    elif isinstance(camera, Perspective):
-        down = (v - camera.centre_y) / camera.focal_y
-        right = (u - camera.centre_x - camera.skew * down) / camera.focal_x
-        ahead = np.stack([np.ones_like(u), -right, -down], axis=-1)
-        directions = turn(ahead / np.linalg.norm(ahead, axis=-1, keepdims=True), camera.yaw)
-    else:
-        raise TypeError(
-            f"no rays are known for {type(camera).__name__}; use HyperbolicMirror, Cylindrical, "
-            "Equirectangular or Perspective"
-        )
+    grid, seen = camera.grid(), camera.mask()
+    directions, disc = camera.unproject(grid)
+    if camera.ring is not None:
+        disc &= camera.ring._replace(inner=0.0).holds(grid)
     own = _own_body(directions, robot_radius, camera)
-    is_own = seen & np.isfinite(own).all(axis=-1)
-    if isinstance(camera, HyperbolicMirror):
-        seen = ring
-    seen &= np.isfinite(directions).all(axis=-1) & ~is_own
+    is_own = disc & np.isfinite(own).all(axis=-1)
+    seen &= ~is_own
     across, down_angle = _pixel_angles(directions)
     with np.errstate(invalid="ignore"):
         footprint = np.sqrt(across * down_angle)
     corner = math.hypot(camera.width / 2, camera.height_px / 2)
-    rim = np.hypot(u + 0.5 - camera.width / 2, v + 0.5 - camera.height_px / 2) / corner
-    if isinstance(camera, Cylindrical | Equirectangular):
+    rim = np.hypot(grid[..., 0] + 0.5 - camera.width / 2, grid[..., 1] + 0.5 - camera.height_px / 2) / corner
+    if camera.wraps:
         rim = np.zeros_like(rim)
     pixels = np.flatnonzero(seen).astype(np.int32)
     order, wedge_start, wedges = _wedges(directions[seen])
@@ -166,7 +112,7 @@ def _own_body(directions: F64, radius: float, camera: Camera) -> F64:
     It is a round deck with a mark in front, and under a mirror the camera that looks up at it.
     """
     colours = np.full(directions.shape, np.nan)
-    height = getattr(camera, "height", None)
+    height = camera.height
     if radius <= 0.0 or height is None or height <= DECK:
         return colours
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -177,7 +123,7 @@ def _own_body(directions: F64, radius: float, camera: Camera) -> F64:
         colours[deck] = (95.0, 82.0, 70.0)
         colours[deck & (off > 0.88 * radius)] = (38.0, 36.0, 34.0)
         colours[deck & (np.abs(azimuth) < 0.2)] = (40.0, 60.0, 205.0)
-        if isinstance(camera, HyperbolicMirror):
+        if camera.sees_itself:
             off = level * HANGS
             for edge, colour in ((HOUSING, (46.0, 44.0, 42.0)), (0.6 * HOUSING, (120.0, 118.0, 115.0)),
                                  (0.5 * HOUSING, (40.0, 22.0, 18.0))):  # fmt: skip
@@ -212,42 +158,6 @@ def _gathered(
     steepest = np.maximum.reduceat(slope[order], start)
     wedges = np.stack([around + lowest - 1e-6, around + highest + 1e-6, steepest], axis=1)
     return order, np.append(start, len(order)).astype(np.int32), wedges
-
-
-def mirror_directions(camera: HyperbolicMirror, pixels: npt.ArrayLike) -> F64:
-    """Unit rays (..., 3) in the mirror's frame of pixels (..., 2); NaN where they look past the mirror."""
-    return back_project(
-        pixels,
-        camera.focal_x,
-        camera.focal_y,
-        camera.centre_x,
-        camera.centre_y,
-        camera.skew,
-        camera.a,
-        camera.b,
-    )
-
-
-def strip_azimuths(camera: Cylindrical | Equirectangular, columns: npt.ArrayLike) -> F64:
-    """Azimuths (rad, counter-clockwise from forward) of the centres of columns of a strip."""
-    sign = 1.0 if camera.sense == "clockwise" else -1.0
-    azimuths: F64 = sign * 2.0 * math.pi * (camera.column_of_forward - (np.asarray(columns) + 0.5)) / camera.width
-    return azimuths
-
-
-def from_angles(azimuth: npt.ArrayLike, elevation: npt.ArrayLike) -> F64:
-    """Unit rays (..., 3) of azimuths and elevations (rad)."""
-    azimuth, elevation = np.asarray(azimuth), np.asarray(elevation)
-    return np.stack(
-        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)], axis=-1
-    )
-
-
-def turn(rays: F64, yaw: float) -> F64:
-    """Rays (..., 3) turned about z, counter-clockwise by `yaw`."""
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    x, y = rays[..., 0], rays[..., 1]
-    return np.stack([cos * x - sin * y, sin * x + cos * y, rays[..., 2]], axis=-1)
 
 
 def _pixel_angles(directions: F64) -> tuple[F64, F64]:

@@ -6,7 +6,7 @@ floor at 0) unless a field says otherwise.
 """
 
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from omninav.pipeline import Bounds
 
@@ -296,62 +296,19 @@ class OdometryNoise:
     sqrt(m); `conf/odometry_noise` holds their nine levels."""
 
 
-@dataclass(frozen=True)
-class MirrorCamera:
-    """The omnidirectional camera: a hyperbolic mirror over a perspective camera. Numbers as in camera.yaml."""
-
-    kind: Literal["mirror"] = "mirror"
-    width: int = 640
-    height_px: int = 480
-    focal: Positive = 497.0
-    centre: Point = (319.5, 239.5)
-    a: Positive = 28.095
-    b: Positive = 23.4125
-    inner_radius_px: float = 34.0
-    outer_radius_px: float = 238.0
-    height: Positive = 0.9
-    yaw: float = 0.3
-
-
-@dataclass(frozen=True)
-class CylinderCamera:
-    """A ready strip: azimuths at equal steps, forward in the middle; tangents of elevations (rad) at equal steps."""
-
-    kind: Literal["cylinder"] = "cylinder"
-    width: int = 720
-    height_px: int = 180
-    elevation_top: float = 0.6
-    elevation_bottom: float = -0.8
-    height: Positive = 0.9
-
-
-@dataclass(frozen=True)
-class EquirectangularCamera:
-    """A ready panorama: azimuths at equal steps, forward in the middle, and elevations (rad) at equal steps."""
-
-    kind: Literal["equirectangular"] = "equirectangular"
-    width: int = 720
-    height_px: int = 180
-    elevation_top: float = 0.7
-    elevation_bottom: float = -0.85
-    height: Positive = 0.9
-
-
-@dataclass(frozen=True)
-class PerspectiveCamera:
-    """An ordinary camera that looks ahead, turned by `yaw`: focal length and centre in pixels."""
-
-    kind: Literal["perspective"] = "perspective"
-    width: int = 320
-    height_px: int = 240
-    focal: Positive = 277.0
-    centre: Point = (159.5, 119.5)
-    height: Positive = 0.9
-    yaw: float = 0.0
-
-
-CameraConfig = MirrorCamera | CylinderCamera | EquirectangularCamera | PerspectiveCamera
-"""Told apart by `kind`."""
+def mirror(columns: int = 640) -> dict[str, Any]:
+    """The usual camera as in camera.yaml: a hyperbolic mirror over a camera of 4 : 3, of so many columns."""
+    scale = columns / 640
+    focal, x, y = 497.0 * scale, 320.0 * scale - 0.5, 240.0 * scale - 0.5
+    return {
+        "projection": "hyperbolic",
+        "image": {"width": columns, "height": columns * 3 // 4},
+        "K": [[focal, 0.0, x], [0.0, focal, y], [0.0, 0.0, 1.0]],
+        "mirror": {"a": 28.095, "b": 23.4125},
+        "mask": {"inner_radius_px": 34.0 * scale, "outer_radius_px": 238.0 * scale},
+        "height": 0.9,
+        "yaw": 0.3,
+    }
 
 
 @dataclass(frozen=True)
@@ -439,11 +396,17 @@ class WorldConfig:
     routes: dict[str, Route] = field(default_factory=dict)
     robot: Robot = Robot()
     odometry: OdometryNoise = OdometryNoise()
-    camera: CameraConfig = MirrorCamera()
+    camera: dict[str, Any] = field(default_factory=mirror)
+    """What a camera.yaml holds, of any projection, with the camera's height."""
     sensor: Sensor = Sensor()
     timing: Timing = Timing()
     ranges: Ranges = Ranges()
     delivery: Delivery = Delivery()
+
+    @property
+    def eye_height(self) -> float:
+        """Metres of the camera above the floor."""
+        return float(self.camera["height"])
 
     def day(self, number: int) -> Day:
         """What day `number` (from 0) is like."""

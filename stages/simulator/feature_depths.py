@@ -48,6 +48,6 @@ class FeatureDepths(Stage):
         patches = np.zeros((0, 3)) if features is None else features.bearings
         ends = np.zeros((0, 2, 3)) if vertical_segments is None else vertical_segments.bearings()
         rays = np.concatenate([patches, ends.reshape(-1, 3)])
-        eye = (truth.x, truth.y, self.world.camera.height)
+        eye = (truth.x, truth.y, self.world.eye_height)
         metres = first_hits(self._world.boxes, self.world.height, eye, rays @ turn_about_vertical(truth.heading).T)
         return self.Out(depths=Depths(metres[: len(patches)], metres[len(patches) :].reshape(-1, 2)))

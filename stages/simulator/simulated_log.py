@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.mcap.log import LogWriter
-from omninav.stages.camera.models import Camera, HyperbolicMirror, Perspective
 from omninav.stages.recordings.camera_yaml import write_camera
 
 from .simulated_recording import SimulatedRecording
@@ -98,22 +97,13 @@ def _write_scan(log: LogWriter, recording: SimulatedRecording, number: int, arri
 
 def _write_picture(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int, quality: int) -> None:
     _, stamp, shot = recording.sent[number]
-    info = _camera_info(recording.camera)
+    camera = recording.camera
+    size = {"width": camera.width, "height": camera.height_px}
+    info = {"header": {"frame_id": "omni_camera"}, **size, **camera.camera_info()}  # camera.yaml says the rest
     _, packed = cv2.imencode(".jpg", recording.picture(shot), [cv2.IMWRITE_JPEG_QUALITY, quality])
     picture = {"header": {"frame_id": "omni_camera"}, "format": "jpeg", "data": packed.ravel()}
     log.write("/camera/camera_info", "sensor_msgs/msg/CameraInfo", stamp, info, arrival)
     log.write("/camera/image/compressed", "sensor_msgs/msg/CompressedImage", stamp, picture, arrival)
-
-
-def _camera_info(camera: Camera) -> dict[str, Any]:
-    """What a CameraInfo can say of a camera; camera.yaml says the rest."""
-    info = {"header": {"frame_id": "omni_camera"}, "width": camera.width, "height": camera.height_px}
-    if isinstance(camera, HyperbolicMirror | Perspective):
-        k = [camera.focal_x, camera.skew, camera.centre_x, 0.0, camera.focal_y, camera.centre_y, 0.0, 0.0, 1.0]
-        info["k"] = k
-    if isinstance(camera, HyperbolicMirror):
-        info |= {"distortion_model": "hyperbolic_mirror", "d": [camera.a, camera.b]}
-    return info
 
 
 def _pose(pose: F64) -> dict[str, Any]:

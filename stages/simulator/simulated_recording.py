@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.files import digest_file, digest_text
-from omninav.stages import simulator
-from omninav.stages.camera import catadioptric
+from omninav.stages import camera, simulator
 from omninav.stages.geometry.plane import odometry_noise, se2
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.recordings.topics import ascending
@@ -59,7 +58,7 @@ class SimulatedRecording:
         self.events = tuple(sorted([*world.routes[route].events, *events], key=lambda event: event.at))
         self._later: World | None = None
         self._lasts = world.routes[route].day_lasts
-        self.camera = camera_of(world.camera)
+        self.camera = camera_of(world)
         self.dropped: Counter[str] = Counter()
         self.details: dict[str, str] = {}
         self._start = EPOCH + day * 86400 * 10**9 + (9 + sorted(world.routes).index(route)) * 3600 * 10**9
@@ -176,7 +175,7 @@ class SimulatedRecording:
             self._scene(float(at)),
             self._rays,
             self._true(shutter_times(sensor, at)),
-            self.world.camera.height,
+            self.world.eye_height,
             exposure=sensor.exposure * (1.0 + sensor.exposure_drift * float(swing)),
             noise=sensor.noise,
             key=self._key + shot,
@@ -234,9 +233,9 @@ def in_order(days: int | Sequence[int]) -> list[int]:
 
 def simulation_digest(world: WorldConfig) -> str:
     """sha256 over a world and the code that simulates it."""
-    folder = Path(simulator.__file__).parent
-    used = [Path(str(module.__file__)) for module in (catadioptric, odometry_noise, se2)]
-    code = [*sorted(folder.glob("*.py")), Path(__file__), *used]
+    folders = [Path(str(package.__file__)).parent for package in (simulator, camera)]
+    code = [file for folder in folders for file in sorted(folder.glob("*.py"))]
+    code += [Path(str(module.__file__)) for module in (odometry_noise, se2)]
     described = json.dumps(dataclasses.asdict(world), sort_keys=True)
     return digest_text(described, *(digest_file(path) for path in code))
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
-from omninav.stages.camera.models import Camera
+from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator import tours
@@ -92,7 +92,7 @@ class ClosedLoop(Source):
         self._world, self._scene = world, world.scene
         self._room = gather(world.obstacles, self.world.size, reach(self.world.robot))
         self._limits = limits(self.world.robot)
-        self._camera = camera_of(self.world.camera)
+        self._camera = camera_of(self.world)
         self._rays = camera_rays(self._camera, self.world.sensor.vignetting, self.world.robot.radius)
         self._bias = draw_bias(self.world.odometry, stream(self.world.seed, "odometry bias", self.day))
         self._first = self._first_pose(world)
@@ -166,7 +166,7 @@ class ClosedLoop(Source):
             return None
         swing = float(np.sin(2 * np.pi * now / sensor.exposure_period))
         exposure = sensor.exposure * (1.0 + sensor.exposure_drift * swing)
-        eye = self.world.camera.height
+        eye = self.world.eye_height
         poses = around(robot, shutter_times(sensor, 0.0))
         seen = render(
             self._scene, self._rays, poses, eye, exposure=exposure, noise=sensor.noise, key=key, people=people

@@ -8,7 +8,7 @@ import numpy as np
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.files import digest_file
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.camera.models import Camera
+from omninav.stages.camera.model import Camera
 from omninav.stages.simulator.cameras import camera_of
 from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.demo import DEMO
@@ -45,7 +45,7 @@ class GoalImage(Stage):
         file = self._file()
         if file is None:
             return self.Out()
-        pixels, camera = read_image(file), camera_of(self.world.camera)
+        pixels, camera = read_image(file), camera_of(self.world)
         if pixels.shape[:2] != (camera.height_px, camera.width):
             raise BadInput(
                 f"goal: {file} has {pixels.shape[1]} x {pixels.shape[0]} pixels, and the robot's camera takes "

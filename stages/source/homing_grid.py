@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
 from omninav.pipeline.files import digest_text
-from omninav.stages.camera.models import Camera
+from omninav.stages.camera.model import Camera
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, UnreadableRecording
 from omninav.stages.simulator.cameras import camera_of, camera_rays
@@ -124,14 +124,14 @@ class RenderedViews:
         points = points[np.array(seen, np.bool_)]
         headings = rng.uniform(-math.pi, math.pi, len(points))
         self.poses = np.concatenate([[target], np.column_stack([points, headings])])
-        self.camera = camera_of(config.camera)
+        self.camera = camera_of(config)
         self._config, self._scene = config, world.scene
         self._rays = camera_rays(self.camera, config.sensor.vignetting, config.robot.radius)
 
     def image(self, row: int) -> Pixels | None:
         """Rendered now, with the camera's noise."""
         sensor = self._config.sensor
-        height = self._config.camera.height
+        height = self._config.eye_height
         return render(self._scene, self._rays, self.poses[row], height, sensor.exposure, sensor.noise, key=row)
 
 
@@ -165,7 +165,7 @@ def grid_around(target: tuple[float, float, float], spacing: float, reach: float
 
 def in_sight(world: World, one: tuple[float, ...], other: tuple[float, ...]) -> bool:
     """Whether no body stands between two points at the height of the camera."""
-    height = world.config.camera.height
+    height = world.config.eye_height
     away = np.array([other[0] - one[0], other[1] - one[1], 0.0])
     metres = float(np.linalg.norm(away))
     hit = first_hits(world.boxes, world.config.height, (one[0], one[1], height), away[None] / metres)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
-from omninav.stages.camera.models import Camera
+from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.cuts import Splice, as_if_driven, check_splices, crossed, spliced_frames
 from omninav.stages.recordings.opening import open_recording

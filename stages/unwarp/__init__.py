@@ -1,1 +1,1 @@
-"""Pictures into panoramas: one file per projection."""
+"""Images into panoramas and perspective windows: one file per way, whatever the camera."""

@@ -1,4 +1,4 @@
-"""Unwarps the picture of a mirror nothing is known of: a ring around a centre, found in the picture if need be."""
+"""Unwarps the image of a mirror nothing is known of: a ring around a centre, found in the image if need be."""
 
 import dataclasses
 import math
@@ -8,34 +8,33 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.stages.camera.models import Camera, Donut
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State
+from omninav.stages.camera.donut import Donut
+from omninav.stages.camera.model import Camera, Ring
 from omninav.stages.values.image import Image, Panorama, Pixels
 
-from .table import LastTable, Table, fixed_point, other_camera, polar
+from .table import PanoramaTable
 
 Array = npt.NDArray[np.float64]
 Grey = npt.NDArray[np.float32]
-Ring = tuple[float, float, float, float]
-"""Centre x, centre y, inner radius, outer radius, in pixels."""
 
 
 class RingNotFound(ValueError):
-    """No ring stands out in the picture."""
+    """No ring stands out in the image."""
 
 
-LEAST_SCORE = 1.0
-"""Below it no ring was found. Over 27 pictures of three real and rendered mirrors rings score 1.03 to 1.37; parts of
-these pictures without a whole ring, panoramas and noise score 0.49 to 0.99."""
+MIN_SCORE = 1.0
+"""Below it no ring was found. Over 27 images of three real and rendered mirrors rings score 1.03 to 1.37; parts of
+these images without a whole ring, panoramas and noise score 0.49 to 0.99."""
 
 
 def radial_edges(grey: Grey, centre: tuple[float, float], radii: int, rays: int = 90) -> Array:
     """How much of a circle is an edge, per radius in whole pixels: (radii,) in [0, 1].
 
     A ray counts at a radius where the step of brightness across it is large against the steps around it (a tenth of the
-    picture along the ray, and the rays beside it). So a faint rim between a plain wall and its plain reflection counts
-    as much as one before a bright window, and a crowded part of the picture counts little anywhere. Circles may leave
-    the picture with up to 40 percent of their length.
+    image along the ray, and the rays beside it). So a faint rim between a plain wall and its plain reflection counts
+    as much as one before a bright window, and a crowded part of the image counts little anywhere. Circles may leave
+    the image with up to 40 percent of their length.
     """
     angle = 2 * np.pi * np.arange(rays)[:, None] / rays
     u = (centre[0] + np.arange(radii) * np.cos(angle)).astype(np.float32)
@@ -50,9 +49,9 @@ def radial_edges(grey: Grey, centre: tuple[float, float], radii: int, rays: int 
 
 
 def find_ring(pixels: Pixels) -> Ring:
-    """Centre and radii of the mirror's ring in a picture; raises RingNotFound where no ring stands out.
+    """Centre and radii of the mirror's ring in an image; raises RingNotFound where no ring stands out.
 
-    The ring is the pair of circles around one centre near the picture's middle that are edges over most of their
+    The ring is the pair of circles around one centre near the image's middle that are edges over most of their
     length: the mirror's rim, and, within 45 percent of it, the camera's own reflection. That they share a centre is
     what tells them from the round things in the scene.
     """
@@ -61,9 +60,9 @@ def find_ring(pixels: Pixels) -> Ring:
     small = cv2.resize(pixels, None, fx=1.0 / scale, fy=1.0 / scale, interpolation=cv2.INTER_AREA)
     grey = cast(Grey, cv2.cvtColor(small, cv2.COLOR_BGR2GRAY).astype(np.float32))
     h, w = grey.shape
-    least, most = int(0.28 * min(h, w)), int(0.62 * min(h, w))
-    outer_radii = np.arange(least, most - 2)
-    low, high = max(2, int(0.06 * least)), (0.45 * outer_radii).astype(int)
+    smallest, largest = int(0.28 * min(h, w)), int(0.62 * min(h, w))
+    outer_radii = np.arange(smallest, largest - 2)
+    low, high = max(2, int(0.06 * smallest)), (0.45 * outer_radii).astype(int)
     centre, best, inner, outer = (w / 2.0, h / 2.0), -1.0, 0, 0
     span, step = 0.16 * min(h, w), 0.02 * min(h, w)
     while step > 0.2:
@@ -74,7 +73,7 @@ def find_ring(pixels: Pixels) -> Ring:
         for dy in offsets:
             for dx in offsets:
                 candidate = (middle[0] + float(dx), middle[1] + float(dy))
-                edges = radial_edges(blurred, candidate, most)
+                edges = radial_edges(blurred, candidate, largest)
                 within = np.maximum.accumulate(np.concatenate([np.zeros(low), edges[low:]]))
                 scores = edges[outer_radii] + within[high]
                 at = int(np.argmax(scores))
@@ -82,10 +81,10 @@ def find_ring(pixels: Pixels) -> Ring:
                     best, centre, outer = float(scores[at]), candidate, int(outer_radii[at])
                     inner = low + int(np.argmax(edges[low : high[at] + 1]))
         span, step = 1.5 * step, step / 3
-    if best < LEAST_SCORE:
+    if best < MIN_SCORE:
         raise RingNotFound("no ring stands out")
-    # Half a pixel of the small picture within the rim, and outside of the camera's reflection.
-    return (
+    # Half a pixel of the small image within the rim, and outside of the camera's reflection.
+    return Ring(
         (centre[0] + 0.5) * scale - 0.5,
         (centre[1] + 0.5) * scale - 0.5,
         (inner + 1.5) * scale,
@@ -93,20 +92,8 @@ def find_ring(pixels: Pixels) -> Ring:
     )
 
 
-def donut_table(camera: Donut, columns: int, rows: int) -> Table:
-    """Rows are equal steps of radius from the outer one (top) to the inner one, columns equal steps of azimuth."""
-    assert camera.centre_x is not None
-    assert camera.centre_y is not None
-    assert camera.inner_radius_px is not None
-    assert camera.outer_radius_px is not None
-    ring = camera.outer_radius_px - camera.inner_radius_px
-    radius = camera.outer_radius_px - ring * (np.arange(rows) + 0.5) / rows
-    u, v = polar(camera.centre_x, camera.centre_y, radius, columns, camera.sense, camera.yaw)
-    return fixed_point(u, v)
-
-
 class DonutUnwrapState(State):
-    """What was found in the first picture of a log that showed a ring; it stays, so that panoramas do not jump."""
+    """What was found in the first image of a log that showed a ring; it stays, so that panoramas do not jump."""
 
     log: int = -1
     centre_x: float = math.nan
@@ -116,7 +103,7 @@ class DonutUnwrapState(State):
 
 
 def with_ring(camera: Donut, image: Image, found: DonutUnwrapState, ctx: Context) -> Donut | None:
-    """The camera with centre and radii; what it leaves open is found in the picture, once per log (`found`)."""
+    """The camera with centre and radii; what it leaves open is found in the image, once per log (`found`)."""
     given = (camera.centre_x, camera.centre_y, camera.inner_radius_px, camera.outer_radius_px)
     if all(value is not None for value in given):
         return camera
@@ -125,8 +112,8 @@ def with_ring(camera: Donut, image: Image, found: DonutUnwrapState, ctx: Context
             ring = find_ring(image.pixels)
         except RingNotFound:
             ctx.count(
-                "no_ring_in_picture",
-                detail="unwarp: no mirror ring found in the picture; give centre and radii in camera.yaml",
+                "no_ring_in_image",
+                detail="unwarp: no mirror ring found in the image; give centre and radii in camera.yaml",
             )
             return None
         found.centre_x, found.centre_y, found.inner_radius_px, found.outer_radius_px = ring
@@ -138,14 +125,16 @@ def with_ring(camera: Donut, image: Image, found: DonutUnwrapState, ctx: Context
 
 
 class DonutUnwarp(Stage):
-    """Panorama from an uncalibrated mirror image, by centre and radii, found in the picture where not given.
+    """Panorama from an uncalibrated mirror image, by centre and radii, found in the image where not given.
 
     Rows are equal steps of radius, the outer circle on top; elevations are not known. What is found in the first
-    picture of a log that shows a ring is kept for all of it (State). Raises BadInput where the camera is another one.
+    image of a log that shows a ring is kept for all of it (State). Raises BadInput where the camera is another one.
     """
 
     columns: Annotated[int, Bounds(ge=8)] = 360
+    """Columns of the panorama (pixels)."""
     rows: Annotated[int, Bounds(ge=1)] = 80
+    """Rows of the panorama (pixels)."""
 
     class Out(Outputs):
         """The ring, unrolled; absent as long as no ring was found."""
@@ -153,22 +142,18 @@ class DonutUnwarp(Stage):
         panorama: Panorama | None = None
 
     def setup(self, ctx: Context) -> None:
-        """No table yet: the camera comes with the first picture."""
-        self._tables = LastTable(self._table)
+        """No table yet: the camera comes with the first image."""
+        self._table = PanoramaTable(self.columns, self.rows)
         self._open: tuple[Camera, int] | None = None
         self._complete: Donut | None = None
 
-    def _table(self, camera: Camera) -> Table:
-        assert isinstance(camera, Donut)
-        return donut_table(camera, self.columns, self.rows)
-
     def step(self, ctx: Context, image: Image, camera: Camera, found: DonutUnwrapState) -> Out:
-        """Unroll one picture."""
+        """Unroll one image."""
         if not isinstance(camera, Donut):
-            raise other_camera(camera, "a Donut")
+            raise BadInput(f"unwarp: this recording's camera is {camera.projection}, not donut; use unwarp=panorama")
         here = (camera, ctx.tick.log)
         if self._complete is None or self._open != here:
             self._complete, self._open = with_ring(camera, image, found, ctx), here
         if self._complete is None:
             return self.Out()
-        return self.Out(panorama=self._tables.apply(image, self._complete))
+        return self.Out(panorama=self._table.panorama(image, self._complete))

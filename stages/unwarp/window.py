@@ -1,4 +1,4 @@
-"""Cuts perspective windows from an omnidirectional picture: what ordinary cameras in its place would see."""
+"""Cuts perspective windows from an omnidirectional image: what ordinary cameras in its place would see."""
 
 import math
 from typing import Annotated, NamedTuple, cast
@@ -7,20 +7,19 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.camera.models import Camera, Perspective
-from omninav.stages.camera.rays import pixels_of_rays
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
+from omninav.stages.camera.model import Camera, require_elevations
+from omninav.stages.camera.perspective import Perspective
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.image import Image, Pixels, Windows
 
-from .table import Table, fixed_point
+from .table import RemapTable, remap_table
 
 Array = npt.NDArray[np.float64]
 
 
 def window_rays(heading: float, pitch: float, field: float, columns: int, rows: int) -> Array:
-    """Directions (rows, columns, 3) in the robot's frame that the pixels of a perspective picture look along.
+    """Directions (rows, columns, 3) in the robot's frame that the pixels of a perspective image look along.
 
     `heading` (rad, counter-clockwise from forward) and `pitch` (rad above the horizon) of its optical axis, `field` its
     horizontal field of view (rad). Pixels are square.
@@ -38,12 +37,12 @@ def window_rays(heading: float, pitch: float, field: float, columns: int, rows: 
 class WindowTable(NamedTuple):
     """A camera's windows, one below the other as one remap `table`; `seen` (W, rows, columns) or None: all is seen."""
 
-    table: Table
+    table: RemapTable
     seen: npt.NDArray[np.bool_] | None
 
     def windows(self, pixels: Pixels, headings: Array, field: float, rows: int) -> Windows:
-        """Windows of a picture; black where the camera sees nothing."""
-        cut = self.table.remapped(pixels)
+        """Windows of an image; black where the camera sees nothing."""
+        cut = self.table.remap(pixels)
         cut = cut.reshape(len(headings), rows, *cut.shape[1:])
         if self.seen is not None:
             cut[~self.seen] = 0
@@ -51,21 +50,24 @@ class WindowTable(NamedTuple):
 
 
 class PerspectiveWindow(Stage):
-    """Perspective windows cut from an omnidirectional picture, or the picture of an ordinary camera as it is.
+    """Perspective windows cut from an omnidirectional image, or the image of an ordinary camera as it is.
 
-    Wolf, Burgard & Burkhardt 2005, section VI: their robot has ordinary cameras. `directions`: how many windows,
-    evenly around the robot, counter-clockwise from straight ahead; 1: an ordinary camera that looks ahead. Each shows
-    `field_deg` horizontally in `columns` x `rows` square pixels, its axis `pitch_deg` above the horizon. What the
-    camera does not see is black there, and said. An ordinary camera's picture is only resized, and shows what it shows.
-    Raises BadInput for a camera of which elevations are not known, windows that show nothing, and several
-    `directions` of an ordinary camera.
+    Wolf, Burgard & Burkhardt 2005, section VI: their robot has ordinary cameras. What the camera does not see is black
+    in a window, and counted. An ordinary camera's image is only resized, and shows what it shows. Raises BadInput for a
+    camera of which elevations are not known, windows that show nothing, and several `directions` of an ordinary camera.
     """
 
     directions: Annotated[int, Bounds(ge=1)] = 1
+    """Number of windows, evenly around the robot, counter-clockwise from straight ahead; 1: an ordinary camera that
+    looks ahead."""
     field_deg: Annotated[float, Bounds(gt=0, lt=180)] = 60.0
+    """Horizontal field of view of a window."""
     columns: Annotated[int, Bounds(ge=8)] = 320
+    """Columns of a window, of square pixels."""
     rows: Annotated[int, Bounds(ge=1)] = 240
+    """Rows of a window."""
     pitch_deg: Annotated[float, Bounds(ge=-90, le=90)] = 0.0
+    """Elevation of the windows' optical axes above the horizon."""
 
     class Out(Outputs):
         """The windows, where other unwarps give a panorama."""
@@ -73,12 +75,12 @@ class PerspectiveWindow(Stage):
         panorama: Windows
 
     def setup(self, ctx: Context) -> None:
-        """No table yet: the camera comes with the first picture."""
+        """No table yet: the camera comes with the first image."""
         self._camera: Camera | None = None
         self._table: WindowTable | None = None
 
     def step(self, ctx: Context, image: Image, camera: Camera) -> Out:
-        """Cut the windows of one picture."""
+        """Cut the windows of one image."""
         if isinstance(camera, Perspective):
             return self.Out(panorama=self._ordinary(image, camera))
         headings = wrap(2.0 * math.pi * np.arange(self.directions) / self.directions)
@@ -88,9 +90,8 @@ class PerspectiveWindow(Stage):
 
     def _built(self, ctx: Context, camera: Camera, headings: Array) -> WindowTable:
         size = math.radians(self.pitch_deg), math.radians(self.field_deg), self.columns, self.rows
-        rays = np.stack([window_rays(float(heading), *size) for heading in headings])
-        u, v = pixels_of_rays(camera, rays)
-        seen = ~(np.isnan(u) | np.isnan(v))
+        require_elevations(camera)
+        table, seen = remap_table(camera, np.concatenate([window_rays(float(h), *size) for h in headings]))
         if not seen.any():
             raise BadInput(
                 f"unwarp: the camera sees nothing of a window of {self.field_deg:g} deg at {self.pitch_deg:g} deg "
@@ -103,8 +104,7 @@ class PerspectiveWindow(Stage):
                 detail=f"unwarp: {100 * dark:.1f} % of the windows lie outside of what the camera sees, and are black; "
                 "nodes.unwarp.pitch_deg or a smaller field_deg moves them inside",
             )
-        table = fixed_point(u.reshape(-1, self.columns), v.reshape(-1, self.columns), wraps=True)
-        return WindowTable(table, None if dark == 0.0 else seen)
+        return WindowTable(table, None if dark == 0.0 else seen.reshape(len(headings), self.rows, self.columns))
 
     def _ordinary(self, image: Image, camera: Perspective) -> Windows:
         if self.directions > 1:

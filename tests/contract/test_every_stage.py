@@ -116,13 +116,6 @@ NOT_YET_DOCUMENTED = [
     "source.homing_grid",
     "source.log",
     "source.two_views",
-    "unwarp.by_camera",
-    "unwarp.donut",
-    "unwarp.equirectangular",
-    "unwarp.fisheye",
-    "unwarp.hyperbolic",
-    "unwarp.strip",
-    "unwarp.window",
 ]
 """Modules whose parameters are still to be explained below their fields. It only shrinks."""
 

@@ -7,15 +7,13 @@ import numpy as np
 
 from omninav.pipeline import Context
 from omninav.stages.control.follow_homing import FollowHoming, FollowHomingState
-from omninav.stages.simulator.config import Day, Door, MirrorCamera, Room
+from omninav.stages.simulator.config import Day, Door, Room, mirror
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.source.closed_loop import ClosedLoop, ClosedLoopState
 from omninav.stages.values.homing import HomingVector, PathProgress
 from omninav.stages.values.pose import Pose
 
-SMALL = MirrorCamera(
-    width=160, height_px=120, focal=124.25, centre=(79.5, 59.5), inner_radius_px=8.5, outer_radius_px=59.5
-)
+SMALL = mirror(columns=160)
 KITCHEN = Room(name="kitchen", corner=(0.0, 0.0), size=(6.0, 3.0), doors=(Door(side="north", at=3.0),))
 WORLD = replace(
     DEMO, size=(6.0, 6.0), camera=SMALL, rooms=(KITCHEN,), shelves=(), blocks=(), aisle_blocks=(), hangings=(),

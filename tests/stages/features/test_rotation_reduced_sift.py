@@ -9,7 +9,6 @@ from turned_robot import CAMERA, both_kinds, look, wrapped
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.camera.bearings import camera_bearings
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import LocalFeatures
@@ -66,7 +65,7 @@ def test_of_a_turned_camera_the_bearings_are_the_robots() -> None:
 def test_beyond_the_mirrors_edge_there_is_nothing_to_see() -> None:
     noise = np.random.default_rng(0).integers(0, 255, (480, 640, 3)).astype(np.uint8)
     larger = dataclasses.replace(CAMERA, focal_x=300.0, focal_y=300.0, outer_radius_px=400.0)  # than the mirror is
-    assert np.isnan(camera_bearings(np.array([[638.0, 2.0]]), larger)).all()
+    assert np.isnan(larger.unproject(np.array([[638.0, 2.0]]))[0]).all()
     stage, context = RotationReducedSift(), Context("features")
     stage.setup(context)
     features = stage.step(context, image=Image(noise), camera=larger).features

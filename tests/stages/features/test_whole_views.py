@@ -17,7 +17,7 @@ from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.world import World
-from omninav.stages.unwarp.by_camera import UnwarpByCamera
+from omninav.stages.unwarp.panorama import UnwarpPanorama
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.views import WholeView
 
@@ -41,9 +41,9 @@ def described(stage: Any, pixels: np.ndarray) -> WholeView:
 def seen() -> Any:
     """What the demo's robot sees at a pose, as a panorama's pixels."""
     scene = World(DEMO).scene
-    camera = camera_of(DEMO.camera)
+    camera = camera_of(DEMO)
     rays = camera_rays(camera)
-    unwarp = UnwarpByCamera()
+    unwarp = UnwarpPanorama()
     context = Context("unwarp")
     unwarp.setup(context)
 

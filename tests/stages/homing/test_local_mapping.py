@@ -12,7 +12,7 @@ from turned_robot import CAMERA, both_kinds, look, wrapped
 from omninav.pipeline import Context
 from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_state
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.camera.models import Donut
+from omninav.stages.camera.donut import Donut
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.geometry.appearance.feature_matching import mutual_nearest
 from omninav.stages.geometry.plane.se2 import between

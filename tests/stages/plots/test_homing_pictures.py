@@ -8,7 +8,8 @@ from small_run import collected
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
-from omninav.stages.camera.models import Equirectangular, HyperbolicMirror
+from omninav.stages.camera.equirectangular import Equirectangular
+from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.mapping.thumbnails import TourSnapshot, ViewThumbnails, bound
 from omninav.stages.plots.drive_video import DriveVideo
 from omninav.stages.plots.homing_snapshot import HomingSnapshot, HomingSnapshotState
@@ -26,7 +27,7 @@ from omninav.stages.values.thumbnails import decoded
 
 CTX = Context("view")
 MIRROR = HyperbolicMirror(640, 480, 497.0, 497.0, 319.5, 239.5, 28.095, 23.4125, 34.0, 238.0, height=0.9, yaw=0.3)
-STRIP = Equirectangular(360, 90, 180.0, 0.7, -0.85, height=0.9)
+STRIP = Equirectangular(360, 90, 180.0, elevation_top=0.7, elevation_bottom=-0.85, height=0.9)
 MAP = made_map([(1.0, 1.0), (4.0, 1.0), (4.0, 4.0)], {(0, 1): 1, (1, 2): 0})
 PLAN = FloorPlan(np.array([[(2.0, 2.0), (3.0, 2.0), (3.0, 3.0), (2.0, 3.0)]]), 6.0, 5.0)
 TICKS = 12

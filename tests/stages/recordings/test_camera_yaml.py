@@ -6,15 +6,13 @@ import pytest
 import yaml
 
 from omninav.pipeline.mcap.log import make_message
-from omninav.stages.camera.models import (
-    Camera,
-    Cylindrical,
-    Donut,
-    Equirectangular,
-    Fisheye,
-    HyperbolicMirror,
-    Perspective,
-)
+from omninav.stages.camera.cylindrical import Cylindrical
+from omninav.stages.camera.donut import Donut
+from omninav.stages.camera.equirectangular import Equirectangular
+from omninav.stages.camera.fisheye import Fisheye
+from omninav.stages.camera.hyperbolic import HyperbolicMirror
+from omninav.stages.camera.model import Camera
+from omninav.stages.camera.perspective import Perspective
 from omninav.stages.recordings.camera_yaml import camera_from_info, parse_camera, write_camera
 from omninav.stages.recordings.recording import UnreadableRecording
 
@@ -58,8 +56,10 @@ def test_a_missing_key_is_named_with_its_file(key: str) -> None:
     ("old", "new", "said"),
     [
         ("  a: 28.095", "  aa: 28.095", r"key 'mirror\.a' is missing"),
-        ("a: 28.095", "a: long", r"'mirror\.a' must be a number, not 'long'"),
-        ("a: 28.095", "a: -1", r"'mirror\.a' must be above 0"),
+        ("a: 28.095", "a: long", r"'mirror\.a' is 'long' \(str\), expected float > 0"),
+        ("a: 28.095", "a: -1", r"'mirror\.a' is -1\.0 is out of bounds, expected float > 0"),
+        ("a: 28.095", "a: {b: 1}", r"'mirror\.a' must be a number or a word, not a dict"),
+        ("yaw: 0.3", "yaw: .nan", "'yaw' must be a number or a word, not nan"),
         ("hyperbolic", "hyperbolik", "'projection' cannot be 'hyperbolik'; did you mean 'hyperbolic'"),
         ("yaw:", "yaww:", "key 'yaww' is not known; did you mean 'yaw'"),
         ("inner_radius_px: 34", "inner_radius_px: 340", "must be below"),

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from conftest import DRIVE, GRID, RECORDINGS, TOUR
 
-from omninav.stages.camera.models import HyperbolicMirror
+from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.recordings.occupancy_grid import FREE, read_occupancy
 from omninav.stages.recordings.opening import open_recording

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from omninav.stages.camera.models import Equirectangular
+from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.simulator.cameras import camera_rays
 from omninav.stages.simulator.config import Day
 from omninav.stages.simulator.demo import DEMO

@@ -13,7 +13,7 @@ from omninav.stages.control.clearance import free_ahead, roomier_side
 from omninav.stages.control.wall_avoider import WallAvoider, WallAvoiderState
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator.cameras import shutter_times
-from omninav.stages.simulator.config import Delivery, Event, MirrorCamera, OdometryNoise, Ranges, Sensor, WorldConfig
+from omninav.stages.simulator.config import Delivery, Event, OdometryNoise, Ranges, Sensor, WorldConfig, mirror
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.robot import around, steer
@@ -23,9 +23,7 @@ from omninav.stages.values.command import Command
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.scan import Scan
 
-SMALL = MirrorCamera(
-    width=160, height_px=120, focal=124.25, centre=(79.5, 59.5), inner_radius_px=8.5, outer_radius_px=59.5
-)
+SMALL = mirror(columns=160)
 WORLD = replace(DEMO, camera=SMALL)
 EXACT = replace(WORLD, odometry=OdometryNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
@@ -141,7 +139,7 @@ def test_its_pictures_are_blurred_by_its_motion_around_their_tick():
     np.testing.assert_allclose(poses[2], driven[0, :3], atol=1e-3)
     np.testing.assert_array_equal(poses[1], state[:3])
     steps = around(state, shutter_times(quiet.sensor, 0.0))
-    seen = render(source._scene, source._rays, steps, quiet.camera.height)
+    seen = render(source._scene, source._rays, steps, quiet.eye_height)
     np.testing.assert_array_equal(last[1].image.pixels, seen)
 
 

@@ -9,12 +9,12 @@ import pytest
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.plots.image_file import ImageFile
-from omninav.stages.simulator.config import MirrorCamera
+from omninav.stages.simulator.config import mirror
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.source.goal_image import GoalImage
 from omninav.stages.values.image import Image
 
-WORLD = replace(DEMO, camera=MirrorCamera(width=16, height_px=12))
+WORLD = replace(DEMO, camera=mirror(columns=16))
 PIXELS = np.random.default_rng(0).integers(0, 255, (12, 16, 3)).astype(np.uint8)
 
 

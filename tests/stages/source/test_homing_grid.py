@@ -9,14 +9,12 @@ from conftest import DATA, needs_data
 
 from omninav.pipeline import Context
 from omninav.stages.recordings.recording import UnreadableRecording
-from omninav.stages.simulator.config import MirrorCamera
+from omninav.stages.simulator.config import mirror
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.world import World
 from omninav.stages.source.homing_grid import HomingGrid, HomingGridState, grid_around, in_sight
 
-SMALL = MirrorCamera(
-    width=160, height_px=120, focal=124.25, centre=(79.5, 59.5), inner_radius_px=8.5, outer_radius_px=59.5
-)
+SMALL = mirror(columns=160)
 WORLD = replace(DEMO, camera=SMALL)
 START = WORLD.routes["drive"].waypoints[0]
 ANTWORLD = DATA / "antworld-rendered" / "grid_200mm"

@@ -14,7 +14,7 @@ from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.recordings.topics import Topics
-from omninav.stages.simulator.config import Day, Delivery, Event, MirrorCamera, OdometryNoise, Route, Sensor
+from omninav.stages.simulator.config import Day, Delivery, Event, OdometryNoise, Route, Sensor, mirror
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.record_log import RecordLog
 from omninav.stages.simulator.renderer import render
@@ -23,9 +23,7 @@ from omninav.stages.simulator.simulated_recording import SimulatedRecording
 from omninav.stages.simulator.world import World
 from omninav.stages.source.log import LogSource, LogSourceState
 
-SMALL = MirrorCamera(
-    width=160, height_px=120, focal=124.25, centre=(79.5, 59.5), inner_radius_px=8.5, outer_radius_px=59.5
-)
+SMALL = mirror(columns=160)
 WORLD = replace(
     DEMO,
     camera=SMALL,

@@ -3,25 +3,22 @@ import math
 import numpy as np
 import pytest
 
-from omninav.pipeline import Context
-from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.camera.models import (
-    Camera,
-    Cylindrical,
-    Donut,
-    Equirectangular,
-    Fisheye,
-    HyperbolicMirror,
-    Perspective,
-)
-from omninav.stages.simulator.cameras import camera_rays
-from omninav.stages.unwarp.hyperbolic import elevation_range
+from omninav.pipeline import BadInput, Context
+from omninav.stages.camera.cylindrical import Cylindrical
+from omninav.stages.camera.donut import Donut
+from omninav.stages.camera.equirectangular import Equirectangular
+from omninav.stages.camera.fisheye import Fisheye
+from omninav.stages.camera.hyperbolic import HyperbolicMirror
+from omninav.stages.camera.model import Camera
+from omninav.stages.camera.perspective import Perspective
 from omninav.stages.unwarp.window import PerspectiveWindow, window_rays
 from omninav.stages.values.image import Image, Pixels, Windows
 
 MIRROR = HyperbolicMirror(640, 480, 497.0, 497.0, 319.5, 239.5, 28.095, 23.4125, 34.0, 238.0, yaw=0.3)
 FISHEYE = Fisheye(640, 480, 150.0, 319.5, 239.5, 238.0, 10.0, sense="counter_clockwise", yaw=0.3)
-EQUIRECTANGULAR = Equirectangular(720, 240, 100.0, math.radians(50), math.radians(-60), sense="counter_clockwise")
+EQUIRECTANGULAR = Equirectangular(
+    720, 240, 100.0, sense="counter_clockwise", elevation_top=math.radians(50), elevation_bottom=math.radians(-60)
+)
 CYLINDER = Cylindrical(720, 240, 360.0, elevation_top=math.radians(45), elevation_bottom=math.radians(-45))
 PERSPECTIVE = Perspective(320, 240, 277.0, 277.0, 159.5, 119.5, yaw=0.5)
 
@@ -33,15 +30,9 @@ def windows(camera: Camera, pixels: Pixels, ctx: Context | None = None, **parame
 
 
 def directions_seen(camera: Camera) -> np.ndarray:
-    """The unit ray of each pixel of a camera's picture, by the simulator's model of it, or by hand."""
-    if isinstance(camera, Fisheye):
-        v, u = np.mgrid[0 : camera.height_px, 0 : camera.width].astype(float)
-        angle = np.hypot(u - camera.centre_x, v - camera.centre_y) / camera.focal_px
-        bearing = -np.arctan2(v - camera.centre_y, u - camera.centre_x) + camera.yaw
-        return np.stack([np.sin(angle) * np.cos(bearing), np.sin(angle) * np.sin(bearing), np.cos(angle)], axis=-1)
-    rays, seen = camera_rays(camera), np.zeros((camera.height_px * camera.width, 3))
-    seen[rays.pixels] = rays.directions
-    return seen.reshape(camera.height_px, camera.width, 3)
+    """The unit ray of each pixel of a camera's image that shows the world; zero elsewhere."""
+    rays, _ = camera.unproject(camera.grid())
+    return np.where(camera.mask()[..., None], rays, 0.0)
 
 
 @pytest.mark.parametrize("pitch", [0.0, -20.0])
@@ -85,7 +76,7 @@ def test_what_the_camera_does_not_see_is_black_and_said() -> None:
     assert (cut.pixels[cut.seen] == 255).all()
     rays = window_rays(0.0, 0.0, math.radians(100.0), 64, 48)
     elevation = np.arctan2(rays[..., 2], np.hypot(rays[..., 0], rays[..., 1]))
-    assert np.array_equal(cut.seen[0], elevation <= elevation_range(MIRROR)[0])
+    assert np.array_equal(cut.seen[0], elevation <= MIRROR.elevations[0])
     share = 100 * (1 - cut.seen.mean())
     assert f"{share:.1f} % of the windows lie outside" in ctx.details["windows_beyond_the_camera"]
     assert windows(MIRROR, white, field_deg=50.0).seen is None
@@ -107,7 +98,7 @@ def test_an_ordinary_camera_has_no_other_directions() -> None:
 
 @pytest.mark.parametrize("camera", [Donut(640, 480, 319.5, 239.5, 34.0, 238.0), Cylindrical(720, 240, 360.0)])
 def test_no_window_is_cut_where_elevations_are_not_known(camera: Camera) -> None:
-    with pytest.raises(BadInput, match=r"no elevations .* give its model in camera.yaml .* or use unwarp=by_camera"):
+    with pytest.raises(BadInput, match=r"no elevations .* give its model in camera.yaml .* or use unwarp=panorama"):
         windows(camera, np.zeros((camera.height_px, camera.width, 3), np.uint8))
 
 

@@ -1,0 +1,67 @@
+"""A mirror image with nothing known of the mirror: a ring, one azimuth per radius."""
+
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import BadInput
+
+from .model import Array, Bools, Camera, Key, Ring, Sense
+from .rays import angles, unit_vectors
+
+
+class Donut(Camera, projection="donut"):
+    """A ring between two circles. Azimuths are right; elevations are a guess: of square pixels, the horizon in the
+    middle of the ring.
+
+    Centre and radii are None where they are to be found in the image (`unwarp=donut`); rays and pixels are refused
+    then (BadInput).
+    """
+
+    centre_x: Annotated[float | None, Key("centre", "x")] = None
+    """Pixels, as the next three."""
+    centre_y: Annotated[float | None, Key("centre", "y")] = None
+    inner_radius_px: Annotated[float | None, Key("mask", "inner_radius_px")] = None
+    outer_radius_px: Annotated[float | None, Key("mask", "outer_radius_px")] = None
+    sense: Sense = "clockwise"
+
+    @property
+    def ring(self) -> Ring | None:
+        """Between the two radii; None where one of the four numbers is not known."""
+        x, y, inner, outer = self.centre_x, self.centre_y, self.inner_radius_px, self.outer_radius_px
+        if x is None or y is None or inner is None or outer is None:
+            return None
+        return Ring(x, y, inner, outer)
+
+    @property
+    def elevations_known(self) -> bool:
+        """They are a guess."""
+        return False
+
+    def project(self, rays: Array) -> tuple[Array, Bools]:
+        """Radius = (1 + elevation) x the middle one. Raises BadInput."""
+        ring = self._known()
+        azimuth, elevation = angles(rays)
+        sign = 1.0 if self.sense == "clockwise" else -1.0
+        radius = (1.0 + elevation) * (ring.inner + ring.outer) / 2.0
+        u = ring.centre_x + radius * np.cos(azimuth - self.yaw)
+        pixels = np.stack([u, ring.centre_y + sign * radius * np.sin(azimuth - self.yaw)], axis=-1)
+        return pixels, self.shows(pixels)
+
+    def unproject(self, pixels: Array) -> tuple[Array, Bools]:
+        """Elevation = radius / the middle one - 1. Raises BadInput."""
+        ring = self._known()
+        x, y = pixels[..., 0] - ring.centre_x, pixels[..., 1] - ring.centre_y
+        sign = 1.0 if self.sense == "clockwise" else -1.0
+        middle = (ring.inner + ring.outer) / 2.0
+        elevation = (np.hypot(x, y) - middle) / middle
+        return unit_vectors(np.arctan2(sign * y, x) + self.yaw, elevation), np.ones(elevation.shape, np.bool_)
+
+    def _known(self) -> Ring:
+        if self.ring is None:
+            raise BadInput(
+                "camera: a donut without centre_x, centre_y, inner_radius_px and outer_radius_px; give centre and mask "
+                "in camera.yaml, or use unwarp=donut, which finds them in the image, and its panorama: "
+                "wires.features.image=unwarp.panorama"
+            )
+        return self.ring

@@ -1,0 +1,182 @@
+"""What every camera model answers: where a ray is seen, where a pixel looks, and what of the image shows the world.
+
+A model is one file in this folder. Everything else (panoramas, windows, bearings, thumbnails, the simulator's rays,
+camera.yaml) follows from what it says here.
+"""
+
+import importlib
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import KW_ONLY
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import BadInput, Bounds, Value
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+Sense = Literal["clockwise", "counter_clockwise"]
+"""In which sense azimuth grows in the image, seen on a screen (v down). A camera that looks up, by a lens or into a
+mirror, has u along x and v along y, so its bearings atan2(v, u) grow clockwise on the screen."""
+
+
+class Key(NamedTuple):
+    """Where `camera.yaml` holds a parameter: a section and a name in it, or the matrix K and a place in it (row-major).
+
+    A parameter without one stands at the top under its own name; of several the first is written, any is read.
+    """
+
+    section: str
+    name: str | int
+
+
+FocalX = Annotated[float, Key("K", 0), Bounds(gt=0)]
+FocalY = Annotated[float, Key("K", 4), Bounds(gt=0)]
+CentreX = Annotated[float, Key("K", 2)]
+CentreY = Annotated[float, Key("K", 5)]
+Skew = Annotated[float, Key("K", 1)]
+InnerRadius = Annotated[float, Key("mask", "inner_radius_px"), Bounds(ge=0)]
+OuterRadius = Annotated[float, Key("mask", "outer_radius_px"), Bounds(gt=0)]
+
+
+class Ring(NamedTuple):
+    """The part of an image between two circles whose radii are upright lines of the world (pixels)."""
+
+    centre_x: float
+    centre_y: float
+    inner: float
+    outer: float
+
+    def holds(self, pixels: Array) -> Bools:
+        """Which pixels (..., 2) lie in it: (...,)."""
+        radius = np.hypot(pixels[..., 0] - self.centre_x, pixels[..., 1] - self.centre_y)
+        inside: Bools = (radius >= self.inner) & (radius <= self.outer)
+        return inside
+
+
+MODELS: dict[str, type["Camera"]] = {}
+"""The camera models that were imported, by what `projection:` in camera.yaml calls them; see `camera_models`."""
+
+
+class Camera(Value, ABC):
+    """A camera: rays of the robot's frame (x forward, y left, z up) to pixels (column u, row v) and back.
+
+    A subclass is a model and names itself: `class Fisheye(Camera, projection="fisheye")`. Its fields are what
+    camera.yaml says of it. Raises ValueError for fields that contradict each other. Integer coordinates are the
+    centres of pixels.
+    """
+
+    projection: ClassVar[str]
+    wraps: ClassVar[bool] = False
+    """The image is a full circle itself: its left edge goes on at its right one."""
+    sees_itself: ClassVar[bool] = False
+    """The camera's housing is seen in the middle of its own image, as under a mirror."""
+
+    width: Annotated[int, Key("image", "width"), Bounds(gt=0)]
+    """Columns of an image."""
+    height_px: Annotated[int, Key("image", "height"), Bounds(gt=0)]
+    """Rows of an image."""
+    _: KW_ONLY
+    height: float | None = None
+    """Metres of the projection centre above the floor; None where it is not known."""
+    yaw: float = 0.0
+    """Radians, counter-clockwise, by which the camera is turned against the robot."""
+
+    def __init_subclass__(cls, projection: str = "", **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if projection:
+            cls.projection = projection
+            MODELS[projection] = cls
+
+    def __post_init__(self) -> None:
+        ring = self.ring
+        if ring is not None and ring.inner >= ring.outer:
+            raise ValueError("'mask.inner_radius_px' must be below 'mask.outer_radius_px'")
+
+    @abstractmethod
+    def project(self, rays: Array) -> tuple[Array, Bools]:
+        """Pixels (..., 2) at which rays (..., 3) of any length are seen, and which of them (...,) the image shows."""
+
+    @abstractmethod
+    def unproject(self, pixels: Array) -> tuple[Array, Bools]:
+        """Unit rays (..., 3) that pixels (..., 2) look along, and which of them (...,) look anywhere; NaN elsewhere."""
+
+    @property
+    def ring(self) -> Ring | None:
+        """The ring of the image that shows the world; None where columns, and not radii, are upright lines."""
+        return None
+
+    @property
+    def elevations(self) -> tuple[float, float] | None:
+        """Highest and lowest elevation (rad) of a camera that sees the full circle; None for any other.
+
+        Raises BadInput where the model does not reach over the whole ring.
+        """
+        ring = self.ring
+        if ring is None:
+            return None
+        edges = np.array([[ring.centre_x + radius, ring.centre_y] for radius in (ring.outer, ring.inner)])
+        rays, looks = self.unproject(edges)
+        if not looks.all():
+            raise BadInput(
+                f"camera: the mask ({ring.inner:g} to {ring.outer:g} px) reaches beyond what this {self.projection} "
+                "camera shows; check the mask and the model in camera.yaml"
+            )
+        found = np.arctan2(rays[:, 2], np.hypot(rays[:, 0], rays[:, 1]))
+        return float(found.max()), float(found.min())
+
+    @property
+    def elevations_known(self) -> bool:
+        """Whether elevations are measured; else azimuths are right, and elevations a guess."""
+        return True
+
+    def shows(self, pixels: Array) -> Bools:
+        """Which pixels (..., 2), whole or not, lie in the image and, where it has one, in its ring: (...,)."""
+        u, v = pixels[..., 0], pixels[..., 1]
+        inside: Bools = (u >= 0.0) & (u <= self.width - 1.0) & (v >= 0.0) & (v <= self.height_px - 1.0)
+        return inside if self.ring is None else inside & self.ring.holds(pixels)
+
+    def mask(self) -> Bools:
+        """Which pixels of an image (height_px, width) show the world."""
+        grid = self.grid()
+        return self.shows(grid) & self.unproject(grid)[1]
+
+    def grid(self) -> Array:
+        """The coordinates of all pixels (height_px, width, 2), columns and rows."""
+        rows, columns = np.mgrid[0 : self.height_px, 0 : self.width].astype(np.float64)
+        return np.stack([columns, rows], axis=-1)
+
+    def camera_info(self) -> dict[str, Any]:
+        """What a CameraInfo message can say of it besides its size."""
+        return {}
+
+    @classmethod
+    def from_camera_info(cls, model: str, size: tuple[int, int], k: Sequence[float], d: Sequence[float]) -> Self | None:
+        """The camera of a CameraInfo's `distortion_model`, (width, height), K and D; None where that is another one."""
+        return None
+
+
+def camera_models() -> dict[str, type[Camera]]:
+    """All camera models by their names in camera.yaml: those of this folder, and those that a user's code defined."""
+    for file in sorted(Path(__file__).parent.glob("[a-z]*.py")):
+        importlib.import_module(f"{__package__}.{file.stem}")
+    return MODELS
+
+
+def seen_at(camera: Camera, rays: Array) -> Array:
+    """Pixels (..., 2) at which rays (..., 3) in the robot's frame are seen; NaN where they are not."""
+    pixels, shown = camera.project(rays)
+    return np.where(shown[..., None], pixels, np.nan)
+
+
+def require_elevations(camera: Camera) -> None:
+    """Raise BadInput for a camera of which elevations are not known."""
+    if not camera.elevations_known:
+        raise BadInput(
+            f"camera: no elevations are known for the rows of a {camera.projection} image, nor where in it a "
+            "direction is seen; give its model in camera.yaml (projection: hyperbolic, fisheye, equirectangular, …, or "
+            "cylindrical with elevation: {top, bottom}), or use unwarp=panorama"
+        )

@@ -1,0 +1,48 @@
+"""An ordinary camera that looks ahead."""
+
+from collections.abc import Sequence
+from typing import Any, Self
+
+import numpy as np
+
+from .model import Array, Bools, Camera, CentreX, CentreY, FocalX, FocalY, Skew
+from .rays import normalised, turned
+
+
+class Perspective(Camera, projection="perspective"):
+    """A pinhole camera without distortion, looking along the robot's forward turned by `yaw`."""
+
+    focal_x: FocalX
+    """Pixels; with the next three and `skew` the matrix K."""
+    focal_y: FocalY
+    centre_x: CentreX
+    centre_y: CentreY
+    skew: Skew = 0.0
+
+    def project(self, rays: Array) -> tuple[Array, Bools]:
+        """p ~ K (-y, -z, x); what lies behind is not shown."""
+        ahead = turned(rays, -self.yaw)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            depth = np.where(ahead[..., 0] > 0.0, ahead[..., 0], np.nan)
+            right, down = -ahead[..., 1] / depth, -ahead[..., 2] / depth
+        u = self.focal_x * right + self.skew * down + self.centre_x
+        pixels = np.stack([u, self.focal_y * down + self.centre_y], axis=-1)
+        return pixels, self.shows(pixels)
+
+    def unproject(self, pixels: Array) -> tuple[Array, Bools]:
+        """K^-1 p; every pixel looks somewhere."""
+        down = (pixels[..., 1] - self.centre_y) / self.focal_y
+        right = (pixels[..., 0] - self.centre_x - self.skew * down) / self.focal_x
+        rays = np.stack([np.ones_like(down), -right, -down], axis=-1)
+        return turned(normalised(rays), self.yaw), np.ones(down.shape, np.bool_)
+
+    def camera_info(self) -> dict[str, Any]:
+        """K."""
+        return {"k": [self.focal_x, self.skew, self.centre_x, 0.0, self.focal_y, self.centre_y, 0.0, 0.0, 1.0]}
+
+    @classmethod
+    def from_camera_info(cls, model: str, size: tuple[int, int], k: Sequence[float], d: Sequence[float]) -> Self | None:
+        """Of an undistorted image."""
+        if model not in ("", "plumb_bob", "rational_polynomial") or any(d):
+            return None
+        return cls(*size, k[0], k[4], k[2], k[5], skew=k[1])
