@@ -523,20 +523,21 @@ def _check(arguments: list[str]) -> int:
 
 def _check_experiment(run: "ExperimentRun") -> int:
     """What an experiment would run. Its conditions are composed and checked by now."""
+    from omninav.pipeline.experiment.conditions import open_inputs
     from omninav.pipeline.graph.ground_truth import truth_readers
 
     experiment = run.experiment
-    run.open_inputs()
+    open_inputs(run.all_runs)
     factors = ", ".join(f"{len(experiment.labels(factor))} {factor}" for factor in experiment.sweep)
-    runs = sum(len(cell.seeds) for cell in run.all_cells)
+    runs = sum(len(each.seeds) for each in run.all_runs)
     print(f"{experiment.name}, profile {run.profile}: nothing wrong with it")
-    over = f" over each of {len(experiment.drives)} drives" if experiment.drives else ""
+    over = f" in each of {len(experiment.scenarios)} scenarios" if experiment.scenarios else ""
     conditions = len(experiment.conditions())
     print(f"{conditions} conditions ({factors}), each with {experiment.repetitions} repetitions{over}")
-    beside = len(run.all_cells) - len(run.cells)
-    print(f"{runs} runs in all" + (f", {beside} of them beside the conditions" if beside else ""))
+    references = len(run.all_runs) - len(run.conditions)
+    print(f"{runs} runs in all" + (f", {references} of them reference runs" if references else ""))
     print(f"claims to be judged: {len(experiment.claims)}")
-    readers = sorted({name for cell in run.cells if cell.planned for name in truth_readers(cell.planned.graph)})
+    readers = sorted({name for each in run.conditions if each.planned for name in truth_readers(each.planned.graph)})
     print(f"ground truth is read by: {', '.join(readers) or 'nobody'}")
     return 0
 

@@ -1,4 +1,4 @@
-"""Jobs in processes of their own, some at a time: one that fails or dies says so and does not stop the others."""
+"""Jobs in processes of their own, some at a time: one that fails or dies is reported and does not stop the others."""
 
 import os
 import signal
@@ -22,31 +22,32 @@ ONE_THREAD = {
         "OPENCV_FOR_THREADS_NUM",
     )
 }
-"""What keeps the libraries of a job to one core where several jobs run beside each other."""
+"""Keeps the libraries of a job to one core where several jobs run at a time."""
 
-Tell = Callable[[Any], None]
+Send = Callable[[Any], None]
+"""Sends a message (plain data) from a job to the process that started it."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """Something to do in a process of its own: `function` (`module:name`) is called with `given` and a `tell`.
-
-    `given` is plain data; `tell` sends plain data back while the job runs. What it prints goes to `log`.
-    """
+    """A function to call in a process of its own, with plain data and a `Send`."""
 
     name: str
     function: str
+    """`module:name`."""
     given: Mapping[str, Any]
+    """Its first argument."""
     log: Path
+    """The file that gets what it prints."""
 
 
-def work_through(
-    jobs: Sequence[Job], cores: int, heard: Callable[[Job, Any], None], ended: Callable[[Job, str | None], None]
+def run_jobs(
+    jobs: Sequence[Job], cores: int, on_message: Callable[[Job, Any], None], on_end: Callable[[Job, str | None], None]
 ) -> dict[str, str]:
-    """Do all jobs, `cores` at a time, in their order. Returns what went wrong, by the job's name.
+    """Run all jobs in their order, `cores` at a time. Returns the errors by the jobs' names.
 
-    `heard` gets what a job tells; `ended` is called at each one's end, with what went wrong or None. When this process
-    is killed the jobs end too, at the next word they tell.
+    `on_message` gets every message of a job; `on_end` is called when one ends, with its error or None. When this
+    process is killed, the jobs end too, at the next message that they send.
     """
     spawn = get_context("spawn")  # a fork of a process with compiled threads may hang
     waiting, errors = list(jobs), dict[str, str]()
@@ -56,7 +57,7 @@ def work_through(
             while waiting and len(running) < cores:
                 job = waiting.pop(0)
                 ours, theirs = spawn.Pipe(duplex=False)
-                process = spawn.Process(target=_work, args=(job, theirs), name=job.name)
+                process = spawn.Process(target=_run, args=(job, theirs), name=job.name)
                 with _environment(ONE_THREAD if cores > 1 else {}):
                     process.start()
                 theirs.close()
@@ -65,32 +66,32 @@ def work_through(
             for ready in connection.wait(list(running)):
                 job, process = running[ready]
                 try:
-                    kind, word = ready.recv()
+                    kind, message = ready.recv()
                 except EOFError:
-                    kind, word = "died", None
-                if kind == "told":
-                    heard(job, word)
+                    kind, message = "died", None
+                if kind == "message":
+                    on_message(job, message)
                     continue
                 process.join()
                 del running[ready]
-                error = word if kind != "died" else _death(process.exitcode)
+                error = message if kind != "died" else _cause_of_death(process.exitcode)
                 if error is not None:
                     errors[job.name] = error
-                ended(job, error)
+                on_end(job, error)
     finally:
         for _, process in running.values():
             process.terminate()
     return errors
 
 
-def _death(code: int | None) -> str:
+def _cause_of_death(code: int | None) -> str:
     if code is not None and code < 0:
         return f"its process was ended by {signal.Signals(-code).name}"
-    return f"its process ended without a word (exit code {code})"
+    return f"its process ended without a message (exit code {code})"
 
 
-def _work(job: Job, pipe: Any) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent hears Ctrl-C and ends its jobs
+def _run(job: Job, pipe: Any) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C and ends its jobs
     job.log.parent.mkdir(parents=True, exist_ok=True)
     log = job.log.open("w", buffering=1)
     os.dup2(log.fileno(), 1)
@@ -98,16 +99,16 @@ def _work(job: Job, pipe: Any) -> None:
     error: str | None = None
     try:
         module, _, name = job.function.partition(":")
-        getattr(import_module(module), name)(job.given, lambda word: pipe.send(("told", word)))
-    except BrokenPipeError:  # nobody listens any more
+        getattr(import_module(module), name)(job.given, lambda message: pipe.send(("message", message)))
+    except BrokenPipeError:  # the parent was killed
         sys.exit(1)
     except Exception as failed:
         traceback.print_exc()
-        error = _said(failed)
+        error = _in_one_line(failed)
     pipe.send(("ended", error))
 
 
-def _said(error: Exception) -> str:
+def _in_one_line(error: Exception) -> str:
     from omninav.pipeline.engine.engine import StageFailed
     from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 

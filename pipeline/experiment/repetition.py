@@ -1,7 +1,6 @@
 """One condition of an experiment, run once for every seed: what does not depend on the seed is computed once.
 
-Logs are simulated once and read by all conditions. The map and the features come from the cache. The first repetition
-records what follows from log and map alone (a frame's table of similarities), and the others read it.
+The first repetition records what follows from the inputs alone, and the others read it.
 """
 
 import copy
@@ -21,6 +20,7 @@ from omninav.pipeline.graph.graph import Graph, Node
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.value import Value
+from omninav.pipeline.report.quantities import numbers
 from omninav.pipeline.run.run import (
     ArtifactPlan,
     Plan,
@@ -34,14 +34,15 @@ from omninav.pipeline.run.run import (
     usable,
 )
 
-from .process_pool import Tell
+from .job_progress import Heartbeat
+from .process_pool import Send
 
 BASE_SEED = 0
-"""Of maps and whatever else the repetitions share."""
+"""Of artifacts and whatever else the repetitions share."""
 
 
 def measured(graph: Graph) -> Graph:
-    """The part of a graph that its metrics depend on: repetitions need no pictures."""
+    """The part of a graph that its metrics depend on: repetitions need no plots."""
     origins = [
         f"{node.name}.{port.name}"
         for node in graph.nodes.values()
@@ -52,7 +53,7 @@ def measured(graph: Graph) -> Graph:
 
 
 def condition_key(planned: Plan, groups: Sequence[Sequence[str]] = ()) -> str:
-    """The hash of everything but the seed that decides a condition's results. Its logs must be there.
+    """The hash of everything but the seed that decides a condition's results. Its inputs must be there.
 
     `groups`: stages whose time together is among them.
     """
@@ -64,7 +65,7 @@ def condition_key(planned: Plan, groups: Sequence[Sequence[str]] = ()) -> str:
 
 
 def artifact_key(artifact: ArtifactPlan) -> str:
-    """The hash of everything that decides an artifact's content. Its logs must be there."""
+    """The hash of everything that decides an artifact's content. Its inputs must be there."""
     if artifact.graph is None:
         assert artifact.file is not None
         return digest_file(artifact.file)
@@ -75,7 +76,7 @@ _DIGESTS: dict[str, str] = {}
 
 
 def known_digests(graph: Graph) -> list[str]:
-    """The content hashes of the files that a graph reads. Opening a long log takes seconds: once will do."""
+    """The content hashes of the files that a graph reads. Opening a long one takes seconds, so each is opened once."""
     found = []
     for node in graph.nodes.values():
         key = f"{node.target} {json.dumps(node.parameters, sort_keys=True, default=str)}"
@@ -106,10 +107,10 @@ def _results(folder: Path, key: str, seed: int, cache: Cache | None) -> list[Pat
     return [folder / f"seed_{seed}.json", *kept]
 
 
-def repeat(given: Mapping[str, Any], tell: Tell) -> None:
-    """Run a condition for some seeds; each one's result is a file, and `tell` hears its seed when it is there.
+def repeat(given: Mapping[str, Any], send: Send) -> None:
+    """Run a condition for some seeds, as a job; each one's result is a file, and its seed is sent when it is there.
 
-    Without `shared` nothing but the map comes from the cache or from the repetition before: all is timed as on a robot.
+    Without `shared` nothing but artifacts comes from the cache or from the repetition before, so that all is timed.
 
     `given`: `config` (plain; its artifacts are files by now), `folder`, `key`, `code`, `seeds`, `shared`, `groups` (of
     stages whose time together is measured). Raises `BadInput` where the code has changed since the experiment was
@@ -126,7 +127,7 @@ def repeat(given: Mapping[str, Any], tell: Tell) -> None:
     artifacts: dict[str, Value] = {}
     facts: dict[str, Any] = {}
     for artifact in planned.artifacts:
-        artifacts[artifact.name], made = obtain(run, artifact, BASE_SEED, cache, math.inf, Heartbeat(tell))
+        artifacts[artifact.name], made = obtain(run, artifact, BASE_SEED, cache, math.inf, Heartbeat(send))
         facts[artifact.name] = made
         (folder / f"{artifact.name}.omap").unlink(missing_ok=True)  # the cache keeps it
     shared: CachedPrefix | None = None
@@ -134,10 +135,12 @@ def repeat(given: Mapping[str, Any], tell: Tell) -> None:
         place = run.memory / f"seed_{seed}"
         record = bool(given["shared"]) and shared is None and number + 1 < len(seeds)
         engine, recorded = _once(
-            graph, artifacts, seed, place, cache if given["shared"] else None, shared, record, tell
+            graph, artifacts, seed, place, cache if given["shared"] else None, shared, record, send
         )
         shared = recorded or shared
-        result = {"key": given["key"], "seed": seed, "metrics": results_of(engine)[0].values}
+        metrics = results_of(engine)[0]
+        result = {"key": given["key"], "seed": seed, "metrics": metrics.values}
+        result["context"] = {number.head: number.text for number in numbers(metrics).values() if number.is_context}
         result["timing"] = stage_times(engine, given.get("groups") or ())
         result |= notes_of(engine)
         result["artifacts"] = facts
@@ -147,19 +150,7 @@ def repeat(given: Mapping[str, Any], tell: Tell) -> None:
             shutil.rmtree(place, ignore_errors=True)
         for path in _results(folder, given["key"], seed, cache if given["shared"] else None):
             write_whole(path, json.dumps(result, indent=1, sort_keys=True, default=str) + "\n")
-        tell({"seed": seed})
-    shutil.rmtree(run.memory, ignore_errors=True)
-
-
-def prepare(given: Mapping[str, Any], tell: Tell) -> None:
-    """Make an artifact for conditions: `config` (plain) of one of them, its `name`, the `folder` to leave it in."""
-    planned = plan(given["config"])
-    cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
-    run = Run(Path(given["folder"]))
-    run.folder.mkdir(parents=True, exist_ok=True)  # nothing else makes it where the cache has the artifact
-    for artifact in planned.artifacts:
-        if artifact.name == given["name"]:
-            obtain(run, artifact, BASE_SEED, cache, math.inf, Heartbeat(tell))
+        send({"seed": seed})
     shutil.rmtree(run.memory, ignore_errors=True)
 
 
@@ -171,11 +162,11 @@ def _once(
     cache: Cache | None,
     shared: CachedPrefix | None,
     record: bool,
-    tell: Tell,
+    send: Send,
 ) -> tuple[Engine, CachedPrefix | None]:
     """One repetition; with `record` also the front that the others may share. What grows in place is its own."""
     artifacts = {name: copy.deepcopy(value) if value.in_place else value for name, value in artifacts.items()}
-    step = Heartbeat(tell).step
+    step = Heartbeat(send).step
     if shared is not None:
         engine = Engine(graph, artifacts, seed, place, place, every_s=math.inf, front=shared, progress=step)
         engine.run()
@@ -219,35 +210,3 @@ def _recordable(graph: Graph, known: CachedPrefix | None) -> list[str]:
     small = {origin for origin in read if not getattr(getattr(graph.port(origin), "type", None), "bulky", False)}
     tick = {f"{graph.source.name}.tick"} if graph.source is not None else set()
     return sorted(small | tick | set(known.boundary if known is not None and inside else ()))
-
-
-class Heartbeat:
-    """A job's progress, told to its experiment at some frames: a job whose experiment was killed ends soon."""
-
-    def __init__(self, tell: Tell) -> None:
-        self._tell = tell
-
-    def update(self, name: str, done: int, total: int | None = None) -> None:
-        """`done` frames of `total` have gone through the graph `name`, as `Progress` hears it."""
-        self.step(done, total)
-
-    def step(self, done: int, total: int | None = None) -> None:
-        """The same, of the only graph there is."""
-        if done == 1 or done % 25 == 0 or done == total:
-            self._tell({"frames": done, "of": total})
-
-
-def simulate(given: Mapping[str, Any], tell: Tell) -> None:
-    """Write a simulated drive as a log, with what its stages state of it: `config` (plain), `part` and `folder`.
-
-    It appears as a whole: written to `part`, then renamed.
-    """
-    part, folder = Path(given["part"]), Path(given["folder"])
-    shutil.rmtree(part, ignore_errors=True)
-    part.mkdir(parents=True)
-    planned = plan(given["config"])
-    engine = Engine(planned.graph, {}, planned.seed, progress=Heartbeat(tell).step)
-    engine.run()
-    write_whole(part / "facts.json", json.dumps(notes_of(engine)["facts"], indent=1, sort_keys=True) + "\n")
-    shutil.rmtree(folder, ignore_errors=True)
-    part.rename(folder)

@@ -5,8 +5,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-Take = Literal["mean", "median", "min", "max", "first", "last", "change", "ratio", "slope", "largest_rise"]
-"""What is taken of a series: `change` is the last less the first, `ratio` the last over the first, `slope` that of the
+Aggregate = Literal["mean", "median", "min", "max", "first", "last", "change", "ratio", "slope", "largest_rise"]
+"""What becomes of a series: `change` is the last less the first, `ratio` the last over the first, `slope` that of the
 line that fits best (per entry), `largest_rise` the largest step upwards from one entry to the next."""
 
 
@@ -35,32 +35,36 @@ def series_at(result: Any, path: str) -> list[float | None]:
     return [float(each) if _is_number(each) else None for each in found] if isinstance(found, list | tuple) else []
 
 
-def figure_at(result: Any, path: str, take: Take = "mean", part: tuple[float, float] = (0.0, 1.0)) -> float | None:
-    """The number at a path, or what is taken of the series there; several paths joined by + are added.
+def figure_at(
+    result: Any, path: str, aggregate: Aggregate = "mean", window: tuple[float, float] = (0.0, 1.0)
+) -> float | None:
+    """The number at a path, or the aggregate of the series there; several paths joined by + are added.
 
-    `part` is the share of a series that counts, from its start: (0.75, 1) is its last quarter. None where there is
+    `window` is the share of a series that counts, from its start: (0.75, 1) is its last quarter. None where there is
     nothing.
     """
     figures = []
     for each in path.split("+"):
         found = at(result, each.strip())
         if isinstance(found, list | tuple):
-            found = taken([float(value) if _is_number(value) else None for value in found], take, part)
+            found = aggregated([float(value) if _is_number(value) else None for value in found], aggregate, window)
         if not _is_number(found):
             return None
         figures.append(float(found))
     return sum(figures)
 
 
-def taken(series: Sequence[float | None], take: Take, part: tuple[float, float] = (0.0, 1.0)) -> float | None:
+def aggregated(
+    series: Sequence[float | None], aggregate: Aggregate, window: tuple[float, float] = (0.0, 1.0)
+) -> float | None:
     """One figure of a series. Entries that are None are left out; None where too few are there."""
-    first, last = int(np.floor(part[0] * len(series))), int(np.ceil(part[1] * len(series)))
+    first, last = int(np.floor(window[0] * len(series))), int(np.ceil(window[1] * len(series)))
     places = [place for place in range(first, last) if series[place] is not None]
     values = np.array([series[place] for place in places], dtype=np.float64)
-    needed = 2 if take in ("change", "ratio", "slope", "largest_rise") else 1
-    if len(values) < needed or (take == "ratio" and values[0] == 0.0):
+    needed = 2 if aggregate in ("change", "ratio", "slope", "largest_rise") else 1
+    if len(values) < needed or (aggregate == "ratio" and values[0] == 0.0):
         return None
-    match take:
+    match aggregate:
         case "first":
             return float(values[0])
         case "last":
@@ -74,7 +78,7 @@ def taken(series: Sequence[float | None], take: Take, part: tuple[float, float] 
         case "largest_rise":
             return float(np.diff(values).max())
         case _:
-            return float(getattr(np, take)(values))
+            return float(getattr(np, aggregate)(values))
 
 
 def pooled_deviation(means: Sequence[float], deviations: Sequence[float], counts: Sequence[float]) -> float:

@@ -1,11 +1,9 @@
-"""An experiment as a file: what is varied, what is measured, what the paper says of it; read and checked.
+"""An experiment as a file: what is varied, what is measured, what the paper claims; read and checked.
 
-`conf/experiment/<variant>/<name>.yaml` is written for people: words are what one would type on the command line. Every
-combination of the sweep's labels is a condition, and each condition is run once for every seed.
+Every combination of the sweep's labels is a condition, and each condition is run once for every seed.
 """
 
 import itertools
-import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -13,31 +11,32 @@ from typing import Any, Literal
 from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 
-from .series import Take, figure_at
+from .series import Aggregate, figure_at
 
 Labels = dict[str, str]
-"""A condition's label in each factor, or in some of them: `{features: histogram, tour: TT1}`."""
+"""A condition's label in each factor, or in some of them: `{filter: median, data: first}`."""
 
 
 @dataclass(frozen=True)
 class Measure:
-    """A figure of each run: what it is called and where it stands in metrics.json (or `timing.`, or `facts.`).
-
-    `of`: the paths to look at, the first that is there counts; several joined by + are added. `times` changes the unit.
-    Where a path leads to a series (`laps.*.position_error_m.mean`, `over_steps.position_error_m`), `take` says what is
-    taken of it, and `part` of which share of it. `stages`: the time (ms) that these took together, step by step; `of`
-    is `p50_ms`, `p95_ms` or `max_ms` then. `pooled`: the standard deviation over all frames of all repetitions; `of`
-    names the errors (`after_settling.position_error_m`).
-    """
+    """A figure of each run, read from its metrics.json (or from `timing.` or `facts.`)."""
 
     title: str
-    of: tuple[str, ...]
-    times: float = 1.0
+    path: tuple[str, ...]
+    """Paths to look at, of which the first that is there counts; paths joined by + are added. With `stages` it is
+    `p50_ms`, `p95_ms` or `max_ms`; with `pooled` it names the errors (`after_settling.error_m`)."""
+    scale: float = 1.0
+    """The figure is multiplied by it, for another unit."""
     digits: int = 1
-    take: Take = "mean"
-    part: tuple[float, float] = (0.0, 1.0)
+    """Decimals that are shown."""
+    aggregate: Aggregate = "mean"
+    """How a series (`laps.*.error_m.mean`) becomes one figure."""
+    window: tuple[float, float] = (0.0, 1.0)
+    """The share of the series that counts."""
     stages: tuple[str, ...] = ()
+    """Stages whose time together (ms), step by step, is the figure."""
     pooled: bool = False
+    """Whether the figure is the standard deviation over all frames of all repetitions."""
 
 
 Other = float | str | Mapping[str, Any]
@@ -46,19 +45,17 @@ Other = float | str | Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Claim:
-    """Something the paper says (or that we expect), as a comparison that comes out true or false.
+    """Something the paper states (or that we expect), as a comparison that comes out true or false.
 
-    One case for each condition that has the labels of `of`. Its figure is compared with a number, with `published`, or
-    with the labels of another condition. By the mean alone: `at_most`, `at_least`. By the whole 95 % interval: `below`,
-    `above`, `not_above` (better, or worse by less than `MARGIN` of the other side), `no_worse` (the interval includes 0
-    or lies below it: weaker). Or with all others: `lowest` (`not_above` each of them, those that differ in the factors
-    of `among`, by default of `of`). `times` multiplies the other side. With `ratio_to` (the labels of another
-    condition) the figure is the ratio of the two means, and is compared with a number.
+    It has one case for each condition with the labels of `of`, and makes one comparison. By the mean alone: `at_most`,
+    `at_least`. By the whole 95 % interval: `below`, `above`, `not_above` (better, or worse by less than `MARGIN` of the
+    other side), `no_worse` (the interval includes 0 or lies below it: weaker). With all other conditions: `lowest`.
     """
 
-    says: str
+    statement: str
     measure: str
     of: Mapping[str, Any] = field(default_factory=dict)
+    """Labels of the conditions it is about."""
     at_most: Other | None = None
     at_least: Other | None = None
     below: Other | None = None
@@ -66,105 +63,120 @@ class Claim:
     not_above: Other | None = None
     no_worse: Other | None = None
     lowest: bool = False
+    """Whether the figure is `not_above` that of each other condition."""
     among: tuple[str, ...] = ()
-    times: float = 1.0
+    """Factors in which the other conditions of `lowest` differ; by default those of `of`."""
+    scale: float = 1.0
+    """The other side is multiplied by it."""
     ratio_to: Mapping[str, Any] | None = None
+    """Labels of a condition: the figure is then the ratio of the two means, and is compared with a number."""
     paper: str = ""
+    """The paper's own words or figure."""
 
 
 @dataclass(frozen=True)
 class PageLayout:
-    """How results stand on the page: a table by `rows` and `columns`, and a figure along `along` where it is named.
-
-    `drawn`: the measures that have a figure, by default the first.
-    """
+    """How results stand on the page."""
 
     rows: tuple[str, ...]
+    """Factors of the table's rows."""
     columns: str
+    """The factor of its columns."""
     along: str | None = None
+    """A numeric factor: plots are lines along it. None: bars."""
     panels: str | None = None
+    """The factor that has a panel for each label."""
     drawn: tuple[str, ...] = ()
+    """Measures that are plotted; by default the first."""
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A figure of how something goes on within the runs: over laps, logs, steps or a distance, a line per condition.
-
-    `of`: the path of a series (`laps.*.position_error_m.mean`); `at`: the path of where its entries lie, by default 1,
-    2, 3 …; `along`: what that is. `only`: labels that a condition must have to be drawn. `beside`: label -> path of a
-    series that is alike in all conditions of a panel and drawn once, dashed (odometry alone).
-    """
+    """A plot of how something develops within the runs, over laps, logs, steps or a distance: a line per condition."""
 
     title: str
-    along: str
-    of: str
-    at: str = ""
-    times: float = 1.0
+    x_label: str
+    path: str
+    """The path of a series (`laps.*.error_m.mean`)."""
+    x_path: str = ""
+    """The path of where its entries lie; by default 1, 2, 3 …"""
+    scale: float = 1.0
     panels: str | None = None
+    """The factor that has a panel for each label."""
     only: Mapping[str, Any] = field(default_factory=dict)
-    beside: Mapping[str, str] = field(default_factory=dict)
+    """Labels that a condition must have to be drawn."""
+    reference: Mapping[str, str] = field(default_factory=dict)
+    """Label -> path of a series that is equal in all conditions of a panel and drawn once, dashed."""
 
 
 @dataclass(frozen=True)
-class Note:
-    """Something said on the page from runs of another variant beside the experiment: one for each label of `over`."""
+class ReferenceRun:
+    """A sentence on the page with figures of another variant: it is run once for each label of a factor."""
 
-    says: str
+    text: str
+    """`{}` is replaced by the figures."""
     variant: str
     measure: str
+    """The path of the figure."""
     over: str
+    """The factor."""
     set: str = ""
-    times: float = 1.0
+    """Overrides of these runs."""
+    scale: float = 1.0
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """What an experiment's file holds.
-
-    `common` (for all runs), `set` (for all conditions) and the words of `sweep` (factor -> label -> words) are what one
-    would type. `shared`: whether the repetitions of a condition share what does not depend on the seed (not where time
-    is measured). `published`: measure -> labels in the order of the page's rows and column -> the paper's figure.
-
-    `drives`: label -> words. Each condition is run over each of them with every seed, and all count as its repetitions:
-    other days, routes or odometry, so that intervals speak of these too. `without`: labels of conditions to leave out.
-    """
+    """What an experiment's file holds. Overrides are written as one would type them."""
 
     name: str
     title: str
     about: str
     variant: str
     sweep: Mapping[str, Mapping[Any, str]]
+    """Factor -> label -> overrides."""
     measures: Mapping[str, Measure]
     page: PageLayout
     common: str = ""
+    """Overrides of all runs."""
     set: str = ""
+    """Overrides of all conditions, but not of the reference runs."""
     repetitions: int = 50
-    drives: Mapping[str, str] = field(default_factory=dict)
+    """Each condition is run with the seeds 0 to `repetitions` - 1."""
+    scenarios: Mapping[str, str] = field(default_factory=dict)
+    """Label -> overrides. Each condition is run in each of them with every seed, and all count as its repetitions, so
+    that intervals speak of more than the seeds."""
     without: tuple[Mapping[str, Any], ...] = ()
+    """Labels of conditions that are not run."""
     published: Mapping[str, Any] = field(default_factory=dict)
+    """Measure -> labels in the order of the page's rows and column -> the paper's figure."""
     claims: tuple[Claim, ...] = ()
     curves: tuple[Curve, ...] = ()
-    remarks: tuple[Note, ...] = ()
+    reference_runs: tuple[ReferenceRun, ...] = ()
     notes: tuple[str, ...] = ()
     shared: bool = True
+    """Whether the repetitions of a condition share what does not depend on the seed (not where time is measured)."""
     cores: int | None = None
+    """Jobs at a time; None: one for each core."""
     profiles: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """Profile -> what it changes in this file."""
 
     def conditions(self) -> list["Condition"]:
         """Every combination of the sweep's labels but those of `without`, the last factor changing fastest."""
         factors = [
-            [(factor, str(label), words) for label, words in self.sweep[factor].items()] for factor in self.sweep
+            [(factor, str(label), overrides) for label, overrides in self.sweep[factor].items()]
+            for factor in self.sweep
         ]
         found = [
-            Condition({factor: label for factor, label, _ in chosen}, " ".join(words for _, _, words in chosen))
+            Condition({factor: label for factor, label, _ in chosen}, " ".join(typed for _, _, typed in chosen))
             for chosen in itertools.product(*factors)
         ]
         return [condition for condition in found if not any(condition.fits(labels) for labels in self.without)]
 
     @property
     def runs_of_a_condition(self) -> int:
-        """How often each condition is run: every seed over every drive."""
-        return self.repetitions * max(1, len(self.drives))
+        """How often each condition is run: every seed in every scenario."""
+        return self.repetitions * max(1, len(self.scenarios))
 
     def labels(self, factor: str) -> list[str]:
         """The labels of a factor, in the file's order."""
@@ -180,10 +192,10 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Condition:
-    """One combination of the sweep's labels, with the words that make it."""
+    """One combination of the sweep's labels, with the overrides that make it."""
 
     labels: Labels
-    words: str
+    overrides: str
 
     @property
     def name(self) -> str:
@@ -209,9 +221,9 @@ def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
     for key, value in (profiles.get(profile) or {}).items():
         both = isinstance(value, Mapping) and isinstance(scaled.get(key), Mapping)
         scaled[key] = {**scaled[key], **value} if both else value
-    scaled["sweep"] = {factor: _kept(labels) for factor, labels in (scaled.get("sweep") or {}).items()}
-    for key in ("measures", "drives"):
-        scaled[key] = _kept(scaled.get(key) or {})
+    scaled["sweep"] = {factor: _without_null(labels) for factor, labels in (scaled.get("sweep") or {}).items()}
+    for key in ("measures", "scenarios"):
+        scaled[key] = _without_null(scaled.get(key) or {})
     arguments, problems = convert_fields(scaled, Experiment, "experiment")
     if problems:
         raise ProblemsFound(problems)
@@ -222,16 +234,11 @@ def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
     return experiment
 
 
-def _kept(entries: Any) -> Any:
-    """A mapping without what is null in it; anything else as it is, for whoever checks its type."""
+def _without_null(entries: Any) -> Any:
+    """A mapping without its entries of null; anything else as it is, because its type is checked later."""
     if not isinstance(entries, Mapping):
         return entries
     return {key: value for key, value in entries.items() if value is not None}
-
-
-def words_of(text: str) -> list[str]:
-    """Words as a shell would split them: quotes keep a list or a mapping together."""
-    return shlex.split(text)
 
 
 def _contradictions(experiment: Experiment) -> "list[Problem]":
@@ -243,14 +250,14 @@ def _contradictions(experiment: Experiment) -> "list[Problem]":
     shown = [("page.rows", f) for f in page.rows] + [("page.columns", page.columns)]
     shown += [("page." + k, f) for k, f in (("along", page.along), ("panels", page.panels)) if f]
     shown += [(f"curves[{n}].panels", curve.panels) for n, curve in enumerate(experiment.curves) if curve.panels]
-    shown += [(f"remarks[{n}].over", remark.over) for n, remark in enumerate(experiment.remarks)]
+    shown += [(f"reference_runs[{n}].over", each.over) for n, each in enumerate(experiment.reference_runs)]
     labelled = [(f"without[{n}]", labels) for n, labels in enumerate(experiment.without)]
     labelled += [(f"curves[{n}].only", curve.only) for n, curve in enumerate(experiment.curves)]
     measured = [(f"page.drawn[{n}]", name) for n, name in enumerate(page.drawn)]
     for number, claim in enumerate(experiment.claims):
         where = f"claims[{number}]"
         measured.append((f"{where}.measure", claim.measure))
-        problems += [Problem(f"experiment.{where}", said) for said in _unclear(experiment, claim)]
+        problems += [Problem(f"experiment.{where}", fault) for fault in _faults(experiment, claim)]
         sides = [getattr(claim, side) for side in SIDES]
         labelled += [(where, side) for side in (claim.of, claim.ratio_to, *sides) if isinstance(side, Mapping)]
     for where, labels in labelled:
@@ -266,28 +273,28 @@ def _contradictions(experiment: Experiment) -> "list[Problem]":
     problems += [_unknown(where, factor, factors, "factors") for where, factor in shown if factor not in factors]
     left = [f for f in factors if f not in (*page.rows, page.columns)]
     if left:
-        said = f"{', '.join(left)}: each factor of the sweep is a row or the column of the table"
-        problems.append(Problem("experiment.page", said))
+        fault = f"{', '.join(left)}: each factor of the sweep is a row or the column of the table"
+        problems.append(Problem("experiment.page", fault))
     return list(dict.fromkeys(problems))
 
 
-def _unclear(experiment: Experiment, claim: Claim) -> "list[str]":
-    """What stands against a claim as it is written."""
+def _faults(experiment: Experiment, claim: Claim) -> "list[str]":
+    """What is wrong with a claim as it is written."""
     sides = [side for side in SIDES if getattr(claim, side) is not None]
-    said = []
+    faults = []
     if len(sides) + claim.lowest != 1:
-        said.append(f"a claim makes one comparison: {', '.join(SIDES)} or lowest")
+        faults.append(f"a claim makes one comparison: {', '.join(SIDES)} or lowest")
     for side in sides:
         other = getattr(claim, side)
         if isinstance(other, str) and other != "published":
-            said.append(f"{side}: {other!r}, expected a number, `published`, or labels of another condition")
+            faults.append(f"{side}: {other!r}, expected a number, `published`, or labels of another condition")
         if claim.ratio_to is not None and not isinstance(other, float):
-            said.append(f"{side}: a ratio is compared with a number")
+            faults.append(f"{side}: a ratio is compared with a number")
     if claim.ratio_to is not None and claim.lowest:
-        said.append("lowest: a ratio is compared with a number")
+        faults.append("lowest: a ratio is compared with a number")
     if claim.measure in experiment.measures and experiment.measures[claim.measure].pooled:
-        said.append(f"{claim.measure} is pooled over the repetitions, which leaves nothing to judge it by")
-    return said
+        faults.append(f"{claim.measure} is pooled over the repetitions, which leaves nothing to judge it by")
+    return faults
 
 
 def _unknown(where: str, name: str, options: Any, kind: str) -> Problem:
@@ -303,10 +310,10 @@ def figure_of(measure: Measure, result: Mapping[str, Any]) -> float | None:
     space = space_of(result)
     if measure.stages:
         space = result["timing"].get("together", {}).get("+".join(measure.stages), {})
-    for path in measure.of:
-        figure = figure_at(space, f"{path}.std" if measure.pooled else path, measure.take, measure.part)
+    for path in measure.path:
+        figure = figure_at(space, f"{path}.std" if measure.pooled else path, measure.aggregate, measure.window)
         if figure is not None:
-            return figure * measure.times
+            return figure * measure.scale
     return None
 
 

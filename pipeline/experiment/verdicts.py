@@ -16,10 +16,10 @@ Results = Mapping[tuple[tuple[str, str], ...], Mapping[int, Mapping[str, Any]]]
 
 RESAMPLES = 4999
 CONFIDENCE = 0.95
-LEAST = 6
-"""Repetitions below which an interval says nothing: no verdict is made from it."""
+MIN_REPETITIONS = 6
+"""With fewer an interval means nothing: no verdict is made from it."""
 MARGIN = 0.05
-"""Share of the other side by which "no worse" may be worse. More data cannot show that two figures are equal."""
+"""Share of the other side by which `not_above` may be above it: no amount of data shows that two figures are equal."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def samples(experiment: Experiment, results: Results, measure: str, labels: Labe
 def pooled(experiment: Experiment, results: Results, measure: str, labels: Labels) -> float | None:
     """The standard deviation over all frames of all repetitions of a condition, of a measure that is `pooled`."""
     asked = experiment.measures[measure]
-    for path in asked.of:
+    for path in asked.path:
         place = path.rpartition(".")[0]
         frames = f"{place}.frames" if place else "frames"
         groups = [
@@ -103,7 +103,7 @@ def pooled(experiment: Experiment, results: Results, measure: str, labels: Label
         whole = [group for group in known if len(group) == 3]
         if whole:
             means, deviations, counts = zip(*whole, strict=True)
-            return asked.times * pooled_deviation(means, deviations, counts)
+            return asked.scale * pooled_deviation(means, deviations, counts)
     return None
 
 
@@ -140,7 +140,7 @@ def judge(experiment: Experiment, results: Results) -> list[Verdict]:
     """A verdict for each claim of the file, in its order."""
     return [
         Verdict(
-            claim.says,
+            claim.statement,
             experiment.measures[claim.measure].title,
             claim.paper,
             tuple(_cases(experiment, claim, results)),
@@ -166,7 +166,7 @@ def _case(experiment: Experiment, claim: Claim, side: Side, labels: Labels, resu
         return _against_condition(experiment, claim, side, labels, other, results)
     where, against = _where(experiment, labels), "the paper's figure" if other == "published" else "the limit"
     limit = experiment.published_figure(claim.measure, labels) if other == "published" else float(other)
-    limit = None if limit is None else claim.times * limit
+    limit = None if limit is None else claim.scale * limit
     ours, over = samples(experiment, results, claim.measure, labels), None
     seeds, ran = sorted(ours), len(results.get(key_of(labels), {}))
     if claim.ratio_to is not None:
@@ -191,9 +191,9 @@ def _against_condition(
 ) -> Case:
     facing = _facing(labels, other)
     against = _changed(labels, facing)
-    against = f"{claim.times:g} x {against}" if claim.times != 1.0 else against
+    against = f"{claim.scale:g} x {against}" if claim.scale != 1.0 else against
     ours = samples(experiment, results, claim.measure, labels)
-    theirs = {s: claim.times * v for s, v in samples(experiment, results, claim.measure, facing).items()}
+    theirs = {s: claim.scale * v for s, v in samples(experiment, results, claim.measure, facing).items()}
     return _against_samples(side, _where(experiment, labels), ours, theirs, against, ran=_ran(results, labels, facing))
 
 
@@ -221,7 +221,7 @@ def _holds(
         holds = difference <= 1e-9
     elif side == "at_least":
         holds = difference >= -1e-9
-    elif judged < LEAST:
+    elif judged < MIN_REPETITIONS:
         holds = None
     elif side == "not_above":  # better or within the margin; worse; or not decided
         holds = True if high <= MARGIN * other else False if low > 0.0 else None

@@ -18,6 +18,8 @@ class Quantity(Value):
     """Which numbers are better; None where neither is, so that a comparison marks none as best."""
     absent: str = "–"
     """What stands in its place where it is None (`never`)."""
+    context: bool = False
+    """Whether it says how large a run was (frames, length): an experiment's page states it for each condition."""
 
 
 class Metrics(Value):
@@ -40,12 +42,12 @@ class Metrics(Value):
     """Nested mappings of numbers, texts, None and lists."""
     quantities: dict[str, Quantity] = field(default_factory=dict)
     """By path (`success.at_end`), or by name for all entries of that name (`position_error_m`). The title of a path is
-    shown as it stands; that of a name with its place (`Position error, after convergence`). Tables follow this order."""
+    shown as it stands, that of a name with its groups (`Position error, after convergence`). Tables keep this order."""
     headlines: tuple[str, ...] = ()
     """Paths of what one looks for first, with the statistic of a distribution: tiles of a report, columns of a sweep.
     Those that are not among the values are passed over."""
     details: tuple[str, ...] = ()
-    """Paths, of entries or whole groups, that only the run's own page shows: no comparison, no table in the terminal."""
+    """Paths of entries or whole groups that only the run's own page shows, no comparison and no terminal."""
 
 
 def merged(parts: Iterable[Metrics]) -> Metrics:

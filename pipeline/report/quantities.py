@@ -29,14 +29,14 @@ SCALES = {"%": 100.0, "kB": 1e-3}
 class Entry:
     """One entry of metrics.json: its groups (`after_convergence`, …), its name, and a number, text, None or statistics.
 
-    `quantity` is how it is described, `titled` whether under its own path.
+    `quantity` is how it is described, `by_path` whether under its own path.
     """
 
     groups: tuple[str, ...]
     name: str
     value: Any
     quantity: Quantity
-    titled: bool = False
+    by_path: bool = False
 
     @property
     def path(self) -> str:
@@ -61,7 +61,7 @@ class Entry:
     @property
     def where(self) -> str:
         """Its groups in words; nothing where the title says it all."""
-        return "" if self.titled else ", ".join(words(part) for part in self.groups)
+        return "" if self.by_path and self.quantity.title else ", ".join(words(part) for part in self.groups)
 
     def text(self, value: Any) -> str:
         """The value, or one of its statistics, as shown, without its unit."""
@@ -102,6 +102,11 @@ class Number:
         """Which numbers are better, where that is known."""
         return self.entry.quantity.better
 
+    @property
+    def is_context(self) -> bool:
+        """Whether it says what a run was of."""
+        return self.entry.by_path and self.entry.quantity.context
+
 
 def entries(metrics: Metrics) -> list[Entry]:
     """All entries but those of single logs: described ones in their order, then by name; groups after what is in none.
@@ -122,15 +127,15 @@ def _entries(metrics: Metrics, values: Mapping[str, Any], groups: tuple[str, ...
     for name in sorted(values, key=order):
         value, path = values[name], ".".join((*groups, name))
         quantity = metrics.quantities.get(path) or metrics.quantities.get(name) or Quantity()
-        titled = bool(groups) and path in metrics.quantities and quantity.title is not None
+        by_path = path in metrics.quantities
         if isinstance(value, Mapping):
             if value and all(key in STATISTICS for key in value):
                 spread = {key: value[key] for key in STATISTICS if key in value}
-                yield Entry(groups, name, spread, quantity, titled)
+                yield Entry(groups, name, spread, quantity, by_path)
             else:
                 deeper.append((name, value))
         elif not isinstance(value, list | tuple):
-            yield Entry(groups, name, value, quantity, titled)
+            yield Entry(groups, name, value, quantity, by_path)
     for name, value in deeper:
         yield from _entries(metrics, value, (*groups, name))
 

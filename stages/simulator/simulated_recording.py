@@ -204,13 +204,18 @@ class SimulatedRecording:
 
     def digest(self) -> str:
         """sha256 over what the drive sees of the world, the route, the day, the events and the code that renders it."""
-        events = json.dumps([dataclasses.asdict(event) for event in self.events])
-        return digest_text(simulation_digest(self._seen()), self.route, str(self.day), events)
+        return drive_digest(self.world, self.route, self.day, self.events)
 
-    def _seen(self) -> WorldConfig:
-        """The world without the days before and after the drive: drives of a day are alike whatever others bring."""
-        to_come = self.world.days[self.day + 1 :] if self._lasts is not None else ()
-        return dataclasses.replace(self.world, days=(*(Day(),) * self.day, self.world.day(self.day), *to_come))
+
+def drive_digest(world: WorldConfig, route: str, day: int, events: Sequence[Event]) -> str:
+    """The digest of a drive, which need not be planned for it. `events` are in order, those of the route included.
+
+    The days before and after the drive do not count: drives of a day are equal whatever other days bring.
+    """
+    to_come = world.days[day + 1 :] if world.routes[route].day_lasts is not None else ()
+    seen = dataclasses.replace(world, days=(*(Day(),) * day, world.day(day), *to_come))
+    done = json.dumps([dataclasses.asdict(event) for event in events])
+    return digest_text(simulation_digest(seen), route, str(day), done)
 
 
 def refuse_no_room(world: WorldConfig, room: Obstacles, place: Sequence[float], where: str) -> None:

@@ -3,12 +3,14 @@
 import hashlib
 import math
 from collections import Counter
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
+from omninav.pipeline.files import digest_text
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.cuts import Splice, as_if_driven, check_splices, crossed, spliced_frames
@@ -22,6 +24,8 @@ from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
 
 Array = npt.NDArray[np.float64]
+DRIVE = "drive.mcap"
+"""A simulated drive in the folder of its recording."""
 
 
 class LogSourceState(State):
@@ -99,6 +103,31 @@ class LogSource(Source):
         """Ticks to come if every picture can be decoded."""
         self._open()
         return sum(len(frames) for frames in self._frames)
+
+    def recording_key(self) -> str | None:
+        """The hash of a simulated drive; None for a recording."""
+        if self.log is not None or self.route not in self.world.routes:
+            return None
+        from omninav.stages.simulator.simulated_recording import drive_digest, in_order
+
+        days = in_order(self.day)
+        return digest_text(*(drive_digest(self.world, self.route, day, self.events) for day in days))
+
+    def recording_name(self) -> str:
+        """World, route and days of a simulated drive."""
+        return f"{self.world.name} {self.route} day {self.day}{' with events' if self.events else ''}"
+
+    def record(self, ctx: Context, folder: Path) -> None:
+        """Write a simulated drive as an MCAP log, with camera.yaml, floor plan and grid beside it."""
+        from omninav.stages.simulator.record_log import RecordLog
+
+        assert self.route is not None
+        log = str(folder / DRIVE)
+        RecordLog(log=log, world=self.world, route=self.route, day=self.day, events=self.events).step(ctx)
+
+    def replay(self, folder: Path) -> dict[str, Any]:
+        """Read the log in place of the world that it is of."""
+        return {"log": str(folder / DRIVE), "world": None, "route": None, "day": None, "events": None}
 
     def step(self, ctx: Context, position: LogSourceState) -> Out | None:
         """The next picture that can be used; None after the last."""

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from background_runs import kill, start
 
-from omninav.pipeline.experiment.runner import JobProgress
+from omninav.pipeline.experiment.job_progress import JobProgress
 
 STAGES = '''
 import time
@@ -116,14 +116,14 @@ sweep:
   tour: {TT1: nodes.counter.frames=20, TT2: nodes.counter.frames=30}
 repetitions: 6
 measures:
-  error: {title: Error (cm), of: [after.error_m, error_m], times: 100.0}
+  error: {title: Error (cm), path: [after.error_m, error_m], scale: 100.0}
 page: {rows: [method], columns: tour}
 published:
   error: {fair: {TT1: 102, TT2: 30}}
 claims:
-  - {says: fair is better than loaded, measure: error, of: {method: fair}, below: {method: loaded}, paper: better}
-  - {says: fair is as good as the paper's, measure: error, of: {method: fair}, at_most: published}
-  - {says: loaded is best, measure: error, of: {method: loaded}, lowest: true}
+  - {statement: fair is better than loaded, measure: error, of: {method: fair}, below: {method: loaded}, paper: better}
+  - {statement: fair is as good as the paper's, measure: error, of: {method: fair}, at_most: published}
+  - {statement: loaded is best, measure: error, of: {method: loaded}, lowest: true}
 profiles:
   quick: {repetitions: 2}
 """
@@ -138,28 +138,28 @@ sweep:
   method: {fair: nodes.table.bias=1.0, loaded: nodes.table.bias=2.0}
   noise: {low: nodes.noisy.sigma=0.1, high: nodes.noisy.sigma=0.3}
 without: [{method: fair, noise: high}]
-drives: {short: nodes.counter.frames=20, long: nodes.counter.frames=30}
+scenarios: {short: nodes.counter.frames=20, long: nodes.counter.frames=30}
 repetitions: 3
 measures:
-  error: {title: Error (m), of: [error_m], digits: 2}
-  last: {title: Last lap (m), of: [laps.*.error_m], take: last, digits: 2}
-  rise: {title: Largest rise (m), of: [laps.*.error_m], take: largest_rise, digits: 2}
-  lucky: {title: Error of the lucky (m), of: [lucky_m], digits: 2}
-  time: {title: Time (ms), of: [p95_ms], stages: [noisy], digits: 2}
+  error: {title: Error (m), path: [error_m], digits: 2}
+  last: {title: Last lap (m), path: [laps.*.error_m], aggregate: last, digits: 2}
+  rise: {title: Largest rise (m), path: [laps.*.error_m], aggregate: largest_rise, digits: 2}
+  lucky: {title: Error of the lucky (m), path: [lucky_m], digits: 2}
+  time: {title: Time (ms), path: [p95_ms], stages: [noisy], digits: 2}
 page: {rows: [method], columns: noise, drawn: [error, last]}
 curves:
-  - {title: Error (m), along: lap, of: laps.*.error_m}
+  - {title: Error (m), x_label: lap, path: laps.*.error_m}
   - title: Error along the way (m)
-    along: step
-    of: steps.error_m
-    at: steps.step
+    x_label: step
+    path: steps.error_m
+    x_path: steps.step
     panels: noise
     only: {method: loaded}
-    beside: {odometry alone: steps.odometry_m}
+    reference: {odometry alone: steps.odometry_m}
 claims:
-  - {says: errors fall, measure: rise, below: 0.0}
-  - {says: half of the loaded one's, measure: error, of: {method: fair}, ratio_to: {method: loaded}, at_most: 0.6}
-  - {says: the lucky are better, measure: lucky, of: {method: fair}, at_most: 2.0}
+  - {statement: errors fall, measure: rise, below: 0.0}
+  - {statement: half of the loaded one's, measure: error, of: {method: fair}, ratio_to: {method: loaded}, at_most: 0.6}
+  - {statement: the lucky are better, measure: lucky, of: {method: fair}, at_most: 2.0}
 """
 ONCE = 2 * (20 + 30)
 """Lines in `computed`: in two conditions, each frame once."""
@@ -194,8 +194,8 @@ variant: wander
 repetitions: 1
 common: world=home_store_demo nodes.source.seconds=0.4
 sweep: {day: {first: day=0}}
-drives: {here: "nodes.source.start=[4.2,4.0,0.5]", there: "nodes.source.start=[5.0,5.0,0.5]"}
-measures: {way: {title: Way (m), of: [drive.distance_m]}}
+scenarios: {here: "nodes.source.start=[4.2,4.0,0.5]", there: "nodes.source.start=[5.0,5.0,0.5]"}
+measures: {way: {title: Way (m), path: [drive.distance_m]}}
 page: {rows: [], columns: day}
 """
 
@@ -271,7 +271,7 @@ def test_repetitions_that_share_nothing_give_the_same(dice: Finished):
 
 def test_series_within_runs_drives_as_repetitions_and_times_of_stages(omninav, place: Path):
     said = omninav("check", "--config-dir", "mine", "+experiment=laps", check=True).stdout
-    assert "3 conditions (2 method, 2 noise), each with 3 repetitions over each of 2 drives" in said
+    assert "3 conditions (2 method, 2 noise), each with 3 repetitions in each of 2 scenarios" in said
     omninav("--config-dir", "mine", "+experiment=laps", check=True)
     folder = place / "runs/laps_paper"
     fall, half, lucky = json.loads((folder / "verdicts.json").read_text())
@@ -286,7 +286,7 @@ def test_series_within_runs_drives_as_repetitions_and_times_of_stages(omninav, p
     page = (folder / "laps.md").read_text()
     assert f", {judged} of 6" in page
     assert f"({judged} of 6)" in page
-    assert "seeds 0 to 2 over 2 drives (short, long)" in page
+    assert "seeds 0 to 2 over 2 scenarios (short, long)" in page
     assert re.search(r"\*\*Time \(ms\)\*\*\n(.*\n){3}\| fair \| [1-9]", page)
     pictures = ["laps.png", "laps_curve_1.png", "laps_curve_2.png", "laps_last.png"]
     assert sorted(path.name for path in folder.glob("*.png")) == pictures
@@ -301,7 +301,7 @@ def test_a_closed_loop_drives_for_itself(omninav, tmp_path: Path):
     omninav("--config-dir", "mine", "+experiment=about", "cache=null", check=True)
     folder = tmp_path / "runs/about_paper"
     assert len(results(folder)) == 2
-    assert not (folder / "logs").exists()
+    assert not (folder / "recordings").exists()
 
 
 def test_a_killed_experiment_goes_on_where_it_was(dice: Finished):
@@ -350,7 +350,7 @@ def test_what_is_wrong_with_a_file_is_said_before_anything_runs(omninav, place: 
     ended = omninav(*MINE)
     assert ended.returncode == 2
     assert "biass" in ended.stderr
-    (place / "mine/experiment/dice.yaml").write_text(EXPERIMENT.replace("times: 100.0", "stages: [nosy]"))
+    (place / "mine/experiment/dice.yaml").write_text(EXPERIMENT.replace("scale: 100.0", "stages: [nosy]"))
     ended = omninav(*MINE)
     assert ended.returncode == 2
     assert "no condition has a stage 'nosy'" in ended.stderr
@@ -388,10 +388,10 @@ def test_check_checks_every_condition_and_runs_none(omninav, place: Path):
 def test_frames_of_jobs_add_up_and_silent_ones_count_as_the_mean_of_the_others():
     frames = JobProgress(3)
     assert (frames.done, frames.total) == (0, None)
-    frames.heard("training", {"frames": 100, "of": 3000})
+    frames.on_message("training", {"frames": 100, "of": 3000})
     assert (frames.done, frames.total) == (100, 9000)
-    frames.heard("tt1", {"frames": 1, "of": 400})
-    frames.heard("tt1", {"seed": 3})
+    frames.on_message("tt1", {"frames": 1, "of": 400})
+    frames.on_message("tt1", {"seed": 3})
     assert (frames.done, frames.total) == (101, 3400 + 1700)
     frames.end("tt1")
     assert (frames.done, frames.ended) == (500, 1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omninav.pipeline.experiment.series import at, figure_at, pooled_deviation, series_at, taken
+from omninav.pipeline.experiment.series import aggregated, at, figure_at, pooled_deviation, series_at
 
 RESULT = {
     "error_m": {"mean": 2.0},
@@ -49,9 +49,9 @@ def test_a_part_of_a_series_counts_from_its_start():
 
 def test_entries_that_are_not_there_are_left_out_and_too_few_give_nothing():
     assert figure_at(RESULT, "laps.*.error_m.mean", "slope") == pytest.approx(-0.15)
-    assert taken([None, 1.0], "change") is None
-    assert taken([None], "mean") is None
-    assert taken([0.0, 1.0], "ratio") is None
+    assert aggregated([None, 1.0], "change") is None
+    assert aggregated([None], "mean") is None
+    assert aggregated([0.0, 1.0], "ratio") is None
 
 
 def test_paths_joined_by_plus_are_added_and_one_that_is_missing_leaves_none():

@@ -21,10 +21,10 @@ def judged(claim: dict[str, object], **errors: list[float]) -> Verdict:
         "about": "",
         "variant": "none",
         "sweep": {"method": dict.fromkeys(errors, "")},
-        "measures": {"error": {"title": "Error", "of": ["error"]}},
+        "measures": {"error": {"title": "Error", "path": ["error"]}},
         "page": {"rows": [], "columns": "method"},
         "published": {"error": {"a": 10.0}},
-        "claims": [{"says": "it holds", "measure": "error", "of": {"method": "a"}, **claim}],
+        "claims": [{"statement": "it holds", "measure": "error", "of": {"method": "a"}, **claim}],
     }
     results = {
         key_of({"method": name}): {
@@ -61,8 +61,8 @@ def test_the_interval_of_a_mean_is_the_normal_one_for_many_values():
         ({"at_most": 3.4}, CLEAR, FAR, False),
         ({"at_most": "published"}, CLEAR, FAR, True),
         ({"at_most": "published"}, FAR, CLEAR, False),
-        ({"at_most": {"method": "b"}, "times": 5.0}, FAR, CLEAR, True),
-        ({"at_most": {"method": "b"}, "times": 3.5}, FAR, CLEAR, False),
+        ({"at_most": {"method": "b"}, "scale": 5.0}, FAR, CLEAR, True),
+        ({"at_most": {"method": "b"}, "scale": 3.5}, FAR, CLEAR, False),
         ({"below": {"method": "b"}}, CLEAR, FAR, True),
         ({"below": {"method": "b"}}, CLEAR, ALIKE, False),
         ({"above": {"method": "b"}}, FAR, CLEAR, True),
@@ -165,7 +165,7 @@ def test_a_pooled_deviation_is_over_all_frames_of_all_repetitions_and_nothing_is
         "about": "",
         "variant": "none",
         "sweep": {"method": {"a": ""}},
-        "measures": {"sigma": {"title": "Sigma", "of": ["late.error"], "pooled": True, "times": 100.0}},
+        "measures": {"sigma": {"title": "Sigma", "path": ["late.error"], "pooled": True, "scale": 100.0}},
         "page": {"rows": [], "columns": "method"},
     }
     results = {
@@ -181,4 +181,4 @@ def test_a_pooled_deviation_is_over_all_frames_of_all_repetitions_and_nothing_is
     found = pooled(read_experiment(file, "paper"), results, "sigma", {"method": "a"})
     assert found == pytest.approx(100 * np.concatenate(runs).std())
     with pytest.raises(ProblemsFound, match="pooled"):
-        read_experiment(file | {"claims": [{"says": "small", "measure": "sigma", "at_most": 1.0}]}, "paper")
+        read_experiment(file | {"claims": [{"statement": "small", "measure": "sigma", "at_most": 1.0}]}, "paper")

@@ -1,0 +1,186 @@
+"""The conditions of an experiment as runs: their configurations, checked, and the results that they have."""
+
+import json
+import re
+import shlex
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from omninav.pipeline.engine.artifact import Cache
+from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
+from omninav.pipeline.report.progress import Progress
+from omninav.pipeline.run.run import Plan, plan, without_companions
+
+from .repetition import artifact_key, condition_key, finished, known_digests
+from .specification import Condition, Experiment
+from .verdicts import Results, key_of
+
+Compose = Callable[[Sequence[str]], dict[str, Any]]
+"""Overrides -> the plain, complete configuration that they describe."""
+
+
+@dataclass
+class ConditionRun:
+    """A condition in one scenario, or a reference run: what is run for every seed, and what has been found so far."""
+
+    condition: Condition
+    scenario: str
+    variant: str
+    overrides: tuple[str, ...]
+    folder: Path
+    seeds: tuple[int, ...]
+    shared: bool = True
+    """Whether its repetitions share what does not depend on the seed, and other experiments its results."""
+    config: dict[str, Any] = field(default_factory=dict)
+    planned: Plan | None = None
+    key: str = ""
+    """The hash of everything but the seed that decides the results."""
+    results: dict[int, dict[str, Any]] = field(default_factory=dict)
+    """By seed."""
+    error: str = ""
+
+    @property
+    def name(self) -> str:
+        """The condition's labels, and the scenario where there are several."""
+        return ", ".join(part for part in (self.condition.name, self.scenario and f"scenario {self.scenario}") if part)
+
+    @property
+    def missing(self) -> list[int]:
+        """The seeds that have no result yet."""
+        return [seed for seed in self.seeds if seed not in self.results]
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether it can and must still be run."""
+        return not self.error and bool(self.missing)
+
+
+def condition_runs(experiment: Experiment, folder: Path, overrides: Sequence[str]) -> list[ConditionRun]:
+    """A run for each condition in each scenario. `overrides`: what was typed beside the experiment's name."""
+    seeds = tuple(range(experiment.repetitions))
+    return [
+        _run(
+            experiment, folder, overrides, condition, scenario, (experiment.set, condition.overrides, own), seeds=seeds
+        )
+        for condition in experiment.conditions()
+        for scenario, own in (experiment.scenarios or {"": ""}).items()
+    ]
+
+
+def reference_runs(experiment: Experiment, folder: Path, overrides: Sequence[str]) -> list[list[ConditionRun]]:
+    """For each sentence of the file about reference runs: a run for each label of its factor in each scenario."""
+    found = []
+    for reference in experiment.reference_runs:
+        labels = experiment.sweep[reference.over].items()
+        conditions = [Condition({reference.over: str(label)}, str(own or "")) for label, own in labels]
+        found.append(
+            [
+                _run(
+                    experiment,
+                    folder,
+                    overrides,
+                    condition,
+                    scenario,
+                    (reference.set, condition.overrides, own),
+                    variant=reference.variant,
+                )
+                for condition in conditions
+                for scenario, own in (experiment.scenarios or {"": ""}).items()
+            ]
+        )
+    return found
+
+
+def _run(
+    experiment: Experiment,
+    folder: Path,
+    overrides: Sequence[str],
+    condition: Condition,
+    scenario: str,
+    parts: Sequence[str],
+    variant: str = "",
+    seeds: tuple[int, ...] = (0,),
+) -> ConditionRun:
+    """`variant` is that of a reference run, whose time is measured: it shares nothing."""
+    own = [word for part in (experiment.common, *parts) for word in shlex.split(part)]
+    named = any(word.startswith("variant=") for word in own)  # a condition may be of another variant
+    typed = (*([] if named else [f"variant={variant or experiment.variant}"]), *own, *overrides)
+    words = " ".join(part for part in (condition.name, scenario, variant) if part)
+    place = folder / "conditions" / re.sub(r"[^A-Za-z0-9.]+", "_", words).strip("_")
+    shared = experiment.shared and not variant
+    return ConditionRun(condition, scenario, variant or experiment.variant, typed, place, seeds, shared)
+
+
+def check(experiment: Experiment, runs: Sequence[ConditionRun], compose: Compose) -> None:
+    """Compose and check every run. Raises `ProblemsFound` with everything that is wrong with any of them."""
+    problems: list[Problem] = []
+    composed: dict[tuple[str, ...], dict[str, Any]] = {}
+    name = f"{experiment.name}: checking"
+    with Progress(unit="conditions") as progress:
+        progress.begin(name, 0, len(runs))
+        for number, run in enumerate(runs, 1):
+            try:
+                if run.overrides not in composed:
+                    composed[run.overrides] = compose(run.overrides)
+                plain = json.loads(json.dumps(composed[run.overrides], default=str))
+                run.config = dict(without_companions(plain))
+                run.planned = plan(run.config)
+            except ProblemsFound as found:
+                problems += [Problem(f"{run.name}: {p.where}", p.what, p.hint) for p in found.problems]
+            progress.update(name, number, len(runs))
+    problems += _unknown_stages(experiment, runs)
+    if problems:
+        raise ProblemsFound(dict.fromkeys(problems))
+
+
+def _unknown_stages(experiment: Experiment, runs: Sequence[ConditionRun]) -> list[Problem]:
+    """Stages whose time is measured and that no condition has."""
+    graphs = [run.planned.graph for run in runs if run.planned is not None]
+    there = sorted({name for graph in graphs for name in graph.nodes})
+    return [
+        Problem(f"experiment.measures.{name}", f"no condition has a stage '{stage}'", suggest(stage, there, "stages"))
+        for name, measure in experiment.measures.items()
+        for stage in measure.stages
+        if graphs and stage not in there
+    ]
+
+
+def open_inputs(runs: Sequence[ConditionRun]) -> None:
+    """Open every file that the runs read. Raises `BadInput` where one cannot be read."""
+    for run in runs:
+        assert run.planned is not None
+        known_digests(run.planned.graph)
+        for artifact in run.planned.artifacts:
+            artifact_key(artifact)
+
+
+def timed_groups(experiment: Experiment) -> list[tuple[str, ...]]:
+    """Stages whose time is measured together."""
+    return sorted({measure.stages for measure in experiment.measures.values() if measure.stages})
+
+
+def find_results(experiment: Experiment, runs: Sequence[ConditionRun]) -> None:
+    """Plan every run anew, with the recordings that it reads by now, and find the results of earlier attempts."""
+    for run in runs:
+        if run.error:
+            continue
+        try:
+            run.planned = plan(run.config)
+            run.key = condition_key(run.planned, timed_groups(experiment))
+            place = run.config.get("cache") if run.shared else None  # what is timed is timed anew
+            run.results = finished(run.folder, run.key, run.seeds, Cache(Path(place)) if place else None)
+        except (ProblemsFound, BadInput) as wrong:
+            run.error = str(wrong)
+
+
+def results_by_condition(experiment: Experiment, runs: Sequence[ConditionRun]) -> Results:
+    """What has run, by condition and repetition: a number for each seed in each scenario."""
+    found: dict[tuple[tuple[str, str], ...], dict[int, dict[str, Any]]] = {}
+    scenarios = list(experiment.scenarios) or [""]
+    for run in runs:
+        first = scenarios.index(run.scenario) * experiment.repetitions
+        of_condition = found.setdefault(key_of(run.condition.labels), {})
+        of_condition |= {first + seed: result for seed, result in run.results.items()}
+    return found

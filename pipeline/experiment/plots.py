@@ -1,0 +1,228 @@
+"""The plots on an experiment's page: bars or lines of measures, and curves within the runs."""
+
+import itertools
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from omninav.pipeline.report.plot_style import PALETTE, picture
+
+from .series import series_at
+from .specification import Condition, Curve, Experiment, Labels, space_of
+from .verdicts import Array, Results, key_of, samples
+
+
+@dataclass(frozen=True)
+class PagePlot:
+    """A plot on an experiment's page; `content` is a PNG."""
+
+    file: str
+    title: str
+    caption: str
+    content: bytes
+
+
+def plots_of(experiment: Experiment, results: Results) -> list[PagePlot]:
+    """Plots of measures and curves; none where nothing has run."""
+    if not any(results.values()):
+        return []
+    page, found = experiment.page, []
+    for index, name in enumerate(page.drawn or list(experiment.measures)[:1]):
+        measure = experiment.measures[name]
+        content = (
+            _lines(experiment, results, name, page.along, page.panels)
+            if page.along
+            else _bars(experiment, results, name)
+        )
+        caption = f"{measure.title}: mean, and standard deviation over the repetitions"
+        if experiment.published.get(name) and not page.along:
+            caption += "; diamonds are the paper's figures"
+        file = experiment.name + (f"_{name}" if index else "")
+        found.append(PagePlot(f"{file}.png", measure.title, f"{caption}.", content))
+    for index, curve in enumerate(experiment.curves):
+        content = _curve(experiment, results, curve)
+        what = "mean of the repetitions, in a band that holds the middle half of them"
+        caption = f"{curve.title} along {curve.x_label}: {what}"
+        file = f"{experiment.name}_curve_{index + 1}.png"
+        found.append(PagePlot(file, curve.title, f"{caption}.", content))
+    return [plot for plot in found if plot.content]
+
+
+def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
+    """A line for each condition: the mean of the repetitions' series, in a band that holds the middle half of them."""
+    panel_labels = experiment.labels(curve.panels) if curve.panels else [""]
+    conditions = [condition for condition in experiment.conditions() if condition.fits(curve.only)]
+    shown = [f for f in experiment.sweep if f != curve.panels and f not in curve.only]
+    colours = {
+        name: PALETTE[n % len(PALETTE)] for n, name in enumerate(dict.fromkeys(_named(c, shown) for c in conditions))
+    }
+    levels: list[float] = []  # of each line: one that only begins near zero is no reason for powers of ten
+    with picture(4.6 * len(panel_labels) + 0.4, 3.8) as drawn:
+        grid = drawn.canvas.subplots(1, len(panel_labels), squeeze=False, sharey=True)[0]
+        for axes, panel in zip(grid, panel_labels, strict=True):
+            here = [c for c in conditions if not curve.panels or c.labels[curve.panels] == panel]
+            common: dict[str, tuple[Array, Array]] = {}
+            for condition in here:
+                runs = list(results.get(key_of(condition.labels), {}).values())
+                for label, path in curve.reference.items():
+                    x, y = series_of(runs, path, curve.x_path)
+                    if len(x):
+                        common.setdefault(label, (x, curve.scale * np.nanmean(y, axis=0)))
+                x, y = series_of(runs, curve.path, curve.x_path)
+                if not len(x):
+                    continue
+                y = curve.scale * y
+                name, middle = _named(condition, shown), np.nanmean(y, axis=0)
+                levels.append(float(np.nanmedian(middle)))
+                marker = "o" if len(x) <= 30 else None
+                axes.plot(
+                    x, middle, color=colours[name], label=name or "ours", linewidth=1.5, marker=marker, markersize=3
+                )
+                if len(y) > 1:
+                    low, high = np.nanpercentile(y, [25, 75], axis=0)
+                    axes.fill_between(x, low, high, color=colours[name], alpha=0.18, linewidth=0)
+            for index, (label, (x, y)) in enumerate(common.items()):
+                levels.append(float(np.nanmedian(y)))
+                axes.plot(x, y, color="#555555", linestyle=("--", ":", "-.")[index % 3], linewidth=1.3, label=label)
+            axes.set_title(panel)
+            axes.set_xlabel(curve.x_label)
+            axes.locator_params(axis="x", integer=not curve.x_path)  # there is no lap 1.5
+        if not levels:
+            return b""
+        _scale(grid[0], levels, 10.0)
+        grid[0].set_ylabel(curve.title)
+        _legend_above(drawn.canvas, grid)
+    return drawn.content
+
+
+def series_of(runs: Sequence[Mapping[str, Any]], path: str, at_path: str = "") -> tuple[Array, Array]:
+    """Where the entries of a series lie (N,), and the series of all runs that have it (runs, N); NaN where one ends.
+
+    Entries that no run has a figure for are left out.
+    """
+    found = [(series_at(space_of(run), path), series_at(space_of(run), at_path) if at_path else []) for run in runs]
+    found = [(y, x or [float(n + 1) for n in range(len(y))]) for y, x in found if y]
+    longest = max((len(y) for y, _ in found), default=0)
+    filled = np.full((2, len(found), longest), np.nan)
+    for row, (y, x) in enumerate(found):
+        filled[0, row, : len(x)] = [np.nan if each is None else each for each in x[:longest]]
+        filled[1, row, : len(y)] = [np.nan if each is None else each for each in y]
+    there = np.isfinite(filled).any(axis=1).all(axis=0)
+    return np.nanmean(filled[0][:, there], axis=0) if there.any() else np.empty(0), filled[1][:, there]
+
+
+def _named(condition: Condition, factors: Sequence[str]) -> str:
+    return ", ".join(condition.labels[factor] for factor in factors)
+
+
+def _lines(experiment: Experiment, results: Results, name: str, along: str, panels: str | None) -> bytes:
+    """Lines along a numeric factor; error bars are the spread."""
+    measure = experiment.measures[name]
+    panel_labels = experiment.labels(panels) if panels else [""]
+    series = [factor for factor in experiment.sweep if factor not in (along, panels)]
+    combinations = list(itertools.product(*(experiment.labels(factor) for factor in series)))
+    heights: list[float] = []
+    with picture(4.6 * len(panel_labels) + 0.4, 3.8) as drawn:
+        grid = drawn.canvas.subplots(1, len(panel_labels), squeeze=False, sharey=True)[0]
+        for axes, panel in zip(grid, panel_labels, strict=True):
+            for index, chosen in enumerate(combinations):
+                labels = dict(zip(series, chosen, strict=True)) | ({panels: panel} if panels else {})
+                points = [
+                    (float(x), samples(experiment, results, name, labels | {along: x}))
+                    for x in experiment.labels(along)
+                ]
+                known = [(x, list(found.values())) for x, found in points if found]
+                heights += [float(np.mean(values)) for _, values in known]
+                axes.errorbar(
+                    [x for x, _ in known],
+                    [float(np.mean(v)) for _, v in known],
+                    yerr=[float(np.std(v)) for _, v in known],
+                    color=PALETTE[index % len(PALETTE)],
+                    marker="os^Dvx"[index % 6],
+                    markersize=4,
+                    capsize=2.5,
+                    linewidth=1.4,
+                    elinewidth=0.8,
+                    label=", ".join(chosen),
+                )
+            axes.set_title(panel)
+            axes.set_xlabel(along)
+        _scale(grid[0], heights)
+        grid[0].set_ylabel(measure.title)
+        _legend_above(drawn.canvas, grid)
+    return drawn.content
+
+
+def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
+    """Bars; error bars are the spread, hollow diamonds the paper's figures."""
+    measure = experiment.measures[name]
+    columns, rows = experiment.labels(experiment.page.columns), row_labels(experiment)
+    width = 0.8 / len(rows)
+    all_heights: list[float] = []
+    with picture(max(5.0, 1.1 + len(columns) * max(0.42 * (len(rows) + 1), 0.95)), 3.6) as drawn:
+        axes = drawn.canvas.subplots()
+        for index, labels in enumerate(rows):
+            at = np.arange(len(columns)) + (index - (len(rows) - 1) / 2) * width
+            found = [
+                list(samples(experiment, results, name, labels | {experiment.page.columns: c}).values())
+                for c in columns
+            ]
+            heights = [float(np.mean(v)) if v else np.nan for v in found]
+            spreads = [float(np.std(v)) if v else np.nan for v in found]
+            all_heights += heights
+            colour = PALETTE[index % len(PALETTE)]
+            title = ", ".join(labels.values())
+            axes.bar(
+                at,
+                heights,
+                0.9 * width,
+                yerr=spreads,
+                color=colour,
+                capsize=2.5,
+                label=title,
+                error_kw={"elinewidth": 0.8},
+            )
+            paper = [experiment.published_figure(name, labels | {experiment.page.columns: c}) for c in columns]
+            shown = [(x, value) for x, value in zip(at, paper, strict=True) if value is not None]
+            if shown:
+                axes.plot(
+                    *zip(*shown, strict=True), "D", color="white", markeredgecolor="#111111", markersize=5, zorder=5
+                )
+        if experiment.published.get(name):
+            axes.plot([], [], "D", color="white", markeredgecolor="#111111", markersize=5, label="paper")
+        axes.set_xticks(np.arange(len(columns)), [textwrap.fill(c, 14) for c in columns])
+        axes.set_ylabel(measure.title)
+        _scale(axes, all_heights)
+        axes.grid(axis="x", visible=False)
+        if axes.get_legend_handles_labels()[1]:
+            axes.legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
+    return drawn.content
+
+
+def _legend_above(canvas: Any, grid: Any) -> None:
+    """One legend for all panels, where it hides none of the lines."""
+    lines: dict[str, Any] = {}
+    for axes in grid:
+        handles, labels = axes.get_legend_handles_labels()
+        lines |= dict(zip(labels, handles, strict=True))
+    if lines:
+        canvas.legend(lines.values(), lines.keys(), loc="outside upper left", ncols=min(3, len(lines)))
+
+
+def _scale(axes: Any, heights: Sequence[float], ratio: float = 20.0) -> None:
+    """From zero up; in powers of ten where the highest is more than `ratio` times the lowest."""
+    above = [height for height in heights if height > 0]
+    if above and max(above) > ratio * min(above):
+        axes.set_yscale("log")
+        axes.set_ylim(bottom=0.5 * min(above))
+    else:
+        axes.set_ylim(bottom=0)
+
+
+def row_labels(experiment: Experiment) -> list[Labels]:
+    """The labels of the table's rows."""
+    rows = experiment.page.rows
+    return [dict(zip(rows, chosen, strict=True)) for chosen in itertools.product(*(experiment.labels(f) for f in rows))]
