@@ -391,8 +391,8 @@ def complete(config: Any, variants: Callable[[str], Any] | None = None) -> dict[
         "map",
         "route",
         "day",
-        "events",
-        "splices",
+        "kidnappings",
+        "cuts",
     }
     if unread := list(_unread(config)):
         raise ProblemsFound(unread)
@@ -422,7 +422,7 @@ def complete(config: Any, variants: Callable[[str], Any] | None = None) -> dict[
                 if str(key) not in graph_keys:
                     other[key] = config._get_node(key)
             other.update({"tour": None, "map": None} | {key: spec.get(key) for key in ("log", "route", "day")})
-            for lift in ("events", "splices"):  # who lifts the robot on its drive does not lift it on its tour
+            for lift in ("kidnappings", "cuts"):  # who lifts the robot on its drive does not lift it on its tour
                 other[lift] = spec.get(lift) or []
             for node in spec.get("share") or ():
                 if config.nodes.get(node) is not None:

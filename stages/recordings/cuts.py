@@ -10,43 +10,43 @@ from omninav.stages.geometry.plane.se2 import between, compose
 from .recording import UnreadableRecording
 
 Array = npt.NDArray[np.float64]
-Splice = tuple[int, int]
+Cut = tuple[int, int]
 
 
-def check_splices(splices: Sequence[Splice], frames: int, name: str) -> None:
-    """Raise UnreadableRecording where a splice does not lead onwards within a log of so many frames."""
+def check_cuts(cuts: Sequence[Cut], frames: int, name: str) -> None:
+    """Raise UnreadableRecording where a cut does not lead onwards within a log of so many frames."""
     end = 0
-    for after, to in splices:
+    for after, to in cuts:
         if not end < after < to < frames:
             raise UnreadableRecording(
-                f"{name}: the splice [{after}, {to}] does not lead onwards between {end} and {frames - 1}; type "
-                "splices=[[60,300]] to go on with picture 300 once the first 60 are through"
+                f"{name}: the cut [{after}, {to}] does not lead onwards between {end} and {frames - 1}; type "
+                "cuts=[[60,300]] to go on with picture 300 once the first 60 are through"
             )
         end = to
 
 
-def spliced_frames(splices: Sequence[Splice], frames: int) -> npt.NDArray[np.int64]:
+def remaining_frames(cuts: Sequence[Cut], frames: int) -> npt.NDArray[np.int64]:
     """Numbers of the frames that are left."""
     kept = np.ones(frames, np.bool_)
-    for after, to in splices:
+    for after, to in cuts:
         kept[after:to] = False
     return np.flatnonzero(kept)
 
 
-def crossed(splices: Sequence[Splice], frames: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """Whether a splice lies between each of the frames (N,) and the next: (N - 1,)."""
-    done = np.searchsorted([to for _, to in splices], frames, side="right")
+def crossed(cuts: Sequence[Cut], frames: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+    """Whether a cut lies between each of the frames (N,) and the next: (N - 1,)."""
+    done = np.searchsorted([to for _, to in cuts], frames, side="right")
     between_them: npt.NDArray[np.bool_] = np.diff(done) > 0
     return between_them
 
 
-def as_if_driven(poses: Array, splices: Sequence[Splice]) -> Array:
-    """Poses (N, 3) as an odometry gives them that knows nothing of the splices.
+def as_if_driven(poses: Array, cuts: Sequence[Cut]) -> Array:
+    """Poses (N, 3) as an odometry gives them that knows nothing of the cuts.
 
-    What was measured on the way from picture `to - 1` to picture `to` is measured from the last one before the splice.
+    What was measured on the way from picture `to - 1` to picture `to` is measured from the last one before the cut.
     """
     told = poses.copy()
-    for after, to in splices:
+    for after, to in cuts:
         moved = between(told[to - 1], told[to:])
         told[to:] = compose(told[after - 1], moved)
     return told

@@ -197,7 +197,7 @@ class Room:
 
 
 @dataclass(frozen=True)
-class Event:
+class Kidnapping:
     """Somebody lifts the robot, `at` seconds into a drive; odometry does not see it.
 
     It is put down where it was, or at `to` (x, y, heading: a kidnapping), turned by `turn` (rad).
@@ -228,7 +228,7 @@ class Route:
     length: Positive | None = None
     """Metres after which it ends; all the way where null."""
     seed: int = 0
-    events: tuple[Event, ...] = ()
+    kidnappings: tuple[Kidnapping, ...] = ()
     """What is done to the robot on this route, each time that it is driven."""
     day_lasts: Positive | None = None
     """Seconds after which lamps, curtains and goods are the next day's, while the robot drives on; null: never."""

@@ -8,7 +8,7 @@ from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.camera_yaml import write_camera
 
-from .config import Event, WorldConfig
+from .config import Kidnapping, WorldConfig
 from .demo import DEMO
 from .occupancy import write_grid
 from .plan import draw_plan
@@ -27,7 +27,7 @@ class RecordLog(Stage):
     """Writes a simulated drive, or one on each of several days: a log, camera.yaml, a floor plan, an occupancy grid.
 
     `log`: the .mcap file to write; the others are named after it. Plan and grid are the first day's. The same world,
-    route, days and events give the same bytes. Raises `BadInput` where `log` is no .mcap name and
+    route, days and kidnappings give the same bytes. Raises `BadInput` where `log` is no .mcap name and
     `UnreadableRecording` for an unknown route.
     """
 
@@ -35,7 +35,7 @@ class RecordLog(Stage):
     route: str = "drive"
     day: int | tuple[int, ...] = 1
     log: str | None = None
-    events: tuple[Event, ...] = ()
+    kidnappings: tuple[Kidnapping, ...] = ()
 
     class Out(Outputs):
         """Files are all it gives."""
@@ -47,7 +47,7 @@ class RecordLog(Stage):
             raise BadInput("simulate: name the log to write: log=out.mcap")
         days = in_order(self.day)
         ctx.doing(f"building {self.world.name} and planning {self.route}")
-        drives = [SimulatedRecording(self.world, self.route, day, self.events) for day in days]
+        drives = [SimulatedRecording(self.world, self.route, day, self.kidnappings) for day in days]
         ctx.doing("the first picture (for a minute, where the renderer was never compiled before)")
         record(drives, path, progress=ctx.progress)
         path.with_suffix(".camera.yaml").write_text(write_camera(drives[0].camera))

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from omninav.stages.geometry.plane.se2 import compose
 
-from .config import Event, Robot
+from .config import Kidnapping, Robot
 from .obstacles import Obstacles, gather, nearest
 
 F64 = npt.NDArray[np.float64]
@@ -34,15 +34,15 @@ X, Y, HEADING, SPEED, TURNING, TOUCHING, COLLISIONS, WAY = range(8)
 class Drive:
     """A drive: `times` (N,) s, `poses` (N, 3), and where the wheels had brought the robot by then, `rolled_to` (N, 3).
 
-    The last two differ only where somebody lifted the robot. `collisions`: how often it came into contact. `events`:
-    what was done to it, and in which row; what was to happen after its end did not.
+    The last two differ only where somebody lifted the robot. `collisions`: how often it came into contact.
+    `kidnappings`: what was done to it, and in which row; what was to happen after its end did not.
     """
 
     times: F64
     poses: F64
     rolled_to: F64
     collisions: int
-    events: tuple[tuple[int, Event], ...]
+    kidnappings: tuple[tuple[int, Kidnapping], ...]
 
 
 def at_rest(pose: npt.ArrayLike) -> F64:
@@ -129,15 +129,15 @@ def drive(
     rate: float,
     start_heading: float | None = None,
     room: Obstacles | None = None,
-    events: Sequence[Event] = (),
+    kidnappings: Sequence[Kidnapping] = (),
 ) -> Drive:
     """Drive along waypoints (W, 2), recorded at `rate` (Hz) from time 0.
 
     Pure pursuit: the robot steers for the point of the route `look_ahead` metres on, slower the more it must turn, and
     turns on the spot where it would have to look back. Speed and turning change no faster than the limits allow. The
     robot starts at rest at the first waypoint, facing the second unless `start_heading` is given. Obstacles stop it
-    where `room` is given. After an event it goes on from the point of the route that is nearest to where it was put; of
-    several, as on laps, from the next.
+    where `room` is given. After a kidnapping it goes on from the point of the route that is nearest to where it was
+    put; of several, as on laps, from the next.
     """
     points, ends = _legs(waypoints)
     length = float(ends[-1])
@@ -153,21 +153,21 @@ def drive(
     poses = np.empty((most, 3))
     poses[0] = state[:3]
     rolled_to: dict[int, F64] = {}
-    happened: list[tuple[int, Event]] = []
+    happened: list[tuple[int, Kidnapping]] = []
     done, along = 1, 0.0
-    for event in [*sorted(events, key=lambda event: event.at), None]:
-        until = most if event is None else min(most, round(event.at * rate) + 1)
+    for kidnapping in [*sorted(kidnappings, key=lambda kidnapping: kidnapping.at), None]:
+        until = most if kidnapping is None else min(most, round(kidnapping.at * rate) + 1)
         filled, along, arrived = _pursue(
             points, ends, along, state, able, robot.look_ahead, every, room, poses[done:until]
         )
         done += filled
-        if arrived or event is None:
+        if arrived or kidnapping is None:
             break
         rolled_to.setdefault(done - 1, poses[done - 1].copy())
-        happened.append((done - 1, event))
-        put_down(state, event)
+        happened.append((done - 1, kidnapping))
+        put_down(state, kidnapping)
         poses[done - 1] = state[:3]
-        if event.to is not None:
+        if kidnapping.to is not None:
             along = _nearest_along(points, ends, state[:2], along)
     poses = poses[:done]
     before = poses.copy()
@@ -185,9 +185,9 @@ def around(state: F64, seconds: npt.ArrayLike) -> F64:
     return np.stack([x, y, state[HEADING] + state[TURNING] * offset], axis=-1)
 
 
-def put_down(state: F64, event: Event) -> None:
+def put_down(state: F64, kidnapping: Kidnapping) -> None:
     """Somebody lifts a robot and puts it down: its `state` (8,) is at rest then, and nothing is counted as driven."""
-    state[:3] = compose(state[:3] if event.to is None else event.to, (0.0, 0.0, event.turn))
+    state[:3] = compose(state[:3] if kidnapping.to is None else kidnapping.to, (0.0, 0.0, kidnapping.turn))
     state[SPEED] = state[TURNING] = state[TOUCHING] = 0.0
 
 

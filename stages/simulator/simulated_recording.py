@@ -20,7 +20,7 @@ from omninav.stages.values.scan import Scan
 
 from . import tours
 from .cameras import Rays, camera_of, camera_rays, shutter_times
-from .config import Day, Event, WorldConfig
+from .config import Day, Kidnapping, WorldConfig
 from .obstacles import Obstacles, gather, nearest
 from .odometry import draw_bias, odometry
 from .people import Person, Track
@@ -42,20 +42,20 @@ TRANSIT = 42_000_000
 
 
 class SimulatedRecording:
-    """One drive along a named route of a world, on a day: the same seed, route, day and events give the same bytes.
+    """One drive along a named route of a world on a day, as a `Recording`.
 
-    A `Recording`. Pictures come in any order at the same price and with the same noise. The day decides the line that
+    The same seed, route, day and kidnappings give the same bytes. Images come in any order at the same price and with the same noise. The day decides the line that
     is driven, the odometry's errors, the noise and which goods were moved. `collisions` counts what the robot touched.
     Raises `UnreadableRecording` for a route that the world does not have.
     """
 
-    def __init__(self, world: WorldConfig, route: str, day: int, events: Sequence[Event] = ()) -> None:
+    def __init__(self, world: WorldConfig, route: str, day: int, kidnappings: Sequence[Kidnapping] = ()) -> None:
         if route not in world.routes:
             raise UnreadableRecording(
                 f"world '{world.name}' has no route '{route}'; it has: {', '.join(sorted(world.routes)) or 'none'}"
             )
         self.world, self.route, self.day = world, route, day
-        self.events = tuple(sorted([*world.routes[route].events, *events], key=lambda event: event.at))
+        self.kidnappings = tuple(sorted([*world.routes[route].kidnappings, *kidnappings], key=lambda lift: lift.at))
         self._later: World | None = None
         self._lasts = world.routes[route].day_lasts
         self.camera = camera_of(world)
@@ -73,22 +73,22 @@ class SimulatedRecording:
         except tours.NoWay as why:
             raise UnreadableRecording(f"route '{self.route}': {why}") from None
         line = tours.wandered(self._world, way, world.robot.wander, self._stream("line"))
-        for event in self.events:
-            if event.to is not None:
-                refuse_no_room(world, self._room, event.to, "events")
+        for kidnapping in self.kidnappings:
+            if kidnapping.to is not None:
+                refuse_no_room(world, self._room, kidnapping.to, "kidnappings")
         if self._lasts is not None and any(later.furniture or later.doors < 1.0 for later in world.days[self.day :]):
             raise UnreadableRecording(
                 f"route '{self.route}' lasts several days, and on one of world '{world.name}' furniture or doors move; "
                 "lamps, curtains and goods may change while the robot drives, but what it may run into may not"
             )
-        driven = drive(line, world.robot, world.timing.odometry, room=self._room, events=self.events)
+        driven = drive(line, world.robot, world.timing.odometry, room=self._room, kidnappings=self.kidnappings)
         self._seconds, self.driven, self.collisions = driven.times, driven.poses, driven.collisions
         bias = draw_bias(world.odometry, stream(world.seed, "odometry bias", self.day))
         self.rolled = odometry(driven.poses, world.odometry, bias, self._stream("odometry"), driven.rolled_to)
         self.times = self._stamps(driven.times)
-        self.lifted = [(int(self.times[row]), event) for row, event in driven.events]
+        self.lifted = [(int(self.times[row]), kidnapping) for row, kidnapping in driven.kidnappings]
         """When (ns) somebody put the robot down again, and what had been done to it."""
-        put = np.unique([row for row, _ in driven.events]).astype(np.int64)
+        put = np.unique([row for row, _ in driven.kidnappings]).astype(np.int64)
         # Up to that moment it was where its wheels had brought it: nobody flies from one place to the other
         self._true_seconds = np.insert(driven.times, put, driven.times[put])
         self.true_poses = np.insert(driven.poses, put, driven.rolled_to[put], axis=0)
@@ -203,18 +203,18 @@ class SimulatedRecording:
         return self._world.people_at(seconds, Track(self._seconds, self.driven))
 
     def digest(self) -> str:
-        """sha256 over what the drive sees of the world, the route, the day, the events and the code that renders it."""
-        return drive_digest(self.world, self.route, self.day, self.events)
+        """sha256 over what the drive sees of the world, route, day, kidnappings and the code that renders it."""
+        return drive_digest(self.world, self.route, self.day, self.kidnappings)
 
 
-def drive_digest(world: WorldConfig, route: str, day: int, events: Sequence[Event]) -> str:
-    """The digest of a drive, which need not be planned for it. `events` are in order, those of the route included.
+def drive_digest(world: WorldConfig, route: str, day: int, kidnappings: Sequence[Kidnapping]) -> str:
+    """The digest of a drive, which need not be planned for it. `kidnappings` are in order, those of the route included.
 
     The days before and after the drive do not count: drives of a day are equal whatever other days bring.
     """
     to_come = world.days[day + 1 :] if world.routes[route].day_lasts is not None else ()
     seen = dataclasses.replace(world, days=(*(Day(),) * day, world.day(day), *to_come))
-    done = json.dumps([dataclasses.asdict(event) for event in events])
+    done = json.dumps([dataclasses.asdict(kidnapping) for kidnapping in kidnappings])
     return digest_text(simulation_digest(seen), route, str(day), done)
 
 

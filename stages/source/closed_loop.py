@@ -12,7 +12,7 @@ from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator import tours
 from omninav.stages.simulator.cameras import camera_of, camera_rays, shutter_times
-from omninav.stages.simulator.config import Event, WorldConfig
+from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.obstacles import gather
 from omninav.stages.simulator.odometry import draw_bias, measured
@@ -74,7 +74,7 @@ class ClosedLoop(Source):
     seconds: Annotated[float, Bounds(gt=0)] = 60.0
     rate: Annotated[float, Bounds(ge=1)] = 5.0
     rest: Annotated[float, Bounds(ge=0)] = 1.0
-    events: tuple[Event, ...] = ()
+    kidnappings: tuple[Kidnapping, ...] = ()
 
     class Out(Outputs):
         tick: Tick
@@ -97,9 +97,9 @@ class ClosedLoop(Source):
         self._bias = draw_bias(self.world.odometry, stream(self.world.seed, "odometry bias", self.day))
         self._first = self._first_pose(world)
         refuse_no_room(self.world, self._room, self._first.tolist(), "start")
-        for event in self.events:
-            if event.to is not None:
-                refuse_no_room(self.world, self._room, event.to, "events")
+        for kidnapping in self.kidnappings:
+            if kidnapping.to is not None:
+                refuse_no_room(self.world, self._room, kidnapping.to, "kidnappings")
 
     def inputs_digest(self) -> str | None:
         """sha256 over the world and the code that simulates it."""
@@ -137,9 +137,9 @@ class ClosedLoop(Source):
         steer(robot, command.speed, command.turning, self._limits, 1.0 / self.rate, self._room, people)
         rolled = measured(between(before, robot[:3])[None], self.world.odometry, self._bias, ctx.rng)[0]
         simulation.odometry = compose(simulation.odometry, rolled)
-        for event in self.events:
-            if now - 1.0 / self.rate < event.at <= now:
-                put_down(robot, event)
+        for kidnapping in self.kidnappings:
+            if now - 1.0 / self.rate < kidnapping.at <= now:
+                put_down(robot, kidnapping)
         return Motion(*(float(value) for value in rolled))
 
     def _perceive(self, ctx: Context, simulation: ClosedLoopState, motion: Motion | None) -> Out:

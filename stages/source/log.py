@@ -13,11 +13,11 @@ from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
 from omninav.pipeline.files import digest_text
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
-from omninav.stages.recordings.cuts import Splice, as_if_driven, check_splices, crossed, spliced_frames
+from omninav.stages.recordings.cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, UnreadableRecording
 from omninav.stages.recordings.topics import Topics
-from omninav.stages.simulator.config import Event, WorldConfig
+from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
@@ -45,8 +45,8 @@ class LogSource(Source):
     """Recorded drives, one after another: a tick for every picture that can be used.
 
     `log` names one recording or several (see `open_recording`); without one, `route` of the simulated `world` is driven
-    on `day` (or one after the other on several), with `events` on its way. `first`, `stop` and `stride` select frames
-    of each. `splices`: [[60, 300]] goes on with picture 300 of each log once the first 60 are through, and odometry
+    on `day` (or one after the other on several), with `kidnappings` on its way. `first`, `stop` and `stride` select frames
+    of each. `cuts`: [[60, 300]] goes on with picture 300 of each log once the first 60 are through, and odometry
     has not noticed: a kidnapping made of a log that has none. After a pause of more than `new_log_after` seconds
     another log begins: several days may lie in one file.
     Poses are metres and radians; stamps are header stamps. `motion` is the SE(2) increment of the odometry between
@@ -60,14 +60,14 @@ class LogSource(Source):
     world: WorldConfig = DEMO
     route: str | None = None
     day: int | tuple[int, ...] = 1
-    events: tuple[Event, ...] = ()
+    kidnappings: tuple[Kidnapping, ...] = ()
     topics: Topics = Topics()
     camera: str | None = None
     layouts: tuple[str, ...] = ()
     first: Annotated[int, Bounds(ge=0)] = 0
     stop: Annotated[int, Bounds(ge=1)] | None = None
     stride: Annotated[int, Bounds(ge=1)] = 1
-    splices: tuple[Splice, ...] = ()
+    cuts: tuple[Cut, ...] = ()
     new_log_after: Annotated[float, Bounds(gt=0)] = 3600.0
     synthetic_distance_noise: Annotated[float, Bounds(ge=0.10)] = 0.10
     synthetic_turn_noise_deg_per_m: Annotated[float, Bounds(ge=3.0)] = 3.0
@@ -111,11 +111,11 @@ class LogSource(Source):
         from omninav.stages.simulator.simulated_recording import drive_digest, in_order
 
         days = in_order(self.day)
-        return digest_text(*(drive_digest(self.world, self.route, day, self.events) for day in days))
+        return digest_text(*(drive_digest(self.world, self.route, day, self.kidnappings) for day in days))
 
     def recording_name(self) -> str:
         """World, route and days of a simulated drive."""
-        return f"{self.world.name} {self.route} day {self.day}{' with events' if self.events else ''}"
+        return f"{self.world.name} {self.route} day {self.day}{' with kidnappings' if self.kidnappings else ''}"
 
     def record(self, ctx: Context, folder: Path) -> None:
         """Write a simulated drive as an MCAP log, with camera.yaml, floor plan and grid beside it."""
@@ -123,11 +123,11 @@ class LogSource(Source):
 
         assert self.route is not None
         log = str(folder / DRIVE)
-        RecordLog(log=log, world=self.world, route=self.route, day=self.day, events=self.events).step(ctx)
+        RecordLog(log=log, world=self.world, route=self.route, day=self.day, kidnappings=self.kidnappings).step(ctx)
 
     def replay(self, folder: Path) -> dict[str, Any]:
         """Read the log in place of the world that it is of."""
-        return {"log": str(folder / DRIVE), "world": None, "route": None, "day": None, "events": None}
+        return {"log": str(folder / DRIVE), "world": None, "route": None, "day": None, "kidnappings": None}
 
     def step(self, ctx: Context, position: LogSourceState) -> Out | None:
         """The next picture that can be used; None after the last."""
@@ -202,24 +202,24 @@ class LogSource(Source):
             )
 
             days = in_order(self.day)
-            recordings = [SimulatedRecording(self.world, self.route, day, self.events) for day in days]
+            recordings = [SimulatedRecording(self.world, self.route, day, self.kidnappings) for day in days]
         elif not names or None in names:
             raise UnreadableRecording("no recording is named; type log=PATH")
         else:
             recordings = [open_recording(str(name), self.topics, self.camera, self.layouts) for name in names]
         self._recordings, self._frames, self._told = [], [], []
         for recording in recordings:
-            check_splices(self.splices, len(recording.stamps), recording.name)
-            frames = spliced_frames(self.splices, len(recording.stamps))[self.first : self.stop : self.stride]
+            check_cuts(self.cuts, len(recording.stamps), recording.name)
+            frames = remaining_frames(self.cuts, len(recording.stamps))[self.first : self.stop : self.stride]
             if not len(frames):
                 raise UnreadableRecording(
                     f"{recording.name}: first={self.first}, stop={self.stop} leaves none of its frames; "
                     "type nodes.source.first=0 nodes.source.stop=null"
                 )
             poses = recording.truth if recording.odometry is None else recording.odometry
-            told = np.empty((0, 3)) if poses is None else as_if_driven(poses, self.splices)
+            told = np.empty((0, 3)) if poses is None else as_if_driven(poses, self.cuts)
             pauses = np.diff(recording.stamps[frames]) > self.new_log_after * 1e9
-            pauses &= ~crossed(self.splices, frames)
+            pauses &= ~crossed(self.cuts, frames)
             for part in np.split(frames, np.flatnonzero(pauses) + 1):
                 self._recordings.append(recording)
                 self._frames.append(part)

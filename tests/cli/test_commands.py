@@ -301,7 +301,7 @@ def test_the_trajectory_is_in_tum_format_with_ascending_header_stamps(demo: Path
 def test_who_lifts_the_robot_on_its_drive_does_not_lift_it_on_its_tour():
     from omninav.pipeline.cli.main import _composed, complete
 
-    with _composed(["events=[{at: 30.0, turn: 1.5}]"]) as config:
+    with _composed(["kidnappings=[{at: 30.0, turn: 1.5}]"]) as config:
         plain = complete(config)
-    assert plain["nodes"]["source"]["events"] == [{"at": 30.0, "turn": 1.5}]
-    assert plain["artifacts"]["map"]["graph"]["nodes"]["source"]["events"] == []
+    assert plain["nodes"]["source"]["kidnappings"] == [{"at": 30.0, "turn": 1.5}]
+    assert plain["artifacts"]["map"]["graph"]["nodes"]["source"]["kidnappings"] == []

@@ -48,10 +48,10 @@ def test_what_cannot_be_exchanged_is_explained_before_anything_runs(words: tuple
 
 def test_who_is_carried_on_its_drive_is_not_carried_on_its_tour():
     with initialize_config_module("omninav.conf", version_base="1.3"):
-        config = complete(compose("config", overrides=["variant=retrieval_mcl", "splices=[[3,6]]"]))
-    assert config["nodes"]["source"]["splices"] == [[3, 6]]
+        config = complete(compose("config", overrides=["variant=retrieval_mcl", "cuts=[[3,6]]"]))
+    assert config["nodes"]["source"]["cuts"] == [[3, 6]]
     for name in ("map", "album"):
-        assert config["artifacts"][name]["graph"]["nodes"]["source"]["splices"] == []
+        assert config["artifacts"][name]["graph"]["nodes"]["source"]["cuts"] == []
 
 
 @needs_data

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from omninav.stages.geometry.plane.se2 import between
-from omninav.stages.simulator.config import Event, Ranges, Robot
+from omninav.stages.simulator.config import Kidnapping, Ranges, Robot
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.obstacles import Obstacles, beam, gather, nearest
 from omninav.stages.simulator.ranges import measure
@@ -137,7 +137,7 @@ def test_commands_are_followed_within_the_limits():
 
 def test_a_robot_that_was_lifted_and_turned_goes_on_and_its_wheels_know_nothing_of_it():
     line = ((1.0, 2.0), (8.0, 2.0))
-    driven = drive(line, ROBOT, 20.0, room=hall(), events=[Event(at=5.0, turn=1.0)])
+    driven = drive(line, ROBOT, 20.0, room=hall(), kidnappings=[Kidnapping(at=5.0, turn=1.0)])
     jump = np.flatnonzero((driven.poses != driven.rolled_to).any(axis=1))
     assert jump.tolist() == [100]
     np.testing.assert_allclose(between(driven.rolled_to[100], driven.poses[100]), [0.0, 0.0, 1.0], atol=1e-12)
@@ -147,7 +147,7 @@ def test_a_robot_that_was_lifted_and_turned_goes_on_and_its_wheels_know_nothing_
 def test_a_kidnapped_robot_goes_on_from_the_nearest_point_of_its_route():
     line = ((1.0, 2.0), (8.0, 2.0), (8.0, 6.0), (1.0, 6.0))
     whole = drive(line, ROBOT, 20.0, room=hall())
-    driven = drive(line, ROBOT, 20.0, room=hall(), events=[Event(at=5.0, to=(4.0, 6.0, 3.0))])
+    driven = drive(line, ROBOT, 20.0, room=hall(), kidnappings=[Kidnapping(at=5.0, to=(4.0, 6.0, 3.0))])
     np.testing.assert_allclose(driven.poses[100], [4.0, 6.0, 3.0])
     np.testing.assert_allclose(driven.poses[-1, :2], (1.0, 6.0), atol=0.15)
     assert len(driven.times) < 0.5 * len(whole.times)
@@ -157,14 +157,18 @@ def test_a_kidnapped_robot_goes_on_from_the_nearest_point_of_its_route():
 
 def test_what_happens_at_one_moment_happens_in_its_order_and_what_comes_too_late_does_not():
     line = ((1.0, 2.0), (3.0, 2.0))
-    late, one, other = Event(at=500.0, turn=1.0), Event(at=2.0, to=(2.0, 2.0, 0.0)), Event(at=2.0, turn=-0.5)
-    driven = drive(line, ROBOT, 20.0, room=hall(), events=[late, one, other])
-    assert driven.events == ((40, one), (40, other))
+    late, one, other = (
+        Kidnapping(at=500.0, turn=1.0),
+        Kidnapping(at=2.0, to=(2.0, 2.0, 0.0)),
+        Kidnapping(at=2.0, turn=-0.5),
+    )
+    driven = drive(line, ROBOT, 20.0, room=hall(), kidnappings=[late, one, other])
+    assert driven.kidnappings == ((40, one), (40, other))
     np.testing.assert_allclose(driven.poses[40], [2.0, 2.0, -0.5])
     assert driven.rolled_to[40, 0] < 1.9
 
 
 def test_nothing_done_to_a_robot_is_an_event_too():
-    driven = drive(((1.0, 2.0), (3.0, 2.0)), ROBOT, 20.0, room=hall(), events=[Event(at=1.0)])
-    assert [row for row, _ in driven.events] == [20]
+    driven = drive(((1.0, 2.0), (3.0, 2.0)), ROBOT, 20.0, room=hall(), kidnappings=[Kidnapping(at=1.0)])
+    assert [row for row, _ in driven.kidnappings] == [20]
     np.testing.assert_array_equal(driven.poses, driven.rolled_to)

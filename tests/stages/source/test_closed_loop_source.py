@@ -13,7 +13,7 @@ from omninav.stages.control.clearance import free_ahead, roomier_side
 from omninav.stages.control.wall_avoider import WallAvoider, WallAvoiderState
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator.cameras import shutter_times
-from omninav.stages.simulator.config import Delivery, Event, OdometryNoise, Ranges, Sensor, WorldConfig, mirror
+from omninav.stages.simulator.config import Delivery, Kidnapping, OdometryNoise, Ranges, Sensor, WorldConfig, mirror
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.robot import around, steer
@@ -110,7 +110,7 @@ def test_its_ranges_are_those_of_the_world_around_it():
 
 
 def test_somebody_who_lifts_it_is_not_seen_by_its_wheels():
-    loop = Loop(world=EXACT, start=(1.5, 1.3, 0.0), events=(Event(at=1.0, to=(9.5, 7.3, 0.0)),))
+    loop = Loop(world=EXACT, start=(1.5, 1.3, 0.0), kidnappings=(Kidnapping(at=1.0, to=(9.5, 7.3, 0.0)),))
     outs = [loop.step(Command(0.2, 0.0)) for _ in range(9)]
     before, after = outs[4], outs[5]
     assert before is not None
@@ -237,5 +237,5 @@ def test_a_place_without_room_is_refused():
     said = r"start: 3.7, 2.9 of world 'home_store_demo' is 0\.00 m from an obstacle, and the robot's radius is 0\.25 m"
     with pytest.raises(UnreadableRecording, match=said):
         Loop(start=(3.7, 2.9, 0.0))
-    with pytest.raises(UnreadableRecording, match=r"events: 0\.1, 0\.1 of world"):
-        Loop(events=(Event(at=1.0, to=(0.1, 0.1, 0.0)),))
+    with pytest.raises(UnreadableRecording, match=r"kidnappings: 0\.1, 0\.1 of world"):
+        Loop(kidnappings=(Kidnapping(at=1.0, to=(0.1, 0.1, 0.0)),))

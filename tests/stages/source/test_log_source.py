@@ -174,36 +174,34 @@ def test_what_was_lost_at_opening_is_counted_once(tmp_path: Path) -> None:
     assert len(outs) == source.length()
 
 
-def test_a_splice_leaves_the_middle_out_and_odometry_does_not_notice(tmp_path: Path) -> None:
+def test_a_cut_leaves_the_middle_out_and_odometry_does_not_notice(tmp_path: Path) -> None:
     log = str(write_mcap(tmp_path / "log.mcap"))
-    whole, carried = drive(LogSource(log=log)), drive(LogSource(log=log, splices=((3, 6),)))
+    whole, carried = drive(LogSource(log=log)), drive(LogSource(log=log, cuts=((3, 6),)))
     assert [out.tick.frame for out in carried] == [0, 1, 2, *range(6, FRAMES)]
     assert [out.tick.first_of_log for out in carried] == [True] + [False] * (FRAMES - 4)
     np.testing.assert_array_equal(row(carried[3].truth), row(whole[6].truth))
-    for spliced, out in zip(carried[3:], whole[6:], strict=True):
-        np.testing.assert_allclose(row(spliced.motion), row(out.motion), atol=1e-12)
+    for after_cut, out in zip(carried[3:], whole[6:], strict=True):
+        np.testing.assert_allclose(row(after_cut.motion), row(out.motion), atol=1e-12)
     pose = row(carried[0].odometry)
     for out in carried[1:]:
         pose = compose(pose, row(out.motion))
         np.testing.assert_allclose(pose, row(out.odometry), atol=1e-12)
 
 
-def test_a_splice_over_hours_is_no_new_log_but_a_pause_is(tmp_path: Path) -> None:
+def test_a_cut_over_hours_is_no_new_log_but_a_pause_is(tmp_path: Path) -> None:
     log = str(write_mcap(tmp_path / "log.mcap"))
-    assert [out.tick.log for out in drive(LogSource(log=log, splices=((3, 6),), new_log_after=1.0))] == [0] * (
-        FRAMES - 3
-    )
+    assert [out.tick.log for out in drive(LogSource(log=log, cuts=((3, 6),), new_log_after=1.0))] == [0] * (FRAMES - 3)
     assert drive(LogSource(log=log, new_log_after=0.1))[-1].tick.log == FRAMES - 1
 
 
 def test_made_up_odometry_does_not_notice_a_splice_either(tmp_path: Path) -> None:
     log = str(write_mcap(tmp_path / "log.mcap", without(ODOMETRY)))
-    whole, carried = drive(LogSource(log=log)), drive(LogSource(log=log, splices=((2, 5),)))
-    # the same way, each with its own noise: a splice taken for motion would be as long as three pictures' way
+    whole, carried = drive(LogSource(log=log)), drive(LogSource(log=log, cuts=((2, 5),)))
+    # the same way, each with its own noise: a cut taken for motion would be as long as three pictures' way
     assert math.hypot(*row(carried[2].motion)[:2]) < 2 * math.hypot(*row(whole[5].motion)[:2])
 
 
-@pytest.mark.parametrize("splices", [((0, 5),), ((5, 5),), ((5, 400),), ((3, 6), (4, 8))])
-def test_a_splice_that_does_not_lead_onwards_is_refused(tmp_path: Path, splices: tuple[tuple[int, int], ...]) -> None:
+@pytest.mark.parametrize("cuts", [((0, 5),), ((5, 5),), ((5, 400),), ((3, 6), (4, 8))])
+def test_a_cut_that_does_not_lead_onwards_is_refused(tmp_path: Path, cuts: tuple[tuple[int, int], ...]) -> None:
     with pytest.raises(UnreadableRecording, match="does not lead onwards"):
-        drive(LogSource(log=str(write_mcap(tmp_path / "log.mcap")), splices=splices))
+        drive(LogSource(log=str(write_mcap(tmp_path / "log.mcap")), cuts=cuts))

@@ -14,7 +14,7 @@ from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.recordings.topics import Topics
-from omninav.stages.simulator.config import Day, Delivery, Event, OdometryNoise, Route, Sensor, mirror
+from omninav.stages.simulator.config import Day, Delivery, Kidnapping, OdometryNoise, Route, Sensor, mirror
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.record_log import RecordLog
 from omninav.stages.simulator.renderer import render
@@ -30,7 +30,7 @@ WORLD = replace(
     routes={"there": Route(waypoints=((2.0, 1.5), (6.0, 1.5)))},
     delivery=Delivery(dropped=0.15, late=0.2, late_by=0.7),
 )
-KIDNAPPED = (Event(at=3.03, turn=1.0), Event(at=5.0, to=(5.0, 1.4, 0.2)))
+KIDNAPPED = (Kidnapping(at=3.03, turn=1.0), Kidnapping(at=5.0, to=(5.0, 1.4, 0.2)))
 EXACT = replace(WORLD, odometry=OdometryNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), delivery=Delivery())
 
 
@@ -41,7 +41,7 @@ def drive() -> SimulatedRecording:
 
 @pytest.fixture(scope="module")
 def log(drive: SimulatedRecording, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("events") / "drive.mcap"
+    path = tmp_path_factory.mktemp("kidnappings") / "drive.mcap"
     record(drive, path)
     return path
 
@@ -58,10 +58,10 @@ def test_a_lifted_robot_is_elsewhere_in_the_truth_and_nowhere_else():
 
 
 def test_a_routes_own_events_come_with_it_and_others_on_top():
-    route = replace(EXACT.routes["there"], events=KIDNAPPED[:1])
+    route = replace(EXACT.routes["there"], kidnappings=KIDNAPPED[:1])
     drive = SimulatedRecording(replace(EXACT, routes={"there": route}), "there", 1, KIDNAPPED[1:])
     whole = SimulatedRecording(EXACT, "there", 1, KIDNAPPED)
-    assert drive.events == KIDNAPPED
+    assert drive.kidnappings == KIDNAPPED
     np.testing.assert_array_equal(drive.driven, whole.driven)
 
 
@@ -70,7 +70,8 @@ def test_who_is_put_down_beside_laps_goes_on_with_the_lap_that_was_begun():
     laps = Route(kind="laps", waypoints=((2.0, 1.5), (5.0, 1.5), (5.0, 5.5)), laps=3)
     world = replace(EXACT, shelves=(), blocks=(), hangings=(), routes={"laps": laps})
     plain, carried = (
-        SimulatedRecording(world, "laps", 1, events) for events in ((), (Event(at=4.0, to=(5.0, 4.5, 1.57)),))
+        SimulatedRecording(world, "laps", 1, kidnappings)
+        for kidnappings in ((), (Kidnapping(at=4.0, to=(5.0, 4.5, 1.57)),))
     )
     way = [float(np.hypot(*np.diff(drive.rolled[:, :2], axis=0).T).sum()) for drive in (plain, carried)]
     assert 2.0 < way[0] - way[1] < 6.0  # what it was carried over, but no lap
@@ -101,7 +102,7 @@ def test_what_a_robot_may_run_into_does_not_change_while_it_drives():
 
 def test_no_picture_is_taken_on_the_way_from_one_place_to_the_other():
     pictures = replace(EXACT, timing=replace(EXACT.timing, pictures=100.0))
-    drive = SimulatedRecording(pictures, "there", 1, (Event(at=5.0, to=(5.0, 1.4, 0.2)),))
+    drive = SimulatedRecording(pictures, "there", 1, (Kidnapping(at=5.0, to=(5.0, 1.4, 0.2)),))
     steps = np.hypot(*np.diff(drive.truth[:, :2], axis=0).T)
     assert (steps > 0.01).sum() == 1
 
@@ -112,9 +113,9 @@ def test_a_log_holds_truth_up_to_the_leap_and_from_it_on(drive: SimulatedRecordi
     np.testing.assert_array_equal(found.stamps, drive.stamps)
     np.testing.assert_allclose(found.truth, drive.truth, atol=1e-9)  # type: ignore[arg-type]
     np.testing.assert_allclose(found.odometry, drive.odometry, atol=1e-9)  # type: ignore[arg-type]
-    events = [json.loads(message.content.data) for message in LogReader(log).messages(["/ground_truth/event"])]
-    assert [event["at"] for event in events] == [3.03, 5.0]
-    assert events[1]["to"] == [5.0, 1.4, 0.2]
+    kidnappings = [json.loads(message.content.data) for message in LogReader(log).messages(["/ground_truth/event"])]
+    assert [kidnapping["at"] for kidnapping in kidnappings] == [3.03, 5.0]
+    assert kidnappings[1]["to"] == [5.0, 1.4, 0.2]
 
 
 def test_lost_pictures_are_missing_and_overtaken_ones_are_counted(drive: SimulatedRecording, log: Path):
@@ -213,7 +214,7 @@ def test_days_that_cannot_be_are_refused():
 def test_what_a_written_log_states_does_not_count_the_metres_it_was_carried(tmp_path: Path) -> None:
     """Wheels without errors know how far they rolled, and nothing of being lifted."""
     said = Context("record")
-    RecordLog(world=EXACT, route="there", day=(0, 1), log=str(tmp_path / "out.mcap"), events=KIDNAPPED).step(said)
+    RecordLog(world=EXACT, route="there", day=(0, 1), log=str(tmp_path / "out.mcap"), kidnappings=KIDNAPPED).step(said)
     drives = [SimulatedRecording(EXACT, "there", day, KIDNAPPED) for day in (0, 1)]
     rolled = sum(np.hypot(*np.diff(drive.rolled[:, :2], axis=0).T).sum() for drive in drives)
     jumped = sum(np.hypot(*np.diff(drive.true_poses[:, :2], axis=0).T).sum() for drive in drives)
