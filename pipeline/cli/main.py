@@ -544,7 +544,8 @@ def _check_experiment(run: "ExperimentRun") -> int:
 
 def _graph(arguments: list[str]) -> int:
     from omninav.pipeline.files import write_whole
-    from omninav.pipeline.report.graph_drawing import mermaid, svg
+    from omninav.pipeline.report.graph_svg import svg
+    from omninav.pipeline.report.mermaid import mermaid
     from omninav.pipeline.run.run import plan
 
     from .overrides import search

@@ -271,10 +271,8 @@ def start(planned: Plan, argv: Sequence[str], folder: Path | None = None) -> Run
         "libraries": {name: version(name) for name in LIBRARIES},
     }
     write_whole(beginning / "config.yaml", yaml.safe_dump(dict(config), sort_keys=False, allow_unicode=True, width=120))
-    from omninav.pipeline.report.graph_drawing import (  # drawing is not needed to start the command line
-        mermaid,
-        svg,
-    )
+    from omninav.pipeline.report.graph_svg import svg  # drawing is not needed to start the command line
+    from omninav.pipeline.report.mermaid import mermaid
 
     write_whole(beginning / "graph.svg", svg(planned.graph))
     write_whole(beginning / "graph.mmd", mermaid(planned.graph))

@@ -7,7 +7,7 @@ from omninav.pipeline.graph.graph import build
 from omninav.pipeline.graph.ground_truth import steering, truth_readers
 from omninav.pipeline.graph.problems import ProblemsFound
 from omninav.pipeline.graph.signature import signature
-from omninav.pipeline.report.graph_drawing import mermaid
+from omninav.pipeline.report.mermaid import mermaid
 
 NODES = {"source": "Steered", "stop": "Constant", "driving": "Scale", "scored": "Scale", "all": "Collected"}
 WIRES = {

@@ -6,7 +6,8 @@ import pytest
 from omninav.pipeline.graph.graph import Graph, Node, Wire
 from omninav.pipeline.graph.signature import Parameter, Port, Signature
 from omninav.pipeline.graph.stage import Stage
-from omninav.pipeline.report.graph_drawing import mermaid, svg
+from omninav.pipeline.report.graph_svg import svg
+from omninav.pipeline.report.mermaid import mermaid
 
 
 def graph(nodes: dict[str, tuple[str, str]], wires: list[str], **more: Wire) -> Graph:

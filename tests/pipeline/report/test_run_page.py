@@ -109,9 +109,9 @@ def test_pictures_are_inside_the_page_in_their_order(tmp_path):
     assert SVG in page
 
 
-def test_a_film_is_inside_the_page_and_can_be_stepped_through(tmp_path):
-    film = Figure("film", "The drive", "Frame by frame.", b"not really a film", "video/mp4", per_second=8.0)
-    page = report(tmp_path, figures=(PICTURE, film))
+def test_a_video_is_inside_the_page_and_can_be_stepped_through(tmp_path):
+    video = Figure("video", "The drive", "Frame by frame.", b"not really a video", "video/mp4", per_second=8.0)
+    page = report(tmp_path, figures=(PICTURE, video))
     assert 'src="data:video/mp4;base64,' in page
     assert 'data-per-second="8.0"' in page
     assert page.count("<script>") == 1
@@ -134,7 +134,7 @@ def test_a_filter_that_never_converged_is_said_to_have_never_done_so(tmp_path):
 
 def test_several_logs_have_a_line_each(tmp_path):
     said = text_of(report(tmp_path, metrics=measured(logs=[VALUES, {"frames": 7}])))
-    assert "Log by log" in said
+    assert "Per log" in said
     assert "1 7 – –" in said
 
 
