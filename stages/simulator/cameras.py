@@ -15,7 +15,7 @@ from .config import Sensor, WorldConfig
 F64 = npt.NDArray[np.float64]
 
 
-RAYS_TO_A_WEDGE = 200
+RAYS_PER_WEDGE = 200
 """About how many rays share one look around: fewer looks for more rays cost less, but each finds more bodies."""
 
 
@@ -58,11 +58,11 @@ def shutter_times(sensor: Sensor, at: float) -> F64:
     return parts
 
 
-DECK = 0.45
+DECK_HEIGHT_M = 0.45
 """Height (m) of the robot's deck: in the ordinary mirror it just fills the middle that is masked."""
-HOUSING = 0.02
+HOUSING_RADIUS_M = 0.02
 """Radius (m) of the camera below the mirror."""
-HANGS = 0.073
+LENS_BELOW_FOCUS_M = 0.073
 """Distance (m) of the camera's lens below the mirror's focus."""
 
 
@@ -113,21 +113,20 @@ def _own_body(directions: F64, radius: float, camera: Camera) -> F64:
     """
     colours = np.full(directions.shape, np.nan)
     height = camera.height
-    if radius <= 0.0 or height is None or height <= DECK:
+    if radius <= 0.0 or height is None or height <= DECK_HEIGHT_M:
         return colours
     with np.errstate(invalid="ignore", divide="ignore"):
         level = np.hypot(directions[..., 0], directions[..., 1]) / np.maximum(-directions[..., 2], 1e-9)
         azimuth = np.arctan2(directions[..., 1], directions[..., 0])
-        off = level * (height - DECK)
+        off = level * (height - DECK_HEIGHT_M)
         deck = off < radius
         colours[deck] = (95.0, 82.0, 70.0)
         colours[deck & (off > 0.88 * radius)] = (38.0, 36.0, 34.0)
         colours[deck & (np.abs(azimuth) < 0.2)] = (40.0, 60.0, 205.0)
         if camera.sees_itself:
-            off = level * HANGS
-            for edge, colour in ((HOUSING, (46.0, 44.0, 42.0)), (0.6 * HOUSING, (120.0, 118.0, 115.0)),
-                                 (0.5 * HOUSING, (40.0, 22.0, 18.0))):  # fmt: skip
-                colours[off < edge] = colour
+            off = level * LENS_BELOW_FOCUS_M
+            for share, colour in ((1.0, (46.0, 44.0, 42.0)), (0.6, (120.0, 118.0, 115.0)), (0.5, (40.0, 22.0, 18.0))):
+                colours[off < share * HOUSING_RADIUS_M] = colour
     return colours
 
 
@@ -140,7 +139,7 @@ def _wedges(directions: F64) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int3
     if len(columns) * 16 <= len(azimuth):  # a strip: all rays of a column look one way
         return _gathered(number, columns[number] * 1e-5, azimuth, slope)
     taken = len(np.unique(np.floor(azimuth * 180.0 / math.pi))) / 360.0
-    count = max(8, round(len(azimuth) / RAYS_TO_A_WEDGE / taken))
+    count = max(8, round(len(azimuth) / RAYS_PER_WEDGE / taken))
     around = 2.0 * math.pi / count
     number = np.round((azimuth - azimuth[0]) / around)
     return _gathered(np.mod(number.astype(np.int64), count), azimuth[0] + number * around, azimuth, slope)

@@ -1,6 +1,6 @@
 """What a world is made of, as typed configuration. `WorldConfig()` is an empty hall, `demo.DEMO` a small home store.
 
-Bodies are listed one by one (shelves, blocks, hangings, lamps) or by the dozen (aisle blocks, rooms, a lamp grid);
+Bodies are listed one by one (shelves, blocks, wall_panels, lamps) or by the dozen (aisle blocks, rooms, a lamp grid);
 `layout.expand` turns these into such lists. Metres and radians in the map frame (x right and y up on the map, z up, the
 floor at 0) unless a field says otherwise.
 """
@@ -89,7 +89,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Hanging:
+class WallPanel:
     """A poster, sign, window or door against a wall: its middle on the wall, the way it faces, and what is on it."""
 
     centre: Point
@@ -182,7 +182,7 @@ class Room:
     windows: tuple[Side, ...] = ()
     """Sides with a row of windows; each has a curtain."""
     furniture: Furniture = "none"
-    amount: Share = 0.6
+    furniture_density: Share = 0.6
     """Share of the places for furniture that are taken."""
     walls: bool = True
     wall: Material = "plaster"
@@ -210,7 +210,7 @@ class Kidnapping:
 
 @dataclass(frozen=True)
 class Route:
-    """A way through a world; `tours.plan` makes it a line of points around whatever stands in between.
+    """A way through a world; `route_planning.plan` makes it a line of points around whatever stands in between.
 
     `waypoints` goes through the given points, `laps` round them. `aisles` goes through every aisle of the blocks named
     in `through` (all where empty), `rooms` to every room named there that can be reached, `random` from one free
@@ -223,14 +223,14 @@ class Route:
     through: tuple[str, ...] = ()
     laps: Annotated[int, Bounds(ge=1)] = 1
     """Of `laps`: times around; of `aisles`: times through each, there and back by turns."""
-    first: tuple[Point, ...] = ()
+    lead_in: tuple[Point, ...] = ()
     """Of `laps`: points that it goes through before."""
     length: Positive | None = None
     """Metres after which it ends; all the way where null."""
     seed: int = 0
     kidnappings: tuple[Kidnapping, ...] = ()
     """What is done to the robot on this route, each time that it is driven."""
-    day_lasts: Positive | None = None
+    day_duration_s: Positive | None = None
     """Seconds after which lamps, curtains and goods are the next day's, while the robot drives on; null: never."""
 
 
@@ -267,7 +267,7 @@ class Robot:
     turn_acceleration: Positive = 2.0
     look_ahead: Positive = 0.45
     """Distance (m) along the route of the point that is steered for."""
-    wander: Spread = 0.04
+    path_jitter_m: Spread = 0.04
     """Spread (m) of each day's line, drawn every 2.5 m: as a root mean square over the way it comes to 0.78 of it."""
     contact: Literal["slide", "hold"] = "slide"
     """What a robot does that is steered into an obstacle: it slides along it, or is held where it is."""
@@ -331,7 +331,7 @@ class Sensor:
 class Timing:
     """Rates (Hz) of pictures and of odometry and truth."""
 
-    pictures: Positive = 2.0
+    images: Positive = 2.0
     odometry: Positive = 20.0
 
 
@@ -343,13 +343,13 @@ class Ranges:
     """
 
     readings: Annotated[int, Bounds(ge=1)] = 16
-    beam: Positive = 0.26
+    beam_width: Positive = 0.26
     """Opening angle (rad) of a cone, 15 degrees."""
-    farthest: Positive = 4.0
+    max_range: Positive = 4.0
     """Metres; there is no echo from further away."""
     noise: Spread = 0.01
     """Standard deviation (m) of an echo."""
-    lost: Share = 0.02
+    dropout: Share = 0.02
     """Share of readings without an echo though something is there."""
     rate: Positive = 5.0
     """Readings (Hz) of the whole ring in a log."""
@@ -357,11 +357,11 @@ class Ranges:
 
 @dataclass(frozen=True)
 class Delivery:
-    """What happens to pictures on their way into the log: a share is lost, a share arrives `late_by` seconds late."""
+    """What happens to pictures on their way into the log: a share is lost, a share arrives `delay_s` seconds late."""
 
     dropped: Share = 0.0
     late: Share = 0.0
-    late_by: Spread = 0.7
+    delay_s: Spread = 0.7
 
 
 @dataclass(frozen=True)
@@ -384,7 +384,7 @@ class WorldConfig:
     lamp_grid: LampGrid | None = None
     shelves: tuple[Shelf, ...] = ()
     blocks: tuple[Block, ...] = ()
-    hangings: tuple[Hanging, ...] = ()
+    wall_panels: tuple[WallPanel, ...] = ()
     lamps: tuple[Lamp, ...] = ()
     ambient: Annotated[float, Bounds(ge=0, lt=1)] = 0.45
     """Share of the light that comes from all around; lamps and windows give the rest."""

@@ -1,6 +1,6 @@
 """The world that comes embedded: a small home store, 12 x 9 m, the same as `conf/world/home_store_demo.yaml`."""
 
-from .config import Block, Hanging, LampGrid, Route, Shelf, WorldConfig
+from .config import Block, LampGrid, Route, Shelf, WallPanel, WorldConfig
 
 
 def _shelves() -> tuple[Shelf, ...]:
@@ -24,22 +24,22 @@ def _blocks() -> tuple[Block, ...]:
     )
 
 
-def _hangings() -> tuple[Hanging, ...]:
+def _wall_panels() -> tuple[WallPanel, ...]:
     east, north, west, south = 0.0, 1.5707963267948966, 3.141592653589793, -1.5707963267948966
     return (
-        Hanging((0.0, 1.9), east, 1.0, 0.0, 2.1, "door"),
-        Hanging((0.0, 4.2), east, 1.2, 1.0, 1.0),
-        Hanging((0.0, 8.0), east, 0.8, 1.1, 1.1),
-        Hanging((1.6, 0.0), north, 1.0, 1.0, 1.2),
-        Hanging((3.6, 0.0), north, 1.4, 1.1, 0.9),
-        Hanging((5.4, 0.0), north, 0.8, 0.9, 1.3),
-        Hanging((7.6, 0.0), north, 1.6, 0.8, 1.4, "window"),
-        Hanging((9.9, 0.0), north, 1.0, 0.0, 2.1, "door"),
-        Hanging((12.0, 3.6), west, 1.2, 1.1, 1.2),
-        Hanging((12.0, 5.6), west, 1.8, 0.0, 2.2, "door"),
-        Hanging((1.4, 9.0), south, 1.0, 1.0, 1.3),
-        Hanging((9.4, 9.0), south, 1.4, 0.9, 1.2, "window"),
-        Hanging((10.9, 9.0), south, 0.7, 1.2, 1.0),
+        WallPanel((0.0, 1.9), east, 1.0, 0.0, 2.1, "door"),
+        WallPanel((0.0, 4.2), east, 1.2, 1.0, 1.0),
+        WallPanel((0.0, 8.0), east, 0.8, 1.1, 1.1),
+        WallPanel((1.6, 0.0), north, 1.0, 1.0, 1.2),
+        WallPanel((3.6, 0.0), north, 1.4, 1.1, 0.9),
+        WallPanel((5.4, 0.0), north, 0.8, 0.9, 1.3),
+        WallPanel((7.6, 0.0), north, 1.6, 0.8, 1.4, "window"),
+        WallPanel((9.9, 0.0), north, 1.0, 0.0, 2.1, "door"),
+        WallPanel((12.0, 3.6), west, 1.2, 1.1, 1.2),
+        WallPanel((12.0, 5.6), west, 1.8, 0.0, 2.2, "door"),
+        WallPanel((1.4, 9.0), south, 1.0, 1.0, 1.3),
+        WallPanel((9.4, 9.0), south, 1.4, 0.9, 1.2, "window"),
+        WallPanel((10.9, 9.0), south, 0.7, 1.2, 1.0),
     )
 
 
@@ -70,7 +70,7 @@ DEMO = WorldConfig(
     name="home_store_demo",
     shelves=_shelves(),
     blocks=_blocks(),
-    hangings=_hangings(),
+    wall_panels=_wall_panels(),
     lamp_grid=LampGrid(),
     routes=_routes(),
 )

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 
-from .config import AisleBlock, Block, Hanging, Lamp, LampGrid, Point, Room, Shelf, WorldConfig
+from .config import AisleBlock, Block, Lamp, LampGrid, Point, Room, Shelf, WallPanel, WorldConfig
 from .rooms import doors, furnish, openings, roof, walls, windows
 from .streams import stream
 
@@ -24,7 +24,7 @@ class Layout:
 
     shelves: tuple[Shelf, ...]
     blocks: tuple[Block, ...]
-    hangings: tuple[Hanging, ...]
+    wall_panels: tuple[WallPanel, ...]
     lamps: tuple[Lamp, ...]
     aisles: tuple[Aisle, ...]
 
@@ -40,20 +40,20 @@ def expand(config: WorldConfig, day: int = 0) -> Layout:
         aisles += between
     if config.lamp_grid is not None:
         lamps += _lamp_grid(config.lamp_grid, (0.0, 0.0), config.size)
-    hangings, today, cuts = list(config.hangings), config.day(day), openings(config)
+    wall_panels, today, cuts = list(config.wall_panels), config.day(day), openings(config)
     for room in config.rooms:
         lamps += _room_lamps(config, room)
         if room.walls:
             blocks += walls(config, room, cuts) + roof(config, room) + doors(config, room, today, day)
-            hangings += windows(room)
+            wall_panels += windows(room)
         fittings = furnish(config, room, cuts, today, day)
         blocks += fittings.blocks
-        hangings += fittings.hangings
-    hangings = [_curtained(config, hanging, k, day) for k, hanging in enumerate(hangings)]
-    return Layout(tuple(shelves), tuple(blocks), tuple(hangings), tuple(lamps), tuple(aisles))
+        wall_panels += fittings.wall_panels
+    wall_panels = [_curtained(config, hanging, k, day) for k, hanging in enumerate(wall_panels)]
+    return Layout(tuple(shelves), tuple(blocks), tuple(wall_panels), tuple(lamps), tuple(aisles))
 
 
-def _curtained(config: WorldConfig, hanging: Hanging, number: int, day: int) -> Hanging:
+def _curtained(config: WorldConfig, hanging: WallPanel, number: int, day: int) -> WallPanel:
     """A window with its curtain closed, where the day has it so."""
     if hanging.material != "window":
         return hanging

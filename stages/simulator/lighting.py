@@ -9,29 +9,29 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from .config import Day, Hanging, Lamp, WorldConfig
+from .config import Day, Lamp, WallPanel, WorldConfig
 from .streams import stream
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 
-REACH = 12.0
+LIGHT_RANGE_M = 12.0
 """Distance (m) beyond which a light adds nothing: what little would come from there is part of the ambient light."""
-SOFT = 0.25
+LIGHT_SIZE_M2 = 0.25
 """Square (m) of the extent of a light: close by it is no point."""
-SPREAD = 2.5
+BOUNCE_SIGMA_M = 2.5
 """How far (m, one sigma) light that is thrown back spreads."""
-CLOSE = 0.15
+CONTACT_SHADOW_M = 0.15
 """Distance (m) over which a body darkens the floor beside it."""
 DAYLIGHT = (1.1, 1.0, 0.92)
 """Colour of the sky: blue, green, red."""
-SKY_STEP = 4.0
+SKY_LIGHT_SPACING_M = 4.0
 """Distance (m) of the lamps that an open sky is made of."""
-THROUGH_CURTAINS = 0.06
+CURTAIN_TRANSMISSION = 0.06
 """Share of the light that passes a closed curtain."""
-FACES = np.array([(0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], dtype=np.float64)
+FACE_NORMALS = np.array([(0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], dtype=np.float64)
 """Ways that lit faces look: up, +x, -x, +y, -y."""
-HEIGHTS = np.array([0.0, 1.0, 1.0, 1.0, 1.0])
+FACE_HEIGHTS_M = np.array([0.0, 1.0, 1.0, 1.0, 1.0])
 """Height (m) at which the light on each is taken."""
 
 
@@ -50,7 +50,7 @@ class Light:
 
 
 def lamps_and_windows(
-    lamps: Sequence[Lamp], hangings: Sequence[Hanging], config: WorldConfig, number: int
+    lamps: Sequence[Lamp], wall_panels: Sequence[WallPanel], config: WorldConfig, number: int
 ) -> list[Light]:
     """What shines in a world on day `number`: its lamps, then its windows; a closed curtain lets little light in."""
     day = config.day(number)
@@ -62,9 +62,9 @@ def lamps_and_windows(
         )
         for lamp, is_on in zip(lamps, lamps_on(lamps, config, number), strict=True)
     ]
-    for hanging in hangings:
+    for hanging in wall_panels:
         if hanging.material in ("window", "curtain"):
-            share = 1.0 if hanging.material == "window" else THROUGH_CURTAINS
+            share = 1.0 if hanging.material == "window" else CURTAIN_TRANSMISSION
             cos, sin = math.cos(hanging.facing), math.sin(hanging.facing)
             lights.append(
                 Light(
@@ -86,11 +86,13 @@ def _sky(config: WorldConfig, day: Day) -> list[Light]:
     """The light of an open sky, as from many large lamps where no roof is."""
     if config.ceiling != "sky":
         return []
-    columns, rows = (math.ceil(extent / SKY_STEP) for extent in config.size)
+    columns, rows = (math.ceil(extent / SKY_LIGHT_SPACING_M) for extent in config.size)
     roofs = [(*room.corner, *room.size) for room in config.rooms if room.walls]
-    points = [((c + 0.5) * SKY_STEP, (r + 0.5) * SKY_STEP) for r in range(rows) for c in range(columns)]
+    points = [
+        ((c + 0.5) * SKY_LIGHT_SPACING_M, (r + 0.5) * SKY_LIGHT_SPACING_M) for r in range(rows) for c in range(columns)
+    ]
     return [
-        Light(position=(x, y, config.height), colour=DAYLIGHT, on=day.light, scale=0.25 * SKY_STEP**2)
+        Light(position=(x, y, config.height), colour=DAYLIGHT, on=day.light, scale=0.25 * SKY_LIGHT_SPACING_M**2)
         for x, y in points
         if not any(left <= x <= left + wide and low <= y <= low + deep for left, low, wide, deep in roofs)
     ]
@@ -126,14 +128,14 @@ def light_map(
     ).reshape(-1, 12)
     blocking = _blocking(boxes, x, y, height)
     lit, full = np.zeros((5, rows, columns, 3), dtype=np.float32), np.zeros((rows, columns), dtype=np.float32)
-    _shine(table, blocking, x, y, height, HEIGHTS, FACES, lit, full)
+    _shine(table, blocking, x, y, height, FACE_HEIGHTS_M, FACE_NORMALS, lit, full)
     mean = float(full.mean(dtype=np.float64)) or 1.0
     lit *= (1.0 - ambient) / mean
     lit[1:] *= 1.6  # a wall also gets what floor and ceiling throw back
     if not lights:
         return lit + np.float32(1.0)
-    around = np.maximum(cv2.GaussianBlur(full, (0, 0), SPREAD / step), 1e-9)
-    here = cv2.GaussianBlur(lit[0], (0, 0), SPREAD / step) * (mean / (1.0 - ambient) if ambient < 1.0 else 0.0)
+    around = np.maximum(cv2.GaussianBlur(full, (0, 0), BOUNCE_SIGMA_M / step), 1e-9)
+    here = cv2.GaussianBlur(lit[0], (0, 0), BOUNCE_SIGMA_M / step) * (mean / (1.0 - ambient) if ambient < 1.0 else 0.0)
     everywhere = here.mean(axis=(0, 1), dtype=np.float64) / mean
     lit += (ambient * (0.75 * here / around[..., None] + 0.25 * everywhere)).astype(np.float32)
     return lit
@@ -143,8 +145,8 @@ def contact_map(boxes: F64, corner: F64, size: tuple[float, float], step: float)
     """What bodies that stand on the floor leave of its light (rows, columns): 0.6 beside them, 1 some way off."""
     columns, rows = (math.ceil((extent - 2 * c) / step) + 2 for extent, c in zip(size, corner, strict=True))
     distance = np.full((rows, columns), 1e3, dtype=np.float32)
-    _near(boxes[boxes[:, 6] < 0.3], corner, step, 6.0 * CLOSE, distance)
-    left: F32 = (1.0 - 0.4 * np.exp(-distance / CLOSE)).astype(np.float32)
+    _near(boxes[boxes[:, 6] < 0.3], corner, step, 6.0 * CONTACT_SHADOW_M, distance)
+    left: F32 = (1.0 - 0.4 * np.exp(-distance / CONTACT_SHADOW_M)).astype(np.float32)
     return left
 
 
@@ -191,20 +193,20 @@ def _shine(
     for row in numba.prange(len(y)):
         for light in range(len(lights)):
             away_y = lights[light, 1] - y[row]
-            if abs(away_y) > REACH:
+            if abs(away_y) > LIGHT_RANGE_M:
                 continue
-            half = math.sqrt(REACH * REACH - away_y * away_y)
+            half = math.sqrt(LIGHT_RANGE_M * LIGHT_RANGE_M - away_y * away_y)
             first = max(0, math.ceil((lights[light, 0] - half - x[0]) / step))
             last = min(len(x) - 1, math.floor((lights[light, 0] + half - x[0]) / step))
             for column in range(first, last + 1):
                 away_x = lights[light, 0] - x[column]
                 if not _sees(blocking, x[column], y[row], away_x, away_y, x[0], y[0], step):
                     continue
-                edge = 1.0 - (away_x * away_x + away_y * away_y) / (REACH * REACH)
+                edge = 1.0 - (away_x * away_x + away_y * away_y) / (LIGHT_RANGE_M * LIGHT_RANGE_M)
                 for side in range(5):
                     rise = lights[light, 2] - heights[side]
                     square = away_x * away_x + away_y * away_y + rise * rise
-                    square += SOFT
+                    square += LIGHT_SIZE_M2
                     arriving = away_x * faces[side, 0] + away_y * faces[side, 1] + rise * faces[side, 2]
                     leaving = -(away_x * lights[light, 3] + away_y * lights[light, 4] + rise * lights[light, 5])
                     if arriving <= 0.0 or leaving <= 0.0:

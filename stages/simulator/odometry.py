@@ -38,10 +38,9 @@ def draw_bias(noise: OdometryNoise, rng: np.random.Generator) -> Bias:
 def measured(motions: npt.ArrayLike, noise: OdometryNoise, bias: Bias, rng: np.random.Generator) -> F64:
     """True increments of motion (N, 3) as the wheels measure them.
 
-    Each increment is taken as rotation, translation, rotation (Thrun, Burgard & Fox 2005, section 5.4) and each part is
-    add_odometry_noise: sigma_trans = translation sqrt(m), sigma_rot^2 = rotation^2 |rad| + drift^2 m; then comes the noise that
-    is `added`. A robot that turns on the spot or rolls back is not thought to swing round: the first rotation is split
-    from the translation's sign.
+    Each increment is split into rotation, translation, rotation (Thrun, Burgard & Fox 2005, section 5.4), and each part
+    gets noise: sigma_trans = translation sqrt(m), sigma_rot^2 = rotation^2 |rad| + drift^2 m; then `added` noise
+    follows. A motion backwards is a negative translation, not two half turns.
     """
     motions = np.asarray(motions, dtype=np.float64)
     length = np.hypot(motions[:, 0], motions[:, 1])

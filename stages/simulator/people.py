@@ -17,28 +17,28 @@ from .streams import stream
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 
-LOOKS = 16
+OUTFITS = 16
 """Different people there are, by their clothes."""
-RADIUS = 0.25
-ROOM = 0.32
+RADIUS_M = 0.25
+WALKER_CLEARANCE_M = 0.32
 """Clearance (m) of a walker's way from its middle line."""
-STEP_LENGTH = 0.7
+STRIDE_M = 0.7
 """Metres a step."""
-NEAREST = 0.6
+MIN_ROBOT_DISTANCE_M = 0.6
 """Metres from the robot's middle that people keep."""
-COMPANIONS = 4
+MAX_COMPANIONS = 4
 """People at most who take an interest in the robot at a time."""
-PACE = 1.3
+MAX_SPEED = 1.3
 """Metres a second that nobody exceeds."""
-APART = 2.1 * RADIUS
+MIN_PERSON_DISTANCE_M = 2.1 * RADIUS_M
 """Metres between the middles of people who do not let one another pass."""
-RUN_OVER = 0.58
+GIVE_WAY_DISTANCE_M = 0.58
 """Metres from the robot's middle where nobody stays who cannot get out of its way."""
-SIGHT, LOST = 5.0, 3.0
+OUT_OF_SIGHT_M, GIVE_UP_DISTANCE_M = 5.0, 3.0
 """Metres from the robot from which somebody may come or go unseen; metres from where somebody would like to be."""
-AWAY = 5.0
+MIN_ABSENCE_S = 5.0
 """Seconds that somebody is gone at least."""
-STEP = 0.2
+STEP_S = 0.2
 """Seconds of a step of those who walk near the robot."""
 
 
@@ -48,7 +48,7 @@ class Person:
 
     position: tuple[float, float]
     heading: float
-    radius: float = RADIUS
+    radius: float = RADIUS_M
     height: float = 1.75
     look: int = 0
     stride: float = 0.0
@@ -143,45 +143,45 @@ class Walker:
         self._rng = rng
         self._clearance = clearance
         self.height = float(rng.uniform(1.5, 1.95))
-        self.look = int(rng.integers(LOOKS))
+        self.look = int(rng.integers(OUTFITS))
         self._speed = float(rng.uniform(0.5, 1.2))
         self._heading = float(rng.uniform(-math.pi, math.pi))
-        self._moments: list[tuple[float, float, float, float, float]] = [(0.0, *start, self._heading, 0.0)]
+        self._legs: list[tuple[float, float, float, float, float]] = [(0.0, *start, self._heading, 0.0)]
 
     def at(self, seconds: float) -> Person:
         """This person at a time from 0 on; the same whatever was asked before."""
-        while self._moments[-1][0] <= seconds:
-            self._go_on()
-        number = bisect_right(self._moments, seconds, key=lambda moment: moment[0]) - 1
-        (t0, x0, y0, _, way0), (t1, x1, y1, heading, way1) = self._moments[number : number + 2]
+        while self._legs[-1][0] <= seconds:
+            self._next_leg()
+        number = bisect_right(self._legs, seconds, key=lambda moment: moment[0]) - 1
+        (t0, x0, y0, _, way0), (t1, x1, y1, heading, way1) = self._legs[number : number + 2]
         part = (seconds - t0) / (t1 - t0)
         position = (x0 + part * (x1 - x0), y0 + part * (y1 - y0))
-        stride = math.pi * (way0 + part * (way1 - way0)) / STEP_LENGTH
-        return Person(position, heading, RADIUS, self.height, self.look, stride)
+        stride = math.pi * (way0 + part * (way1 - way0)) / STRIDE_M
+        return Person(position, heading, RADIUS_M, self.height, self.look, stride)
 
-    def _go_on(self) -> None:
+    def _next_leg(self) -> None:
         """Another leg, or a halt: turned aside, as if to look at something."""
-        time, x, y, _, way = self._moments[-1]
+        time, x, y, _, way = self._legs[-1]
         rng = self._rng
         if rng.uniform() < 0.25:
             aside = self._heading + math.copysign(math.pi / 2, rng.uniform(-1.0, 1.0))
-            self._moments.append((time + float(rng.uniform(2.0, 15.0)), x, y, aside, way))
+            self._legs.append((time + float(rng.uniform(2.0, 15.0)), x, y, aside, way))
             return
         bearings = self._heading + np.concatenate([rng.normal(0.0, 0.6, 12), rng.uniform(-math.pi, math.pi, 12)])
         lengths = rng.uniform(0.8, 7.0, len(bearings))
         along = lengths[:, None] * np.linspace(1.0 / 28, 1.0, 28)
         points = np.stack([x + along * np.cos(bearings)[:, None], y + along * np.sin(bearings)[:, None]], axis=-1)
-        free = (self._clearance(points.reshape(-1, 2)) > ROOM).reshape(along.shape).all(axis=1)
+        free = (self._clearance(points.reshape(-1, 2)) > WALKER_CLEARANCE_M).reshape(along.shape).all(axis=1)
         worth = np.where(free, lengths * (1.3 + np.cos(bearings - self._heading)), -1.0)
         best = int(np.argmax(worth))
         if worth[best] <= 0.0:
             self._heading += float(rng.uniform(1.0, 2.5))
-            self._moments.append((time + 1.0, x, y, self._heading, way))
+            self._legs.append((time + 1.0, x, y, self._heading, way))
             return
         self._heading = float(bearings[best])
         goal, length = points[best, -1], float(lengths[best])
         took = length / self._speed
-        self._moments.append((time + took, float(goal[0]), float(goal[1]), self._heading, way + length))
+        self._legs.append((time + took, float(goal[0]), float(goal[1]), self._heading, way + length))
 
 
 class Track(NamedTuple):
@@ -197,13 +197,13 @@ class Companion:
     def __init__(self, rng: np.random.Generator, clearance: Clearance) -> None:
         self._clearance = clearance
         self.height = float(rng.uniform(1.5, 1.95))
-        self.look = int(rng.integers(LOOKS))
+        self.look = int(rng.integers(OUTFITS))
         self._bearing = float(rng.uniform(0.9, 2.6) * rng.choice([-1.0, 1.0]))
         self._period = float(rng.uniform(50.0, 110.0))
         self._phase = float(rng.uniform(0.0, 1.0))
         self._sway = rng.uniform(0.0, 2.0 * math.pi, 2)
 
-    def wish(self, seconds: float, track: Track, others: F64) -> F64 | None:
+    def desired_place(self, seconds: float, track: Track, others: F64) -> F64 | None:
         """Where (2,) this person would like to be, from where the robot was up to then; None: no room but `others`'."""
         poses = track.poses[-2000:]
         x, y = poses[-1, :2]
@@ -228,12 +228,12 @@ class Companion:
 
     def _has_room(self, place: F64, x: float, y: float, others: F64) -> bool:
         """Whether one can stand at a place: on nobody's feet, and if near the robot at (x, y) with nothing between."""
-        if math.hypot(place[0] - x, place[1] - y) < NEAREST:
+        if math.hypot(place[0] - x, place[1] - y) < MIN_ROBOT_DISTANCE_M:
             return False
-        if len(others) and np.hypot(*(others - place).T).min() < 2.2 * RADIUS:
+        if len(others) and np.hypot(*(others - place).T).min() < 2.2 * RADIUS_M:
             return False
         between = np.array([place, [0.5 * (place[0] + x), 0.5 * (place[1] + y)]])
-        clear = self._clearance(between) > (0.8 * RADIUS, 0.0)
+        clear = self._clearance(between) > (0.8 * RADIUS_M, 0.0)
         return bool(clear[0] and (clear[1] or math.dist(place, (x, y)) > 2.0))
 
 
@@ -244,27 +244,27 @@ def _back_along(poses: F64, gait: F64, distance: float) -> F64:
     return point
 
 
-X, Y, HEADING, WAY, GONE = range(5)
+X, Y, HEADING, WALKED, GONE = range(5)
 """What the crowd's state (P, 5) holds of each person: place, facing, metres walked, since when (s) it is gone or -1."""
 
 
 class Crowd:
-    """The people of a world on a day: walkers all over, of whom a few keep the robot company where its track is known.
+    """The people of a world on a day: walkers, and a few companions of the robot where its track is known.
 
-    Nobody walks faster than `PACE` or through anything. Who is in the robot's way steps aside; who cannot is gone for a
-    while, and comes back out of its sight. The same seed, day, time and track give the same people, in whatever order
-    times are asked for.
+    Nobody walks faster than `MAX_SPEED` or through anything. A person in the robot's way steps aside, or disappears for
+    a while and comes back out of the robot's sight. The same seed, day, time and track give the same people, whatever
+    the order of the times that are asked for.
     """
 
     def __init__(self, seed: int, day: int, count: int, size: tuple[float, float], clearance: Clearance) -> None:
         rng = stream(seed, "people", day)
-        near = min(COMPANIONS, (count + 4) // 8)
+        near = min(MAX_COMPANIONS, (count + 4) // 8)
         self._companions = [Companion(stream(seed, "companion", day, k), clearance) for k in range(near)]
         self._walkers: list[Walker] = []
         self._clearance = clearance
         for number in range(count - near):
             points = rng.uniform((0.0, 0.0), size, (200, 2))
-            free = points[clearance(points) > ROOM]
+            free = points[clearance(points) > WALKER_CLEARANCE_M]
             if len(free):
                 start = (float(free[0, 0]), float(free[0, 1]))
                 self._walkers.append(Walker(stream(seed, "walker", day, number), start, clearance))
@@ -277,13 +277,13 @@ class Crowd:
             return tuple(walker.at(max(0.0, seconds)) for walker in self._walkers)
         known = self._known
         if known is None or known[0].times is not track.times or known[0].poses is not track.poses:
-            self._known = known = track, [self.gathered(track)]
+            self._known = known = track, [self.initial_state(track)]
         states, begin = known[1], float(track.times[0])
-        whole = max(0, math.floor((seconds - begin) / STEP + 1e-9))
+        whole = max(0, math.floor((seconds - begin) / STEP_S + 1e-9))
         while len(states) <= whole + 1:
-            now = begin + STEP * (len(states) - 1)
-            states.append(self.went_on(states[-1], now, now + STEP, track))
-        part = min(max((seconds - begin) / STEP - whole, 0.0), 1.0)
+            now = begin + STEP_S * (len(states) - 1)
+            states.append(self.advanced(states[-1], now, now + STEP_S, track))
+        part = min(max((seconds - begin) / STEP_S - whole, 0.0), 1.0)
         state = states[whole].copy()
         there = (state[:, GONE] < 0.0) & (states[whole + 1][:, GONE] < 0.0)
         change = states[whole + 1] - states[whole]
@@ -291,31 +291,31 @@ class Crowd:
         state[there] += part * change[there]
         later = states[whole + 1][:, [X, Y]]
         strolls = [
-            who.at(begin + STEP * whole).position == tuple(states[whole][number, :2])
-            and who.at(begin + STEP * (whole + 1)).position == tuple(later[number])
+            who.at(begin + STEP_S * whole).position == tuple(states[whole][number, :2])
+            and who.at(begin + STEP_S * (whole + 1)).position == tuple(later[number])
             for number, who in enumerate(self._walkers)
         ]
-        return self.seen(state, seconds, strolls)
+        return self.visible(state, seconds, strolls)
 
-    def gathered(self, track: Track) -> F64:
+    def initial_state(self, track: Track) -> F64:
         """Everybody when a drive begins (P, 5): walkers first."""
         now = float(track.times[0])
         state = np.zeros((len(self._everybody), 5))
-        state[:, GONE] = now - AWAY
-        return self._moved(state, now, 0.0, Track(track.times[:1], track.poses[:1]), begins=True)
+        state[:, GONE] = now - MIN_ABSENCE_S
+        return self._advanced(state, now, 0.0, Track(track.times[:1], track.poses[:1]), begins=True)
 
-    def went_on(self, state: F64, seconds: float, until: float, track: Track) -> F64:
+    def advanced(self, state: F64, seconds: float, until: float, track: Track) -> F64:
         """Everybody (P, 5) some time later, from where the robot was up to `seconds`: nobody knows what comes next."""
-        steps = math.ceil((until - seconds) / STEP - 1e-9)
+        steps = math.ceil((until - seconds) / STEP_S - 1e-9)
         last = max(1, int(np.searchsorted(track.times, seconds + 1e-9, side="right")))
         known = Track(track.times[:last], track.poses[:last])
         for number in range(steps):
-            end = until if number == steps - 1 else seconds + STEP
-            state = self._moved(state, end, end - seconds, known)
+            end = until if number == steps - 1 else seconds + STEP_S
+            state = self._advanced(state, end, end - seconds, known)
             seconds = end
         return state
 
-    def seen(self, state: F64, seconds: float, strolls: Sequence[bool] | None = None) -> tuple[Person, ...]:
+    def visible(self, state: F64, seconds: float, strolls: Sequence[bool] | None = None) -> tuple[Person, ...]:
         """Who is there, and as what one sees them; `strolls`: which walkers nobody keeps from it."""
         people = []
         for number, (row, who) in enumerate(zip(state, self._everybody, strict=True)):
@@ -326,11 +326,11 @@ class Crowd:
                 if strolling is not None and free:
                     people.append(strolling)
                 else:
-                    stride = math.pi * float(row[WAY]) / STEP_LENGTH
-                    people.append(Person(at, float(row[HEADING]), RADIUS, who.height, who.look, stride))
+                    stride = math.pi * float(row[WALKED]) / STRIDE_M
+                    people.append(Person(at, float(row[HEADING]), RADIUS_M, who.height, who.look, stride))
         return tuple(people)
 
-    def _moved(self, before: F64, now: float, took: float, track: Track, begins: bool = False) -> F64:
+    def _advanced(self, before: F64, now: float, took: float, track: Track, begins: bool = False) -> F64:
         """Everybody one step later: each in turn goes where it likes, as far as the others and the robot let it."""
         state = before.copy()
         robot = _expected(track, now)
@@ -339,81 +339,89 @@ class Crowd:
             there[number] = False
             if isinstance(who, Walker):
                 there[: len(self._walkers)] = False  # walkers pass one another
-                wish: F64 | None = np.array(who.at(max(0.0, now)).position)
+                desired_place: F64 | None = np.array(who.at(max(0.0, now)).position)
             else:
-                wish = who.wish(now, track, state[there, :2])
+                desired_place = who.desired_place(now, track, state[there, :2])
             row = state[number]
             if row[GONE] >= 0.0 or begins:
                 if isinstance(who, Companion) and not begins:
-                    wish = _out_of_sight(track.poses[-2000:, :2], robot)
-                self._come(row, wish, now, robot, state[there, :2], 0.0 if begins else SIGHT)
+                    desired_place = _out_of_sight(track.poses[-2000:, :2], robot)
+                self._reappear(row, desired_place, now, robot, state[there, :2], 0.0 if begins else OUT_OF_SIGHT_M)
             else:
-                goal = row[:2].copy() if wish is None else wish
-                if isinstance(who, Companion) and math.dist(goal, row[:2]) > 1.2 and not _lost(row, goal, robot):
-                    goal = _along_track(track.poses[-2000:, :2], row[:2])
+                goal = row[:2].copy() if desired_place is None else desired_place
+                if (
+                    isinstance(who, Companion)
+                    and math.dist(goal, row[:2]) > 1.2
+                    and not _has_given_up(row, goal, robot)
+                ):
+                    goal = _ahead_on_track(track.poses[-2000:, :2], row[:2])
                 self._walk(row, goal, now, took, robot, state[there, :2])
                 if isinstance(who, Companion):
                     row[HEADING] = math.atan2(robot[1] - row[Y], robot[0] - row[X])
         return state
 
-    def _come(self, row: F64, wish: F64 | None, now: float, robot: F64, others: F64, away: float) -> None:
+    def _reappear(self, row: F64, desired_place: F64 | None, now: float, robot: F64, others: F64, away: float) -> None:
         """Somebody who was gone is there again, if far from the robot and on nobody's feet."""
-        if wish is None or now - row[GONE] < AWAY or math.dist(wish, robot) < max(away, NEAREST):
+        if (
+            desired_place is None
+            or now - row[GONE] < MIN_ABSENCE_S
+            or math.dist(desired_place, robot) < max(away, MIN_ROBOT_DISTANCE_M)
+        ):
             return
-        if not len(others) or np.hypot(*(others - wish).T).min() >= APART:
-            row[[X, Y]], row[GONE] = wish, -1.0
-            row[HEADING] = math.atan2(robot[1] - wish[1], robot[0] - wish[0])
+        if not len(others) or np.hypot(*(others - desired_place).T).min() >= MIN_PERSON_DISTANCE_M:
+            row[[X, Y]], row[GONE] = desired_place, -1.0
+            row[HEADING] = math.atan2(robot[1] - desired_place[1], robot[0] - desired_place[0])
 
     def _walk(self, row: F64, goal: F64, now: float, took: float, robot: F64, others: F64) -> None:
         """A step towards where somebody would like to be, or aside where others or the robot are in the way."""
         place = row[:2].copy()
-        if _lost(row, goal, robot):
+        if _has_given_up(row, goal, robot):
             row[GONE] = now
             return
-        far = PACE * took
+        far = MAX_SPEED * took
         length = min(math.dist(goal, place), far)
         if length < far:  # it was chosen for having room
-            step, free = goal, not len(others) or np.hypot(*(others - goal).T).min() >= APART
+            step, free = goal, not len(others) or np.hypot(*(others - goal).T).min() >= MIN_PERSON_DISTANCE_M
         else:
             step = place + (goal - place) / math.dist(goal, place) * far
-            free = self._lets(step[None], place, others)[0]
-        if not free or math.dist(step, robot) < NEAREST:
+            free = self._passable(step[None], place, others)[0]
+        if not free or math.dist(step, robot) < MIN_ROBOT_DISTANCE_M:
             bearings = 2.0 * math.pi / 16 * np.arange(16)
             options = place + far * np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
             options = np.concatenate([place[None], options])
             from_robot = np.hypot(*(options - robot).T)
-            lets = self._lets(options, place, others)
+            lets = self._passable(options, place, others)
             lets[0] = True
-            cost = np.hypot(*(options - goal).T) + 100.0 * np.maximum(NEAREST - from_robot, 0.0)
+            cost = np.hypot(*(options - goal).T) + 100.0 * np.maximum(MIN_ROBOT_DISTANCE_M - from_robot, 0.0)
             best = int(np.argmin(np.where(lets, cost, np.inf)))
             step = options[best]
-            if from_robot[best] < RUN_OVER:
+            if from_robot[best] < GIVE_WAY_DISTANCE_M:
                 row[GONE] = now
                 return
         gone = math.dist(step, place)
         row[:2] = step
-        row[WAY] += gone
+        row[WALKED] += gone
         if gone > 1e-6:
             row[HEADING] = math.atan2(step[1] - place[1], step[0] - place[0])
 
-    def _lets(self, places: F64, start: F64, others: F64) -> npt.NDArray[np.bool_]:
+    def _passable(self, places: F64, start: F64, others: F64) -> npt.NDArray[np.bool_]:
         """Whether one can go from `start` to each of some places (N, 2): not into things, nor closer to others."""
-        room = min(0.8 * RADIUS, float(self._clearance(start[None])[0]))
+        room = min(0.8 * RADIUS_M, float(self._clearance(start[None])[0]))
         free: npt.NDArray[np.bool_] = self._clearance(places) >= room
         if len(others):
             gaps = np.hypot(*(places[:, None] - others).transpose(2, 0, 1))
-            free &= (gaps >= np.minimum(APART, np.hypot(*(others - start).T))).all(axis=1)
+            free &= (gaps >= np.minimum(MIN_PERSON_DISTANCE_M, np.hypot(*(others - start).T))).all(axis=1)
         return free
 
 
-def _lost(row: F64, goal: F64, robot: F64) -> bool:
+def _has_given_up(row: F64, goal: F64, robot: F64) -> bool:
     """Whether somebody has given up, and nobody sees it."""
-    return math.dist(goal, row[:2]) > LOST and math.dist(row[:2], robot) > SIGHT
+    return math.dist(goal, row[:2]) > GIVE_UP_DISTANCE_M and math.dist(row[:2], robot) > OUT_OF_SIGHT_M
 
 
 def _out_of_sight(way: F64, robot: F64) -> F64 | None:
     """The last point of the robot's way (N, 2) that it has left far enough behind for somebody to turn up there."""
-    far = np.flatnonzero(np.hypot(*(way - robot).T) >= SIGHT)
+    far = np.flatnonzero(np.hypot(*(way - robot).T) >= OUT_OF_SIGHT_M)
     return way[far[-1]] if len(far) else None
 
 
@@ -424,10 +432,10 @@ def _expected(track: Track, now: float) -> F64:
         return at
     took = float(track.times[-1] - track.times[-2])
     speed: F64 = (at - track.poses[-2, :2]) / took
-    return at if float(np.hypot(*speed)) > PACE else at + speed * (now - float(track.times[-1]))
+    return at if float(np.hypot(*speed)) > MAX_SPEED else at + speed * (now - float(track.times[-1]))
 
 
-def _along_track(way: F64, place: F64) -> F64:
+def _ahead_on_track(way: F64, place: F64) -> F64:
     """The point of the robot's way (N, 2) some 0.8 m on from where it comes nearest to a place."""
     nearest = int(np.argmin(((way - place) ** 2).sum(axis=1)))
     gone = np.cumsum(np.hypot(*np.diff(way[nearest:], axis=0).T))

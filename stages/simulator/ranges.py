@@ -13,7 +13,7 @@ from .people import Person
 
 F64 = npt.NDArray[np.float64]
 
-RAYS = 5
+RAYS_PER_CONE = 5
 """Rays that stand for a cone."""
 
 
@@ -33,10 +33,10 @@ def measure(room: Obstacles, people: F64, poses: npt.ArrayLike, ring: Ranges, rn
     `people` (N, M, 3): x, y and radius of who is about at each.
     """
     poses = np.ascontiguousarray(poses, dtype=np.float64)
-    echoes = _echoes(room, people, poses, ring.readings, ring.beam, ring.farthest)
+    echoes = _echoes(room, people, poses, ring.readings, ring.beam_width, ring.max_range)
     seen = np.maximum(echoes + ring.noise * rng.normal(size=echoes.shape), 0.0)
-    lost = rng.uniform(size=echoes.shape) < ring.lost
-    return np.where(lost | (seen > ring.farthest), np.inf, seen)
+    lost = rng.uniform(size=echoes.shape) < ring.dropout
+    return np.where(lost | (seen > ring.max_range), np.inf, seen)
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -45,8 +45,10 @@ def _echoes(room: Obstacles, people: F64, poses: F64, readings: int, opening: fl
     echoes = np.full((len(poses), readings), np.inf)
     for n in range(len(poses)):
         for k in range(readings):
-            for ray in range(RAYS):
-                azimuth = poses[n, 2] - math.pi + 2 * math.pi * k / readings + opening * (ray / (RAYS - 1) - 0.5)
+            for ray in range(RAYS_PER_CONE):
+                azimuth = (
+                    poses[n, 2] - math.pi + 2 * math.pi * k / readings + opening * (ray / (RAYS_PER_CONE - 1) - 0.5)
+                )
                 dx, dy = math.cos(azimuth), math.sin(azimuth)
                 hit = beam(room, people[n], poses[n, 0], poses[n, 1], dx, dy, farthest)
                 echoes[n, k] = min(echoes[n, k], hit)

@@ -11,7 +11,7 @@ from omninav.stages.recordings.camera_yaml import write_camera
 from .config import Kidnapping, WorldConfig
 from .demo import DEMO
 from .occupancy import write_grid
-from .plan import draw_plan
+from .plan_image import draw_plan
 from .simulated_log import record
 from .simulated_recording import SimulatedRecording, in_order
 from .world import World

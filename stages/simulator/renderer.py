@@ -2,7 +2,7 @@
 
 Every body is an upright box, turned by any angle, that stands on the floor or hangs (walls, shelves, posters, people).
 Rays come in wedges of like azimuth. For a wedge, the cells of a grid over the floor are walked outwards once, and the
-boxes in them are noted, nearest first, until what was met hides the rest up to the ceiling; then each ray is tested
+boxes in them are found_box, nearest first, until what was met hides the rest up to the ceiling; then each ray is tested
 against these few. So a picture costs what is seen, not what the world holds. Each pixel is computed by one thread
 from its own numbers alone, so that threads cannot change a picture.
 """
@@ -28,10 +28,10 @@ U32 = npt.NDArray[np.uint32]
 FACES = 6
 """Faces of a box, in its own frame: -x, +x, -y, +y, bottom, top."""
 CHUNKS = 32
-"""Portions of a picture that threads take in turn; each has its own notes of what a wedge may see."""
-QUICK = {"contract", "arcp", "reassoc", "nsz"}
+"""Portions of a picture that threads take in turn; each has its own found of what a wedge may see."""
+FAST_MATH = {"contract", "arcp", "reassoc", "nsz"}
 """Liberties with rounding, an eighth of the time; the same picture on the same machine for any number of threads."""
-COVERS = 24
+MAX_OCCLUDERS = 24
 """Bodies at most that are remembered as about to hide what is behind them."""
 
 
@@ -119,7 +119,7 @@ def _light_on_deck(scene: Scene, x: float, y: float) -> F32:
     return here
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK, parallel=True)
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH, parallel=True)
 def _trace(
     scene: Scene,
     moving: Bodies,
@@ -144,7 +144,7 @@ def _trace(
         )  # fmt: skip
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK)
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
 def _bearings(boxes: F64, x: float, y: float) -> F64:
     """Where boxes are seen from a point (B, 3): azimuth on the map, half the angle they take at most, distance."""
     seen = np.empty((len(boxes), 3))
@@ -157,7 +157,7 @@ def _bearings(boxes: F64, x: float, y: float) -> F64:
     return seen
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK)
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
 def _chunk(
     scene: Scene,
     moving: Bodies,
@@ -186,14 +186,14 @@ def _chunk(
     levels = len(level_start)
     turn_cos, turn_sin = math.cos(heading), math.sin(heading)
     seen_in = np.zeros(len(boxes), dtype=np.int32)
-    noted = np.empty(len(boxes) + len(moved), dtype=np.int32)
-    notes = np.empty((len(boxes) + len(moved), 14))
-    covers = np.empty((COVERS, 2))
+    found_box = np.empty(len(boxes) + len(moved), dtype=np.int32)
+    found = np.empty((len(boxes) + len(moved), 14))
+    occluders = np.empty((MAX_OCCLUDERS, 2))
     for wedge in range(chunk, len(wedges), chunks):
         low, high = wedges[wedge, 0] + heading, wedges[wedge, 1] + heading
-        count, reach, along_x = _look(
+        count, reach, along_x = _boxes_in_wedge(
             boxes, start, members, grid, rows, columns, ceiling, x, y, z, turn_cos, turn_sin, low, high,
-            wedges[wedge, 2], seen_in, wedge + 1, noted, notes, covers,
+            wedges[wedge, 2], seen_in, wedge + 1, found_box, found, occluders,
         )  # fmt: skip
         fixed = count
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
@@ -201,8 +201,8 @@ def _chunk(
             off = middle - bearings[body, 0]
             off -= 2.0 * math.pi * round(off / (2.0 * math.pi))
             if abs(off) <= half + bearings[body, 1] and bearings[body, 2] <= 1.415 * reach:
-                _note(notes, count, moved, body, x, y, z, turn_cos, turn_sin, 0.0)
-                noted[count] = len(boxes) + body
+                _store_box(found, count, moved, body, x, y, z, turn_cos, turn_sin, 0.0)
+                found_box[count] = len(boxes) + body
                 count += 1
         level_x, level_y = math.cos(middle - heading), math.sin(middle - heading)
         # The axis along which the look measured distances, as the robot sees it.
@@ -214,18 +214,18 @@ def _chunk(
         if column:
             for k in range(count):
                 enter, leave, face = _enter(
-                    notes[k, 0], notes[k, 1], notes[k, 2] * level_x + notes[k, 3] * level_y,
-                    notes[k, 2] * level_y - notes[k, 3] * level_x, notes[k, 4], notes[k, 5],
+                    found[k, 0], found[k, 1], found[k, 2] * level_x + found[k, 3] * level_y,
+                    found[k, 2] * level_y - found[k, 3] * level_x, found[k, 4], found[k, 5],
                 )  # fmt: skip
-                notes[k, 11], notes[k, 12], notes[k, 13] = enter, leave, face
+                found[k, 11], found[k, 12], found[k, 13] = enter, leave, face
         for i in range(wedge_start[wedge], wedge_start[wedge + 1]):
             dx, dy, dz = float(directions[i, 0]), float(directions[i, 1]), float(directions[i, 2])
             ahead = dx * level_x + dy * level_y
             if column:
-                distance, which, face = _meet_in_column(notes, fixed, count, ahead, dz, major, z, ceiling)
+                distance, which, face = _first_hit_in_column(found, fixed, count, ahead, dz, major, z, ceiling)
             else:
                 ahead = dx * major_x + dy * major_y
-                distance, which, face = _meet(notes, fixed, count, dx, dy, dz, ahead, z, ceiling)
+                distance, which, face = _first_hit(found, fixed, count, dx, dy, dz, ahead, z, ceiling)
             if distance >= 1e8:
                 continue
             # Where it is, which way its face looks, and where on its surface.
@@ -238,24 +238,24 @@ def _chunk(
                 u, v = hx, hy
                 slope = abs(dz)
             else:
-                ux = notes[which, 2] * dx + notes[which, 3] * dy
-                uy = notes[which, 2] * dy - notes[which, 3] * dx
-                lx, ly = notes[which, 0] + distance * ux, notes[which, 1] + distance * uy
-                number = noted[which]
+                ux = found[which, 2] * dx + found[which, 3] * dy
+                uy = found[which, 2] * dy - found[which, 3] * dx
+                lx, ly = found[which, 0] + distance * ux, found[which, 1] + distance * uy
+                number = found_box[which]
                 surface = faces[number, face] if number < len(boxes) else moved_faces[number - len(boxes), face]
-                v = notes[which, 7] - distance * dz
+                v = found[which, 7] - distance * dz
                 if face < 2:
                     sign = 2.0 * face - 1.0
-                    u = notes[which, 5] + sign * ly
-                    nx, ny = sign * notes[which, 9], sign * notes[which, 10]
+                    u = found[which, 5] + sign * ly
+                    nx, ny = sign * found[which, 9], sign * found[which, 10]
                     slope = abs(ux)
                 elif face < 4:
                     sign = 2.0 * face - 5.0
-                    u = notes[which, 4] - sign * lx
-                    nx, ny = -sign * notes[which, 10], sign * notes[which, 9]
+                    u = found[which, 4] - sign * lx
+                    nx, ny = -sign * found[which, 10], sign * found[which, 9]
                     slope = abs(uy)
                 else:
-                    u, v = notes[which, 4] + lx, notes[which, 5] - ly
+                    u, v = found[which, 4] + lx, found[which, 5] - ly
                     slope = abs(dz)
 
             # The texture, at the level its size in the picture asks for.
@@ -306,8 +306,8 @@ def _chunk(
             lit[i, 2] += weight * red
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK)
-def _look(
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+def _boxes_in_wedge(
     boxes: F64,
     cell_start: I32,
     cell_boxes: I32,
@@ -325,9 +325,9 @@ def _look(
     steepest: float,
     seen_in: I32,
     mark: int,
-    noted: I32,
-    notes: F64,
-    covers: F64,
+    found_box: I32,
+    found: F64,
+    occluders: F64,
 ) -> tuple[int, float, bool]:
     """Note the boxes that rays between two azimuths of the map may meet, nearest first.
 
@@ -335,7 +335,7 @@ def _look(
     distance: along that axis every slab of cells is crossed by all rays of the wedge at once. A body that both edges
     meet is met by all rays between, being convex; once the walk is past it, it hides what is lower than the line over
     its top. When that line reaches the ceiling, nothing more can be seen.
-    Returns how many were noted, how far it went, and whether along x.
+    Returns how many were found_box, how far it went, and whether along x.
     """
     cos_a, sin_a, cos_b, sin_b = math.cos(low), math.sin(low), math.cos(high), math.sin(high)
     along_x = abs(cos_a + cos_b) >= abs(sin_a + sin_b)
@@ -363,12 +363,12 @@ def _look(
         kept = 0
         risen = False
         for k in range(waiting):
-            if covers[k, 0] <= near:
-                if covers[k, 1] > covered:
-                    covered = covers[k, 1]
+            if occluders[k, 0] <= near:
+                if occluders[k, 1] > covered:
+                    covered = occluders[k, 1]
                     risen = True
             else:
-                covers[kept, 0], covers[kept, 1] = covers[k, 0], covers[k, 1]
+                occluders[kept, 0], occluders[kept, 1] = occluders[k, 0], occluders[k, 1]
                 kept += 1
         waiting = kept
         if risen:
@@ -406,16 +406,16 @@ def _look(
                 off = aside - most * ahead
                 if off > 0.0 and off * off > square * (1.0 + most * most):
                     continue
-                _note(notes, count, boxes, box, x, y, z, turn_cos, turn_sin, near)
-                noted[count] = box
+                _store_box(found, count, boxes, box, x, y, z, turn_cos, turn_sin, near)
+                found_box[count] = box
                 count += 1
-                if waiting == COVERS:
+                if waiting == MAX_OCCLUDERS:
                     continue
                 if along_x:
                     ax, ay, bx, by = float(sign), tan_a, float(sign), tan_b
                 else:
                     ax, ay, bx, by = tan_a, float(sign), tan_b, float(sign)
-                cos, sin, ox, oy = boxes[box, 2], boxes[box, 3], notes[count - 1, 0], notes[count - 1, 1]
+                cos, sin, ox, oy = boxes[box, 2], boxes[box, 3], found[count - 1, 0], found[count - 1, 1]
                 enter_a = _enter(ox, oy, cos * ax + sin * ay, cos * ay - sin * ax, boxes[box, 4], boxes[box, 5])[0]
                 if enter_a >= 1e17 or enter_a <= 0.0:
                     continue
@@ -430,7 +430,7 @@ def _look(
                         continue  # one may look under it
                 hides = over / behind if over > 0.0 else over / max(near, 1e-3)
                 if hides > covered:
-                    covers[waiting, 0], covers[waiting, 1] = behind, hides
+                    occluders[waiting, 0], occluders[waiting, 1] = behind, hides
                     waiting += 1
         slab += sign
         near = far
@@ -438,9 +438,9 @@ def _look(
     return count, near, along_x
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK)
-def _note(
-    notes: F64,
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+def _store_box(
+    found: F64,
     number: int,
     boxes: F64,
     box: int,
@@ -458,17 +458,17 @@ def _note(
     """
     px, py = x - boxes[box, 0], y - boxes[box, 1]
     cos, sin = boxes[box, 2], boxes[box, 3]
-    notes[number, 0], notes[number, 1] = cos * px + sin * py, cos * py - sin * px
-    notes[number, 2], notes[number, 3] = cos * turn_cos + sin * turn_sin, sin * turn_cos - cos * turn_sin
-    notes[number, 4], notes[number, 5] = boxes[box, 4], boxes[box, 5]
-    notes[number, 6], notes[number, 7] = boxes[box, 6] - z, boxes[box, 7] - z
-    notes[number, 8] = near
-    notes[number, 9], notes[number, 10] = cos, sin
+    found[number, 0], found[number, 1] = cos * px + sin * py, cos * py - sin * px
+    found[number, 2], found[number, 3] = cos * turn_cos + sin * turn_sin, sin * turn_cos - cos * turn_sin
+    found[number, 4], found[number, 5] = boxes[box, 4], boxes[box, 5]
+    found[number, 6], found[number, 7] = boxes[box, 6] - z, boxes[box, 7] - z
+    found[number, 8] = near
+    found[number, 9], found[number, 10] = cos, sin
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK)
-def _meet(
-    notes: F64, fixed: int, count: int, dx: float, dy: float, dz: float, ahead: float, z: float, ceiling: float
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+def _first_hit(
+    found: F64, fixed: int, count: int, dx: float, dy: float, dz: float, ahead: float, z: float, ceiling: float
 ) -> tuple[float, int, int]:
     """Distance, note and face of what a ray meets first; note -1 is the floor (face 5) or the ceiling (face 4)."""
     distance, which, face = 1e9, -1, 5
@@ -478,15 +478,15 @@ def _meet(
         distance = (ceiling - z) / dz
         face = 4
     for k in range(count):
-        if distance * ahead <= notes[k, 8] and k < fixed:
+        if distance * ahead <= found[k, 8] and k < fixed:
             continue  # found beyond what was met already
         enter, leave, side = _enter(
-            notes[k, 0], notes[k, 1], notes[k, 2] * dx + notes[k, 3] * dy, notes[k, 2] * dy - notes[k, 3] * dx,
-            notes[k, 4], notes[k, 5],
+            found[k, 0], found[k, 1], found[k, 2] * dx + found[k, 3] * dy, found[k, 2] * dy - found[k, 3] * dx,
+            found[k, 4], found[k, 5],
         )  # fmt: skip
         if enter >= distance or leave <= 0.0:
             continue
-        below, above = notes[k, 6], notes[k, 7]
+        below, above = found[k, 6], found[k, 7]
         if enter < 0.0:
             enter = 0.0
             if below <= 0.0 <= above:
@@ -503,11 +503,11 @@ def _meet(
     return distance, which, face
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK)
-def _meet_in_column(
-    notes: F64, fixed: int, count: int, ahead: float, dz: float, major: float, z: float, ceiling: float
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+def _first_hit_in_column(
+    found: F64, fixed: int, count: int, ahead: float, dz: float, major: float, z: float, ceiling: float
 ) -> tuple[float, int, int]:
-    """As `_meet`, for a ray in a wedge of one azimuth, where the notes say how far off boxes begin and end."""
+    """As `_first_hit`, for a ray in a wedge of one azimuth, where the found say how far off boxes begin and end."""
     slope = dz / max(ahead, 1e-9)
     distance, which, face = 1e9, -1, 5
     if slope < 0.0:
@@ -516,12 +516,12 @@ def _meet_in_column(
         distance = (ceiling - z) / slope
         face = 4
     for k in range(count):
-        if k < fixed and distance * major <= notes[k, 8]:
+        if k < fixed and distance * major <= found[k, 8]:
             continue
-        enter, leave = notes[k, 11], notes[k, 12]
+        enter, leave = found[k, 11], found[k, 12]
         if enter >= distance or leave <= 0.0:
             continue
-        below, above = notes[k, 6], notes[k, 7]
+        below, above = found[k, 6], found[k, 7]
         if enter < 0.0:
             enter = 0.0
             if below <= 0.0 <= above:
@@ -534,11 +534,11 @@ def _meet_in_column(
             if slope > 0.0 and below / slope <= leave and below / slope < distance:
                 distance, which, face = below / slope, k, 4
         else:
-            distance, which, face = enter, k, int(notes[k, 13])
+            distance, which, face = enter, k, int(found[k, 13])
     return distance / max(ahead, 1e-9), which, face
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK)
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
 def _enter(ox: float, oy: float, ux: float, uy: float, length: float, depth: float) -> tuple[float, float, int]:
     """Where a level ray from (ox, oy) along (ux, uy) enters and leaves a rectangle, and the side; 1e18 if it misses."""
     if ux == 0.0:
@@ -565,15 +565,15 @@ def _enter(ox: float, oy: float, ux: float, uy: float, length: float, depth: flo
     return enter, leave, side
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK)
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
 def _half_log2(square: float) -> float:
     """Half the binary logarithm, from the parts of a 32-bit float, linear between powers of two: within 0.05."""
     bits = np.float32(square).view(np.int32)
     return 0.5 * (float(bits) * (1.0 / 8388608.0) - 127.0)
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK)
-def _spread(texel: Any) -> Any:
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+def _unpacked(texel: Any) -> Any:
     """The three colours of a texel, 21 bits apart: one multiplication then weighs all of them."""
     wide = np.uint64(texel)
     return (
@@ -583,7 +583,7 @@ def _spread(texel: Any) -> Any:
     )
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK)
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
 def _sample(
     texels: U32, level_start: I64, levels: int, finest: int, texture: int, level: float, u: float, v: float
 ) -> tuple[float, float, float]:
@@ -603,7 +603,7 @@ def _sample(
     )
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK)
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
 def _bilinear(texels: U32, start: int, side: int, texture: int, u: float, v: float, weight: float) -> Any:
     """The three colours at (u, v), 21 bits apart, times a weight."""
     column, row = max(u * side - 0.5, 0.0), max(v * side - 0.5, 0.0)
@@ -616,14 +616,14 @@ def _bilinear(texels: U32, start: int, side: int, texture: int, u: float, v: flo
     upper = weight - lower
     upper_right, lower_right = wu * upper, wu * lower
     return (
-        _spread(texels[above + left]) * np.uint64(np.int64(upper - upper_right))
-        + _spread(texels[above + right]) * np.uint64(np.int64(upper_right))
-        + _spread(texels[below + left]) * np.uint64(np.int64(lower - lower_right))
-        + _spread(texels[below + right]) * np.uint64(np.int64(lower_right))
+        _unpacked(texels[above + left]) * np.uint64(np.int64(upper - upper_right))
+        + _unpacked(texels[above + right]) * np.uint64(np.int64(upper_right))
+        + _unpacked(texels[below + left]) * np.uint64(np.int64(lower - lower_right))
+        + _unpacked(texels[below + right]) * np.uint64(np.int64(lower_right))
     )
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK)
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
 def _light(light: F32, side: int, column: float, row: float) -> tuple[float, float, float]:
     """Light that falls at a point of the light map on a face that looks one of five ways, linear between samples."""
     column = min(max(column, 0.0), light.shape[2] - 1.001)
@@ -648,7 +648,7 @@ def _light(light: F32, side: int, column: float, row: float) -> tuple[float, flo
     )
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK)
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
 def _contact(contact: F32, column: float, row: float) -> float:
     """What bodies beside a point of the floor leave of its light, linear between samples."""
     column = min(max(column, 0.0), contact.shape[1] - 1.001)
@@ -660,8 +660,8 @@ def _contact(contact: F32, column: float, row: float) -> float:
     return float(lower + wy * (upper - lower))
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK)
-def _mix(number: np.uint64) -> np.uint64:
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+def _mixed(number: np.uint64) -> np.uint64:
     """The next number of a counter-based sequence: splitmix64's finaliser (Steele, Lea & Flood 2014)."""
     number = (number ^ (number >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     number = (number ^ (number >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -681,12 +681,12 @@ def _gaussian_quantiles(count: int) -> F32:
 QUANTILES = _gaussian_quantiles(4096)
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=QUICK, parallel=True)
+@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH, parallel=True)
 def _expose(
     lit: F32, ray_of: I32, gain: F32, exposure: float, noise: float, key: np.uint64, quantiles: F32, picture: U8
 ) -> None:
     """The chip: light times exposure and vignetting, plus noise that follows from key, pixel and colour alone."""
-    start = _mix(key)
+    start = _mixed(key)
     spread = np.float32(noise)
     for p in numba.prange(len(picture)):
         i = ray_of[p]
@@ -697,7 +697,7 @@ def _expose(
             green += share * lit[i, 1]
             red += share * lit[i, 2]
         if noise > 0.0:
-            drawn = _mix(start + np.uint64(p) * np.uint64(0x9E3779B97F4A7C15))
+            drawn = _mixed(start + np.uint64(p) * np.uint64(0x9E3779B97F4A7C15))
             blue += spread * quantiles[drawn & np.uint64(0xFFF)]
             green += spread * quantiles[(drawn >> np.uint64(20)) & np.uint64(0xFFF)]
             red += spread * quantiles[(drawn >> np.uint64(40)) & np.uint64(0xFFF)]

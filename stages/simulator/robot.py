@@ -15,27 +15,27 @@ from .obstacles import Obstacles, gather, nearest
 
 F64 = npt.NDArray[np.float64]
 
-STEP = 0.01
+STEP_S = 0.01
 """Seconds of one step of the simulation."""
-ARRIVED = 0.05
+ARRIVAL_M = 0.05
 """Metres from the last waypoint at which a drive ends."""
-LOOSE = 0.02
+CONTACT_RELEASE_M = 0.02
 """Metres from an obstacle at which a contact has ended and another one counts anew."""
-ABOUT = 0.5
+REJOIN_TOLERANCE_M = 0.5
 """Metres by which one stretch of a route may pass further from a place than another and still be taken for as near."""
-NOBODY: F64 = np.zeros((0, 3))
+NO_PEOPLE: F64 = np.zeros((0, 3))
 """No people in the way."""
 
-X, Y, HEADING, SPEED, TURNING, TOUCHING, COLLISIONS, WAY = range(8)
+X, Y, HEADING, SPEED, TURNING, IN_CONTACT, COLLISIONS, DISTANCE = range(8)
 """What a robot's state (8,) holds: pose, m/s, rad/s, 1 in contact, contacts so far, metres driven so far."""
 
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """A drive: `times` (N,) s, `poses` (N, 3), and where the wheels had brought the robot by then, `rolled_to` (N, 3).
+    """A drive: `times` (N,) s, `poses` (N, 3), and the poses to which the wheels had rolled, `rolled_to` (N, 3).
 
-    The last two differ only where somebody lifted the robot. `collisions`: how often it came into contact.
-    `kidnappings`: what was done to it, and in which row; what was to happen after its end did not.
+    The last two differ only where the robot was lifted. `collisions`: how often it came into contact. `kidnappings`:
+    those that took place before the end of the drive, each with its row.
     """
 
     times: F64
@@ -60,18 +60,18 @@ def limits(robot: Robot) -> F64:
 
 def reach(robot: Robot) -> float:
     """How far (m) from an obstacle a robot needs to know of it."""
-    return robot.radius + 2 * LOOSE
+    return robot.radius + 2 * CONTACT_RELEASE_M
 
 
 def steer(
-    state: F64, speed: float, turning: float, robot: F64, seconds: float, room: Obstacles, people: F64 = NOBODY
+    state: F64, speed: float, turning: float, robot: F64, seconds: float, room: Obstacles, people: F64 = NO_PEOPLE
 ) -> None:
     """Drive on for some time under one command (m/s, rad/s): `state` (8,) changes, within the `limits` (6,) of a robot.
 
     A robot that would get closer to an obstacle or a person than its radius does not: it slides along, or is held
     and each new contact is counted. It can always turn, and always back away.
     """
-    _steer(state, speed, turning, robot, round(seconds / STEP), room, people)
+    _steer(state, speed, turning, robot, round(seconds / STEP_S), room, people)
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -83,17 +83,17 @@ def _steer(state: F64, speed: float, turning: float, robot: F64, steps: int, roo
 @numba.njit(cache=True, error_model="numpy")
 def _step(state: F64, speed: float, turning: float, robot: F64, room: Obstacles, people: F64) -> None:
     wanted = _within(speed, robot[1])
-    state[SPEED] += _within(wanted - state[SPEED], robot[3] * STEP)
-    state[TURNING] += _within(_within(turning, robot[2]) - state[TURNING], robot[4] * STEP)
-    middle = state[HEADING] + 0.5 * state[TURNING] * STEP
-    dx, dy = state[SPEED] * math.cos(middle) * STEP, state[SPEED] * math.sin(middle) * STEP
-    turned = state[HEADING] + state[TURNING] * STEP
+    state[SPEED] += _within(wanted - state[SPEED], robot[3] * STEP_S)
+    state[TURNING] += _within(_within(turning, robot[2]) - state[TURNING], robot[4] * STEP_S)
+    middle = state[HEADING] + 0.5 * state[TURNING] * STEP_S
+    dx, dy = state[SPEED] * math.cos(middle) * STEP_S, state[SPEED] * math.sin(middle) * STEP_S
+    turned = state[HEADING] + state[TURNING] * STEP_S
     state[HEADING] = turned - 2 * math.pi * math.floor((turned + math.pi) / (2 * math.pi))
     if robot[0] > 0.0 and (dx != 0.0 or dy != 0.0):
         dx, dy = _kept_off(state, dx, dy, robot, room, people)
     state[X] += dx
     state[Y] += dy
-    state[WAY] += math.hypot(dx, dy)
+    state[DISTANCE] += math.hypot(dx, dy)
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -102,11 +102,11 @@ def _kept_off(state: F64, dx: float, dy: float, robot: F64, room: Obstacles, peo
     now, away_x, away_y = nearest(room, people, state[X], state[Y])
     then = nearest(room, people, state[X] + dx, state[Y] + dy)[0]
     if then >= robot[0] or then >= now:
-        if then > robot[0] + LOOSE:
-            state[TOUCHING] = 0.0
+        if then > robot[0] + CONTACT_RELEASE_M:
+            state[IN_CONTACT] = 0.0
         return dx, dy
-    state[COLLISIONS] += 1.0 - state[TOUCHING]
-    state[TOUCHING] = 1.0
+    state[COLLISIONS] += 1.0 - state[IN_CONTACT]
+    state[IN_CONTACT] = 1.0
     before = math.hypot(dx, dy)
     into = min(dx * away_x + dy * away_y, 0.0)
     dx, dy = dx - into * away_x, dy - into * away_y
@@ -136,8 +136,8 @@ def drive(
     Pure pursuit: the robot steers for the point of the route `look_ahead` metres on, slower the more it must turn, and
     turns on the spot where it would have to look back. Speed and turning change no faster than the limits allow. The
     robot starts at rest at the first waypoint, facing the second unless `start_heading` is given. Obstacles stop it
-    where `room` is given. After a kidnapping it goes on from the point of the route that is nearest to where it was
-    put; of several, as on laps, from the next.
+    where `room` is given. After a kidnapping it continues from the nearest point of the route; of several equally near
+    ones, as on laps, from the next.
     """
     points, ends = _legs(waypoints)
     length = float(ends[-1])
@@ -145,26 +145,26 @@ def drive(
     ahead = points[min(1, len(points) - 1)] - start
     heading = math.atan2(ahead[1], ahead[0]) if start_heading is None else start_heading
     state = at_rest((*start, heading))
-    able = limits(robot)
+    bounds = limits(robot)
     if room is None:
-        able[0], room = 0.0, gather([], (1.0, 1.0), 0.0)
-    every = round(1.0 / (rate * STEP))
-    most = math.ceil((4.0 * length / robot.speed + 60.0) * rate) + 1
-    poses = np.empty((most, 3))
+        bounds[0], room = 0.0, gather([], (1.0, 1.0), 0.0)
+    every = round(1.0 / (rate * STEP_S))
+    capacity = math.ceil((4.0 * length / robot.speed + 60.0) * rate) + 1
+    poses = np.empty((capacity, 3))
     poses[0] = state[:3]
     rolled_to: dict[int, F64] = {}
-    happened: list[tuple[int, Kidnapping]] = []
+    kidnapped: list[tuple[int, Kidnapping]] = []
     done, along = 1, 0.0
     for kidnapping in [*sorted(kidnappings, key=lambda kidnapping: kidnapping.at), None]:
-        until = most if kidnapping is None else min(most, round(kidnapping.at * rate) + 1)
+        until = capacity if kidnapping is None else min(capacity, round(kidnapping.at * rate) + 1)
         filled, along, arrived = _pursue(
-            points, ends, along, state, able, robot.look_ahead, every, room, poses[done:until]
+            points, ends, along, state, bounds, robot.look_ahead, every, room, poses[done:until]
         )
         done += filled
         if arrived or kidnapping is None:
             break
         rolled_to.setdefault(done - 1, poses[done - 1].copy())
-        happened.append((done - 1, kidnapping))
+        kidnapped.append((done - 1, kidnapping))
         put_down(state, kidnapping)
         poses[done - 1] = state[:3]
         if kidnapping.to is not None:
@@ -173,7 +173,7 @@ def drive(
     before = poses.copy()
     for number, pose in rolled_to.items():
         before[number] = pose
-    return Drive(np.arange(done) / rate, poses, before, int(state[COLLISIONS]), tuple(happened))
+    return Drive(np.arange(done) / rate, poses, before, int(state[COLLISIONS]), tuple(kidnapped))
 
 
 def around(state: F64, seconds: npt.ArrayLike) -> F64:
@@ -188,7 +188,7 @@ def around(state: F64, seconds: npt.ArrayLike) -> F64:
 def put_down(state: F64, kidnapping: Kidnapping) -> None:
     """Somebody lifts a robot and puts it down: its `state` (8,) is at rest then, and nothing is counted as driven."""
     state[:3] = compose(state[:3] if kidnapping.to is None else kidnapping.to, (0.0, 0.0, kidnapping.turn))
-    state[SPEED] = state[TURNING] = state[TOUCHING] = 0.0
+    state[SPEED] = state[TURNING] = state[IN_CONTACT] = 0.0
 
 
 def _legs(waypoints: npt.ArrayLike) -> tuple[F64, F64]:
@@ -207,10 +207,10 @@ def _nearest_along(points: F64, ends: F64, at: F64, along: float = 0.0) -> float
     part = np.clip(((at - points[:-1]) * legs).sum(axis=1) / (legs**2).sum(axis=1), 0.0, 1.0)
     off = np.hypot(*(points[:-1] + part[:, None] * legs - at).T)
     places = ends[:-1] + part * np.diff(ends)
-    near = off <= off.min() + ABOUT
+    near = off <= off.min() + REJOIN_TOLERANCE_M
     ahead = near & (places >= along)
     first = int(np.argmax(ahead if ahead.any() else near))
-    chosen = [leg for leg in range(first, len(legs)) if places[leg] - places[first] < 2 * ABOUT]
+    chosen = [leg for leg in range(first, len(legs)) if places[leg] - places[first] < 2 * REJOIN_TOLERANCE_M]
     return float(places[chosen[int(np.argmin(off[chosen]))]])
 
 
@@ -247,8 +247,10 @@ def _pursue(
     """Follow a line until `poses` (N, 3) is full or the robot is there: rows filled, metres along, whether it is."""
     length = ends[-1]
     goal_x, goal_y = points[-1, 0], points[-1, 1]
-    patience = math.ceil((2 * math.pi / robot[2] + robot[2] / robot[4]) / STEP)  # as long as it takes to turn once
-    waited = 0
+    max_stalled_steps = math.ceil(
+        (2 * math.pi / robot[2] + robot[2] / robot[4]) / STEP_S
+    )  # as long as it takes to turn once
+    stalled_steps = 0
     for row in range(len(poses)):
         for _ in range(every):
             best, before = np.inf, along
@@ -259,20 +261,22 @@ def _pursue(
                 off = math.hypot(x - state[X], y - state[Y])
                 if off < best:
                     best, along = off, at
-            waited = waited + 1 if along == before else 0
-            if waited > patience:  # it circles round the point that it steers for, and so has been there
-                along, waited = min(along + look_ahead, length), 0
+            stalled_steps = stalled_steps + 1 if along == before else 0
+            if (
+                stalled_steps > max_stalled_steps
+            ):  # it circles round the point that it steers for, and so has been there
+                along, stalled_steps = min(along + look_ahead, length), 0
             remaining = math.hypot(goal_x - state[X], goal_y - state[Y])
             if along >= length - look_ahead:
-                halts = along >= length - 0.6 * ARRIVED or (remaining < 2 * ARRIVED and state[TURNING] == 0.0)
-                if (remaining < ARRIVED and state[SPEED] < 0.05) or (halts and state[SPEED] == 0.0):
+                halts = along >= length - 0.6 * ARRIVAL_M or (remaining < 2 * ARRIVAL_M and state[TURNING] == 0.0)
+                if (remaining < ARRIVAL_M and state[SPEED] < 0.05) or (halts and state[SPEED] == 0.0):
                     return row, along, True
             x, y = _point(points, ends, min(along + look_ahead, length))
             off = math.atan2(y - state[Y], x - state[X]) - state[HEADING]
             off -= 2 * math.pi * math.floor((off + math.pi) / (2 * math.pi))
-            brake = math.sqrt(robot[3] * max(length - along - 0.6 * ARRIVED, 0.0))
+            brake = math.sqrt(robot[3] * max(length - along - 0.6 * ARRIVAL_M, 0.0))
             speed = min(robot[1] * max(math.cos(off), 0.0) ** 2 if abs(off) < 1.0 else 0.0, brake)
-            turning = 0.0 if remaining < 2 * ARRIVED else 2.0 * off
-            _step(state, speed, turning, robot, room, NOBODY)
+            turning = 0.0 if remaining < 2 * ARRIVAL_M else 2.0 * off
+            _step(state, speed, turning, robot, room, NO_PEOPLE)
         poses[row] = state[:3]
     return len(poses), along, False

@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .config import Block, Day, Door, Furniture, Hanging, Material, Point, Room, Side, WorldConfig
+from .config import Block, Day, Door, Furniture, Material, Point, Room, Side, WallPanel, WorldConfig
 from .streams import stream
 
-THICK = 0.12
+INNER_WALL_M = 0.12
 """Thickness (m) of an inner wall."""
-DOOR_HEIGHT = 2.1
-CLEAR = 0.7
+DOOR_HEIGHT_M = 2.1
+DOOR_CLEARANCE_M = 0.7
 """Metres on both sides of a door that furniture leaves free."""
 
 
@@ -103,9 +103,9 @@ INWARD: dict[Side, int] = {"east": -1, "west": 1, "north": -1, "south": 1}
 def walls(config: WorldConfig, room: Room, cuts: list[Opening]) -> list[Block]:
     """Walls of a room just inside its rectangle, and its facade just outside; above openings they go on."""
     height = room.height or config.height
-    layers: list[tuple[float, Material, str, float]] = [(THICK / 2, room.wall, f"{room.name} wall", 0.0)]
+    layers: list[tuple[float, Material, str, float]] = [(INNER_WALL_M / 2, room.wall, f"{room.name} wall", 0.0)]
     if room.facade:
-        layers.append((-THICK / 2, room.facade, f"{room.name} facade", THICK))
+        layers.append((-INNER_WALL_M / 2, room.facade, f"{room.name} facade", INNER_WALL_M))
     blocks = []
     for inset, material, look, overlap in layers:
         for side in ("east", "north", "west", "south"):
@@ -118,20 +118,22 @@ def walls(config: WorldConfig, room: Room, cuts: list[Opening]) -> list[Block]:
                     blocks.append(_piece_of_wall(along_x, at, begin, end, 0.0, height, material, look))
             for cut in here:
                 begin, end = cut.middle - cut.width / 2, cut.middle + cut.width / 2
-                if height > DOOR_HEIGHT + 0.05:
-                    blocks.append(_piece_of_wall(along_x, at, begin, end, DOOR_HEIGHT, height, material, look))
+                if height > DOOR_HEIGHT_M + 0.05:
+                    blocks.append(_piece_of_wall(along_x, at, begin, end, DOOR_HEIGHT_M, height, material, look))
     return blocks
 
 
 def _cuts(cut: Opening, along_x: bool, line: float, low: float, high: float) -> bool:
-    return cut.along_x == along_x and abs(cut.line - line) < 3 * THICK and low < cut.middle < high
+    return cut.along_x == along_x and abs(cut.line - line) < 3 * INNER_WALL_M and low < cut.middle < high
 
 
 def _piece_of_wall(
     along_x: bool, at: float, begin: float, end: float, bottom_z: float, top_z: float, material: Material, look: str
 ) -> Block:
     middle = (begin + end) / 2
-    centre, size = ((middle, at), (end - begin, THICK)) if along_x else ((at, middle), (THICK, end - begin))
+    centre, size = (
+        ((middle, at), (end - begin, INNER_WALL_M)) if along_x else ((at, middle), (INNER_WALL_M, end - begin))
+    )
     return Block(centre, size, top_z - bottom_z, material, "concrete", bottom_z, look=look, kind="wall")
 
 
@@ -140,7 +142,7 @@ def roof(config: WorldConfig, room: Room) -> list[Block]:
     if room.height is None or not room.walls:
         return []
     (x, y), (width, depth) = room.corner, room.size
-    out = THICK if room.facade else 0.0
+    out = INNER_WALL_M if room.facade else 0.0
     centre, size = (x + width / 2, y + depth / 2), (width + 2 * out, depth + 2 * out)
     return [
         Block(centre, size, 0.3, room.facade or "concrete", "concrete", room.height, 0.0, "ceiling", "roof", "roof")
@@ -154,21 +156,21 @@ def doors(config: WorldConfig, room: Room, day: Day, number: int) -> list[Block]
         if not door.leaf:
             continue
         along_x, line, low, _ = _wall(room, door.side)
-        at, inward = line + INWARD[door.side] * THICK / 2, INWARD[door.side]
+        at, inward = line + INWARD[door.side] * INNER_WALL_M / 2, INWARD[door.side]
         middle = low + door.at
         is_open = stream(config.seed, "door", room.name, k, "day", number).uniform() < day.doors
         if is_open:
-            along, across, turned = middle - door.width / 2, at + inward * (door.width / 2 + THICK / 2), True
+            along, across, turned = middle - door.width / 2, at + inward * (door.width / 2 + INNER_WALL_M / 2), True
         else:
             along, across, turned = middle, at, False
         centre = (along, across) if along_x else (across, along)
         yaw = 0.0 if along_x != turned else math.pi / 2
         look = f"{room.name} door"
-        leaves.append(Block(centre, (door.width, 0.05), DOOR_HEIGHT, "door", "wood", yaw=yaw, look=look, kind="door"))
+        leaves.append(Block(centre, (door.width, 0.05), DOOR_HEIGHT_M, "door", "wood", yaw=yaw, look=look, kind="door"))
     return leaves
 
 
-def windows(room: Room) -> list[Hanging]:
+def windows(room: Room) -> list[WallPanel]:
     """Rows of windows on the named sides, where no door is."""
     panes = []
     for side in room.windows:
@@ -192,17 +194,17 @@ def _on_wall(
     material: Material,
     along_x: bool,
     line: float,
-) -> Hanging:
-    at = line + INWARD[side] * (THICK if room.walls else 0.0)
+) -> WallPanel:
+    at = line + INWARD[side] * (INNER_WALL_M if room.walls else 0.0)
     facing = {"east": math.pi, "north": -math.pi / 2, "west": 0.0, "south": math.pi / 2}[side]
-    return Hanging((along, at) if along_x else (at, along), facing, width, low, height, material)
+    return WallPanel((along, at) if along_x else (at, along), facing, width, low, height, material)
 
 
 class Fittings(NamedTuple):
     """What stands and hangs in a room."""
 
     blocks: list[Block]
-    hangings: list[Hanging]
+    wall_panels: list[WallPanel]
 
 
 def furnish(config: WorldConfig, room: Room, cuts: list[Opening], day: Day, number: int) -> Fittings:
@@ -212,7 +214,7 @@ def furnish(config: WorldConfig, room: Room, cuts: list[Opening], day: Day, numb
     rng = stream(config.seed, "furniture", room.name)
     moved = stream(config.seed, "furniture", room.name, "day", number)
     blocks: list[Block] = []
-    hangings: list[Hanging] = []
+    wall_panels: list[WallPanel] = []
     pieces = CATALOGUE[room.furniture]
     for side in ("east", "north", "west", "south"):
         if not room.walls:
@@ -220,31 +222,31 @@ def furnish(config: WorldConfig, room: Room, cuts: list[Opening], day: Day, numb
         along_x, line, low, high = _wall(room, side)
         corner = 1.0 if side in ("east", "west") else 0.2
         free = [
-            (c.middle - c.width / 2 - CLEAR, c.middle + c.width / 2 + CLEAR)
+            (c.middle - c.width / 2 - DOOR_CLEARANCE_M, c.middle + c.width / 2 + DOOR_CLEARANCE_M)
             for c in cuts
             if _cuts(c, along_x, line, low, high)
         ]
-        for piece, along in _lined_up(rng, pieces, room.amount, low + corner, high - corner, free):
+        for piece, along in _placed_along(rng, pieces, room.furniture_density, low + corner, high - corner, free):
             shift = float(np.clip(moved.normal(0.0, 1.0), -2, 2)) * day.furniture
             if piece.depth == 0.0:
                 if not any(w == side for w in room.windows):
                     low_z, width = rng.uniform(0.9, 1.2), rng.uniform(0.6, 1.2)
                     kind: Material = "board" if room.furniture in ("meeting", "lab") else "poster"
                     tall = 1.0 if kind == "board" else rng.uniform(0.7, 1.2)
-                    hangings.append(_on_wall(room, side, along, width, low_z, tall, kind, along_x, line))
+                    wall_panels.append(_on_wall(room, side, along, width, low_z, tall, kind, along_x, line))
                 continue
             if side in room.windows and piece.height > 1.4:
                 continue
             along = min(max(along + shift, low + corner + piece.length / 2), high - corner - piece.length / 2)
-            blocks += _against(room, side, along_x, line, along, piece, float(moved.normal()) * day.furniture)
+            blocks += _against_wall(room, side, along_x, line, along, piece, float(moved.normal()) * day.furniture)
     blocks += _table(config, room, float(moved.normal()) * day.furniture)
-    return Fittings(blocks, hangings)
+    return Fittings(blocks, wall_panels)
 
 
-def _lined_up(
+def _placed_along(
     rng: np.random.Generator,
     pieces: tuple[_Piece, ...],
-    amount: float,
+    density: float,
     begin: float,
     end: float,
     free: list[tuple[float, float]],
@@ -253,7 +255,7 @@ def _lined_up(
     at = begin
     while at < end:
         piece = pieces[int(rng.integers(len(pieces)))]
-        wanted, gap = rng.uniform() < amount, rng.uniform(0.02, 0.4)
+        wanted, gap = rng.uniform() < density, rng.uniform(0.02, 0.4)
         last = at + piece.length
         blocked = [stretch for stretch in free if at < stretch[1] and last > stretch[0]]
         if blocked:
@@ -264,14 +266,14 @@ def _lined_up(
         at = last + gap
 
 
-def _against(
+def _against_wall(
     room: Room, side: Side, along_x: bool, line: float, along: float, piece: _Piece, turn: float
 ) -> Iterator[Block]:
     """A piece of furniture with its back to the wall, what stands on it, and the chair in front."""
     inward = INWARD[side]
 
     def body(part: _Piece, depth_at: float, yaw: float = 0.0, look: str = "") -> Block:
-        across = line + inward * (THICK + 0.01 + depth_at)
+        across = line + inward * (INNER_WALL_M + 0.01 + depth_at)
         centre, size = (
             ((along, across), (part.length, part.depth)) if along_x else ((across, along), (part.depth, part.length))
         )
@@ -321,7 +323,7 @@ def _planted(config: WorldConfig, room: Room) -> list[Block]:
                 x + width * (column + 0.5 + rng.uniform(-0.2, 0.2)) / columns,
                 y + depth * (row + 0.5 + rng.uniform(-0.2, 0.2)) / rows,
             )
-            taken, what, yaw = rng.uniform() < room.amount, rng.uniform(), rng.uniform(0.0, math.pi)
+            taken, what, yaw = rng.uniform() < room.furniture_density, rng.uniform(), rng.uniform(0.0, math.pi)
             trunk, crown = rng.uniform(0.25, 0.4), min(rng.uniform(1.6, 2.6), width, depth)
             look = f"plant {rng.integers(12)}"
             if not taken:

@@ -18,7 +18,7 @@ from .simulated_recording import SimulatedRecording
 
 F64 = npt.NDArray[np.float64]
 
-WHEEL_TRANSIT, RING_TRANSIT = 2_000_000, 5_000_000
+ODOMETRY_LATENCY_NS, SCAN_LATENCY_NS = 2_000_000, 5_000_000
 """Nanoseconds from the stamp of odometry and of a range reading to its arrival."""
 
 
@@ -58,15 +58,15 @@ def _write(log: LogWriter, recording: SimulatedRecording, quality: int, wrote_pi
             said = json.dumps(asdict(recording.lifted[number][1]))
             log.write("/ground_truth/event", "std_msgs/msg/String", arrival, {"data": said})
         else:
-            _write_picture(log, recording, number, arrival, quality)
+            _write_image(log, recording, number, arrival, quality)
             wrote_picture()
 
 
 def _arrivals(recording: SimulatedRecording) -> list[tuple[int, str, int]]:
     """All messages by the time of their arrival (ns): what it is, and its number."""
-    found = [(int(stamp) + WHEEL_TRANSIT, "odometry", number) for number, stamp in enumerate(recording.times)]
-    found += [(int(stamp) + WHEEL_TRANSIT, "truth", number) for number, stamp in enumerate(recording.true_times)]
-    found += [(int(stamp) + RING_TRANSIT, "scan", number) for number, stamp in enumerate(recording.ring_times)]
+    found = [(int(stamp) + ODOMETRY_LATENCY_NS, "odometry", number) for number, stamp in enumerate(recording.times)]
+    found += [(int(stamp) + ODOMETRY_LATENCY_NS, "truth", number) for number, stamp in enumerate(recording.true_times)]
+    found += [(int(stamp) + SCAN_LATENCY_NS, "scan", number) for number, stamp in enumerate(recording.scan_times)]
     found += [(stamp, "event", number) for number, (stamp, _) in enumerate(recording.lifted)]
     return found + [(arrival, "picture", number) for number, (arrival, _, _) in enumerate(recording.sent)]
 
@@ -81,7 +81,7 @@ def _write_odometry(log: LogWriter, recording: SimulatedRecording, number: int, 
 
 
 def _write_scan(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int) -> None:
-    scan = recording.ring(number)
+    scan = recording.scan_at(number)
     message = {
         "header": {"frame_id": "base_link"},
         "angle_min": scan.first,
@@ -92,15 +92,15 @@ def _write_scan(log: LogWriter, recording: SimulatedRecording, number: int, arri
         "range_max": scan.farthest,
         "ranges": scan.ranges.astype(np.float32),
     }
-    log.write("/scan", "sensor_msgs/msg/LaserScan", int(recording.ring_times[number]), message, arrival)
+    log.write("/scan", "sensor_msgs/msg/LaserScan", int(recording.scan_times[number]), message, arrival)
 
 
-def _write_picture(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int, quality: int) -> None:
+def _write_image(log: LogWriter, recording: SimulatedRecording, number: int, arrival: int, quality: int) -> None:
     _, stamp, shot = recording.sent[number]
     camera = recording.camera
     size = {"width": camera.width, "height": camera.height_px}
     info = {"header": {"frame_id": "omni_camera"}, **size, **camera.camera_info()}  # camera.yaml says the rest
-    _, packed = cv2.imencode(".jpg", recording.picture(shot), [cv2.IMWRITE_JPEG_QUALITY, quality])
+    _, packed = cv2.imencode(".jpg", recording.image_of_shot(shot), [cv2.IMWRITE_JPEG_QUALITY, quality])
     picture = {"header": {"frame_id": "omni_camera"}, "format": "jpeg", "data": packed.ravel()}
     log.write("/camera/camera_info", "sensor_msgs/msg/CameraInfo", stamp, info, arrival)
     log.write("/camera/image/compressed", "sensor_msgs/msg/CompressedImage", stamp, picture, arrival)

@@ -18,7 +18,7 @@ from omninav.stages.recordings.topics import ascending
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
-from . import tours
+from . import route_planning
 from .cameras import Rays, camera_of, camera_rays, shutter_times
 from .config import Day, Kidnapping, WorldConfig
 from .obstacles import Obstacles, gather, nearest
@@ -26,26 +26,27 @@ from .odometry import draw_bias, odometry
 from .people import Person, Track
 from .ranges import azimuths, measure, round_bodies
 from .renderer import Scene, render
-from .robot import NOBODY, drive, reach
+from .robot import NO_PEOPLE, drive, reach
 from .streams import stream
 from .world import World
 
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
 
-EPOCH = 1_767_571_200 * 10**9
+DAY_0_NS = 1_767_571_200 * 10**9
 """Midnight before day 0, 2026-01-05 UTC, in nanoseconds."""
-OFFSET = 0.52
+FIRST_IMAGE_S = 0.52
 """Seconds from the start of a drive to its first picture: odometry reaches back before it."""
-TRANSIT = 42_000_000
+IMAGE_LATENCY_NS = 42_000_000
 """Nanoseconds from a picture's stamp to its arrival."""
 
 
 class SimulatedRecording:
-    """One drive along a named route of a world on a day, as a `Recording`.
+    """One drive along a named route of a world on a day.
 
-    The same seed, route, day and kidnappings give the same bytes. Images come in any order at the same price and with the same noise. The day decides the line that
-    is driven, the odometry's errors, the noise and which goods were moved. `collisions` counts what the robot touched.
+    A `Recording`: the same seed, route, day and kidnappings give the same bytes. Images can be asked for in any order.
+    The day decides the line that is driven, the odometry's errors, the noise and which goods were moved. `collisions`
+    counts contacts.
     Raises `UnreadableRecording` for a route that the world does not have.
     """
 
@@ -55,28 +56,32 @@ class SimulatedRecording:
                 f"world '{world.name}' has no route '{route}'; it has: {', '.join(sorted(world.routes)) or 'none'}"
             )
         self.world, self.route, self.day = world, route, day
-        self.kidnappings = tuple(sorted([*world.routes[route].kidnappings, *kidnappings], key=lambda lift: lift.at))
-        self._later: World | None = None
-        self._lasts = world.routes[route].day_lasts
+        self.kidnappings = tuple(
+            sorted([*world.routes[route].kidnappings, *kidnappings], key=lambda kidnapping: kidnapping.at)
+        )
+        self._later_world: World | None = None
+        self._day_duration_s = world.routes[route].day_duration_s
         self.camera = camera_of(world)
         self.dropped: Counter[str] = Counter()
         self.details: dict[str, str] = {}
-        self._start = EPOCH + day * 86400 * 10**9 + (9 + sorted(world.routes).index(route)) * 3600 * 10**9
+        self._start = DAY_0_NS + day * 86400 * 10**9 + (9 + sorted(world.routes).index(route)) * 3600 * 10**9
         self._drive()
-        self._take_pictures()
-        self._turn_rings()
+        self._schedule_images()
+        self._schedule_scans()
 
     def _drive(self) -> None:
         world = self.world
         try:
-            way = tours.plan(self._world, world.routes[self.route])
-        except tours.NoWay as why:
+            way = route_planning.plan(self._world, world.routes[self.route])
+        except route_planning.UnreachableRoute as why:
             raise UnreadableRecording(f"route '{self.route}': {why}") from None
-        line = tours.wandered(self._world, way, world.robot.wander, self._stream("line"))
+        line = route_planning.jittered(self._world, way, world.robot.path_jitter_m, self._stream("line"))
         for kidnapping in self.kidnappings:
             if kidnapping.to is not None:
                 refuse_no_room(world, self._room, kidnapping.to, "kidnappings")
-        if self._lasts is not None and any(later.furniture or later.doors < 1.0 for later in world.days[self.day :]):
+        if self._day_duration_s is not None and any(
+            later.furniture or later.doors < 1.0 for later in world.days[self.day :]
+        ):
             raise UnreadableRecording(
                 f"route '{self.route}' lasts several days, and on one of world '{world.name}' furniture or doors move; "
                 "lamps, curtains and goods may change while the robot drives, but what it may run into may not"
@@ -95,14 +100,14 @@ class SimulatedRecording:
         self._true_columns = (*self.true_poses[:, :2].T.copy(), np.unwrap(self.true_poses[:, 2]))
         self.true_times: I64 = np.insert(self.times, put, self.times[put] - 1)
 
-    def _take_pictures(self) -> None:
+    def _schedule_images(self) -> None:
         timing, delivery = self.world.timing, self.world.delivery
-        count = max(0, int(np.floor((self._seconds[-1] - OFFSET) * timing.pictures + 1e-9)) + 1)
-        self._shots = OFFSET + np.arange(count) / timing.pictures
+        count = max(0, int(np.floor((self._seconds[-1] - FIRST_IMAGE_S) * timing.images + 1e-9)) + 1)
+        self._shots = FIRST_IMAGE_S + np.arange(count) / timing.images
         fate = self._stream("delivery").uniform(size=(count, 2))
         stamps = self._stamps(self._shots)
-        late = np.where(fate[:, 1] < delivery.late, round(delivery.late_by * 1e9), 0)
-        arrivals = stamps + TRANSIT + late
+        late = np.where(fate[:, 1] < delivery.late, round(delivery.delay_s * 1e9), 0)
+        arrivals = stamps + IMAGE_LATENCY_NS + late
         sent = np.flatnonzero(fate[:, 0] >= delivery.dropped)
         self.sent: list[tuple[int, int, int]] = sorted(
             (int(arrivals[shot]), int(stamps[shot]), int(shot)) for shot in sent
@@ -113,15 +118,15 @@ class SimulatedRecording:
             self.dropped["backward_stamp"] = len(overtaken)
             stamp = self.sent[overtaken[0]][1]
             self.details["backward_stamp"] = f"{self.name}: a picture was overtaken, stamp {stamp} ns"
-        self._taken: I64 = np.array([self.sent[number][2] for number in kept], dtype=np.int64)
-        self.stamps: I64 = stamps[self._taken]
-        self.truth = self._true(self._shots[self._taken])
-        self.odometry = se2.interpolate(self._seconds, self.rolled, self._shots[self._taken])
+        self._received: I64 = np.array([self.sent[number][2] for number in kept], dtype=np.int64)
+        self.stamps: I64 = stamps[self._received]
+        self.truth = self._true(self._shots[self._received])
+        self.odometry = se2.interpolate(self._seconds, self.rolled, self._shots[self._received])
 
-    def _turn_rings(self) -> None:
+    def _schedule_scans(self) -> None:
         rate = self.world.ranges.rate
-        self._rings = np.arange(int(np.floor(self._seconds[-1] * rate + 1e-9)) + 1) / rate
-        self.ring_times = self._stamps(self._rings)
+        self._scan_seconds = np.arange(int(np.floor(self._seconds[-1] * rate + 1e-9)) + 1) / rate
+        self.scan_times = self._stamps(self._scan_seconds)
         """Stamps (ns) of all turns of the range ring."""
         self._ring_key = int(self._stream("ranges").integers(2**62))
 
@@ -145,12 +150,12 @@ class SimulatedRecording:
 
     def _scene(self, seconds: float) -> Scene:
         """The world as it looks at a time: a long drive may see several days."""
-        if self._lasts is None or seconds < self._lasts:
+        if self._day_duration_s is None or seconds < self._day_duration_s:
             return self._world.scene
-        number = self.day + int(seconds // self._lasts)
-        if self._later is None or self._later.day != number:
-            self._later = World(self.world, number)
-        return self._later.scene
+        number = self.day + int(seconds // self._day_duration_s)
+        if self._later_world is None or self._later_world.day != number:
+            self._later_world = World(self.world, number)
+        return self._later_world.scene
 
     @cached_property
     def _room(self) -> Obstacles:
@@ -165,9 +170,9 @@ class SimulatedRecording:
 
     def image(self, frame: int) -> Pixels:
         """The picture of a frame, (height, width, 3) uint8 blue-green-red, rendered now."""
-        return self.picture(int(self._taken[frame]))
+        return self.image_of_shot(int(self._received[frame]))
 
-    def picture(self, shot: int) -> Pixels:
+    def image_of_shot(self, shot: int) -> Pixels:
         """A picture by its number among all that were taken, also those that nobody received."""
         sensor, at = self.world.sensor, self._shots[shot]
         swing = np.sin(2 * np.pi * at / sensor.exposure_period)
@@ -188,22 +193,22 @@ class SimulatedRecording:
 
     def scan(self, frame: int) -> Scan | None:
         """The last turn of the range ring before a frame."""
-        return self.ring(int(np.searchsorted(self.ring_times, self.stamps[frame], side="right")) - 1)
+        return self.scan_at(int(np.searchsorted(self.scan_times, self.stamps[frame], side="right")) - 1)
 
-    def ring(self, turn: int) -> Scan:
+    def scan_at(self, turn: int) -> Scan:
         """A turn of the range ring, by its number."""
-        at, ring = self._rings[turn], self.world.ranges
+        at, ring = self._scan_seconds[turn], self.world.ranges
         people = round_bodies(self._people(float(at)))
         rng = np.random.default_rng([self._ring_key, turn])
         metres = measure(self._room, people[None], self._true(at[None]), ring, rng)[0]
-        return ring_scan(self.world, metres.astype(np.float32).astype(np.float64))  # as a message holds them
+        return scan_value(self.world, metres.astype(np.float32).astype(np.float64))  # as a message holds them
 
     def _people(self, seconds: float) -> tuple[Person, ...]:
         """Who is about, some of them because of the robot."""
         return self._world.people_at(seconds, Track(self._seconds, self.driven))
 
     def digest(self) -> str:
-        """sha256 over what the drive sees of the world, route, day, kidnappings and the code that renders it."""
+        """sha256 over the days of the world that the drive sees, route, day, kidnappings and the simulator's code."""
         return drive_digest(self.world, self.route, self.day, self.kidnappings)
 
 
@@ -212,15 +217,15 @@ def drive_digest(world: WorldConfig, route: str, day: int, kidnappings: Sequence
 
     The days before and after the drive do not count: drives of a day are equal whatever other days bring.
     """
-    to_come = world.days[day + 1 :] if world.routes[route].day_lasts is not None else ()
+    to_come = world.days[day + 1 :] if world.routes[route].day_duration_s is not None else ()
     seen = dataclasses.replace(world, days=(*(Day(),) * day, world.day(day), *to_come))
-    done = json.dumps([dataclasses.asdict(kidnapping) for kidnapping in kidnappings])
+    done = json.dumps([dataclasses.asdict(each) for each in kidnappings])
     return digest_text(simulation_digest(seen), route, str(day), done)
 
 
 def refuse_no_room(world: WorldConfig, room: Obstacles, place: Sequence[float], where: str) -> None:
     """Raise `UnreadableRecording` for a place (x, y, heading) where the robot has no room to stand."""
-    clear = nearest(room, NOBODY, float(place[0]), float(place[1]))[0]
+    clear = nearest(room, NO_PEOPLE, float(place[0]), float(place[1]))[0]
     if clear < world.robot.radius:
         raise UnreadableRecording(
             f"{where}: {place[0]:g}, {place[1]:g} of world '{world.name}' is {max(clear, 0.0):.2f} m from an obstacle, "
@@ -245,7 +250,7 @@ def simulation_digest(world: WorldConfig) -> str:
     return digest_text(described, *(digest_file(path) for path in code))
 
 
-def ring_scan(world: WorldConfig, metres: F64) -> Scan:
+def scan_value(world: WorldConfig, metres: F64) -> Scan:
     """A turn of a world's range ring as the value that travels on wires."""
     first, step = azimuths(world.ranges)
-    return Scan(metres, first, step, nearest=0.0, farthest=world.ranges.farthest)
+    return Scan(metres, first, step, nearest=0.0, farthest=world.ranges.max_range)

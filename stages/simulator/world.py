@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from . import people, textures
 from .bodies import Box, Tiling
-from .config import Block, Hanging, Lamp, Room, Shelf, WorldConfig
+from .config import Block, Lamp, Room, Shelf, WallPanel, WorldConfig
 from .layout import expand
 from .lighting import lamps_and_windows, lamps_on
 from .obstacles import Obstacles, distances, gather
@@ -20,13 +20,13 @@ from .streams import stream
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
 
-WALL = 0.2
+WALL_THICKNESS_M = 0.2
 """Thickness (m) of the outer walls."""
-LOW = 0.03
+MAX_DRIVABLE_HEIGHT_M = 0.03
 """What is no higher (m) can be driven over."""
-PATCHED = ("floor", "ceiling", "grass", "asphalt", "paving", "parquet", "sky")
+VARIED_MATERIALS = ("floor", "ceiling", "grass", "asphalt", "paving", "parquet", "sky")
 """Grounds whose pieces differ a little; others are of one piece."""
-HEADROOM = 1.4
+HEADROOM_M = 1.4
 """What hangs higher (m) can be driven under."""
 
 
@@ -58,7 +58,7 @@ class World:
             *self._walls(),
             *(box for k, shelf in enumerate(self.layout.shelves) for box in self._shelf(shelf, k)),
             *(self._block(block, k) for k, block in enumerate(self.layout.blocks)),
-            *(self._hanging(hanging, k) for k, hanging in enumerate(self.layout.hangings)),
+            *(self._wall_panel(hanging, k) for k, hanging in enumerate(self.layout.wall_panels)),
             *(self._lamp(lamp, on) for lamp, on in zip(lamps, lamps_on(lamps, config, day), strict=True)),
         ]
         self.floor = self._ground(config.floor, 6, config.rooms)
@@ -82,12 +82,12 @@ class World:
         rows, columns = math.ceil(self.config.size[1]), math.ceil(self.config.size[0])
         choice = stream(self.config.seed, "ground", material).integers(kinds, size=(rows, columns))
         numbers = np.array([self._texture(material, f"{material} {k}") for k in range(kinds)])
-        choice = choice if material in PATCHED else 0 * choice
+        choice = choice if material in VARIED_MATERIALS else 0 * choice
         tiles = numbers[choice]
         width, depth = self.config.size[0] / columns, self.config.size[1] / rows
         for room in rooms:
             if room.floor is not None:
-                kinds = 3 if room.floor in PATCHED else 1
+                kinds = 3 if room.floor in VARIED_MATERIALS else 1
                 own = np.array([self._texture(room.floor, f"{room.name} floor {k}") for k in range(kinds)])
                 (left, low), (wide, deep) = room.corner, room.size
                 across = slice(round(left / width), round((left + wide) / width))
@@ -100,16 +100,16 @@ class World:
         high = self.config.height
         walls = []
         for name, centre, length, yaw in (
-            ("east", (width + WALL / 2, depth / 2), depth, math.pi / 2),
-            ("north", (width / 2, depth + WALL / 2), width, 0.0),
-            ("west", (-WALL / 2, depth / 2), depth, math.pi / 2),
-            ("south", (width / 2, -WALL / 2), width, 0.0),
+            ("east", (width + WALL_THICKNESS_M / 2, depth / 2), depth, math.pi / 2),
+            ("north", (width / 2, depth + WALL_THICKNESS_M / 2), width, 0.0),
+            ("west", (-WALL_THICKNESS_M / 2, depth / 2), depth, math.pi / 2),
+            ("south", (width / 2, -WALL_THICKNESS_M / 2), width, 0.0),
         ):
             texture = self._texture(self.config.wall, name)
-            half = (length / 2 + WALL, WALL / 2)
+            half = (length / 2 + WALL_THICKNESS_M, WALL_THICKNESS_M / 2)
             side = self._plain(texture, 2 * half[0], high, textures.extent(self.config.wall))
-            end = self._plain(texture, WALL, high)
-            cap = self._plain(texture, 2 * half[0], WALL)
+            end = self._plain(texture, WALL_THICKNESS_M, high)
+            cap = self._plain(texture, 2 * half[0], WALL_THICKNESS_M)
             walls.append(Box("wall", centre, half, yaw, 0.0, high, (end, end, side, side, cap, cap)))
         return walls
 
@@ -196,7 +196,7 @@ class World:
         faces = (ends, ends, fronts, fronts, bottom, top)
         return Box(block.kind, block.centre, half, block.yaw, block.bottom_z, block.bottom_z + block.height, faces)
 
-    def _hanging(self, hanging: Hanging, number: int) -> Box:
+    def _wall_panel(self, hanging: WallPanel, number: int) -> Box:
         front = self._plain(self._texture(hanging.material, f"hanging {number}"), hanging.width, hanging.height)
         rim = self._plain(self._texture("concrete", "rim"), 1.0, 1.0)
         thick = 0.03
@@ -221,7 +221,7 @@ class World:
     @cached_property
     def scene(self) -> Scene:
         """This world for the ray caster."""
-        looks = [people.coverings(self._texture, look) for look in range(people.LOOKS)]
+        looks = [people.coverings(self._texture, look) for look in range(people.OUTFITS)]
         day = np.array(self.config.day(self.day).light)
         pictures, glow = [], [textures.glow(material) for material, _ in self._named]
         for number, (material, name) in enumerate(self._named):
@@ -237,7 +237,7 @@ class World:
             self.config.height,
             pictures,
             glow,
-            lamps_and_windows(self.layout.lamps, self.layout.hangings, self.config, self.day),
+            lamps_and_windows(self.layout.lamps, self.layout.wall_panels, self.config, self.day),
             self.config.ambient,
             looks,
         )
@@ -259,7 +259,7 @@ class World:
     @cached_property
     def obstacles(self) -> list[Box]:
         """What a robot cannot drive over or under."""
-        return [box for box in self.boxes if box.high > LOW and box.low < HEADROOM]
+        return [box for box in self.boxes if box.high > MAX_DRIVABLE_HEIGHT_M and box.low < HEADROOM_M]
 
     def clearance(self, points: npt.ArrayLike) -> F64:
         """Distance (m) of points (N, 2) of the map to the nearest obstacle or wall; 0 inside one."""

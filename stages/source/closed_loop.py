@@ -10,7 +10,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.recording import UnreadableRecording
-from omninav.stages.simulator import tours
+from omninav.stages.simulator import route_planning
 from omninav.stages.simulator.cameras import camera_of, camera_rays, shutter_times
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.demo import DEMO
@@ -19,8 +19,8 @@ from omninav.stages.simulator.odometry import draw_bias, measured
 from omninav.stages.simulator.people import Person, Track
 from omninav.stages.simulator.ranges import measure, round_bodies
 from omninav.stages.simulator.renderer import render
-from omninav.stages.simulator.robot import COLLISIONS, WAY, around, at_rest, limits, put_down, reach, steer
-from omninav.stages.simulator.simulated_recording import EPOCH, refuse_no_room, ring_scan, simulation_digest
+from omninav.stages.simulator.robot import COLLISIONS, DISTANCE, around, at_rest, limits, put_down, reach, steer
+from omninav.stages.simulator.simulated_recording import DAY_0_NS, refuse_no_room, scan_value, simulation_digest
 from omninav.stages.simulator.streams import stream
 from omninav.stages.simulator.world import World
 from omninav.stages.values.command import Command
@@ -146,16 +146,16 @@ class ClosedLoop(Source):
         pose, now = simulation.robot[:3], simulation.ticks / self.rate
         people = self._meet(simulation, now)
         metres = measure(self._room, round_bodies(people)[None], pose[None], self.world.ranges, ctx.rng)[0]
-        stamp = EPOCH + self.day * 86400 * 10**9 + 8 * 3600 * 10**9 + round(now * 1e9)
+        stamp = DAY_0_NS + self.day * 86400 * 10**9 + 8 * 3600 * 10**9 + round(now * 1e9)
         return self.Out(
             tick=Tick(index=simulation.ticks, stamp=stamp, frame=simulation.ticks, first_of_log=simulation.ticks == 0),
             image=self._look(ctx, simulation.robot, now, people),
             camera=self._camera,
             odometry=_pose(simulation.odometry),
             motion=motion,
-            scan=ring_scan(self.world, metres),
+            scan=scan_value(self.world, metres),
             truth=_pose(pose),
-            tally=DriveTally(int(simulation.robot[COLLISIONS]), float(simulation.robot[WAY])),
+            tally=DriveTally(int(simulation.robot[COLLISIONS]), float(simulation.robot[DISTANCE])),
         )
 
     def _look(self, ctx: Context, robot: F64, now: float, people: tuple[Person, ...]) -> Image | None:
@@ -179,20 +179,20 @@ class ClosedLoop(Source):
         simulation.track = np.vstack([before, [now, *simulation.robot[:3]]])[-REMEMBERED:]
         track = Track(simulation.track[:, 0], simulation.track[:, 1:])
         if len(before):
-            simulation.crowd = crowd.went_on(simulation.crowd, float(before[-1, 0]), now, track)
+            simulation.crowd = crowd.advanced(simulation.crowd, float(before[-1, 0]), now, track)
         else:
-            simulation.crowd = crowd.gathered(track)
+            simulation.crowd = crowd.initial_state(track)
         return self._people(simulation)
 
     def _people(self, simulation: ClosedLoopState) -> tuple[Person, ...]:
         """Who is about at the last tick that was made."""
-        return self._world.crowd.seen(simulation.crowd, float(simulation.track[-1, 0]))
+        return self._world.crowd.visible(simulation.crowd, float(simulation.track[-1, 0]))
 
     def _first_pose(self, world: World) -> F64:
         if self.start is not None:
             pose = np.array(self.start)
         elif self.route in self.world.routes:
-            way = tours.plan(world, self.world.routes[self.route])
+            way = route_planning.plan(world, self.world.routes[self.route])
             ahead = next((point for point in way if np.hypot(*(point - way[0])) > 0.1), way[-1]) - way[0]
             pose = np.array([*way[0], np.arctan2(ahead[1], ahead[0])])
         else:

@@ -45,10 +45,10 @@ class LogSource(Source):
     """Recorded drives, one after another: a tick for every picture that can be used.
 
     `log` names one recording or several (see `open_recording`); without one, `route` of the simulated `world` is driven
-    on `day` (or one after the other on several), with `kidnappings` on its way. `first`, `stop` and `stride` select frames
-    of each. `cuts`: [[60, 300]] goes on with picture 300 of each log once the first 60 are through, and odometry
-    has not noticed: a kidnapping made of a log that has none. After a pause of more than `new_log_after` seconds
-    another log begins: several days may lie in one file.
+    on `day` (or one after the other on several), with `kidnappings` on its way. `first`, `stop` and `stride` select
+    frames of each. `cuts`: [[60, 300]] goes on with picture 300 of each log once the first 60 are through, and
+    odometry has not noticed: a kidnapping made of a log that has none. After a pause of more than `new_log_after`
+    seconds another log begins: several days may lie in one file.
     Poses are metres and radians; stamps are header stamps. `motion` is the SE(2) increment of the odometry between
     the pictures' own times, absent at the first picture of each log; where pictures are left out it spans the gap.
 

@@ -18,7 +18,7 @@ import numpy as np
 from omninav.stages.recordings.opening import open_recording
 
 HERE = Path(__file__).resolve().parent
-RATES = ("world.timing.pictures=1", "world.timing.odometry=10", "world.ranges.rate=1", "world.sensor.noise=1")
+RATES = ("world.timing.images=1", "world.timing.odometry=10", "world.ranges.rate=1", "world.sensor.noise=1")
 MIRROR = (
     "world_camera=mirror",
     "world.camera.width=280",

@@ -17,7 +17,7 @@ MAPPED = f"log={DATA / 'tour.mcap'}"
 BOTH = f"log=[{DATA / 'tour.mcap'},{DATA / 'drive.mcap'}]"
 EVERY_SECOND = "nodes.source.stride=2"
 SMALL_CAMERA = (
-    "world.timing.pictures=1",
+    "world.timing.images=1",
     "world.camera.width=280",
     "world.camera.height_px=210",
     "world.camera.focal=217.4375",

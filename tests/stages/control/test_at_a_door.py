@@ -16,7 +16,7 @@ from omninav.stages.values.pose import Pose
 SMALL = mirror(columns=160)
 KITCHEN = Room(name="kitchen", corner=(0.0, 0.0), size=(6.0, 3.0), doors=(Door(side="north", at=3.0),))
 WORLD = replace(
-    DEMO, size=(6.0, 6.0), camera=SMALL, rooms=(KITCHEN,), shelves=(), blocks=(), aisle_blocks=(), hangings=(),
+    DEMO, size=(6.0, 6.0), camera=SMALL, rooms=(KITCHEN,), shelves=(), blocks=(), aisle_blocks=(), wall_panels=(),
     routes={}, days=(Day(), Day(doors=0.0)),
 )  # fmt: skip
 TARGET = (3.0, 1.5)

@@ -9,7 +9,7 @@ import pytest
 
 from omninav.pipeline.graph.ports import convert
 from omninav.stages.simulator.bodies import Box, box_array
-from omninav.stages.simulator.config import Day, Hanging, Lamp, Room, WorldConfig
+from omninav.stages.simulator.config import Day, Lamp, Room, WallPanel, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.lighting import Light, contact_map, lamps_and_windows, lamps_on, light_map
 from omninav.stages.simulator.world import World
@@ -81,7 +81,7 @@ def test_a_days_lamps_are_named_or_hit_by_a_share() -> None:
 
 
 def test_a_closed_curtain_keeps_a_windows_light_out() -> None:
-    panes = [Hanging((0.0, 5.0), 0.0, 2.0, 0.8, 1.4, material) for material in ("window", "curtain")]
+    panes = [WallPanel((0.0, 5.0), 0.0, 2.0, 0.8, 1.4, material) for material in ("window", "curtain")]
     lit = []
     for pane in panes:
         lights = lamps_and_windows([Lamp((8.0, 5.0))], [pane], WorldConfig(size=(10.0, 10.0)), 0)

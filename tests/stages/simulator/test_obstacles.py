@@ -11,7 +11,18 @@ from omninav.stages.simulator.config import Kidnapping, Ranges, Robot
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.obstacles import Obstacles, beam, gather, nearest
 from omninav.stages.simulator.ranges import measure
-from omninav.stages.simulator.robot import COLLISIONS, HEADING, NOBODY, SPEED, WAY, at_rest, drive, limits, reach, steer
+from omninav.stages.simulator.robot import (
+    COLLISIONS,
+    DISTANCE,
+    HEADING,
+    NO_PEOPLE,
+    SPEED,
+    at_rest,
+    drive,
+    limits,
+    reach,
+    steer,
+)
 from omninav.stages.simulator.world import World
 
 ROBOT = Robot()
@@ -32,7 +43,7 @@ def test_clearance_is_that_of_the_world():
     world = World(DEMO)
     room = gather(world.obstacles, DEMO.size, 0.6)
     points = np.random.default_rng(0).uniform((0, 0), DEMO.size, (500, 2))
-    found = [max(0.0, nearest(room, NOBODY, x, y)[0]) for x, y in points]
+    found = [max(0.0, nearest(room, NO_PEOPLE, x, y)[0]) for x, y in points]
     np.testing.assert_allclose(found, np.minimum(world.clearance(points), 0.6), atol=1e-9)
 
 
@@ -41,8 +52,8 @@ def test_the_way_out_leads_straight_away_from_the_nearest_thing(yaw: float):
     room = gather([Pillar(yaw=yaw)], (10.0, 8.0), 3.0)
     rng = np.random.default_rng(1)
     for x, y in rng.uniform((3.5, 3.5), (6.5, 6.5), (200, 2)):
-        distance, away_x, away_y = nearest(room, NOBODY, x, y)
-        further = nearest(room, NOBODY, x + 1e-4 * away_x, y + 1e-4 * away_y)[0]
+        distance, away_x, away_y = nearest(room, NO_PEOPLE, x, y)
+        further = nearest(room, NO_PEOPLE, x + 1e-4 * away_x, y + 1e-4 * away_y)[0]
         assert further - distance == pytest.approx(1e-4, rel=0.02)
 
 
@@ -64,11 +75,11 @@ def test_beams_find_what_marching_finds():
         dx, dy = math.cos(azimuth), math.sin(azimuth)
         touched = world.clearance(np.stack([x + steps * dx, y + steps * dy], axis=1)) <= 0.0
         marched = steps[np.argmax(touched)] if touched.any() else math.inf
-        assert beam(room, NOBODY, x, y, dx, dy, 4.0) == pytest.approx(marched, abs=0.006) or marched > 3.98
+        assert beam(room, NO_PEOPLE, x, y, dx, dy, 4.0) == pytest.approx(marched, abs=0.006) or marched > 3.98
 
 
 def test_a_ring_hears_the_nearest_thing_in_each_cone_and_nothing_beyond_its_reach():
-    ring = Ranges(noise=0.0, lost=0.0)
+    ring = Ranges(noise=0.0, dropout=0.0)
     room = gather([Pillar((5.0, 4.0), (0.01, 0.01))], (10.0, 8.0), 0.6)
     (heard,) = measure(room, np.zeros((1, 0, 3)), [[3.0, 4.0, 0.0]], ring, np.random.default_rng(0))
     assert heard[8] == pytest.approx(1.99)
@@ -78,7 +89,7 @@ def test_a_ring_hears_the_nearest_thing_in_each_cone_and_nothing_beyond_its_reac
 
 
 def test_noise_and_lost_echoes_of_a_ring_are_as_configured():
-    ring = Ranges(noise=0.02, lost=0.1)
+    ring = Ranges(noise=0.02, dropout=0.1)
     room = gather([Pillar((5.0, 4.0), (1.0, 1.0))], (10.0, 8.0), 0.6)
     heard = measure(room, np.zeros((4000, 0, 3)), np.tile((3.0, 4.0, 0.0), (4000, 1)), ring, np.random.default_rng(0))
     ahead = heard[:, 8]
@@ -131,7 +142,7 @@ def test_commands_are_followed_within_the_limits():
     assert state[SPEED] == pytest.approx(ROBOT.speed)
     straight = at_rest((1.0, 4.0, 0.0))
     steer(straight, 0.4, 0.0, limits(ROBOT), 10.0, hall())
-    assert straight[WAY] == pytest.approx(0.4 * 10.0 - 0.4**2 / (2 * ROBOT.acceleration), abs=0.005)
+    assert straight[DISTANCE] == pytest.approx(0.4 * 10.0 - 0.4**2 / (2 * ROBOT.acceleration), abs=0.005)
     assert straight[HEADING] == 0.0
 
 

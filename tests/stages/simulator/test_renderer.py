@@ -44,7 +44,7 @@ def marker() -> tuple[Scene, npt.NDArray[np.float64]]:
     """An otherwise bare, evenly lit room with one shining box, and the box's corners on the map (8, 3)."""
     config = WorldConfig(
         shelves=(),
-        hangings=(),
+        wall_panels=(),
         lamps=(Lamp((3.0, 2.0)),),
         blocks=(Block(centre=(6.0, 5.0), size=(0.8, 0.5), height=0.7, bottom_z=0.4, yaw=0.4),),
     )
@@ -148,7 +148,7 @@ def test_the_corners_of_a_box_are_found_within_half_a_pixel(
 def test_a_turn_of_the_robot_is_a_shift_of_the_panorama(demo: Scene) -> None:
     rays = camera_rays(PANORAMA)
     before = render(demo, rays, (5.8, 4.5, 0.4), EYE)
-    columns = 37  # a turn counter-clockwise moves the scene to the right
+    columns = 37  # a rotated counter-clockwise moves the scene to the right
     after = render(demo, rays, (5.8, 4.5, 0.4 + columns * 2 * math.pi / 720), EYE)
     differences = np.abs(np.roll(before, columns, axis=1).astype(int) - after)
     # Rounding may flip what a ray at an edge meets; a shift by 0.1 column more would change far more pixels.

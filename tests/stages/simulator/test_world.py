@@ -12,7 +12,7 @@ from omninav.stages.simulator import textures
 from omninav.stages.simulator.config import Block, Day, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.occupancy import occupancy, write_grid
-from omninav.stages.simulator.plan import draw_plan
+from omninav.stages.simulator.plan_image import draw_plan
 from omninav.stages.simulator.world import World
 
 CONF = Path(__file__).parents[3] / "conf" / "world"
@@ -40,7 +40,7 @@ def test_clearance_is_the_distance_to_the_nearest_face(demo: World) -> None:
 
 
 def test_turned_bodies_keep_their_corners_clear() -> None:
-    config = WorldConfig(shelves=(), hangings=(), blocks=(Block((6.0, 4.0), (2.0, 2.0), 1.0, yaw=np.pi / 4),))
+    config = WorldConfig(shelves=(), wall_panels=(), blocks=(Block((6.0, 4.0), (2.0, 2.0), 1.0, yaw=np.pi / 4),))
     clear = World(config).clearance([(6.0 + np.sqrt(2) + 0.5, 4.0), (7.0, 5.0), (7.5, 5.5)])
     np.testing.assert_allclose(clear, [0.5, np.sqrt(2) - 1, np.sqrt(2) * 1.5 - 1], atol=1e-9)
 

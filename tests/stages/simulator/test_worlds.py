@@ -1,4 +1,4 @@
-"""The worlds that come with the project: what stands there, the ways through, what days change, what a seed fixes."""
+"""The worlds that come with the project: what stands there, the space through, what days change, what a seed fixes."""
 
 import dataclasses
 import math
@@ -12,11 +12,11 @@ from omegaconf import OmegaConf
 
 from omninav.pipeline.graph.ports import convert
 from omninav.stages.geometry.plane.se2 import compose, wrap
-from omninav.stages.simulator import tours
+from omninav.stages.simulator import route_planning
 from omninav.stages.simulator.config import AisleBlock, Block, Day, Door, LampGrid, Room, Route, WorldConfig
 from omninav.stages.simulator.layout import expand
 from omninav.stages.simulator.occupancy import occupancy
-from omninav.stages.simulator.plan import draw_plan
+from omninav.stages.simulator.plan_image import draw_plan
 from omninav.stages.simulator.simulated_log import record
 from omninav.stages.simulator.simulated_recording import SimulatedRecording
 from omninav.stages.simulator.world import World
@@ -74,8 +74,8 @@ def test_tours_keep_clear_of_everything_on_the_first_and_on_the_last_day(name: s
     for day in (0, len(config.days) - 1):
         world = built(name, day)
         for route in config.routes.values():
-            line = tours.plan(world, route)
-            driven = tours.wandered(world, line, config.robot.wander, np.random.default_rng(day))
+            line = route_planning.plan(world, route)
+            driven = route_planning.jittered(world, line, config.robot.path_jitter_m, np.random.default_rng(day))
             dense = np.concatenate([a + (b - a) * np.linspace(0, 1, 5)[:, None] for a, b in pairwise(driven)])
             assert world.clearance(dense).min() > config.robot.radius
             assert length(line) > 10
@@ -85,7 +85,7 @@ def test_a_days_line_is_beside_the_route_by_the_stated_share_of_its_spread() -> 
     """Root mean square of draws cut off at 2 (0.959), of straight lines between (2/3) ** 0.5: 0.783."""
     hall = World(WorldConfig(size=(1010.0, 10.0)))
     line = np.array([[5.0, 5.0], [1005.0, 5.0]])
-    offs = [tours.wandered(hall, line, 0.1, np.random.default_rng(day))[20:-20, 1] - 5.0 for day in range(12)]
+    offs = [route_planning.jittered(hall, line, 0.1, np.random.default_rng(day))[20:-20, 1] - 5.0 for day in range(12)]
     assert np.sqrt(np.mean(np.square(offs))) == pytest.approx(0.0783, rel=0.04)
 
 
@@ -103,14 +103,14 @@ def test_a_days_line_is_beside_the_route_by_the_stated_share_of_its_spread() -> 
     ],
 )
 def test_routes_have_the_lengths_of_the_papers(name: str, route: str, least: float, most: float) -> None:
-    assert least <= length(tours.plan(built(name), load(name).routes[route])) <= most
+    assert least <= length(route_planning.plan(built(name), load(name).routes[route])) <= most
 
 
 def test_laps_begin_where_what_comes_first_has_led() -> None:
     open_hall = World(WorldConfig(size=(20.0, 20.0)))
     square = ((5.0, 5.0), (15.0, 5.0), (15.0, 15.0), (5.0, 15.0))
-    plain = tours.plan(open_hall, Route(square, "laps", laps=2))
-    line = tours.plan(open_hall, Route(square, "laps", laps=2, first=((2.0, 2.0), (2.0, 5.0))))
+    plain = route_planning.plan(open_hall, Route(square, "laps", laps=2))
+    line = route_planning.plan(open_hall, Route(square, "laps", laps=2, lead_in=((2.0, 2.0), (2.0, 5.0))))
     np.testing.assert_array_equal(line[0], (2.0, 2.0))
     assert length(line) == pytest.approx(length(plain) + 6.0, abs=1.0)
 
@@ -158,7 +158,7 @@ def test_the_home_store_has_more_than_40_aisles_and_training_goes_through_each()
     world = built("home_store")
     aisles = world.layout.aisles
     assert len(aisles) > 40
-    line = tours.plan(world, world.config.routes["training"])
+    line = route_planning.plan(world, world.config.routes["training"])
     for aisle in aisles:
         a, b = np.array(aisle.ends)
         for share in np.linspace(0.15, 0.75, 5):
@@ -214,7 +214,7 @@ def parts(day: Day) -> dict[str, object]:
     def kind(*names: str) -> list[tuple[object, ...]]:
         return [(b.kind, b.centre, b.half, b.yaw, b.low, b.high) for b in world.boxes if b.kind in names]
 
-    hung = [hanging.material for hanging in world.layout.hangings]
+    hung = [hanging.material for hanging in world.layout.wall_panels]
     return {
         "goods": [tuple(map(tuple, face.tiles)) for b in world.boxes if b.kind == "shelf" for face in b.faces[:4]],
         "shelves": kind("shelf", "stock", "wall", "roof", "lamp"),
@@ -253,15 +253,15 @@ def test_days_after_the_last_are_like_the_last_but_hit_other_things() -> None:
 def test_a_closed_door_keeps_tours_out_and_an_open_one_lets_them_in() -> None:
     inside = Route(((8.0, 1.0), (3.5, 3.5), (8.0, 8.0)))
     config = dataclasses.replace(HOUSE, days=(Day(), Day(doors=0.0)))
-    entered, kept_out = (tours.plan(World(config, day), inside) for day in (0, 1))
+    entered, kept_out = (route_planning.plan(World(config, day), inside) for day in (0, 1))
     assert (entered[:, 0] < 6.0).any()
     assert not (kept_out[:, 0] < 6.9).any()
 
 
 def test_a_place_without_room_is_refused_with_its_coordinates() -> None:
     walled = dataclasses.replace(HOUSE, blocks=(Block((3.5, 8.0), (5.0, 1.9), 1.0),))
-    with pytest.raises(tours.NoWay, match=r"no room for the robot near \(3.5, 8\)"):
-        tours.plan(World(walled, 0), Route(((8.0, 1.0), (3.5, 8.0))))
+    with pytest.raises(route_planning.UnreachableRoute, match=r"no room for the robot near \(3.5, 8\)"):
+        route_planning.plan(World(walled, 0), Route(((8.0, 1.0), (3.5, 8.0))))
 
 
 # Lay-outs
@@ -327,4 +327,4 @@ def test_the_store_in_the_documentation_is_one() -> None:
     for day in (0, 1):
         world = World(config, day)
         for route in config.routes.values():
-            assert length(tours.plan(world, route)) > 70
+            assert length(route_planning.plan(world, route)) > 70

@@ -102,7 +102,7 @@ def test_a_robot_driven_into_a_shelf_is_counted_and_stays_outside():
 
 
 def test_its_ranges_are_those_of_the_world_around_it():
-    loop = Loop(world=replace(WORLD, ranges=Ranges(noise=0.0, lost=0.0, beam=1e-6)), start=(1.2, 4.5, math.pi))
+    loop = Loop(world=replace(WORLD, ranges=Ranges(noise=0.0, dropout=0.0, beam_width=1e-6)), start=(1.2, 4.5, math.pi))
     out = loop.step()
     assert out is not None
     assert out.scan.ranges[8] == pytest.approx(1.2, abs=0.05)  # the wall ahead, or the poster on it

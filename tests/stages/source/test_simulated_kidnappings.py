@@ -28,7 +28,7 @@ WORLD = replace(
     DEMO,
     camera=SMALL,
     routes={"there": Route(waypoints=((2.0, 1.5), (6.0, 1.5)))},
-    delivery=Delivery(dropped=0.15, late=0.2, late_by=0.7),
+    delivery=Delivery(dropped=0.15, late=0.2, delay_s=0.7),
 )
 KIDNAPPED = (Kidnapping(at=3.03, turn=1.0), Kidnapping(at=5.0, to=(5.0, 1.4, 0.2)))
 EXACT = replace(WORLD, odometry=OdometryNoise(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), delivery=Delivery())
@@ -68,7 +68,7 @@ def test_a_routes_own_events_come_with_it_and_others_on_top():
 def test_who_is_put_down_beside_laps_goes_on_with_the_lap_that_was_begun():
     """A triangle of 12 m, three times: who is carried ahead on the first lap has most of it left, and two more."""
     laps = Route(kind="laps", waypoints=((2.0, 1.5), (5.0, 1.5), (5.0, 5.5)), laps=3)
-    world = replace(EXACT, shelves=(), blocks=(), hangings=(), routes={"laps": laps})
+    world = replace(EXACT, shelves=(), blocks=(), wall_panels=(), routes={"laps": laps})
     plain, carried = (
         SimulatedRecording(world, "laps", 1, kidnappings)
         for kidnappings in ((), (Kidnapping(at=4.0, to=(5.0, 4.5, 1.57)),))
@@ -79,8 +79,8 @@ def test_who_is_put_down_beside_laps_goes_on_with_the_lap_that_was_begun():
 
 def test_a_long_drive_sees_the_light_and_the_goods_of_several_days():
     days = (Day(), Day(rearranged=0.5), Day(light=(0.5, 0.5, 0.5)))
-    still = replace(EXACT, days=days, timing=replace(EXACT.timing, pictures=1.0), sensor=Sensor(noise=0.0))
-    lasting = replace(still, routes={"there": replace(still.routes["there"], day_lasts=3.0)})
+    still = replace(EXACT, days=days, timing=replace(EXACT.timing, images=1.0), sensor=Sensor(noise=0.0))
+    lasting = replace(still, routes={"there": replace(still.routes["there"], day_duration_s=3.0)})
     drive = SimulatedRecording(lasting, "there", 0)
     for shot, day in ((0, 0), (2, 0), (4, 1), (7, 2)):
         at = drive._shots[shot]
@@ -89,19 +89,19 @@ def test_a_long_drive_sees_the_light_and_the_goods_of_several_days():
         as_that_day = render(
             World(still, day).scene, drive._rays, drive._true(at[None]), 0.9, exposure, key=drive._key + shot
         )
-        np.testing.assert_array_equal(drive.picture(shot), as_that_day)
-    np.testing.assert_array_equal(drive.picture(0), SimulatedRecording(still, "there", 0).picture(0))
+        np.testing.assert_array_equal(drive.image_of_shot(shot), as_that_day)
+    np.testing.assert_array_equal(drive.image_of_shot(0), SimulatedRecording(still, "there", 0).image_of_shot(0))
 
 
 def test_what_a_robot_may_run_into_does_not_change_while_it_drives():
-    lasting = replace(EXACT.routes["there"], day_lasts=3.0)
+    lasting = replace(EXACT.routes["there"], day_duration_s=3.0)
     world = replace(EXACT, days=(Day(), Day(furniture=0.1)), routes={"there": lasting})
     with pytest.raises(UnreadableRecording, match="route 'there' lasts several days, and on one of world"):
         SimulatedRecording(world, "there", 0)
 
 
 def test_no_picture_is_taken_on_the_way_from_one_place_to_the_other():
-    pictures = replace(EXACT, timing=replace(EXACT.timing, pictures=100.0))
+    pictures = replace(EXACT, timing=replace(EXACT.timing, images=100.0))
     drive = SimulatedRecording(pictures, "there", 1, (Kidnapping(at=5.0, to=(5.0, 1.4, 0.2)),))
     steps = np.hypot(*np.diff(drive.truth[:, :2], axis=0).T)
     assert (steps > 0.01).sum() == 1
@@ -114,7 +114,7 @@ def test_a_log_holds_truth_up_to_the_leap_and_from_it_on(drive: SimulatedRecordi
     np.testing.assert_allclose(found.truth, drive.truth, atol=1e-9)  # type: ignore[arg-type]
     np.testing.assert_allclose(found.odometry, drive.odometry, atol=1e-9)  # type: ignore[arg-type]
     kidnappings = [json.loads(message.content.data) for message in LogReader(log).messages(["/ground_truth/event"])]
-    assert [kidnapping["at"] for kidnapping in kidnappings] == [3.03, 5.0]
+    assert [event["at"] for event in kidnappings] == [3.03, 5.0]
     assert kidnappings[1]["to"] == [5.0, 1.4, 0.2]
 
 

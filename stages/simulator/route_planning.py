@@ -18,96 +18,96 @@ from .world import World
 
 F64 = npt.NDArray[np.float64]
 
-SPARE = 0.1
+CLEARANCE_M = 0.1
 """Metres that a tour keeps from obstacles beyond the robot's radius."""
-COMFORT = 0.6
+COMFORT_DISTANCE_M = 0.6
 """Metres beyond the radius from which on a tour no longer minds an obstacle."""
-SPACING = 0.4
+POINT_SPACING_M = 0.4
 """Metres between the points of a tour."""
-NEAR = 1.2
+MAX_GOAL_SHIFT_M = 1.2
 """Metres within which a point that has no room for the robot is replaced by one that has."""
-SWAY = 2.5
+JITTER_PERIOD_M = 2.5
 """Metres over which a hand on the joystick drifts to one side."""
 
 
-class NoWay(Exception):
+class UnreachableRoute(Exception):
     """A route that cannot be driven on this day: one clear line why."""
 
 
 def plan(world: World, route: Route) -> F64:
     """The points (W, 2) of a route around what stands in the world on its day, rounded as a joystick is moved.
 
-    All points keep the robot's radius and 0.1 m from obstacles where there is as much room. On a day with closed doors
-    what lies behind them is left out. Raises `NoWay` where a point cannot be reached otherwise, or nothing is left.
+    All points keep the robot's radius and 0.1 m from obstacles where there is as much room. Points behind closed doors
+    are left out. Raises `UnreachableRoute` if another point cannot be reached, or no point is left.
     """
     radius = world.config.robot.radius
     if route.kind == "waypoints":
         points = np.asarray(route.waypoints, dtype=np.float64)
         if len(points) and _straight(world, points, radius):
             return _cut(points, route.length)
-    ways = _ways(world)
-    goals = ways.open_to(_goals(world, ways, route))
+    space = _free_space(world)
+    goals = space.reachable(_goals(world, space, route))
     line = [np.asarray(next(goals, (math.nan, math.nan)))]
     if np.isnan(line[0]).any():
-        raise NoWay(f"world '{world.config.name}': the route has no points")
+        raise UnreachableRoute(f"world '{world.config.name}': the route has no points")
     legs, done = [], 0.0
     for goal in goals:
-        leg = ways.between(line[-1], np.asarray(goal))
+        leg = space.between(line[-1], np.asarray(goal))
         legs.append(leg)
         line.append(leg[-1])
         done += _length(leg)
         if route.length is not None and done >= route.length:
             break
     if not legs:
-        raise NoWay(f"world '{world.config.name}': the route has only one point that can be reached")
-    return _cut(ways.smooth(np.concatenate([legs[0], *(leg[1:] for leg in legs[1:])])), route.length)
+        raise UnreachableRoute(f"world '{world.config.name}': the route has only one point that can be reached")
+    return _cut(space.smooth(np.concatenate([legs[0], *(leg[1:] for leg in legs[1:])])), route.length)
 
 
-def wandered(world: World, line: F64, spread: float, rng: np.random.Generator) -> F64:
+def jittered(world: World, line: F64, spread: float, rng: np.random.Generator) -> F64:
     """A line (W, 2) as it is driven on one day: every 2.5 m it is drawn aside, Gaussian with `spread` m in x and in y.
 
-    Draws are cut off at two standard deviations, and the drift is linear in between: over the whole way its root mean
+    Draws are cut off at two standard deviations, and the drift is linear in between: over the whole path its root mean
     square is 0.78 of `spread` (0.96 for the cut, root of 2/3 for the lines). It is smaller where it would leave less
     than 0.1 m of room. Start and end stay.
     """
-    points = _resampled(line, SPACING)
+    points = _resampled(line, POINT_SPACING_M)
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    knots = np.arange(0.0, along[-1] + 2 * SWAY, SWAY)
+    knots = np.arange(0.0, along[-1] + 2 * JITTER_PERIOD_M, JITTER_PERIOD_M)
     draws = np.clip(rng.normal(0.0, spread, (len(knots), 2)), -2 * spread, 2 * spread)
     drift = np.stack([np.interp(along, knots, draws[:, axis]) for axis in range(2)], axis=1)
-    drift *= np.clip(np.minimum(along, along[-1] - along) / SWAY, 0.0, 1.0)[:, None]
-    needed = np.minimum(world.clearance(points), world.config.robot.radius + SPARE) - 1e-9
+    drift *= np.clip(np.minimum(along, along[-1] - along) / JITTER_PERIOD_M, 0.0, 1.0)[:, None]
+    needed = np.minimum(world.clearance(points), world.config.robot.radius + CLEARANCE_M) - 1e-9
     share = np.ones(len(points))
     for factor in (0.5, 0.5, 0.5, 0.5, 0.0):
         tight = world.clearance(points + share[:, None] * drift) < needed
         share[np.convolve(tight, np.ones(5))[2:-2] > 0] *= factor  # with the neighbours, so that the line stays smooth
-    wandering: F64 = points + share[:, None] * drift
-    return wandering
+    jittered_line: F64 = points + share[:, None] * drift
+    return jittered_line
 
 
 # Where a route leads
 
 
-def _goals(world: World, ways: "_Ways", route: Route) -> Iterator[Point]:
+def _goals(world: World, space: "_FreeSpace", route: Route) -> Iterator[Point]:
     """The points that a route visits, one after the other."""
     if route.kind == "waypoints":
         yield from route.waypoints
         return
     if route.kind == "laps":
-        yield from route.first
+        yield from route.lead_in
         for _ in range(route.laps):
             yield from route.waypoints
         yield from route.waypoints[:1]
         return
     rng = stream(world.config.seed, "tour", route.kind, route.seed)
-    start = route.waypoints[0] if route.waypoints else ways.somewhere(rng)
+    start = route.waypoints[0] if route.waypoints else space.random_place(rng)
     yield start
     if route.kind == "rooms":
-        yield from _through_rooms(world, ways, route, start)
+        yield from _through_rooms(world, space, route, start)
     elif route.kind == "aisles":
         yield from _through_aisles(world, route, start)
     else:
-        yield from _at_random(world, ways, route, start, rng)
+        yield from _at_random(world, space, route, start, rng)
     yield from route.waypoints[1:]
 
 
@@ -115,7 +115,7 @@ def _through_aisles(world: World, route: Route, start: Point) -> Iterator[Point]
     """Down every aisle, always the nearest one next; on the next time around from the other end."""
     aisles = [a for a in world.layout.aisles if not route.through or a.block in route.through]
     if not aisles:
-        raise NoWay(f"world '{world.config.name}' has no aisles in {', '.join(route.through) or 'it'}")
+        raise UnreachableRoute(f"world '{world.config.name}' has no aisles in {', '.join(route.through) or 'it'}")
     at = start
     entered: dict[int, int] = {}
     for _ in range(route.laps):
@@ -128,12 +128,12 @@ def _through_aisles(world: World, route: Route, start: Point) -> Iterator[Point]
             ]
             _, number, end = min(options)
             entered[number] = end
-            points = list(_down(left.pop(number), end))
+            points = list(_along_aisle(left.pop(number), end))
             yield from points
             at = points[-1]
 
 
-def _down(aisle: Aisle, end: int) -> Iterator[Point]:
+def _along_aisle(aisle: Aisle, end: int) -> Iterator[Point]:
     """Into an aisle at an end and out at the other; out of a closed one where one came in."""
     (ax, ay), (bx, by) = aisle.ends[end], aisle.ends[1 - end]
     yield ax, ay
@@ -146,17 +146,17 @@ def _down(aisle: Aisle, end: int) -> Iterator[Point]:
         yield bx, by
 
 
-def _through_rooms(world: World, ways: "_Ways", route: Route, start: Point) -> Iterator[Point]:
-    """Into every room, the nearest by the way there first."""
+def _through_rooms(world: World, space: "_FreeSpace", route: Route, start: Point) -> Iterator[Point]:
+    """Into every room, the nearest by the path there first."""
     rooms = [room for room in world.config.rooms if not route.through or room.name in route.through]
     unknown = set(route.through) - {room.name for room in rooms}
     if unknown:
-        raise NoWay(f"world '{world.config.name}' has no room {', '.join(sorted(unknown))}")
-    spots = [spot for room in rooms if (spot := ways.freest(room.corner, room.size)) is not None]
+        raise UnreachableRoute(f"world '{world.config.name}' has no room {', '.join(sorted(unknown))}")
+    spots = [spot for room in rooms if (spot := space.roomiest_place(room.corner, room.size)) is not None]
     at: Point = start
     while spots:
-        far = ways.distances(np.asarray(at))
-        reach = [ways.look_up(far, spot) for spot in spots]
+        far = space.distances(np.asarray(at))
+        reach = [space.cost_at(far, spot) for spot in spots]
         nearest = int(np.argmin(reach))
         if not math.isfinite(reach[nearest]):
             return  # behind closed doors
@@ -164,7 +164,9 @@ def _through_rooms(world: World, ways: "_Ways", route: Route, start: Point) -> I
         yield at
 
 
-def _at_random(world: World, ways: "_Ways", route: Route, start: Point, rng: np.random.Generator) -> Iterator[Point]:
+def _at_random(
+    world: World, space: "_FreeSpace", route: Route, start: Point, rng: np.random.Generator
+) -> Iterator[Point]:
     """From one place to another, for as long as it is asked for: down aisles near by where there are any."""
     length = route.length or 100.0
     at, gone = start, 0.0
@@ -181,9 +183,9 @@ def _at_random(world: World, ways: "_Ways", route: Route, start: Point, rng: np.
             )[:16]
             _, number, end = near[int(rng.integers(len(near)))]
             seen.append(number)
-            points = list(_down(aisles[number], end))
+            points = list(_along_aisle(aisles[number], end))
         else:
-            points = [ways.somewhere(rng)]
+            points = [space.random_place(rng)]
         for point in points:
             gone += math.dist(at, point)
             at = point
@@ -194,13 +196,13 @@ def _at_random(world: World, ways: "_Ways", route: Route, start: Point, rng: np.
 
 
 @lru_cache(maxsize=1)
-def _ways(world: World) -> "_Ways":
+def _free_space(world: World) -> "_FreeSpace":
     """Ways of the world that was asked for last: its routes share them."""
-    return _Ways(world)
+    return _FreeSpace(world)
 
 
-class _Ways:
-    """Free cells of a world's floor as a graph: shortest ways that mind obstacles, and what can be reached."""
+class _FreeSpace:
+    """Free cells of a world's floor as a graph: shortest space that mind obstacles, and what can be reached."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -208,14 +210,14 @@ class _Ways:
         columns, rows = (math.ceil(extent / self._step) for extent in world.config.size)
         x, y = self._step * (np.arange(columns) + 0.5), self._step * (np.arange(rows) + 0.5)
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        self._clear: F64 = world.clearance(points).reshape(rows, columns)
+        self._clearance_map: F64 = world.clearance(points).reshape(rows, columns)
         radius = world.config.robot.radius
-        self._free = self._clear > radius + SPARE
+        self._free = self._clearance_map > radius + CLEARANCE_M
         count, parts = cv2.connectedComponents(self._free.astype(np.uint8), connectivity=8)
         sizes = np.bincount(parts.ravel(), minlength=count)
         sizes[0] = 0
-        self._main = parts == sizes.argmax()
-        self._dear = 1.0 + 3.0 * np.clip(1.0 - (self._clear - radius) / COMFORT, 0.0, 1.0)
+        self._reachable = parts == sizes.argmax()
+        self._cost_factor = 1.0 + 3.0 * np.clip(1.0 - (self._clearance_map - radius) / COMFORT_DISTANCE_M, 0.0, 1.0)
         self._graph = self._edges()
 
     def _edges(self) -> csr_array:
@@ -229,7 +231,7 @@ class _Ways:
             both = self._free[a] & self._free[b]
             starts.append(number[a][both])
             ends.append(number[b][both])
-            costs.append((0.5 * self._step * math.hypot(dx, dy) * (self._dear[a] + self._dear[b]))[both])
+            costs.append((0.5 * self._step * math.hypot(dx, dy) * (self._cost_factor[a] + self._cost_factor[b]))[both])
         start, end, cost = np.concatenate(starts), np.concatenate(ends), np.concatenate(costs)
         return csr_array((cost, (start, end)), shape=(number.size, number.size))  # type: ignore[no-untyped-call]
 
@@ -238,35 +240,37 @@ class _Ways:
         x, y = (float(v) for v in np.asarray(point))
         columns = self._free.shape[1]
         row, column = int(y / self._step), int(x / self._step)
-        for reach in (0, 2, 5, max(5, math.ceil(NEAR / self._step))):
+        for reach in (0, 2, 5, max(5, math.ceil(MAX_GOAL_SHIFT_M / self._step))):
             low = max(row - reach, 0), max(column - reach, 0)
-            free = np.argwhere(self._main[low[0] : row + reach + 1, low[1] : column + reach + 1])
+            free = np.argwhere(self._reachable[low[0] : row + reach + 1, low[1] : column + reach + 1])
             if len(free):
                 free += low
                 nearest = free[np.argmin(((free - (row, column)) ** 2).sum(axis=1))]
                 return int(nearest[0] * columns + nearest[1])
-        raise NoWay(f"world '{self._world.config.name}': no room for the robot near ({x:g}, {y:g}) on this day")
+        raise UnreachableRoute(
+            f"world '{self._world.config.name}': no room for the robot near ({x:g}, {y:g}) on this day"
+        )
 
     def _middle(self, cells: npt.NDArray[np.int_]) -> F64:
         rows, columns = np.divmod(cells, self._free.shape[1])
         middle: F64 = self._step * (np.stack([columns, rows], axis=-1) + 0.5)
         return middle
 
-    def open_to(self, goals: Iterator[Point]) -> Iterator[Point]:
+    def reachable(self, goals: Iterator[Point]) -> Iterator[Point]:
         """Goals without those behind doors that are closed today."""
         for goal in goals:
             try:
                 self._cell(goal)
-            except NoWay:
+            except UnreachableRoute:
                 if self._world.config.day(self._world.day).doors == 1.0:
                     raise
                 continue
             yield goal
 
     def between(self, start: F64, end: F64) -> F64:
-        """Points (N, 2) of a way between two points, straight where nothing is near."""
-        if _straight(self._world, np.stack([start, end]), self._world.config.robot.radius + 2 * SPARE):
-            return _resampled(np.stack([start, end]), SPACING)
+        """Points (N, 2) of a path between two points, straight where nothing is near."""
+        if _straight(self._world, np.stack([start, end]), self._world.config.robot.radius + 2 * CLEARANCE_M):
+            return _resampled(np.stack([start, end]), POINT_SPACING_M)
         a, b = self._cell(start), self._cell(end)
         if a == b:
             return np.stack([start, self._middle(np.array([b]))[0]])
@@ -276,21 +280,21 @@ class _Ways:
             cost, before = dijkstra(self._graph, directed=False, indices=a, return_predecessors=True)
         if not np.isfinite(cost[b]):
             (x, y), name = end, self._world.config.name
-            raise NoWay(f"world '{name}': ({x:g}, {y:g}) cannot be reached on day {self._world.day}")
+            raise UnreachableRoute(f"world '{name}': ({x:g}, {y:g}) cannot be reached on day {self._world.day}")
         cells = [b]
         while cells[-1] != a:
             cells.append(int(before[cells[-1]]))
-        way = self._middle(np.array(cells[::-1]))
-        if self._world.is_free(start[None], self._world.config.robot.radius + SPARE)[0]:
-            way[0] = start
-        if self._world.is_free(end[None], self._world.config.robot.radius + SPARE)[0]:
-            way[-1] = end
-        return _resampled(way, SPACING)
+        path = self._middle(np.array(cells[::-1]))
+        if self._world.is_free(start[None], self._world.config.robot.radius + CLEARANCE_M)[0]:
+            path[0] = start
+        if self._world.is_free(end[None], self._world.config.robot.radius + CLEARANCE_M)[0]:
+            path[-1] = end
+        return _resampled(path, POINT_SPACING_M)
 
     def smooth(self, line: F64) -> F64:
         """A line without its corners: each point drawn to the middle of its neighbours while there is room."""
-        points = _resampled(line, SPACING)
-        needed = np.minimum(self._clearance(points), self._world.config.robot.radius + 2 * SPARE)
+        points = _resampled(line, POINT_SPACING_M)
+        needed = np.minimum(self._clearance(points), self._world.config.robot.radius + 2 * CLEARANCE_M)
         for turn in range(60):
             inner = slice(1 + turn % 2, len(points) - 1, 2)
             count = len(points[inner])
@@ -305,7 +309,7 @@ class _Ways:
 
     def _clearance(self, points: F64) -> F64:
         at = (points / self._step - 0.5).astype(np.float32)
-        clear = self._clear.astype(np.float32)
+        clear = self._clearance_map.astype(np.float32)
         looked_up: F64 = np.concatenate(
             [  # a remapped picture has fewer than 32768 rows
                 cv2.remap(clear, part[:, 0], part[:, 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).ravel()
@@ -315,20 +319,20 @@ class _Ways:
         return looked_up
 
     def distances(self, start: F64) -> F64:
-        """Costs of the ways from a point to all cells; infinite where there is none."""
+        """Costs of the space from a point to all cells; infinite where there is none."""
         cost: F64 = dijkstra(self._graph, directed=False, indices=self._cell(start))
         return cost
 
-    def look_up(self, costs: F64, point: Point) -> float:
+    def cost_at(self, costs: F64, point: Point) -> float:
         """The cost at a point."""
         return float(costs[self._cell(point)])
 
-    def freest(self, corner: Point, size: Point) -> Point | None:
+    def roomiest_place(self, corner: Point, size: Point) -> Point | None:
         """The roomiest reachable place in a rectangle, not far from its middle; None where there is none."""
         low = [math.floor(v / self._step) for v in (corner[1], corner[0])]
         high = [math.ceil((v + extent) / self._step) for v, extent in ((corner[1], size[1]), (corner[0], size[0]))]
         window = (slice(low[0], high[0]), slice(low[1], high[1]))
-        room = np.where(self._main[window], np.minimum(self._clear[window], 1.5), -1.0)
+        room = np.where(self._reachable[window], np.minimum(self._clearance_map[window], 1.5), -1.0)
         rows, columns = np.mgrid[0 : room.shape[0], 0 : room.shape[1]]
         off = np.hypot(rows - room.shape[0] / 2, columns - room.shape[1] / 2) * self._step
         best = np.unravel_index(np.argmax(np.where(room > 0, room - 0.05 * off, -9.0)), room.shape)
@@ -336,9 +340,12 @@ class _Ways:
             return None
         return float((low[1] + best[1] + 0.5) * self._step), float((low[0] + best[0] + 0.5) * self._step)
 
-    def somewhere(self, rng: np.random.Generator) -> Point:
+    def random_place(self, rng: np.random.Generator) -> Point:
         """A place with some room around it."""
-        roomy = np.argwhere(self._main & (self._clear > min(COMFORT, float(self._clear[self._main].max()) * 0.8)))
+        roomy = np.argwhere(
+            self._reachable
+            & (self._clearance_map > min(COMFORT_DISTANCE_M, float(self._clearance_map[self._reachable].max()) * 0.8))
+        )
         row, column = roomy[int(rng.integers(len(roomy)))]
         return float((column + 0.5) * self._step), float((row + 0.5) * self._step)
 
