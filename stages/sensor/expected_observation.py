@@ -1,4 +1,4 @@
-"""How well each particle explains the view, from the view that is expected at its pose."""
+"""Weights particles by comparing the view with the one expected at each pose."""
 
 import math
 
@@ -22,7 +22,7 @@ from .near_references import Array, Floats, Ints, NearReferences
 
 # Sums over the bins may be taken in any order, which lets them be vector instructions.
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})
-def _likeness(
+def _similarity(
     poses: Array,
     references: Array,
     features: Floats,
@@ -33,18 +33,18 @@ def _likeness(
     columns: int,
     lines: int,
     nearest: npt.NDArray[np.int32],
-    fade: float,
-    ordinary: float,
+    fade_distance_m: float,
+    background_level: float,
     network: Ints,
     factors: Floats,
     scale: np.float32,
 ) -> Array:
     segments, bins = view.shape
-    expected, alike = np.empty((segments, bins), np.float32), np.empty(segments, np.float32)
-    apart = np.empty(nearest.shape[1])
+    expected, similarity = np.empty((segments, bins), np.float32), np.empty(segments, np.float32)
+    squares = np.empty(nearest.shape[1])
     out = np.empty(len(poses))
     for n in range(len(poses)):
-        out[n] = ordinary
+        out[n] = background_level
         i, j = int(np.floor((poses[n, 0] - origin[0]) / cell)), int(np.floor((poses[n, 1] - origin[1]) / cell))
         if not (0 <= i < columns and 0 <= j < lines):
             continue
@@ -52,21 +52,21 @@ def _likeness(
         number, closest, mass = 0, np.inf, 0.0
         while number < len(here) and here[number] >= 0:
             x, y = poses[n, 0] - references[here[number], 0], poses[n, 1] - references[here[number], 1]
-            apart[number] = x * x + y * y
-            closest = min(closest, apart[number])
+            squares[number] = x * x + y * y
+            closest = min(closest, squares[number])
             number += 1
         if number == 0:
             continue
         for k in range(number):
-            apart[k] = 1.0 / (apart[k] + 0.25 * closest + 1e-4 * fade * fade)
-            mass += apart[k]
+            squares[k] = 1.0 / (squares[k] + 0.25 * closest + 1e-4 * fade_distance_m * fade_distance_m)
+            mass += squares[k]
         expected[:] = np.float32(0)
         for k in range(number):
             reference = features[here[k]]
             shift = (references[here[k], 2] - poses[n, 2]) * segments / (2 * np.pi)
             first = int(np.floor(shift))
-            later = np.float32((shift - first) * apart[k] / mass)
-            sooner = np.float32(apart[k] / mass) - later
+            later = np.float32((shift - first) * squares[k] / mass)
+            sooner = np.float32(squares[k] / mass) - later
             at = first % segments
             for s in range(segments):
                 then = at + 1 if at + 1 < segments else 0
@@ -80,35 +80,35 @@ def _likeness(
             if histograms:
                 for b in range(bins):
                     common += mine[b] if mine[b] < seen[b] else seen[b]
-                alike[s] = common
+                similarity[s] = common
             else:
                 for b in range(bins):
                     common += (mine[b] - seen[b]) ** 2
-                alike[s] = max(np.float32(1) - np.float32(np.sqrt(common)) / scale, np.float32(0))
+                similarity[s] = max(np.float32(1) - np.float32(np.sqrt(common)) / scale, np.float32(0))
         for p in range(len(network)):
-            a, c = alike[network[p, 0]], alike[network[p, 1]]
-            alike[network[p, 0]] = a if a > c else c
-            alike[network[p, 1]] = c if a > c else a
+            a, c = similarity[network[p, 0]], similarity[network[p, 1]]
+            similarity[network[p, 0]] = a if a > c else c
+            similarity[network[p, 1]] = c if a > c else a
         total, best = np.float32(0), np.float32(0)
         for k in range(segments):
-            total += alike[k]
+            total += similarity[k]
             score = total * factors[k]
             best = score if score > best else best
-        known = math.exp(-0.5 * closest / (fade * fade))
-        faded = known * best + (1.0 - known) * ordinary
-        out[n] = faded if faded > ordinary else ordinary
+        known = math.exp(-0.5 * closest / (fade_distance_m * fade_distance_m))
+        faded = known * best + (1.0 - known) * background_level
+        out[n] = faded if faded > background_level else background_level
     return out
 
 
-def likeness_of_expected(
+def similarity_of_expected(
     poses: Array,
     references: Array,
     features: Floats,
     view: Floats,
     histograms: bool,
     cells: NearestCells,
-    fade: float,
-    ordinary: float,
+    fade_distance_m: float,
+    background_level: float,
     exponent: float = 0.5,
     colour_scale: float = LARGEST_COLOUR_DISTANCE,
 ) -> Array:
@@ -116,26 +116,35 @@ def likeness_of_expected(
 
     The expected view is the mean of the references nearest to the pose (`references` (R, 3), `features` (R, segments,
     bins)), each turned to the pose's heading, with weights 1 / (d^2 + (d_min / 2)^2). S as in `segments.similarities`.
-    It fades to `ordinary` and is not below it, as in `expected_similarity`.
+    It fades to `background_level` as in `expected_similarity`.
     """
     network, factors = sorting_network(len(view)), penalties(len(view), exponent)
     poses, view = np.ascontiguousarray(poses), np.ascontiguousarray(view, np.float32)
     scale = np.float32(colour_scale)
-    found: Array = _likeness(
-        poses, references, features, view, histograms, *cells, fade, ordinary, network, factors, scale
+    found: Array = _similarity(
+        poses,
+        references,
+        features,
+        view,
+        histograms,
+        *cells,
+        fade_distance_m,
+        background_level,
+        network,
+        factors,
+        scale,
     )
     return found
 
 
 class ExpectedObservation(NearReferences):
-    """Likelihood of particles by the paper's letter: an expected observation for each, compared with the view.
+    """Weights particles by the similarity of the view to an expected observation for each, to a power.
 
-    Gross & Koenig 2004, section 2: the similarity S is that "between the expected observation of the sample in its
-    current pose and the actual observation". The features of the nearest references are mixed and turned to the
-    particle's heading, then compared. `near_references` interpolates similarities in place of features, which costs a
-    tenth. Power, ordinary match, proposals and all parameters are those of `near_references`, which see. Penalty and
-    scale of colours are those of the `similarities`, since likelihoods are taken in proportion to the best of them.
-    Raises BadInput where those are no such comparison (`match=l2`).
+    Gross & Koenig 2004, section 2, to the letter: S is the similarity "between the expected observation of the sample
+    in its current pose and the actual observation". The features of the nearest references are averaged and turned to
+    the particle's heading, then compared; `near_references` interpolates similarities instead, at a tenth of the cost.
+    Everything else is as there. Penalty and colour scale are those of the `similarities`. Raises BadInput where these
+    compare no segments (`match=l2`).
     """
 
     def step(  # type: ignore[override]
@@ -148,7 +157,7 @@ class ExpectedObservation(NearReferences):
         motion: Motion | None = None,
         length_scale: LengthScale | None = None,
     ) -> NearReferences.Out:
-        """Weigh all particles."""
+        """Weight all particles."""
         if similarities.exponent is None:
             raise BadInput(
                 "sensor: expected_observation compares the segments as the match does, and this match compares whole "
@@ -161,14 +170,14 @@ class ExpectedObservation(NearReferences):
     def _expected(
         self, poses: Array, map: ReferenceGraph, rows: Ints, values: Floats, unit: float, floor: float
     ) -> Array:
-        return likeness_of_expected(
+        return similarity_of_expected(
             poses,
             map.poses,
             map.features,
             self._view.values,
             isinstance(self._view, SegmentHistograms),
             self._cells,
-            self.fade * unit,
+            self.fade_distance * unit,
             floor,
             self._exponent,
             self._colour_scale,

@@ -1,4 +1,4 @@
-"""Visibility areas over an occupancy grid."""
+"""Computes the visibility areas of a map's references over an occupancy grid."""
 
 import math
 from typing import Annotated, NamedTuple
@@ -18,18 +18,25 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Runs = npt.NDArray[np.uint16]
 
-LARGEST = 65535
-"""Rows and columns of a grid are stored in 16 bits."""
-BEFORE = 1e-3
-"""Cells between the face of an occupied cell and the point that must be visible."""
-FACES = np.array([[0.0, 0.5 + BEFORE], [0.0, -0.5 - BEFORE], [0.5 + BEFORE, 0.0], [-0.5 - BEFORE, 0.0]])
-"""From an occupied cell's centre to the point before a face: rows, columns; to its right, left, above, below."""
-BINS = 360
-"""Headings that are told apart where a share of the state space is counted."""
+MAX_CELLS_PER_SIDE = 65535
+"""Rows and columns are stored in 16 bits."""
+FACE_GAP_CELLS = 1e-3
+"""Distance between the face of an occupied cell and the point that must be visible."""
+FACES = np.array(
+    [
+        [0.0, 0.5 + FACE_GAP_CELLS],
+        [0.0, -0.5 - FACE_GAP_CELLS],
+        [0.5 + FACE_GAP_CELLS, 0.0],
+        [-0.5 - FACE_GAP_CELLS, 0.0],
+    ]
+)
+"""From an occupied cell's centre to the point in front of a face: rows, columns; right, left, upper, lower face."""
+HEADING_BINS = 360
+"""Headings distinguished where the covered share of the state space is counted."""
 
 
 class Sight(NamedTuple):
-    """What rays meet: `cells` (N, 2) row and column of the occupied cell, -1 where none; `faces` (N,) of `FACES`."""
+    """What rays hit: `cells` (N, 2), row and column of the occupied cell, -1 where none; `faces` (N,), of `FACES`."""
 
     cells: Ints
     faces: Ints
@@ -45,7 +52,7 @@ def first_occupied(cells: Cells, starts: Array, directions: Array) -> Sight:
     """The closest occupied cell along rays through free cells.
 
     `starts` (N, 2): row and column in cells, as numbers whose whole part is the cell; `directions` (N,) rad. A ray that
-    begins in a cell that is not free, leaves the grid, or enters an unknown cell meets nothing (erratum 46).
+    begins in a cell that is not free, leaves the grid, or enters an unknown cell hits nothing (erratum 46).
     """
     found, faces = _cast(cells, np.ascontiguousarray(starts), np.ascontiguousarray(directions))
     return Sight(found, faces)
@@ -100,7 +107,7 @@ def _sees(cells: Cells, row: int, column: int, to_row: float, to_column: float) 
     return row == last_row and column == last_column
 
 
-def grown_areas(cells: Cells, points: Array) -> tuple[Runs, npt.NDArray[np.int32]]:
+def grow_areas(cells: Cells, points: Array) -> tuple[Runs, npt.NDArray[np.int32]]:
     """Cells from which points are visible, by constrained region growing (Wolf, Burgard & Burkhardt 2005, section V).
 
     `points` (T, 2): row and column in cells, in free cells. From a point's own cell the area grows over its eight
@@ -159,9 +166,9 @@ def _grow(cells: Cells, points: Array) -> tuple[Runs, npt.NDArray[np.int32]]:
 def visibility_areas(poses: Array, grid: OccupancyGrid, axes: Array) -> VisibilityAreas:
     """The visibility areas of views from poses (R, 3) along azimuths (S,) from their headings.
 
-    Where the paper speaks of the closest occupied cell, here the face of it counts that the view meets: a wall that is
-    one cell thick is not seen from its other side. A point lambda is the middle of such a face; views that meet the
-    same face share one point and one area.
+    Where the paper speaks of the closest occupied cell, here the face counts that the view hits: a wall one cell thick
+    is not seen from its other side. A point lambda is the middle of such a face; views that hit the same face share
+    one point and one area.
     """
     rows, columns = grid.cells.shape
     starts = (poses[:, 1::-1] - grid.origin[::-1]) / grid.resolution
@@ -174,15 +181,15 @@ def visibility_areas(poses: Array, grid: OccupancyGrid, axes: Array) -> Visibili
     target[hit] = which
     cell, face = np.divmod(faces, len(FACES))
     points = np.column_stack(np.divmod(cell, columns)) + 0.5 + FACES[face]
-    runs, first = grown_areas(grid.cells, points)
+    runs, first = grow_areas(grid.cells, points)
     metres = np.array(grid.origin) + grid.resolution * points[:, ::-1]
     shape = target.reshape(len(poses), len(axes))
     return VisibilityAreas(axes, shape, metres, first, runs, (rows, columns), grid.resolution, grid.origin)
 
 
 def covered(areas: VisibilityAreas, centres: Array, window: float) -> tuple[float, float]:
-    """Which share of places (N, 2) lies in any area, and of places and headings in one whose point is at most `window`
-    radians aside of the heading."""
+    """The share of places (N, 2) in any area, and of places and headings in one whose point is within `window` radians
+    of the heading."""
     if not len(centres):
         return 0.0, 0.0
     cells = np.floor((centres[:, ::-1] - areas.origin[::-1]) / areas.resolution).astype(np.int64)
@@ -196,36 +203,35 @@ def covered(areas: VisibilityAreas, centres: Array, window: float) -> tuple[floa
 def _headings(
     starts: npt.NDArray[np.int32], runs: Runs, points: Array, where: Ints, centres: Array, window: float
 ) -> npt.NDArray[np.bool_]:
-    seen = np.zeros((len(centres), BINS), np.bool_)
-    half = min(round(window / (2 * math.pi) * BINS), BINS // 2)
+    seen = np.zeros((len(centres), HEADING_BINS), np.bool_)
+    half = min(round(window / (2 * math.pi) * HEADING_BINS), HEADING_BINS // 2)
     for t in range(len(points)):
         for k in range(starts[t], starts[t + 1]):
             for column in range(runs[k, 1], runs[k, 2]):
                 n = where[runs[k, 0], column]
                 if n >= 0:
                     direction = math.atan2(points[t, 1] - centres[n, 1], points[t, 0] - centres[n, 0])
-                    middle = math.floor(direction / (2 * math.pi) * BINS)
+                    middle = math.floor(direction / (2 * math.pi) * HEADING_BINS)
                     for b in range(middle - half, middle + half + 1):
-                        seen[n, b % BINS] = True
+                        seen[n, b % HEADING_BINS] = True
     return seen
 
 
 class LineOfSight(Stage):
-    """Visibility areas of a map's references: the free cells from which what they look at is in sight.
+    """Computes the visibility areas of a map's references: the free cells that see what the references look at.
 
-    Wolf, Burgard & Burkhardt 2005, section V: along a view's optical axis lies the closest occupied cell, lambda; its
+    Wolf, Burgard & Burkhardt 2005, section V: lambda is the closest occupied cell along a view's optical axis; its
     visibility area are the free cells from which lambda is visible, found by constrained region growing. Occupied and
-    unknown cells block (erratum 46). Of lambda the face counts that the view meets, so that no view is seen through a
-    thin wall. A view all around has one area for each of `sectors` equal parts of it (null: as many as the map's views
-    have segments), along the part's middle; an ordinary camera's has one, straight ahead. A reference has none where it
-    stands in no free cell, or where its ray ends in unknown.
-
-    `within_deg`: how far an ordinary camera's heading may be off lambda in the share of the state space (place and
-    heading) that is reported as covered. It is counted over `free`, where that is wired, else over all free cells.
+    unknown cells block (erratum 46). Only the face of lambda that the view hits counts, so that no view is seen through
+    a thin wall. A panorama has one area per sector, along the sector's middle; a forward-looking camera has one,
+    straight ahead. A reference outside the free cells has none, nor has a ray that ends in unknown cells.
     """
 
     sectors: Annotated[int, Bounds(ge=1)] | None = None
+    """Sectors of a panorama, each with an area; null: as many as the map's views have segments."""
     within_deg: Annotated[float, Bounds(gt=0, le=180)] = 5.0
+    """Deviation of a forward-looking camera's heading from lambda in the reported coverage of the state space, which
+    is counted over `free` where wired, else over all free cells."""
 
     class Out(Outputs):
         """`areas`, and what share of the free space they cover."""
@@ -234,9 +240,11 @@ class LineOfSight(Stage):
         metrics: Metrics
 
     def step(self, ctx: Context, map: ReferenceGraph, grid: OccupancyGrid, free: FreeSpace | None = None) -> Out:
-        """Cast, grow, and count."""
-        if max(grid.cells.shape) > LARGEST:
-            raise BadInput(f"grid: {grid.cells.shape} cells are more than {LARGEST} a side; use a coarser resolution")
+        """Compute all areas and their coverage."""
+        if max(grid.cells.shape) > MAX_CELLS_PER_SIDE:
+            raise BadInput(
+                f"grid: {grid.cells.shape} cells are more than {MAX_CELLS_PER_SIDE} a side; use a coarser resolution"
+            )
         axes = axes_of(self.sectors or max(map.features.shape[1], 1))
         areas = visibility_areas(map.poses, grid, axes)
         none = int((areas.target < 0).sum())
@@ -246,10 +254,10 @@ class LineOfSight(Stage):
                 f"poses come from {map.pose_source}"
             )
         if none:
-            ctx.count("view_without_area", none, "areas: the view meets no occupied cell of the grid")
+            ctx.count("view_without_area", none, "areas: the view hits no occupied cell of the grid")
         places = grid.centres(*np.nonzero(grid.cells == FREE)) if free is None else free.centres
         place, state = covered(areas, places, math.radians(self.within_deg) if len(axes) == 1 else math.pi)
-        said = {
+        figures = {
             "references": len(map),
             "areas": areas.target.size - none,
             "points": len(areas.points),
@@ -260,7 +268,7 @@ class LineOfSight(Stage):
             "size_bytes": areas.nbytes,
             "grid": grid.made_from,
         }
-        return self.Out(areas=areas, metrics=Metrics({"visibility": said}))
+        return self.Out(areas=areas, metrics=Metrics({"visibility": figures}))
 
 
 def _sizes(areas: VisibilityAreas) -> Array:

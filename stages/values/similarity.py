@@ -34,6 +34,25 @@ class Similarities(Value):
         return compared, rows
 
 
+class SimilarityField(Value):
+    """Weights (max(S, floor) / top)^power over the compared references and headings, prepared for drawing.
+
+    `values`, `candidates`: as in `Similarities`. `floor`: the similarity below which all cells weigh alike. `above`
+    (A,): flat indices of the cells above it, `weights` (A,): their cumulative weights. `floor_cells` (references,):
+    cumulative number of cells at the floor, by sampling weight; `floor_weight`: what they weigh in all. `mean`: mean
+    weight over the map.
+    """
+
+    values: npt.NDArray[np.float32]
+    candidates: npt.NDArray[np.int64] | None
+    floor: float
+    above: npt.NDArray[np.int64]
+    weights: npt.NDArray[np.float64]
+    floor_cells: npt.NDArray[np.float64]
+    floor_weight: float
+    mean: float
+
+
 class Answers(Value):
     """The references of a map that are most similar to the current view, the most similar first.
 

@@ -1,4 +1,4 @@
-"""From where the views of a map can be seen."""
+"""Visibility areas: from where the views of a map can be seen."""
 
 import numpy as np
 import numpy.typing as npt

@@ -23,12 +23,12 @@ def planned(*words: str):
 @pytest.mark.parametrize("features", ["haar_integral", "hsv_histogram"])
 @pytest.mark.parametrize("match", ["retrieval", "selective"])
 @pytest.mark.parametrize("sensor", ["visibility", "near_references"])
-@pytest.mark.parametrize("fusion", ["random_samples", "importance_resampling"])
+@pytest.mark.parametrize("fusion", ["uniform_recovery", "importance_resampling"])
 def test_each_stage_of_one_variant_serves_the_other(variant: str, features: str, match: str, sensor: str, fusion: str):
     words = (f"features={features}", f"match={match}", f"sensor={sensor}", f"fusion={fusion}")
     nodes = planned(f"variant={variant}", *words).graph.nodes
-    assert ("areas" in nodes) == (sensor == "visibility")
-    assert ("retrieval_view" in nodes) == (match == "retrieval")
+    assert ("visibility_areas" in nodes) == (sensor == "visibility")
+    assert ("retrieval_plot" in nodes) == (match == "retrieval")
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ def move_poses(poses: Array, motion: Triple, sigmas: Triple, noise: Array) -> Ar
 
 
 def move_gaussians(means: Array, covariances: Array, motion: Triple, sigmas: Triple) -> tuple[Array, Array]:
-    """Gaussians (K, 3), (K, 3, 3) after rotation, translation, rotation with noise of `sigmas`, linearised around each mean.
+    """Gaussians (K, 3), (K, 3, 3) after rotation, translation, rotation with noise of `sigmas`, linearised.
 
     C' = F C F^T + G diag(sigmas^2) G^T with F, G the derivatives of `move_poses` by the pose and by the noise: positive
     definite where C is.
@@ -58,7 +58,7 @@ def move_gaussians(means: Array, covariances: Array, motion: Triple, sigmas: Tri
 
 
 def motion_gaussian(motion: Triple, sigmas: Triple) -> tuple[Array, Array]:
-    """Rotation, translation, rotation as one motion (3,), x, y, turn, in the frame of its start, and its covariance (3, 3).
+    """Rotation, translation, rotation as one motion (3,) in the frame of its start, and its covariance (3, 3).
 
     The rank is 3 where there is a translation and all sigmas are above 0; a turn in place moves nothing sideways.
     """

@@ -1,4 +1,4 @@
-"""From similarities to evidence: how steep it is, and how much of a picture's is new."""
+"""From similarities to evidence: its contrast, and the novelty of an image."""
 
 import math
 
@@ -25,8 +25,8 @@ def best_headings(values: Floats) -> Floats:
 def contrast_power(best: Floats, contrast: float, sampling_weight: Array | None = None) -> float:
     """The power p at which S^p differs by `contrast` nats for each standard deviation of log S.
 
-    `best` (R,): each reference's similarity at its best heading. `sampling_weight` (R,): how many references of the map each
-    stands for; None: one each.
+    `best` (R,): each reference's similarity at its best heading. `sampling_weight` (R,): how many references of the map
+    each represents; None: one each.
     """
     logarithms = np.log(np.maximum(best, 1e-12)).astype(np.float64)
     centre = np.average(logarithms, weights=sampling_weight)
@@ -34,12 +34,12 @@ def contrast_power(best: Floats, contrast: float, sampling_weight: Array | None 
     return contrast / max(spread, 1e-6)
 
 
-def fresh_share(way: float | None, independent: float, standing: float) -> float:
-    """Which share of a picture's evidence is new, in [standing, 1]: a picture taken at the same place says little more.
+def evidence_novelty(driven_m: float | None, independence_m: float, min_novelty: float) -> float:
+    """The share of an image's evidence that is new, in [min_novelty, 1]: images taken at one place are not independent.
 
-    `way`: metres since the picture before, None where it is not known; from `independent` metres on all is new, and
-    with 0 always.
+    `driven_m`: distance since the previous image, None where it is unknown. From `independence_m` on all evidence is
+    new; with 0 always.
     """
-    if way is None or independent <= 0.0:
+    if driven_m is None or independence_m <= 0.0:
         return 1.0
-    return min(1.0, max(standing, way / independent))
+    return min(1.0, max(min_novelty, driven_m / independence_m))

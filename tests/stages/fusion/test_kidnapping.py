@@ -12,6 +12,7 @@ from omninav.stages.geometry.appearance.segments import turned_view
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.sensor.near_references import NearReferences
+from omninav.stages.sensor.similarity_proposals import SimilarityProposals
 from omninav.stages.values.belief import Likelihood
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.length_scale import LengthScale
@@ -19,7 +20,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 
 SEGMENTS, BINS = 12, 16
-REACH = LengthScale(0.6)
+LENGTH_SCALE = LengthScale(0.6)
 STEP = Motion(0.3, 0.0, 0.0)
 
 
@@ -66,24 +67,26 @@ def drive(path: list[np.ndarray], match: SelectiveMatch, seed: int = 0) -> Filte
         "motion": RotationTranslationRotation(),
         "match": match,
         "sensor": NearReferences(),
+        "proposals": SimilarityProposals(),
         "fusion": ImportanceResampling(),
     }
     contexts = {name: Context(name, np.random.default_rng([seed, n])) for n, name in enumerate(stages)}
     for name, stage in stages.items():
         stage.setup(contexts[name])
-    start, motion, _, sensor, fusion = stages.values()
+    start, motion, _, sensor, proposals, fusion = stages.values()
     noise, errors, said, compared = np.random.default_rng(9), [], [], []
     for k, pose in enumerate(path):
         for ctx in contexts.values():
             ctx.tick = Tick(index=k, stamp=k, first_of_log=k == 0)
         moved = STEP if k else None
         if k == 0:
-            belief = start.step(contexts["start"], MAP, None, REACH).belief
+            belief = start.step(contexts["start"], MAP, None, LENGTH_SCALE).belief
         belief = motion.step(contexts["motion"], belief, moved).belief
         view = SegmentHistograms(LAND.seen_from(pose, noise.normal(0, 0.5, (SEGMENTS, BINS))))
-        alike = match.step(contexts["match"], view, MAP, belief, REACH).similarities
-        out = sensor.step(contexts["sensor"], alike, belief, MAP, moved, REACH)
-        belief = fusion.step(contexts["fusion"], belief, out.likelihood, out.proposals).belief
+        alike = match.step(contexts["match"], view, MAP, belief, LENGTH_SCALE).similarities
+        out = sensor.step(contexts["sensor"], alike, belief, MAP, moved, LENGTH_SCALE)
+        proposed = proposals.step(contexts["proposals"], out.field, MAP, LENGTH_SCALE).proposals
+        belief = fusion.step(contexts["fusion"], belief, out.likelihood, proposed).belief
         estimate = belief.estimate().pose
         errors.append(np.hypot(estimate.x - pose[0], estimate.y - pose[1]))
         said.append(out.likelihood)

@@ -9,7 +9,7 @@ from omninav.stages.geometry.appearance.segments import selective_similarity, tu
 from omninav.stages.geometry.plane.nearest_cells import nearest_cells
 from omninav.stages.match.l2 import L2Match
 from omninav.stages.match.selective import SelectiveMatch
-from omninav.stages.sensor.expected_observation import ExpectedObservation, likeness_of_expected
+from omninav.stages.sensor.expected_observation import ExpectedObservation, similarity_of_expected
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentColours, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
@@ -24,7 +24,7 @@ FEATURES /= FEATURES.sum(axis=2, keepdims=True)
 def test_the_expected_view_is_the_mean_of_the_nearest_turned_to_the_heading() -> None:
     poses, view = np.column_stack([RNG.uniform(0, 4, (30, 2)), RNG.uniform(-9, 9, 30)]), FEATURES[5]
     cells = nearest_cells(REFERENCES, 3, 0.1, 6.0)
-    found = likeness_of_expected(poses, REFERENCES, FEATURES, view, True, cells, 2.0, 0.1)
+    found = similarity_of_expected(poses, REFERENCES, FEATURES, view, True, cells, 2.0, 0.1)
     for pose, likeness in zip(poses, found, strict=True):
         centre = cells.origin + (np.floor((pose[:2] - cells.origin) / cells.cell) + 0.5) * cells.cell
         nearest = np.argsort(np.hypot(*(REFERENCES[:, :2] - centre).T))[:3]
@@ -39,14 +39,14 @@ def test_the_expected_view_is_the_mean_of_the_nearest_turned_to_the_heading() ->
 def test_colours_are_compared_by_their_distance() -> None:
     colours = (RNG.random((40, 9, 3)) * 255).astype(np.float32)
     cells = nearest_cells(REFERENCES, 1, 0.05, 3.0)
-    found = likeness_of_expected(REFERENCES, REFERENCES, colours, colours[4], False, cells, 1.0, 0.0)
+    found = similarity_of_expected(REFERENCES, REFERENCES, colours, colours[4], False, cells, 1.0, 0.0)
     assert int(np.argmax(found)) == 4
     assert found[4] == pytest.approx(1.0, abs=0.01)
 
 
 def test_the_particle_where_the_view_was_taken_wins() -> None:
     map = ReferenceGraph(REFERENCES, FEATURES, "histograms", np.zeros((0, 2), np.int64), "truth")
-    stage, ctx = ExpectedObservation(reach_m=0.1), Context("sensor", np.random.default_rng(0))
+    stage, ctx = ExpectedObservation(length_scale_m=0.1), Context("sensor", np.random.default_rng(0))
     stage.setup(ctx)
     seen = np.roll(FEATURES[3], 3, axis=0)  # a robot there, turned left by a quarter
     poses = np.array(
@@ -67,7 +67,7 @@ def test_the_view_is_compared_as_the_match_compares_it(match: SelectiveMatch | L
     colours = (RNG.random((40, 9, 3)) * 60).astype(np.float32)
     map, seen = ReferenceGraph(REFERENCES, colours, "colours", np.zeros((0, 2), np.int64), "truth"), colours[4] + 5
     alike = match.step(Context("match"), SegmentColours(seen), map).similarities
-    stage, ctx = ExpectedObservation(reach_m=0.1, power=5.0), Context("sensor", np.random.default_rng(0))
+    stage, ctx = ExpectedObservation(length_scale_m=0.1, power=5.0), Context("sensor", np.random.default_rng(0))
     stage.setup(ctx)
     belief = Particles(REFERENCES, np.full(40, 1 / 40))
     if isinstance(match, L2Match):

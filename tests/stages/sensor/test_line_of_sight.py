@@ -15,7 +15,7 @@ from omninav.stages.sensor.line_of_sight import (
     axes_of,
     covered,
     first_occupied,
-    grown_areas,
+    grow_areas,
     visibility_areas,
 )
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid
@@ -127,7 +127,7 @@ def test_areas_are_those_of_clipping_every_line_at_every_cell(seed: int):
                 points.append((row + 0.5 + 0.501 * step[0], column + 0.5 + 0.501 * step[1]))
     if not points:
         return
-    runs, starts = grown_areas(cells, np.array(points))
+    runs, starts = grow_areas(cells, np.array(points))
     for number, point in enumerate(points[:6]):
         mask = np.zeros(cells.shape, bool)
         for row, first, behind in runs[starts[number] : starts[number + 1]]:
@@ -184,12 +184,12 @@ def test_it_says_what_it_covers_and_how_much_it_takes():
     ctx = Context("areas")
     free = FreeSpace(ROOM.centres(np.array([1, 1]), np.array([1, 2])), 1.0)
     out = LineOfSight().step(ctx, a_map((4.5, 1.5, math.pi / 2), (-3.0, 1.5, 0.0)), ROOM, free)
-    said = out.metrics.values["visibility"]
-    assert said["references"] == 2
-    assert said["areas"] == 1
-    assert said["covered_rate"] == 1.0
-    assert said["area_median_m2"] == 14.0
-    assert said["size_bytes"] == out.areas.nbytes
+    figures = out.metrics.values["visibility"]
+    assert figures["references"] == 2
+    assert figures["areas"] == 1
+    assert figures["covered_rate"] == 1.0
+    assert figures["area_median_m2"] == 14.0
+    assert figures["size_bytes"] == out.areas.nbytes
     assert ctx.counts["view_without_area"] == 1
 
 

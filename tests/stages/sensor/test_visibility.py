@@ -8,11 +8,13 @@ import pytest
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.geometry.probability.evidence import contrast_power, fresh_share
+from omninav.stages.geometry.probability.evidence import contrast_power, evidence_novelty
 from omninav.stages.sensor.line_of_sight import axes_of, visibility_areas
-from omninav.stages.sensor.visibility import FADED, Visibility, looks_at, mean_seen, seen_from, sums_by_turn
+from omninav.stages.sensor.visibility import Visibility
+from omninav.stages.sensor.visibility_index import looks_at, seen_from
+from omninav.stages.sensor.visibility_similarity import CUTOFF_SIGMAS, mean_seen, sums_by_turn
 from omninav.stages.values.belief import Particles
-from omninav.stages.values.grid import FREE, OCCUPIED, FreeSpace, OccupancyGrid
+from omninav.stages.values.grid import FREE, OCCUPIED, OccupancyGrid
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
@@ -102,7 +104,7 @@ def test_particles_that_see_all_around_take_each_view_turned_to_where_they_see_i
     areas = visibility_areas(REFERENCES, ROOM, axes_of(sectors))
     # a wave between columns 10 degrees apart is at most (pi / 18)^2 / 8 / 2 = 0.002 off a line, which is drawn twice
     values = 0.5 + 0.5 * np.cos(np.arange(36) * np.pi / 18 + RNG.uniform(0, 6, (25, 1)))
-    stage = Visibility(power=1.0, near_m=None)
+    stage = Visibility(power=1.0, distance_sigma_m=None)
     stage.setup(Context("sensor"))
     poses = some_poses(300)
     out = stage.step(
@@ -121,7 +123,13 @@ def test_particles_that_see_all_around_take_each_view_turned_to_where_they_see_i
 def test_views_count_less_the_farther_away_they_were_taken_where_that_is_asked_for(sectors, shape):
     areas = visibility_areas(REFERENCES, ROOM, axes_of(sectors))
     values = RNG.random((25, 36))
-    stage = Visibility(power=1.0, near_m=0.4, window_deg=20.0, shape=shape or "step", sees="ahead" if shape else "auto")
+    stage = Visibility(
+        power=1.0,
+        distance_sigma_m=0.4,
+        window_deg=20.0,
+        window_shape=shape or "step",
+        field_of_view="forward" if shape else "auto",
+    )
     poses = some_poses(300)
     found = weighed(stage, values, poses, areas).likelihood.values * np.float32(values.max())
     values = values.astype(np.float32).astype(float)
@@ -136,7 +144,7 @@ def test_views_count_less_the_farther_away_they_were_taken_where_that_is_asked_f
 def test_every_view_that_is_near_enough_to_count_is_listed_for_its_cell(near):
     areas = visibility_areas(REFERENCES, ROOM, axes_of(5))
     looks = looks_at(areas, REFERENCES, each_view=True)
-    starts, items, *_ = seen_from(areas, looks, FADED * near)
+    starts, items, *_ = seen_from(areas, looks, CUTOFF_SIGMAS * near)
     lists = [set(items[a:b]) for a, b in itertools.pairwise(starts)]
     assert len(items) == sum(map(len, lists))
     middles = ROOM.centres(*np.divmod(np.arange(ROOM.cells.size), ROOM.cells.shape[1]))
@@ -144,11 +152,11 @@ def test_every_view_that_is_near_enough_to_count_is_listed_for_its_cell(near):
         seen, away = areas.mask(looks.target[g]).ravel(), np.abs(middles - looks.place[g])
         nearest = np.hypot(*np.maximum(away - 0.05, 0).T)  # of a cell's spots
         listed = np.array([g in cell for cell in lists])
-        assert listed[seen & (nearest < FADED * near - 1e-9)].all()
-        assert not listed[~seen | (np.hypot(*away.T) > FADED * near + 0.0708)].any()
+        assert listed[seen & (nearest < CUTOFF_SIGMAS * near - 1e-9)].all()
+        assert not listed[~seen | (np.hypot(*away.T) > CUTOFF_SIGMAS * near + 0.0708)].any()
 
 
-def test_far_from_the_maps_origin_particles_weigh_the_same():
+def test_far_from_the_maps_origin_likelihoods_are_the_same():
     moved = np.array([4096.0, -8192.0, 0.0])
     grid = OccupancyGrid(ROOM.cells, ROOM.resolution, (ROOM.origin[0] + moved[0], ROOM.origin[1] + moved[1]))
     values, poses = RNG.random((25, 36)), some_poses(300)
@@ -179,7 +187,7 @@ def test_a_robot_at_a_references_own_pose_takes_it_as_it_is():
         assert out.likelihood.values[0] * values.max() == pytest.approx(values[0, column], abs=0.004)
 
 
-def test_k_of_0_weighs_the_mean_similarity_of_the_present_view_to_the_database():
+def test_where_no_area_holds_a_pose_its_likelihood_is_the_mean_similarity_to_the_database():
     areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
     values = RNG.random((25, 1))
     far = np.array([[50.0, 50.0, 0.0], [-0.95, 2.05, 0.0]])  # outside of the grid; in a wall
@@ -208,11 +216,13 @@ def test_similarities_are_raised_before_they_are_averaged():
     )
 
 
-def test_references_that_were_not_compared_count_nowhere_and_those_that_stand_for_many_count_as_many():
+def test_references_that_were_not_compared_count_nowhere_and_sampled_ones_count_by_their_weight():
     areas = visibility_areas(REFERENCES, ROOM, axes_of(3))
     values, poses = RNG.random((25, 36)), some_poses(300)
     some = np.array([1, 4, 7, 20])
-    found = weighed(Visibility(power=1.0, near_m=None), values[some], poses, areas, candidates=some).likelihood
+    found = weighed(
+        Visibility(power=1.0, distance_sigma_m=None), values[some], poses, areas, candidates=some
+    ).likelihood
     only = VisibilityAreas(
         areas.axes,
         np.where(np.isin(np.arange(25), some)[:, None], areas.target, -1).astype(np.int32),
@@ -225,23 +235,28 @@ def test_references_that_were_not_compared_count_nowhere_and_those_that_stand_fo
     )
     held = np.zeros_like(values)
     held[some] = values[some]
-    words = weighed(Visibility(power=1.0, near_m=None), held, poses, only).likelihood
+    words = weighed(Visibility(power=1.0, distance_sigma_m=None), held, poses, only).likelihood
     known = np.abs(words.values - words.mean_likelihood) > 1e-9
     assert np.allclose(found.values[known], words.values[known], atol=1e-6)
     twice = weighed(
-        Visibility(power=1.0, near_m=None), values[some], poses, areas, candidates=some, sampling_weight=np.full(4, 2.0)
+        Visibility(power=1.0, distance_sigma_m=None),
+        values[some],
+        poses,
+        areas,
+        candidates=some,
+        sampling_weight=np.full(4, 2.0),
     )
     assert np.allclose(twice.likelihood.values, found.values, atol=1e-6)
 
 
-def test_a_standing_robots_pictures_are_little_evidence_where_that_is_asked_for():
-    assert fresh_share(0.1, 0.0, 0.05) == 1.0
-    assert fresh_share(None, 0.5, 0.05) == 1.0
-    assert fresh_share(0.0, 0.5, 0.05) == 0.05
-    assert fresh_share(0.1, 0.5, 0.05) == pytest.approx(0.2)
+def test_images_of_a_standing_robot_are_little_evidence_with_an_independence_distance():
+    assert evidence_novelty(0.1, 0.0, 0.05) == 1.0
+    assert evidence_novelty(None, 0.5, 0.05) == 1.0
+    assert evidence_novelty(0.0, 0.5, 0.05) == 0.05
+    assert evidence_novelty(0.1, 0.5, 0.05) == pytest.approx(0.2)
     areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
     values, poses = RNG.uniform(0.5, 1.0, (25, 1)).astype(np.float32), some_poses(50)
-    stage, particles = Visibility(power=1.0, independent=0.75), Particles(poses, np.full(50, 0.02))
+    stage, particles = Visibility(power=1.0, independence_distance=0.75), Particles(poses, np.full(50, 0.02))
     stage.setup(Context("sensor"))
 
     def at(motion: Motion):
@@ -254,18 +269,20 @@ def test_a_standing_robots_pictures_are_little_evidence_where_that_is_asked_for(
     assert np.allclose(standing.values, moving.values**0.05)
 
 
-def test_which_way_a_robot_sees_follows_from_the_match_or_is_said():
+def test_the_field_of_view_follows_from_the_match_or_is_given():
     areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
     poses, one = some_poses(100), RNG.random((25, 1))
     all_alike = np.repeat(one, 36, axis=1)
     ahead = weighed(Visibility(power=1.0), one, poses, areas).likelihood.values
-    assert np.allclose(weighed(Visibility(power=1.0, sees="ahead"), all_alike, poses, areas).likelihood.values, ahead)
-    around = weighed(Visibility(power=1.0, sees="around"), one, poses, areas).likelihood.values
+    assert np.allclose(
+        weighed(Visibility(power=1.0, field_of_view="forward"), all_alike, poses, areas).likelihood.values, ahead
+    )
+    around = weighed(Visibility(power=1.0, field_of_view="panoramic"), one, poses, areas).likelihood.values
     assert np.allclose(weighed(Visibility(power=1.0), all_alike, poses, areas).likelihood.values, around, atol=1e-6)
     assert not np.allclose(ahead, around)
 
 
-def test_an_empty_map_says_nothing():
+def test_an_empty_map_weights_all_particles_alike():
     areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
     assert (weighed(Visibility(), np.zeros((0, 36)), some_poses(5), areas).likelihood.values == 1).all()
 
@@ -289,19 +306,3 @@ def test_without_retrieval_all_particles_in_any_area_weigh_alike():
         inside = 0 <= row < 30 and 0 <= column < 40 and anywhere[row, column]
         assert value == float(inside)
     assert set(values) == {0.0, 1.0}
-
-
-def test_proposals_are_anywhere_in_the_free_space_and_absent_without_one():
-    areas = visibility_areas(REFERENCES[:3], ROOM, axes_of(1))
-    free = FreeSpace(np.array([[50.5, 50.5], [51.5, 50.5]]), 1.0)
-    poses, alike = some_poses(20), Similarities(RNG.random((3, 1)).astype(np.float32))
-    for retrieval in (True, False):
-        stage, ctx = Visibility(retrieval=retrieval, proposals=40), Context("sensor", np.random.default_rng(0))
-        stage.setup(ctx)
-        given = alike, Particles(poses, np.full(20, 1 / 20)), a_map(REFERENCES[:3]), areas
-        proposed = stage.step(ctx, *given, free=free).proposals
-        assert proposed is not None
-        assert proposed.poses.shape == (40, 3)
-        assert (proposed.poses[:, 0] >= 50).all()
-        assert proposed.weights.tolist() == [1 / 40] * 40
-        assert stage.step(ctx, *given).proposals is None

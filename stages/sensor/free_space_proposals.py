@@ -1,0 +1,28 @@
+"""Proposes poses anywhere in the free space, for recovery from kidnapping."""
+
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.grid import FreeSpace
+
+
+class FreeSpaceProposals(Stage):
+    """Draws poses uniformly over the free space with all headings, anew at each image.
+
+    Wolf, Burgard & Burkhardt 2005, section III: random samples. All poses have equal weights.
+    """
+
+    number: Annotated[int, Bounds(ge=1)] = 100
+    """Poses proposed at each image."""
+
+    class Out(Outputs):
+        """Poses of equal weights."""
+
+        proposals: Particles
+
+    def step(self, ctx: Context, free: FreeSpace) -> Out:
+        """Propose poses for one image."""
+        return self.Out(proposals=Particles(free.draw(ctx.rng, self.number), np.full(self.number, 1.0 / self.number)))

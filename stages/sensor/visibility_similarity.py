@@ -1,0 +1,203 @@
+"""Mean similarity of the views whose visibility areas hold a pose."""
+
+import math
+from typing import Any, Literal
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from .visibility_index import Array, Cells, Ints, Looks, Numbers, Shorts
+
+Floats = npt.NDArray[np.float32]
+Single = np.floating[Any]
+Window = Literal["step", "triangle", "gaussian"]
+
+WINDOW_SHAPES: dict[Window, int] = {"step": 0, "triangle": 1, "gaussian": 2}
+CUTOFF_SIGMAS = 3.0
+"""Standard deviations beyond which a Gaussian is 0."""
+ARC_TANGENT = (0.1590383972660733, -0.05115725038296156, 0.023334547989038373, -0.0062283931965400755)
+"""atan(t) / 2 pi on [0, 1] as t, t^3, t^5, t^7: a least-squares fit that is off by 0.005 degrees at most."""
+EXPONENTIAL = tuple(
+    np.float32(c) for c in (0.99999997814, -0.99999741652, 0.49994906235, -0.16629159934, 0.04039209277, -0.00626962699)
+)
+"""exp(-t) on [0, 9 / 16] as 1, t, t^2 ...: a least-squares fit; its eighth power is off by 1.5e-6 of it at most."""
+
+
+def sums_by_turn(looks: Looks, rows: Ints, values: Array, each: Array) -> tuple[Floats, Floats]:
+    """Sums of the views of each group over the robot's turn: (G, headings + 1), (G,).
+
+    Entry (g, h) is the sum of the `values` (R, headings) of all views of group g for a robot that sees their point
+    2 pi h / headings farther to its right than the robot of the first view did, wherever it has moved meanwhile: the
+    first is compared at that turn, the others at what they are `turned` more. Between the compared headings values are
+    linear. The last column repeats the first. The second result is the number of views. `rows` (references,): a
+    reference's row in `values`, -1 where it was not compared; `each` (R,): its sampling weight.
+    """
+    return _sums(looks.starts, looks.reference, looks.turned, rows, np.ascontiguousarray(values), each)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _sums(
+    starts: Ints, reference: Shorts, turned: Array, rows: Ints, values: Array, each: Array
+) -> tuple[Floats, Floats]:
+    headings = values.shape[1]
+    sums, number = np.zeros((len(starts) - 1, headings + 1), np.float32), np.zeros(len(starts) - 1, np.float32)
+    at_turns = np.empty(headings)
+    for g in range(len(starts) - 1):
+        at_turns[:] = 0.0
+        for a in range(starts[g], starts[g + 1]):
+            row = rows[reference[a]]
+            if row < 0:
+                continue
+            number[g] += each[row]
+            turn = turned[a] / (2 * math.pi) * headings
+            whole = math.floor(turn)
+            part = (turn - whole) * each[row]
+            here = int(whole) % headings
+            for h in range(headings):
+                after = here + 1 if here + 1 < headings else 0
+                at_turns[h] += (each[row] - part) * values[row, here] + part * values[row, after]
+                here = after
+        sums[g, :headings] = at_turns
+        sums[g, headings] = at_turns[0]
+    return sums, number
+
+
+def mean_seen(
+    poses: Array,
+    cells: Cells,
+    looks: Looks,
+    sums: Floats,
+    number: Floats,
+    background_level: float,
+    window: float | None = None,
+    shape: Window = "step",
+    distance_sigma_m: float = math.inf,
+) -> Array:
+    """Mean similarity of the views whose areas hold a pose, equations 7 and 8: (N, 3) -> (N,).
+
+    `sums` and `number` as `sums_by_turn` gives them. With a `window` robots look ahead: psi is the angle between the
+    heading and the direction to a point, wrapped to [-pi, pi) (erratum 44); d(psi) is 1 up to `window` radians and 0
+    beyond (`step`, the paper's), falls to 0 there (`triangle`), or has it as standard deviation (`gaussian`). Without
+    one they see all around, and look up their turn relative to each point. p(M_j | l) of equation 6 falls with the
+    distance d to where a group was taken as exp(-d^2 / (2 distance_sigma^2)) and is 0 beyond three sigmas; with an
+    infinite sigma it is the paper's. `background_level`: the result where K = 0.
+    """
+    farthest = math.pi if window is None else min(CUTOFF_SIGMAS * window if shape == "gaussian" else window, math.pi)
+    turns = looks.bearing / (2 * math.pi)
+    groups = np.column_stack([looks.point - cells.origin, looks.place - cells.origin, turns % 1.0]).astype(np.float32)
+    min_cosine = math.cos(farthest) if farthest < math.pi else -2.0
+    ahead = window is not None, window or math.pi, min_cosine, WINDOW_SHAPES[shape]
+    return _seen(np.ascontiguousarray(poses), *cells, groups, sums, number, background_level, distance_sigma_m, *ahead)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _seen(
+    poses: Array,
+    starts: Ints,
+    items: Numbers,
+    origin: tuple[float, float],
+    resolution: float,
+    rows: int,
+    columns: int,
+    groups: Floats,
+    sums: Floats,
+    number: Floats,
+    background_level: float,
+    distance_sigma_m: float,
+    ahead: bool,
+    window: float,
+    min_cosine: float,
+    shape: int,
+) -> Array:
+    # Single precision, from the grid's corner, and one plain loop for each thing to work out: vector instructions.
+    headings, most = np.float32(sums.shape[1] - 1), 1
+    for cell in range(rows * columns):
+        most = max(most, starts[cell + 1] - starts[cell])
+    kept, right, up = np.empty(most, np.uint32), np.empty(most, np.float32), np.empty(most, np.float32)
+    weight, turn = np.empty(most, np.float32), np.empty(most, np.float32)
+    whole, part = np.empty(most, np.int32), np.empty(most, np.float32)
+    per_near, beyond, along = (
+        np.float32(1.0 / distance_sigma_m),
+        np.float32(CUTOFF_SIGMAS * CUTOFF_SIGMAS),
+        np.float32(min_cosine),
+    )
+    out = np.empty(len(poses))
+    for n in range(len(poses)):
+        out[n] = background_level
+        i = math.floor((poses[n, 1] - origin[1]) / resolution)
+        j = math.floor((poses[n, 0] - origin[0]) / resolution)
+        if not (0 <= i < rows and 0 <= j < columns):
+            continue
+        x, y = np.float32(poses[n, 0] - origin[0]), np.float32(poses[n, 1] - origin[1])
+        heading = np.float32(poses[n, 2] / (2 * math.pi) % 1.0)
+        sine, cosine = np.float32(math.sin(poses[n, 2])), np.float32(math.cos(poses[n, 2]))
+        many = 0
+        for g in items[starts[i * columns + j] : starts[i * columns + j + 1]]:
+            wide, high = (groups[g, 2] - x) * per_near, (groups[g, 3] - y) * per_near
+            far, east, north = wide * wide + high * high, groups[g, 0] - x, groups[g, 1] - y
+            off_axis = ahead and east * cosine + north * sine < along * np.sqrt(east * east + north * north)
+            if far > beyond or off_axis:
+                continue
+            kept[many], right[many], up[many], weight[many], turn[many] = g, east, north, far, heading + groups[g, 4]
+            many += 1
+        for k in range(many):
+            weight[k] = _gaussian(weight[k])
+        if not ahead:
+            _turned_past(right, up, turn, many, headings, whole, part)
+        elif shape:
+            for k in range(many):
+                aside = math.atan2(up[k] * cosine - right[k] * sine, right[k] * cosine + up[k] * sine) / window
+                weight[k] *= 1.0 - abs(aside) if shape == 1 else _gaussian(np.float32(aside * aside))
+        total, mass = np.float32(0), np.float32(0)
+        for k in range(many):
+            g = kept[k]
+            value = sums[g, 0]
+            if not ahead:
+                value = sums[g, whole[k]]
+                value += part[k] * (sums[g, whole[k] + 1] - value)
+            total += weight[k] * value
+            mass += weight[k] * number[g]
+        if mass > 0:
+            out[n] = total / mass
+    return out
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _gaussian(square: Single) -> Single:
+    # exp(-square / 2) up to CUTOFF_SIGMAS standard deviations.
+    t = square * np.float32(1 / 16)
+    power = EXPONENTIAL[4] + t * EXPONENTIAL[5]
+    power = EXPONENTIAL[0] + t * (EXPONENTIAL[1] + t * (EXPONENTIAL[2] + t * (EXPONENTIAL[3] + t * power)))
+    power *= power
+    power *= power
+    return power * power
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _turned_past(
+    right: Floats, up: Floats, turn: Floats, number: int, headings: Single, whole: Shorts, part: Floats
+) -> None:
+    # How far angles (in turns) are past the directions to points, as columns of so many headings: vector instructions.
+    # The arc tangent is a polynomial of the smaller over the larger of two sides.
+    c1, c3, c5, c7 = (
+        np.float32(ARC_TANGENT[0]),
+        np.float32(ARC_TANGENT[1]),
+        np.float32(ARC_TANGENT[2]),
+        np.float32(ARC_TANGENT[3]),
+    )
+    zero, quarter, half, tiny = np.float32(0), np.float32(0.25), np.float32(0.5), np.float32(1e-12)
+    last = np.int32(headings) - np.int32(1)
+    for k in range(number):
+        wide, high = abs(right[k]), abs(up[k])
+        low, top = (wide, high) if wide < high else (high, wide)
+        ratio = low / (top + tiny)
+        square = ratio * ratio
+        angle = ratio * (c1 + square * (c3 + square * (c5 + square * c7)))
+        angle = quarter - angle if high > wide else angle
+        angle = half - angle if right[k] < zero else angle
+        angle = -angle if up[k] < zero else angle
+        past = turn[k] - angle
+        past = (past - np.floor(past)) * headings
+        first = min(np.int32(past), last)
+        whole[k], part[k] = first, past - np.float32(first)

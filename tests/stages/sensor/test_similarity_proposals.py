@@ -1,0 +1,54 @@
+"""Poses proposed where the current view fits."""
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.stages.sensor.near_references import similarity_field
+from omninav.stages.sensor.similarity_proposals import SimilarityProposals, draw_cells
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.similarity import Similarities
+
+RNG = np.random.default_rng(0)
+REFERENCES = np.column_stack([RNG.uniform(0, 4, (40, 2)), RNG.uniform(-3, 3, 40)])
+MAP = ReferenceGraph(REFERENCES, np.zeros((40, 1, 1), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth")
+
+
+def test_cells_are_drawn_by_weight_and_sampling_weight() -> None:
+    field = np.full((3, 4), 0.1, np.float32)
+    field[0, 1] = field[2, 3] = 1.0
+    each = np.array([1.0, 5.0, 3.0])
+    weighted = similarity_field(Similarities(field, sampling_weight=each), 0.5, 1.0, 2.0)
+    drawn = draw_cells(weighted, np.random.default_rng(0), 40_000)
+    # By hand: each cell weighs its value, or the floor, squared, as often as its reference counts.
+    weights = (np.maximum(field, 0.5) ** 2 * each[:, None]).ravel()
+    shares = np.bincount(drawn, minlength=12) / 40_000
+    assert shares == pytest.approx(weights / weights.sum(), abs=0.01)
+    assert shares[1] == pytest.approx(1 / 12, abs=0.004)
+
+
+@pytest.mark.parametrize("floor", [0.0, 2.0])
+def test_where_all_or_nothing_rises_above_the_floor_cells_are_drawn_by_weight_too(floor: float) -> None:
+    field = np.array([[0.2, 0.4], [0.8, 0.6]], np.float32)
+    drawn = draw_cells(similarity_field(Similarities(field), floor, 1.0, 1.0), np.random.default_rng(0), 40_000)
+    weights = np.maximum(field, floor).ravel()
+    assert np.bincount(drawn, minlength=4) / 40_000 == pytest.approx(weights / weights.sum(), abs=0.01)
+
+
+@pytest.mark.parametrize("candidates", [None, np.arange(2, 20)], ids=["all compared", "some compared"])
+def test_poses_are_drawn_around_the_best_reference_and_heading(candidates: np.ndarray | None) -> None:
+    values = np.full((40, 36), 0.5, np.float32)
+    values[3, 9] = 0.9  # at reference 3, for a robot turned left by a quarter
+    similarities = Similarities(values if candidates is None else values[candidates], candidates)
+    ctx = Context("proposals", np.random.default_rng(0))
+    field = similarity_field(similarities, 0.5, 0.9, 30.0)
+    proposals = SimilarityProposals(number=400, spread=0.1).step(ctx, field, MAP).proposals
+    assert proposals is not None
+    assert proposals.weights.sum() == pytest.approx(1.0)
+    gap = np.hypot(*(proposals.poses[:, :2] - REFERENCES[3, :2]).T)
+    turn = np.angle(np.exp(1j * (proposals.poses[:, 2] - REFERENCES[3, 2] - np.pi / 2)))
+    assert ((gap < 0.2) & (np.abs(turn) < 0.09)).mean() > 0.9
+
+
+def test_without_a_field_there_are_no_proposals() -> None:
+    assert SimilarityProposals().step(Context("proposals"), None, MAP).proposals is None
