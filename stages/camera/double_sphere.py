@@ -63,4 +63,4 @@ class DoubleSphere(Camera, projection="double_sphere"):
             along = mz * self.xi + np.sqrt(mz * mz + (1.0 - self.xi * self.xi) * square)
             scale = along / (mz * mz + square)
             rays = normalised(np.stack([scale * mx, scale * my, scale * mz - self.xi], axis=-1))
-        return turned(rays, self.yaw), np.isfinite(rays).all(axis=-1)
+        return turned(rays, self.yaw), np.asarray(np.isfinite(rays).all(axis=-1))

@@ -7,6 +7,7 @@ K: [[fx, skew, cx], [0, fy, cy], [0, 0, 1]].
 
 import dataclasses
 import math
+from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
 import yaml
@@ -22,8 +23,16 @@ Keys = dict[str, set[str]]
 MATRIX = "must be [[fx, skew, cx], [0, fy, cy], [0, 0, 1]], with focal lengths above 0"
 
 
+def read_camera(path: Path) -> Camera:
+    """The camera that a file describes. Raises `UnreadableRecording` naming the file, and the key that is wrong."""
+    try:
+        return parse_camera(path.read_bytes(), str(path))
+    except OSError as error:
+        raise UnreadableRecording(f"{path}: {error.strerror or error}; give camera=PATH/camera.yaml") from None
+
+
 def parse_camera(text: str | bytes, where: str) -> Camera:
-    """The camera that a file describes. Raises `UnreadableRecording` naming `where` and the key that is wrong."""
+    """The camera that a text describes. Raises `UnreadableRecording` naming `where` and the key that is wrong."""
     try:
         content = yaml.safe_load(text)
     except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:

@@ -1,17 +1,115 @@
-"""Descriptions of image folders: found by name, read from YAML, checked."""
+"""What describes a folder of images: found by name, read from YAML, checked."""
 
+import re
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import yaml
 
+from omninav.pipeline import Bounds
 from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.problems import nearest
 
-from .image_folder import Description
 from .recording import UnreadableRecording
+from .tables import Length, Time
+
+
+@dataclass(frozen=True)
+class Rename:
+    """A change to file names on their way from the CSV to the disk: a plain text or a regular expression."""
+
+    replace: str
+    by: str
+    regex: bool = False
+
+    def __call__(self, name: str) -> str:
+        return re.sub(self.replace, self.by, name) if self.regex else name.replace(self.replace, self.by)
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Where the pictures are and when they were taken.
+
+    `csv`: a table with one row per picture, its path relative to the recording's folder and with wildcards; without
+    one, `images` names the pictures by wildcards, in the order of the numbers in their names. `file`: the column with
+    file names, changed by `rename`, then sought in the folder `images` beside the table (or in the recording's folder
+    where that starts with '/'). `time`: the column with times; without one, pictures are `period` seconds apart.
+    """
+
+    csv: str | None = None
+    header: bool = True
+    delimiter: str = ","
+    file: str | int | None = None
+    images: str = ""
+    rename: tuple[Rename, ...] = ()
+    time: Time | None = None
+    period: Annotated[float, Bounds(gt=0)] | None = None
+
+
+@dataclass(frozen=True)
+class Positions:
+    """Where the camera was. `csv` null: columns of the frames' own table, row by row.
+
+    A table of its own is joined by time, interpolated linearly: a picture taken at t is looked up at
+    t + `clock_offset` (seconds). A picture further than `max_gap` seconds from both neighbours' time, or outside the
+    table's time, has no position. `offset_x`, `offset_y` (metres) are added to all positions.
+    """
+
+    x: Length
+    y: Length
+    csv: str | None = None
+    header: bool = True
+    delimiter: str = ","
+    time: Time | None = None
+    clock_offset: float = 0.0
+    max_gap: Annotated[float, Bounds(gt=0)] = 1.0
+    offset_x: float = 0.0
+    offset_y: float = 0.0
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A column of headings in the positions' table: where it counts from, which way, and what is added (radians)."""
+
+    column: str | int
+    unit: Literal["deg", "rad"]
+    zero: Literal["x", "y"] = "x"
+    sense: Literal["clockwise", "counter_clockwise"] = "counter_clockwise"
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """Headings from the track itself where nothing measured them.
+
+    The direction in which the track goes, from a straight line fitted to the positions around a moment with Gaussian
+    weights of standard deviation `window`, in seconds or in metres of way (`unit`); positions themselves stay as they
+    are. `lag` (same unit): the track's direction is looked up that much earlier, as a marker ahead of the wheels turns
+    before the robot does.
+    """
+
+    window: Annotated[float, Bounds(gt=0)] = 1.0
+    unit: Literal["s", "m"] = "s"
+    lag: float = 0.0
+
+
+@dataclass(frozen=True)
+class Description:
+    """A folder of images, described. `which` fills `{which}` in file names; by default it stands for anything.
+
+    `camera`: what a camera.yaml holds (the image's size may be left out); null: the folder's camera.yaml.
+    """
+
+    frames: Frames
+    positions: Positions
+    folder: str | None = None
+    which: str = "*"
+    heading: Heading | None = None
+    tangent: Tangent = field(default_factory=Tangent)
+    camera: dict[str, Any] | None = None
 
 
 def known_layouts(layouts: Sequence[str] = ()) -> dict[str, Path]:

@@ -5,22 +5,50 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from omninav.pipeline.mcap.log import Location, LogReader, Record
 
-from .topics import TopicRecording, Topics, record_topics
+from .recording import Format, OpenOptions
+from .topic_recording import TopicRecording
+from .topics import record_topics
 
 
-def open_mcap(
-    name: str, paths: Sequence[Path], topics: Topics, camera: Path | None = None, lost: Sequence[str] = ()
-) -> TopicRecording:
-    """A recording from MCAP files, in the order given; `lost` parts are counted as `missing_file`.
+class Mcap(Format):
+    """MCAP with ROS 2 messages: one file, or the several of a rosbag2 folder.
 
-    Raises `UnreadableRecording` or `LogError`.
+    Read by our own reader, which survives damage; parts that are lost are counted as `missing_file`.
     """
-    feed = LogReader(paths[0]) if len(paths) == 1 else SplitLog(paths)
-    for file in lost:
-        feed.drop("missing_file", f"{name}: its part {file} does not exist")
-    return record_topics(name, feed, topics, camera, paths)
+
+    names = "a .mcap file or a rosbag2 folder"
+    suffixes = (".mcap",)
+
+    def opens(self, log: str) -> bool:
+        """A .mcap file, or a folder that holds some."""
+        return super().opens(log) or any(Path(log).expanduser().glob("*.mcap"))
+
+    def open(self, log: str, options: OpenOptions) -> TopicRecording:
+        """The files of a folder in the order of its metadata. Raises `UnreadableRecording` or `LogError`."""
+        path = Path(log).expanduser()
+        if not path.is_dir():
+            return record_topics(log, LogReader(path), options.topics, options.camera, [path])
+        parts = sorted(path.glob("*.mcap"))
+        listed = _listed(path / "metadata.yaml") or [part.name for part in parts]
+        there = [path / file for file in listed if (path / file).is_file()] or parts
+        feed = LogReader(there[0]) if len(there) == 1 else SplitLog(there)
+        for file in listed:
+            if not (path / file).is_file():
+                feed.drop("missing_file", f"{log}: its part {file} does not exist")
+        return record_topics(log, feed, options.topics, options.camera, there)
+
+
+def _listed(path: Path) -> list[str]:
+    """The files that a rosbag2 folder is made of, in their order; none where its metadata cannot be read."""
+    try:
+        content = yaml.safe_load(path.read_text())
+        return [Path(file).name for file in content["rosbag2_bagfile_information"]["relative_file_paths"]]
+    except (OSError, yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError):
+        return []
 
 
 class SplitLog:

@@ -68,10 +68,10 @@ def pixels_of(message: Any) -> Pixels:
 
     Raises `Undecodable`.
     """
-    return decode_picture(bytes(message.data)) if hasattr(message, "format") else _raw_pixels(message)
+    return decode_image(bytes(message.data)) if hasattr(message, "format") else _raw_pixels(message)
 
 
-def decode_picture(data: bytes) -> Pixels:
+def decode_image(data: bytes) -> Pixels:
     """A JPEG, PNG or other picture file's bytes as (height, width, 3) uint8 blue-green-red.
 
     Raises `Undecodable`; also for a JPEG or PNG that was cut off, whose missing part OpenCV would fill with grey.

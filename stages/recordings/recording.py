@@ -1,7 +1,10 @@
-"""What every kind of recording offers to the source stage: frames with stamps, odometry and perhaps truth."""
+"""What every recording offers to the source stage (frames with stamps, odometry, perhaps truth), and what opens one."""
 
+from abc import ABC, abstractmethod
 from collections import Counter
-from typing import Protocol
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -54,3 +57,54 @@ class Recording(Protocol):
 
     def digest(self) -> str:
         """sha256 over all content that the frames are made from."""
+
+
+@dataclass(frozen=True)
+class Topics:
+    """The topics to read. `image` null: `/camera/image/compressed`, else `/camera/image`. Others null: not read."""
+
+    image: str | None = None
+    camera_info: str | None = "/camera/camera_info"
+    odometry: str | None = "/odom"
+    truth: str | None = "/ground_truth/pose"
+    scan: str | None = "/scan"
+
+
+@dataclass(frozen=True)
+class OpenOptions:
+    """What a user says besides the recording's name."""
+
+    topics: Topics = Topics()
+    camera: Path | None = None
+    """A camera.yaml in place of the recording's own."""
+    layout_folders: tuple[str, ...] = ()
+    """Folders with further descriptions of folders of images."""
+
+
+FORMATS: list[type["Format"]] = []
+"""The formats that were imported; see `opening.log_formats`."""
+
+
+class Format(ABC):
+    """A kind of log. A subclass is a format: which names it opens, and how."""
+
+    names: ClassVar[str]
+    """What to name, for people: "a .mcap file"."""
+    suffixes: ClassVar[tuple[str, ...]] = ()
+    """Of files that can be nothing else."""
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        FORMATS.append(cls)
+
+    def opens(self, log: str) -> bool:
+        """Whether a name is one of this format, there or not: by default a file with one of the suffixes."""
+        return Path(log).suffix in self.suffixes and not Path(log).expanduser().is_dir()
+
+    @abstractmethod
+    def open(self, log: str, options: OpenOptions) -> Recording:
+        """The recording. Raises `UnreadableRecording` or another `BadInput`."""
+
+    def hint(self, folder: str, options: OpenOptions) -> str:
+        """What to type for a folder that no format opens; '' where this one has nothing to say."""
+        return ""

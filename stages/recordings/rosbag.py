@@ -4,43 +4,34 @@ import struct
 from collections import Counter
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import yaml
-from rosbags.highlevel import AnyReader
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
 
 from omninav.pipeline.mcap.log import BadMessage, Record, standard_types
 
-from .mcap import open_mcap
-from .recording import UnreadableRecording
-from .topics import TopicRecording, Topics, record_topics
+from .recording import Format, OpenOptions, UnreadableRecording
+from .topic_recording import TopicRecording
+from .topics import record_topics
 
 
-def open_rosbag(name: str, path: Path, topics: Topics, camera: Path | None = None) -> TopicRecording:
-    """A recording from a ROS 1 .bag, a .db3 file, or a rosbag2 folder.
+class Rosbag(Format):
+    """ROS 1 bags and rosbag2 in SQLite."""
 
-    A folder of plain MCAP files is read by our own reader, which survives damage. Raises `UnreadableRecording`.
-    """
-    parts = sorted(path.glob("*.mcap")) if path.is_dir() else []
-    if parts:
-        listed = _listed(path / "metadata.yaml") or [part.name for part in parts]
-        there = [path / file for file in listed if (path / file).is_file()]
-        lost = [file for file in listed if not (path / file).is_file()]
-        return open_mcap(name, there or parts, topics, camera, lost)
-    return record_topics(name, BagFeed(path), topics, camera, _files(path))
+    names = "a .bag or .db3 file"
+    suffixes = (".bag", ".db3")
 
+    def opens(self, log: str) -> bool:
+        """Such a file, or a rosbag2 folder."""
+        path = Path(log).expanduser()
+        return super().opens(log) or (path / "metadata.yaml").is_file() or any(path.glob("*.db3"))
 
-def _files(path: Path) -> list[Path]:
-    return sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
-
-
-def _listed(path: Path) -> list[str]:
-    """The files that a rosbag2 folder is made of, in their order; none where its metadata cannot be read."""
-    try:
-        content = yaml.safe_load(path.read_text())
-        return [Path(file).name for file in content["rosbag2_bagfile_information"]["relative_file_paths"]]
-    except (OSError, yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError):
-        return []
+    def open(self, log: str, options: OpenOptions) -> TopicRecording:
+        """With the library rosbags. Raises `UnreadableRecording`."""
+        path = Path(log).expanduser()
+        files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
+        return record_topics(log, BagFeed(path), options.topics, options.camera, files)
 
 
 class BagFeed:
@@ -65,7 +56,9 @@ class BagFeed:
                 ) from None
             self.drop("bad_metadata", f"{path}: metadata.yaml cannot be used ({said})")
 
-    def _open(self, paths: list[Path]) -> AnyReader:
+    def _open(self, paths: list[Path]) -> "AnyReader":
+        from rosbags.highlevel import AnyReader  # slow to import, and seldom needed
+
         reader = AnyReader(paths, default_typestore=standard_types())
         reader.open()
         return reader

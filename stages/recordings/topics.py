@@ -1,139 +1,27 @@
 """A recording out of ROS topics, whatever file they came from: frames, odometry and truth at the frames' stamps."""
 
-import hashlib
-from bisect import bisect_left
-from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Sequence
+from dataclasses import fields
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline.files import digest_file
 from omninav.pipeline.graph.problems import nearest
 from omninav.pipeline.mcap.log import BadMessage, Record
 from omninav.stages.camera.model import Camera
-from omninav.stages.geometry.plane.se2 import interpolate
 from omninav.stages.values.image import Pixels
-from omninav.stages.values.scan import Scan
 
-from .camera_yaml import camera_from_info, parse_camera
-from .messages import (
-    IMAGE_TYPES,
-    POSE_TYPES,
-    SCAN_TYPE,
-    Undecodable,
-    is_blank,
-    pixels_of,
-    pose_of,
-    scan_of,
-)
-from .recording import UnreadableRecording
+from .camera_yaml import camera_from_info, parse_camera, read_camera
+from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, Undecodable, pixels_of, pose_of
+from .recording import Topics, UnreadableRecording
+from .stamps import ascending, poses_at, within
+from .topic_recording import Feed, TopicRecording
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
 IMAGE_TOPICS = ("/camera/image/compressed", "/camera/image")
-STALE = 1_000_000_000
-"""Nanoseconds after which range readings say nothing any more."""
-
-
-@dataclass(frozen=True)
-class Topics:
-    """The topics to read. `image` null: `/camera/image/compressed`, else `/camera/image`. Others null: not read."""
-
-    image: str | None = None
-    camera_info: str | None = "/camera/camera_info"
-    odometry: str | None = "/odom"
-    truth: str | None = "/ground_truth/pose"
-    scan: str | None = "/scan"
-
-
-class Feed(Protocol):
-    """A file (or several) of stamped messages, gone through once and then read where needed."""
-
-    @property
-    def topics(self) -> dict[str, str]: ...
-    @property
-    def attachments(self) -> dict[str, bytes]: ...
-    @property
-    def dropped(self) -> Counter[str]: ...
-    @property
-    def details(self) -> dict[str, str]: ...
-    def scan(self, topics: Collection[str] | None = None) -> Iterator[Record]: ...
-    def fetch(self, location: Any) -> bytes | memoryview: ...
-    def decode(self, topic: str, data: bytes | memoryview) -> Any: ...
-    def drop(self, kind: str, detail: str) -> None: ...
-
-
-class TopicRecording:
-    """Frames from an image topic with poses from pose topics; a `Recording`. Pictures are read when asked for."""
-
-    def __init__(
-        self,
-        name: str,
-        camera: Camera,
-        stamps: Stamps,
-        odometry: Array | None,
-        truth: Array | None,
-        feed: Feed,
-        picture: Callable[[int], Pixels],
-        files: Sequence[Path],
-        scans: Sequence[Record] = (),
-    ) -> None:
-        self.name, self.camera, self.stamps, self.odometry, self.truth = name, camera, stamps, odometry, truth
-        self._feed, self._picture, self._files, self._scans = feed, picture, files, scans
-        self._scan_stamps = np.array([record.stamp for record in scans], dtype=np.int64)
-
-    @property
-    def dropped(self) -> Counter[str]:
-        """What was left out, by kind."""
-        return self._feed.dropped
-
-    @property
-    def details(self) -> dict[str, str]:
-        """The first case of each kind."""
-        return self._feed.details
-
-    def image(self, frame: int) -> Pixels | None:
-        """The picture of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
-        where = f"{self.name}: picture {frame} (stamp {self.stamps[frame] / 1e9:.3f} s)"
-        try:
-            pixels = self._picture(frame)
-        except BadMessage as error:
-            self._feed.drop("bad_message", str(error))
-        except Undecodable as error:
-            self._feed.drop("undecodable_image", f"{where}: {error}")
-        else:
-            size = (self.camera.height_px, self.camera.width)
-            if pixels.shape[:2] != size:
-                height, width = pixels.shape[:2]
-                self._feed.drop("wrong_size", f"{where} is {width} x {height}, the camera {size[1]} x {size[0]}")
-            elif is_blank(pixels):
-                self._feed.drop("blank_image", f"{where} is blank")
-            else:
-                return pixels
-        return None
-
-    def scan(self, frame: int) -> Scan | None:
-        """The last ring of ranges before a frame, read now; None where the last second has none, or a broken one."""
-        number = int(np.searchsorted(self._scan_stamps, self.stamps[frame], side="right")) - 1
-        if number < 0 or self.stamps[frame] - self._scan_stamps[number] > STALE:
-            return None
-        record = self._scans[number]
-        try:
-            return scan_of(self._feed.decode(record.topic, self._feed.fetch(record.location)))
-        except BadMessage as error:
-            self._feed.drop("bad_message", str(error))
-            return None
-
-    def digest(self) -> str:
-        """sha256 over the bytes of all files that were read."""
-        whole = hashlib.sha256()
-        for path in self._files:
-            whole.update(digest_file(path).encode())
-        return whole.hexdigest()
 
 
 def record_topics(name: str, feed: Feed, topics: Topics, camera: Path | None, files: Sequence[Path]) -> TopicRecording:
@@ -167,10 +55,10 @@ def record_topics(name: str, feed: Feed, topics: Topics, camera: Path | None, fi
     stamps = np.array([frame.stamp for frame in frames], dtype=np.int64)
     keep = np.ones(len(frames), dtype=bool)
     if odometry is not None:
-        keep = _within(stamps, odometry[0])
+        keep = within(stamps, odometry[0])
         _drop_frames(feed, name, "outside_odometry", stamps, ~keep, f"outside the time of {topics.odometry}")
     elif truth is not None:
-        keep = _within(stamps, truth[0])
+        keep = within(stamps, truth[0])
         _drop_frames(feed, name, "no_position", stamps, ~keep, f"outside the time of {topics.truth}")
     frames, stamps = [frame for frame, kept in zip(frames, keep, strict=True) if kept], stamps[keep]
     if not frames:
@@ -205,55 +93,13 @@ def find_camera(
         return parse_camera(feed.attachments["camera.yaml"], f"{name}: attachment camera.yaml"), []
     path = named or beside
     if path is not None:
-        try:
-            return parse_camera(path.read_bytes(), str(path)), [path]
-        except OSError as error:
-            raise UnreadableRecording(f"{path}: {error.strerror or error}; give camera=PATH/camera.yaml") from None
+        return read_camera(path), [path]
     if infos:
         return camera_from_info(infos[0], f"{name}: camera_info"), []
     raise UnreadableRecording(
         f"{name}: nothing says how its pictures are to be read: no camera.yaml is attached or lies beside it; "
         "give camera=PATH/camera.yaml"
     )
-
-
-def poses_at(times: Stamps, poses: Array, stamps: Stamps) -> Array:
-    """Poses (N, 3) interpolated to stamps (ns); rows of NaN outside the range of `times`."""
-    at = np.full((len(stamps), 3), np.nan)
-    inside = _within(stamps, times)
-    first = times[0]  # differences are small enough for floats, nanoseconds since 1970 are not
-    at[inside] = interpolate((times - first) / 1e9, poses, (stamps[inside] - first) / 1e9)
-    return at
-
-
-def ascending(stamps: Sequence[int]) -> tuple[list[int], list[int], list[int]]:
-    """Which records to keep so that their stamps ascend: indices kept, repeated, and out of order.
-
-    Of equal stamps the first is kept. Of the rest, the longest ascending sequence is kept: a single stamp that leaps
-    ahead costs itself and not everything after it, and a clock that was set back costs the shorter part.
-    """
-    first: dict[int, int] = {}
-    repeated = [number for number, stamp in enumerate(stamps) if first.setdefault(stamp, number) != number]
-    left = sorted(first.values())
-    tails: list[int] = []  # stamps that end the best sequences of each length
-    ends: list[int] = []
-    before: dict[int, int] = {}
-    for number in left:
-        length = bisect_left(tails, stamps[number])
-        if length == len(tails):
-            tails.append(stamps[number])
-            ends.append(number)
-        else:
-            tails[length], ends[length] = stamps[number], number
-        if length:
-            before[number] = ends[length - 1]
-    kept: list[int] = []
-    at = ends[-1] if ends else None
-    while at is not None:
-        kept.append(at)
-        at = before.get(at)
-    kept.reverse()
-    return kept, repeated, sorted(set(left) - set(kept))
 
 
 def _pose(feed: Feed, record: Record, name: str) -> tuple[float, float, float]:
@@ -356,11 +202,6 @@ def _in_order(feed: Feed, name: str, topic: str, records: list[Record], repeats:
     for number in backward:
         feed.drop("backward_stamp", f"{name}: {topic} has a stamp out of order, {records[number].stamp} ns")
     return [records[number] for number in kept]
-
-
-def _within(stamps: Stamps, times: Stamps) -> npt.NDArray[np.bool_]:
-    inside: npt.NDArray[np.bool_] = (stamps >= times[0]) & (stamps <= times[-1])
-    return inside
 
 
 def _drop_frames(feed: Feed, name: str, kind: str, stamps: Stamps, lost: npt.NDArray[np.bool_], why: str) -> None:

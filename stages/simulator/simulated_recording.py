@@ -14,7 +14,7 @@ from omninav.pipeline.files import digest_file, digest_text
 from omninav.stages import camera, simulator
 from omninav.stages.geometry.plane import odometry_noise, se2
 from omninav.stages.recordings.recording import UnreadableRecording
-from omninav.stages.recordings.topics import ascending
+from omninav.stages.recordings.stamps import ascending
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 

@@ -13,15 +13,15 @@ from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
 from omninav.pipeline.files import digest_text
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
-from omninav.stages.recordings.cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames
 from omninav.stages.recordings.opening import open_recording
-from omninav.stages.recordings.recording import Recording, UnreadableRecording
-from omninav.stages.recordings.topics import Topics
+from omninav.stages.recordings.recording import Recording, Topics, UnreadableRecording
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
+
+from .cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames
 
 Array = npt.NDArray[np.float64]
 DRIVE = "drive.mcap"
@@ -63,7 +63,7 @@ class LogSource(Source):
     kidnappings: tuple[Kidnapping, ...] = ()
     topics: Topics = Topics()
     camera: str | None = None
-    layouts: tuple[str, ...] = ()
+    layout_folders: tuple[str, ...] = ()
     first: Annotated[int, Bounds(ge=0)] = 0
     stop: Annotated[int, Bounds(ge=1)] | None = None
     stride: Annotated[int, Bounds(ge=1)] = 1
@@ -206,7 +206,7 @@ class LogSource(Source):
         elif not names or None in names:
             raise UnreadableRecording("no recording is named; type log=PATH")
         else:
-            recordings = [open_recording(str(name), self.topics, self.camera, self.layouts) for name in names]
+            recordings = [open_recording(str(name), self.topics, self.camera, self.layout_folders) for name in names]
         self._recordings, self._frames, self._told = [], [], []
         for recording in recordings:
             check_cuts(self.cuts, len(recording.stamps), recording.name)

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from omninav.stages.recordings.image_folder import track_directions
 from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.positions import track_directions
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.recordings.tables import Angle, Length, Time, read_table
 
@@ -92,8 +92,8 @@ def test_a_layout_from_a_users_folder_may_change_another(tmp_path: Path) -> None
     (layouts / "mine.yaml").write_text(DESCRIPTION)
     (layouts / "later.yaml").write_text("like: mine\npositions: {clock_offset: 10.1}\n")
     path = folder(tmp_path)
-    assert open_recording(f"mine:{path}", layouts=(str(layouts),)).stamps[0] == 100_000_000
-    later = open_recording(f"later:{path}", layouts=[str(layouts)])
+    assert open_recording(f"mine:{path}", layout_folders=(str(layouts),)).stamps[0] == 100_000_000
+    later = open_recording(f"later:{path}", layout_folders=[str(layouts)])
     assert later.stamps.tolist() == [0, 100_000_000, 200_000_000, 300_000_000]
     own = tmp_path / "own.yaml"
     own.write_text(DESCRIPTION + f"folder: {path}\n")

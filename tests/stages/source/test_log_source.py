@@ -3,21 +3,18 @@
 import copy
 import dataclasses
 import math
-import sys
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from made_logs import FRAMES, IMAGE, ODOMETRY, START, TRUTH, Made, compressed, messages, write_mcap
 
 from omninav.pipeline import Context
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.source.log import LogSource, LogSourceState, disturb
-
-sys.path.insert(0, str(Path(__file__).parent))
-from made_logs import FRAMES, IMAGE, ODOMETRY, START, TRUTH, Made, compressed, messages, write_mcap
 
 
 def context(seed: int = 0) -> Context:

@@ -12,8 +12,7 @@ from omninav.pipeline import Context
 from omninav.pipeline.mcap.log import LogReader
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.recordings.opening import open_recording
-from omninav.stages.recordings.recording import UnreadableRecording
-from omninav.stages.recordings.topics import Topics
+from omninav.stages.recordings.recording import Topics, UnreadableRecording
 from omninav.stages.simulator.config import Day, Delivery, Kidnapping, OdometryNoise, Route, Sensor, mirror
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.record_log import RecordLog

@@ -2,20 +2,10 @@
 
 import random
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.mcap.log import LogReader, make_message
-from omninav.stages.recordings.messages import decode_picture, is_blank, pixels_of
-from omninav.stages.recordings.opening import open_recording
-from omninav.stages.recordings.recording import UnreadableRecording
-from omninav.stages.recordings.topics import Topics, ascending
-
-sys.path.insert(0, str(Path(__file__).parent))
 from made_logs import (
     CAMERA,
     FRAMES,
@@ -33,6 +23,13 @@ from made_logs import (
     write_rosbag1,
     write_rosbag2,
 )
+
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.mcap.log import LogReader, make_message
+from omninav.stages.recordings.messages import decode_image, is_blank, pixels_of
+from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.recording import Topics, UnreadableRecording
+from omninav.stages.recordings.stamps import ascending
 
 
 def only(topic: str):
@@ -222,7 +219,7 @@ def test_every_user_error_is_one_line(tmp_path: Path) -> None:
     no_camera = write_mcap(tmp_path / "camera.mcap", camera=None)
     wrong_camera = write_mcap(tmp_path / "wrong.mcap", camera=CAMERA.replace(b"48", b"64"))
     for log, said in (
-        (tmp_path / "empty", "without metadata.yaml"),
+        (tmp_path / "empty", "no recording is in this folder"),
         (tmp_path / "text.bag", "not a readable bag"),
         (tmp_path / "notes.txt", "not a recording"),
         (tmp_path / "gone.mcap", "no such file"),
@@ -281,7 +278,7 @@ def test_bayer_patterns_keep_their_colours(pattern: str) -> None:
 
 
 def test_a_picture_is_blank_only_when_it_is_constant() -> None:
-    assert is_blank(decode_picture(encoded(np.full((16, 48, 3), (10, 200, 90), np.uint8), ".jpg")))
+    assert is_blank(decode_image(encoded(np.full((16, 48, 3), (10, 200, 90), np.uint8), ".jpg")))
     one_pixel = np.zeros((16, 48, 3), np.uint8)
     one_pixel[3, 5] = 255
     assert not is_blank(one_pixel)

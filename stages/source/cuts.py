@@ -6,8 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.stages.geometry.plane.se2 import between, compose
-
-from .recording import UnreadableRecording
+from omninav.stages.recordings.recording import UnreadableRecording
 
 Array = npt.NDArray[np.float64]
 Cut = tuple[int, int]

@@ -1,0 +1,101 @@
+"""Poses of a folder's images, from a table of positions: joined by time, with headings measured or of the track."""
+
+from math import pi
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.geometry.plane.se2 import wrap
+
+from .description import Description
+from .recording import UnreadableRecording
+from .stamps import ascending, poses_at
+from .tables import Angle, Table
+
+Array = npt.NDArray[np.float64]
+Stamps = npt.NDArray[np.int64]
+
+
+def frame_poses(
+    description: Description, where: str, frames: Table | None, own: Table | None, times: list[int | None]
+) -> Array:
+    """Poses (N, 3) of all frames at their `times` (ns), NaN where there is none.
+
+    `frames` and `own`: the tables of the frames and of the positions alone, as far as there are any. Raises
+    `UnreadableRecording`, naming `where` the description stands.
+    """
+    positions = description.positions
+    table = own or frames
+    if table is None:
+        raise UnreadableRecording(f"{where}: positions.csv is missing: the table with positions")
+    x = table.numbers(positions.x) + positions.offset_x
+    y = table.numbers(positions.y) + positions.offset_y
+    if own is None:
+        track_times = times
+    elif positions.time is None:
+        raise UnreadableRecording(f"{where}: positions.time is missing: {own.path.name} is joined by time")
+    else:
+        track_times = own.nanoseconds(positions.time)
+    known = [row for row, time in enumerate(track_times) if time is not None and np.isfinite(x[row] + y[row])]
+    kept, _, _ = ascending([track_times[row] or 0 for row in known])
+    rows = np.array([known[number] for number in kept], dtype=np.int64)
+    if len(rows) < 2:
+        raise UnreadableRecording(f"{table.path}: fewer than two rows with a position")
+    stamps = np.array([track_times[row] for row in rows], dtype=np.int64)
+    track = np.column_stack([x[rows], y[rows], headings(description, table, rows, stamps, x[rows], y[rows])])
+    poses = np.full((len(times), 3), np.nan)
+    if own is None:
+        poses[rows] = track
+        return poses
+    timed = [row for row, time in enumerate(times) if time is not None]
+    shifted = np.array([times[row] for row in timed], dtype=np.int64) + round(positions.clock_offset * 1e9)
+    sure = np.isfinite(track).all(axis=1)
+    if sure.sum() < 2:
+        raise UnreadableRecording(f"{table.path}: fewer than two rows with a heading")
+    poses[timed] = poses_at(stamps[sure], track[sure], shifted)
+    after = np.clip(np.searchsorted(stamps, shifted), 1, len(stamps) - 1)
+    gap = np.minimum(np.abs(shifted - stamps[after - 1]), np.abs(stamps[after] - shifted))
+    poses[np.array(timed, dtype=np.int64)[gap > positions.max_gap * 1e9]] = np.nan
+    return poses
+
+
+def headings(
+    description: Description, table: Table, rows: npt.NDArray[np.int64], stamps: Stamps, x: Array, y: Array
+) -> Array:
+    """Headings (K,) at rows of a table, of which stamps (ns) and positions (m) are given."""
+    heading, tangent = description.heading, description.tangent
+    if heading is not None:
+        measured = table.numbers(Angle(heading.column, heading.unit))[rows]
+        turned = measured if heading.sense == "counter_clockwise" else -measured
+        return wrap(turned + (pi / 2 if heading.zero == "y" else 0.0) + heading.offset)
+    along = (stamps - stamps[0]) / 1e9
+    if tangent.unit == "m":
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
+    return track_directions(along, np.column_stack([x, y]), tangent.window, tangent.lag)
+
+
+def track_directions(along: Array, positions: Array, window: float, lag: float = 0.0) -> Array:
+    """Directions of a track: (N,) radians, counter-clockwise from x.
+
+    `along` (N,): time or way at each of the `positions` (N, 2), never falling. At each point a straight line
+    p(s) = p0 + v (s - s0), s0 = `along` - `lag`, is fitted to the positions within four windows with weights
+    exp(-((s - s0) / window)^2 / 2); the direction is v's. Where nothing moves within the window, it
+    is the last one known.
+    """
+    directions = np.full(len(along), np.nan)
+    centres = np.clip(along - lag, along[0], along[-1])
+    low = np.searchsorted(along, centres - 4 * window, side="left")
+    high = np.searchsorted(along, centres + 4 * window, side="right")
+    for point, centre in enumerate(centres):
+        near = slice(min(low[point], len(along) - 2), max(high[point], 2))
+        s = along[near] - centre
+        weights = np.exp(-0.5 * (s / window) ** 2) + 1e-12
+        s = s - (weights @ s) / weights.sum()
+        velocity = (weights * s) @ (positions[near] - positions[near].mean(axis=0))
+        if np.hypot(*velocity) > 1e-12:
+            directions[point] = np.arctan2(velocity[1], velocity[0])
+    known = np.flatnonzero(np.isfinite(directions))
+    if not len(known):
+        return np.zeros(len(along))
+    last = np.maximum.accumulate(np.where(np.isfinite(directions), np.arange(len(along)), -1))
+    return directions[np.where(last < 0, known[0], last)]

@@ -1,0 +1,57 @@
+"""Time stamps of a log: which to keep so that they ascend, and poses at them."""
+
+from bisect import bisect_left
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.geometry.plane.se2 import interpolate
+
+Array = npt.NDArray[np.float64]
+Stamps = npt.NDArray[np.int64]
+
+
+def poses_at(times: Stamps, poses: Array, stamps: Stamps) -> Array:
+    """Poses (N, 3) interpolated to stamps (ns); rows of NaN outside the range of `times`."""
+    at = np.full((len(stamps), 3), np.nan)
+    inside = within(stamps, times)
+    first = times[0]  # differences are small enough for floats, nanoseconds since 1970 are not
+    at[inside] = interpolate((times - first) / 1e9, poses, (stamps[inside] - first) / 1e9)
+    return at
+
+
+def ascending(stamps: Sequence[int]) -> tuple[list[int], list[int], list[int]]:
+    """Which records to keep so that their stamps ascend: indices kept, repeated, and out of order.
+
+    Of equal stamps the first is kept. Of the rest, the longest ascending sequence is kept: a single stamp that leaps
+    ahead costs itself and not everything after it, and a clock that was set back costs the shorter part.
+    """
+    first: dict[int, int] = {}
+    repeated = [number for number, stamp in enumerate(stamps) if first.setdefault(stamp, number) != number]
+    left = sorted(first.values())
+    tails: list[int] = []  # stamps that end the best sequences of each length
+    ends: list[int] = []
+    before: dict[int, int] = {}
+    for number in left:
+        length = bisect_left(tails, stamps[number])
+        if length == len(tails):
+            tails.append(stamps[number])
+            ends.append(number)
+        else:
+            tails[length], ends[length] = stamps[number], number
+        if length:
+            before[number] = ends[length - 1]
+    kept: list[int] = []
+    at = ends[-1] if ends else None
+    while at is not None:
+        kept.append(at)
+        at = before.get(at)
+    kept.reverse()
+    return kept, repeated, sorted(set(left) - set(kept))
+
+
+def within(stamps: Stamps, times: Stamps) -> npt.NDArray[np.bool_]:
+    """Which stamps lie in the range of `times`."""
+    inside: npt.NDArray[np.bool_] = (stamps >= times[0]) & (stamps <= times[-1])
+    return inside

@@ -1,0 +1,109 @@
+"""A recording whose frames are messages on topics, whatever file they are in."""
+
+import hashlib
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline.files import digest_file
+from omninav.pipeline.mcap.log import BadMessage, Record
+from omninav.stages.camera.model import Camera
+from omninav.stages.values.image import Pixels
+from omninav.stages.values.scan import Scan
+
+from .messages import Undecodable, is_blank, scan_of
+
+Array = npt.NDArray[np.float64]
+Stamps = npt.NDArray[np.int64]
+STALE = 1_000_000_000
+"""Nanoseconds after which range readings say nothing any more."""
+
+
+class Feed(Protocol):
+    """A file (or several) of stamped messages, gone through once and then read where needed."""
+
+    @property
+    def topics(self) -> dict[str, str]: ...
+    @property
+    def attachments(self) -> dict[str, bytes]: ...
+    @property
+    def dropped(self) -> Counter[str]: ...
+    @property
+    def details(self) -> dict[str, str]: ...
+    def scan(self, topics: Collection[str] | None = None) -> Iterator[Record]: ...
+    def fetch(self, location: Any) -> bytes | memoryview: ...
+    def decode(self, topic: str, data: bytes | memoryview) -> Any: ...
+    def drop(self, kind: str, detail: str) -> None: ...
+
+
+class TopicRecording:
+    """Frames from an image topic with poses from pose topics; a `Recording`. Pictures are read when asked for."""
+
+    def __init__(
+        self,
+        name: str,
+        camera: Camera,
+        stamps: Stamps,
+        odometry: Array | None,
+        truth: Array | None,
+        feed: Feed,
+        picture: Callable[[int], Pixels],
+        files: Sequence[Path],
+        scans: Sequence[Record] = (),
+    ) -> None:
+        self.name, self.camera, self.stamps, self.odometry, self.truth = name, camera, stamps, odometry, truth
+        self._feed, self._picture, self._files, self._scans = feed, picture, files, scans
+        self._scan_stamps = np.array([record.stamp for record in scans], dtype=np.int64)
+
+    @property
+    def dropped(self) -> Counter[str]:
+        """What was left out, by kind."""
+        return self._feed.dropped
+
+    @property
+    def details(self) -> dict[str, str]:
+        """The first case of each kind."""
+        return self._feed.details
+
+    def image(self, frame: int) -> Pixels | None:
+        """The picture of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
+        where = f"{self.name}: picture {frame} (stamp {self.stamps[frame] / 1e9:.3f} s)"
+        try:
+            pixels = self._picture(frame)
+        except BadMessage as error:
+            self._feed.drop("bad_message", str(error))
+        except Undecodable as error:
+            self._feed.drop("undecodable_image", f"{where}: {error}")
+        else:
+            size = (self.camera.height_px, self.camera.width)
+            if pixels.shape[:2] != size:
+                height, width = pixels.shape[:2]
+                self._feed.drop("wrong_size", f"{where} is {width} x {height}, the camera {size[1]} x {size[0]}")
+            elif is_blank(pixels):
+                self._feed.drop("blank_image", f"{where} is blank")
+            else:
+                return pixels
+        return None
+
+    def scan(self, frame: int) -> Scan | None:
+        """The last ring of ranges before a frame, read now; None where the last second has none, or a broken one."""
+        number = int(np.searchsorted(self._scan_stamps, self.stamps[frame], side="right")) - 1
+        if number < 0 or self.stamps[frame] - self._scan_stamps[number] > STALE:
+            return None
+        record = self._scans[number]
+        try:
+            return scan_of(self._feed.decode(record.topic, self._feed.fetch(record.location)))
+        except BadMessage as error:
+            self._feed.drop("bad_message", str(error))
+            return None
+
+    def digest(self) -> str:
+        """sha256 over the bytes of all files that were read."""
+        whole = hashlib.sha256()
+        for path in self._files:
+            whole.update(digest_file(path).encode())
+        return whole.hexdigest()
