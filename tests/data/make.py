@@ -21,14 +21,11 @@ HERE = Path(__file__).resolve().parent
 RATES = ("world.timing.images=1", "world.timing.odometry=10", "world.ranges.rate=1", "world.sensor.noise=1")
 MIRROR = (
     "world_camera=mirror",
-    "world.camera.width=280",
-    "world.camera.height_px=210",
-    "world.camera.focal=217.4375",
-    "world.camera.centre=[139.5,104.5]",
-    "world.camera.inner_radius_px=15",
-    "world.camera.outer_radius_px=104",
+    "world.camera.image={width: 280, height: 210}",
+    "world.camera.K=[[217.4375,0,139.5],[0,217.4375,104.5],[0,0,1]]",
+    "world.camera.mask={inner_radius_px: 15, outer_radius_px: 104}",
 )
-STRIP = ("world_camera=cylinder", "world.camera.width=240", "world.camera.height_px=60")
+STRIP = ("world_camera=cylinder", "world.camera.image={width: 240, height: 60}", "world.camera.column_of_forward=120")
 FOLDER_IMAGES = 26
 LAYOUT = """\
 # Panoramas of a simulated drive with a CSV of their times and poses.  omninav log=FOLDER

@@ -18,12 +18,9 @@ BOTH = f"log=[{DATA / 'tour.mcap'},{DATA / 'drive.mcap'}]"
 EVERY_SECOND = "nodes.source.stride=2"
 SMALL_CAMERA = (
     "world.timing.images=1",
-    "world.camera.width=280",
-    "world.camera.height_px=210",
-    "world.camera.focal=217.4375",
-    "world.camera.centre=[139.5,104.5]",
-    "world.camera.inner_radius_px=15",
-    "world.camera.outer_radius_px=104",
+    "world.camera.image={width: 280, height: 210}",
+    "world.camera.K=[[217.4375,0,139.5],[0,217.4375,104.5],[0,0,1]]",
+    "world.camera.mask={inner_radius_px: 15, outer_radius_px: 104}",
 )
 NO_VIDEO = ("~nodes.video", "~wires.video")
 
