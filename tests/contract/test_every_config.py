@@ -2,7 +2,9 @@
 
 import re
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -11,6 +13,7 @@ from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.main import complete
 from omninav.pipeline.experiment.specification import read_experiment
+from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.registry import resolve
 from omninav.pipeline.graph.signature import signature
 from omninav.pipeline.run.run import plan
@@ -44,22 +47,50 @@ def test_its_first_line_is_its_package_and_its_second_says_what_it_is(path: Path
     assert re.match(r"# .{10,}\.  omninav \S", said), said
 
 
+def stages_in(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The nodes of a file that name their stage, each with its place in the file."""
+    content = yaml.safe_load(path.read_text()) or {}
+    nodes = content.get("nodes") or {}
+    for where, node in [("", content), *((f"nodes.{name}", node) for name, node in nodes.items())]:
+        if isinstance(node, dict) and "_target_" in node:
+            yield where, dict(node)
+
+
 @each
 def test_the_command_in_its_head_composes(path: Path):
     command = shlex.split(head(path)[1].partition("  omninav ")[2])
     option = path.relative_to(CONF / group(path)).with_suffix("")
-    assert f"{'+' if group(path) == 'experiment' else ''}{group(path)}={option}" in command, command
+    if group(path) != "graph":  # its files are included by variants
+        assert f"{'+' if group(path) == 'experiment' else ''}{group(path)}={option}" in command, command
     with initialize_config_module("omninav.conf", version_base="1.3"):
         compose("config", overrides=[word for word in command if not word.startswith("-")])
 
 
-@each
-def test_it_sets_only_parameters_that_its_stage_has(path: Path):
+def graphs_of(path: Path) -> set[str]:
+    """The shared graphs that a file includes, and those that these include."""
     content = yaml.safe_load(path.read_text()) or {}
-    for stage in (content, *(content.get("nodes") or {}).values()):
-        if isinstance(stage, dict) and "_target_" in stage:
-            cls = resolve(stage.pop("_target_"))
-            assert set(stage) <= set(signature(cls).parameters), cls
+    named = {entry.removeprefix("/graph/") for entry in content.get("defaults", []) if isinstance(entry, str)}
+    named = {name for name in named if (CONF / "graph" / f"{name}.yaml").exists()}
+    return named.union(*(graphs_of(CONF / "graph" / f"{name}.yaml") for name in named))
+
+
+@pytest.mark.parametrize("path", sorted((CONF / "graph").glob("*.yaml")), ids=lambda path: path.stem)
+def test_a_shared_graph_is_included_by_the_variant_in_its_head(path: Path):
+    variant = shlex.split(head(path)[1].partition("  omninav ")[2])[0].removeprefix("variant=")
+    assert path.stem in graphs_of(CONF / "variant" / f"{variant}.yaml")
+
+
+@each
+def test_it_states_only_what_differs_from_its_stages_defaults(path: Path):
+    for where, stage in stages_in(path):
+        parameters = signature(resolve(stage.pop("_target_"))).parameters
+        assert set(stage) <= set(parameters), where
+        for name, value in stage.items():
+            converted, problems = convert(value, parameters[name].type, f"{where}.{name}")
+            interpolated = isinstance(value, str) and "${" in value
+            assert interpolated or problems or converted != parameters[name].default, (
+                f"{where}.{name} repeats the default"
+            )
 
 
 @pytest.mark.parametrize("path", sorted((CONF / "variant").glob("*.yaml")), ids=lambda path: path.stem)
@@ -85,7 +116,7 @@ def test_every_group_is_listed_before_the_variant():
     defaults = yaml.safe_load((CONF / "config.yaml").read_text())["defaults"]
     groups = [next(iter(item)) for item in defaults if isinstance(item, dict)]
     folders = {path.name for path in CONF.iterdir() if path.is_dir() and any(path.glob("*.yaml"))}
-    assert folders - {"recording"} <= set(groups)
+    assert folders - {"recording", "graph"} <= set(groups)
     assert OmegaConf.load(CONF / "config.yaml").nodes == {}
 
 
