@@ -33,8 +33,8 @@ from omninav.stages.values.scan import Scan
 F64 = npt.NDArray[np.float64]
 
 
-REMEMBERED = 2500
-"""Ticks of its way that people who keep the robot company know of."""
+TRACK_TICKS = 2500
+"""Ticks of its path that people who keep the robot company know of."""
 
 
 def _nowhere() -> F64:
@@ -45,7 +45,7 @@ class ClosedLoopState(State):
     """The robot as it is: its state (see `robot`; empty before the first tick), odometry pose, ticks made.
 
     `track` (N, 4): time (s) and pose at the last ticks; people who keep it company follow it. `crowd` (P, 5): where
-    everybody is. `ended`: ticks since its way has.
+    everybody is. `ended`: ticks since its route has.
     """
 
     robot: F64 = field(default_factory=_nowhere)
@@ -59,22 +59,29 @@ class ClosedLoopState(State):
 class ClosedLoop(Source):
     """A robot in a simulated world that drives as the last command says; every tick it looks, measures and feels.
 
-    It starts at rest where the world's `route` starts, or at `start` (x, y in metres, heading in radians), and goes on
-    for `seconds`, `rate` ticks each. The command of the tick before holds until this tick. `motion` is what its wheels
-    say, absent at the first tick. Noise is drawn from the run's seed, goods and textures from the world's. Without a
-    command it brakes. A `way` that has ended, since the robot has arrived or given up, ends the drive `rest` seconds
-    later. Pictures are blurred as in a log (`world.sensor.shutter`), by the motion at their tick: nobody
-    knows the next command. A picture that is lost or late on its way (`world.delivery`) is absent, and counted.
+    It starts at rest. The command of the tick before holds until this tick; without one it brakes. `motion` is what its
+    wheels say, absent at the first tick. Noise is drawn from the run's seed, goods and textures from the world's.
+    Images are blurred as in a log (`world.sensor.shutter`), by the motion at their tick: nobody knows the next command.
+    An image that is lost or late on its way (`world.delivery`) is absent, and counted. Raises `UnreadableRecording`
+    for a place to start where the robot has no room.
     """
 
     world: WorldConfig = DEMO
+    """The world, with the robot that drives in it."""
     day: Annotated[int, Bounds(ge=0)] = 1
+    """As the world is on this day."""
     route: str = "drive"
+    """The robot starts where this route of the world does, and faces along it."""
     start: tuple[float, float, float] | None = None
+    """Where it starts instead: x, y (m), heading (rad)."""
     seconds: Annotated[float, Bounds(gt=0)] = 60.0
-    rate: Annotated[float, Bounds(ge=1)] = 5.0
-    rest: Annotated[float, Bounds(ge=0)] = 1.0
+    """How long it drives at most."""
+    rate_hz: Annotated[float, Bounds(ge=1)] = 5.0
+    """Ticks a second."""
+    rest_s: Annotated[float, Bounds(ge=0)] = 1.0
+    """How long it goes on once the planned route has ended: the robot has arrived, or given up."""
     kidnappings: tuple[Kidnapping, ...] = ()
+    """When and how somebody lifts it: {at: 30.0, turn: 1.5} or {at: 30.0, to: [x, y, heading]} (s, m, rad)."""
 
     class Out(Outputs):
         tick: Tick
@@ -107,7 +114,7 @@ class ClosedLoop(Source):
 
     def length(self) -> int | None:
         """Ticks in all."""
-        return int(self.seconds * self.rate)
+        return int(self.seconds * self.rate_hz)
 
     def step(
         self,
@@ -116,9 +123,9 @@ class ClosedLoop(Source):
         command: Command | None = None,
         route: PlannedRoute | None = None,
     ) -> Out | None:
-        """Drive on under the last command, then perceive; None when the time, or the way, is over."""
+        """Drive on under the last command, then perceive; None when the time, or the route, is over."""
         simulation.ended += route is not None and route.state in ("arrived", "gave up")
-        if simulation.ticks >= int(self.seconds * self.rate) or simulation.ended > self.rest * self.rate:
+        if simulation.ticks >= int(self.seconds * self.rate_hz) or simulation.ended > self.rest_s * self.rate_hz:
             return None
         motion = None
         if simulation.ticks == 0:
@@ -131,19 +138,19 @@ class ClosedLoop(Source):
 
     def _drive(self, ctx: Context, simulation: ClosedLoopState, command: Command) -> Motion:
         """One tick under a command, and what the wheels say of it."""
-        robot, now = simulation.robot, simulation.ticks / self.rate
+        robot, now = simulation.robot, simulation.ticks / self.rate_hz
         before = robot[:3].copy()
         people = round_bodies(self._people(simulation))
-        steer(robot, command.speed, command.turning, self._limits, 1.0 / self.rate, self._room, people)
+        steer(robot, command.speed, command.turning, self._limits, 1.0 / self.rate_hz, self._room, people)
         rolled = measured(between(before, robot[:3])[None], self.world.odometry, self._bias, ctx.rng)[0]
         simulation.odometry = compose(simulation.odometry, rolled)
         for kidnapping in self.kidnappings:
-            if now - 1.0 / self.rate < kidnapping.at <= now:
+            if now - 1.0 / self.rate_hz < kidnapping.at <= now:
                 put_down(robot, kidnapping)
         return Motion(*(float(value) for value in rolled))
 
     def _perceive(self, ctx: Context, simulation: ClosedLoopState, motion: Motion | None) -> Out:
-        pose, now = simulation.robot[:3], simulation.ticks / self.rate
+        pose, now = simulation.robot[:3], simulation.ticks / self.rate_hz
         people = self._meet(simulation, now)
         metres = measure(self._room, round_bodies(people)[None], pose[None], self.world.ranges, ctx.rng)[0]
         stamp = DAY_0_NS + self.day * 86400 * 10**9 + 8 * 3600 * 10**9 + round(now * 1e9)
@@ -162,7 +169,7 @@ class ClosedLoop(Source):
         sensor, delivery = self.world.sensor, self.world.delivery
         fate, key = ctx.rng.uniform(size=2), int(ctx.rng.integers(2**62))
         if fate[0] < delivery.dropped or fate[1] < delivery.late:
-            ctx.count("lost_picture" if fate[0] < delivery.dropped else "late_picture")
+            ctx.count("lost_image" if fate[0] < delivery.dropped else "late_image")
             return None
         swing = float(np.sin(2 * np.pi * now / sensor.exposure_period))
         exposure = sensor.exposure * (1.0 + sensor.exposure_drift * swing)
@@ -176,7 +183,7 @@ class ClosedLoop(Source):
     def _meet(self, simulation: ClosedLoopState, now: float) -> tuple[Person, ...]:
         """The robot is where it is now, and people have walked on until then: everybody who is about."""
         crowd, before = self._world.crowd, simulation.track
-        simulation.track = np.vstack([before, [now, *simulation.robot[:3]]])[-REMEMBERED:]
+        simulation.track = np.vstack([before, [now, *simulation.robot[:3]]])[-TRACK_TICKS:]
         track = Track(simulation.track[:, 0], simulation.track[:, 1:])
         if len(before):
             simulation.crowd = crowd.advanced(simulation.crowd, float(before[-1, 0]), now, track)

@@ -1,4 +1,4 @@
-"""A picture of where to go, from an image file."""
+"""An image of where to go, from a file."""
 
 from pathlib import Path
 
@@ -19,29 +19,30 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".tif", ".tiff", ".webp")
 
 
 class GoalImage(Stage):
-    """The picture that a goal names, with the camera that it was taken with: the robot's own.
+    """The image that a goal names, with the camera that it was taken with: the robot's own.
 
-    A `goal` that ends like an image file is one; any other names a place, and there is no picture. Raises BadInput
-    where none is named, where there is no such file, where it is no image, and where it has another size than the
-    robot's camera takes: before anything runs, as far as can be.
+    Raises BadInput where no goal is named, where there is no such file, where it is no image, and where it has another
+    size than the robot's camera takes: before anything runs, as far as can be.
     """
 
     goal: str | int | None = None
+    """An image file, by its suffix; any other names a place, and there is no image."""
     world: WorldConfig = DEMO
+    """The world whose robot took it."""
 
     class Out(Outputs):
-        """Absent where the goal is no picture."""
+        """Absent where the goal is no image."""
 
         image: Image | None = None
         camera: Camera | None = None
 
     def inputs_digest(self) -> str | None:
-        """Of the picture, if there is one."""
+        """Of the image, if there is one."""
         file = self._file()
         return None if file is None else digest_file(file)
 
     def step(self, ctx: Context) -> Out:
-        """Read the picture."""
+        """Read the image."""
         file = self._file()
         if file is None:
             return self.Out()
@@ -49,18 +50,18 @@ class GoalImage(Stage):
         if pixels.shape[:2] != (camera.height_px, camera.width):
             raise BadInput(
                 f"goal: {file} has {pixels.shape[1]} x {pixels.shape[0]} pixels, and the robot's camera takes "
-                f"{camera.width} x {camera.height_px}; give a picture that this camera took"
+                f"{camera.width} x {camera.height_px}; give an image that this camera took"
             )
         return self.Out(image=Image(pixels), camera=camera)
 
     def _file(self) -> Path | None:
         if self.goal is None or not str(self.goal).strip():
-            raise BadInput("goal: no goal is named; type goal=PLACE, its name or number, or goal=PICTURE.png")
+            raise BadInput("goal: no goal is named; type goal=PLACE, its name or number, or goal=IMAGE.png")
         if not str(self.goal or "").lower().endswith(SUFFIXES):
             return None
         file = Path(str(self.goal))
         if not file.is_file():
-            raise BadInput(f"goal: there is no file {file}; give a picture, or a place's number or name")
+            raise BadInput(f"goal: there is no file {file}; give an image, or a place's number or name")
         return file
 
 

@@ -28,22 +28,29 @@ FROM_TOUR = "from_tour"
 
 
 class PlaceGrid(Stage):
-    """The occupancy grid of a place, in cells of about `resolution` metres, and the free space that a robot reaches.
+    """The occupancy grid of a place, and the free space that a robot reaches.
 
-    `grid`: a map_server file; `from_tour`, a stand-in made of the free path of the map's references (see `along_path`:
-    `around`, in reaches of port `reach`, else of `reach_m`); or null: the simulated world's own on its first day, where
-    no `log` is named. Free space is what is at least `clearance_m` from anything occupied and, with `map` wired,
-    connected to its references; a stand-in's is all of it. Raises BadInput where there is a log and no grid.
+    Free space is what keeps clear of anything occupied and, with `map` wired, is connected to its references; that of a
+    stand-in for a grid (see `along_path`) is all of it. Raises BadInput where there is a log and no grid.
     """
 
     grid: str | None = None
-    resolution: Annotated[float, Bounds(gt=0)] = 0.1
+    """A map_server file, or its folder; from_tour: a stand-in made of the free path of the map's references; null: the
+    simulated world's own on its first day, where no log is named."""
+    resolution_m: Annotated[float, Bounds(gt=0)] = 0.1
+    """Side of a cell, about: a file's cells are merged, not split."""
     clearance_m: Annotated[float, Bounds(ge=0)] = 0.2
-    around: Annotated[float, Bounds(gt=0)] = 2.0
-    reach_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """Least distance of free space from anything occupied."""
+    path_half_width: Annotated[float, Bounds(gt=0)] = 2.0
+    """How far from the path a stand-in is free, in length scales of the appearance."""
+    length_scale_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """That length scale where none is wired."""
     log: str | tuple[str, ...] | None = None
+    """The log that is driven: its grid is not known, unless `grid` names it."""
     tour: str | tuple[str, ...] | None = None
+    """The log that the map was made from; grids beside it are suggested."""
     world: WorldConfig = DEMO
+    """The simulated world."""
 
     class Out(Outputs):
         """`grid`, and `free`: where the robot may be."""
@@ -65,16 +72,16 @@ class PlaceGrid(Stage):
         if self.grid == FROM_TOUR:
             if map is None or not len(map):
                 raise BadInput("grid: from_tour needs a map with references; give tour=FILE, or grid=FOLDER/map.yaml")
-            unit = self.reach_m if length_scale is None else length_scale.metres
-            grid = along_path(map.poses, map.edges, self.around * unit, self.resolution)
+            unit = self.length_scale_m if length_scale is None else length_scale.metres
+            grid = along_path(map.poses, map.edges, self.path_half_width * unit, self.resolution_m)
             ctx.fact("grid", "a stand-in made from the tour's free path: walls are where it ends, not where they are")
             ctx.count("grid_is_a_stand_in", detail="grid: made from the tour's free path; a map_server file is better")
         elif file is not None:
-            grid = coarser(read_occupancy(file), self.resolution)
+            grid = coarser(read_occupancy(file), self.resolution_m)
             ctx.fact("grid", file.name)
         else:
-            cells, origin = occupancy(World(self.world, 0), self.resolution)
-            grid = OccupancyGrid(np.where(cells, OCCUPIED, FREE).astype(np.uint8), self.resolution, origin, "world")
+            cells, origin = occupancy(World(self.world, 0), self.resolution_m)
+            grid = OccupancyGrid(np.where(cells, OCCUPIED, FREE).astype(np.uint8), self.resolution_m, origin, "world")
             ctx.fact("grid", f"of the built-in world {self.world.name}")
         clearance = 0.0 if grid.made_from == "tour" else self.clearance_m
         space = free_space(grid, clearance, None if map is None else map.poses)

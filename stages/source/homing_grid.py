@@ -31,31 +31,38 @@ class HomingGridState(State):
 
 
 class Views(Protocol):
-    """Pictures and where they were taken: `poses` (N, 3), the target's first."""
+    """Images and where they were taken: `poses` (N, 3), the target's first."""
 
     camera: Camera
     poses: Array
 
     def image(self, row: int) -> Pixels | None:
-        """The picture of a row."""
+        """The image of a row."""
 
 
 class HomingGrid(Source):
-    """The target's view first, then views from a grid of points around it, `spacing` m apart and within `reach` m.
+    """The view at a target first, then views from a grid of points around it.
 
-    Goedemé et al. 2007, section 8.4.1. In a simulated `place` as it stands on `day` they are rendered where a robot has
-    room and from where nothing between hides the target's spot, each with a heading drawn at random; people are not
-    there. In a recorded `log` with true poses the target is the picture taken closest to x and y of `target`, and the
-    views are all others within `reach`, as they were taken; `camera`: a camera.yaml in place of its own.
+    Goedemé et al. 2007, section 8.4.1. In a simulated world they are rendered where a robot has room and from where
+    nothing between hides the target's spot, each with a heading drawn at random; people are not there. In a recorded
+    log with true poses the target is the image taken closest to it, and the views are all others within the radius, as
+    they were taken. Raises `UnreadableRecording` for a target without room, and for a log without true poses.
     """
 
     log: str | None = None
+    """The log that the views are of; null: they are rendered."""
     camera: str | None = None
-    place: WorldConfig = DEMO
+    """A camera.yaml in place of the log's own."""
+    world: WorldConfig = DEMO
+    """The world that they are rendered of."""
     day: Annotated[int, Bounds(ge=0)] = 0
-    target: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    spacing: Annotated[float, Bounds(gt=0)] = 1.0
-    reach: Annotated[float, Bounds(gt=0)] = 8.0
+    """As the world is on this day."""
+    target: tuple[float, float, float] = (10.0, 8.0, 0.5)
+    """x, y (m), heading (rad); of a log only x and y matter."""
+    spacing_m: Annotated[float, Bounds(gt=0)] = 1.0
+    """Distance of neighbouring points of the grid, in x and in y."""
+    radius_m: Annotated[float, Bounds(gt=0)] = 8.0
+    """Greatest distance of a view from the target."""
 
     class Out(Outputs):
         """One tick a second; the first is the target's."""
@@ -68,14 +75,16 @@ class HomingGrid(Source):
     def setup(self, ctx: Context) -> None:
         """Build the world, or open the log, and choose the points."""
         if self.log is None:
-            self._views: Views = RenderedViews(self.place, self.day, self.target, self.spacing, self.reach, ctx.rng)
+            self._views: Views = RenderedViews(
+                self.world, self.day, self.target, self.spacing_m, self.radius_m, ctx.rng
+            )
         else:
-            self._views = RecordedViews(open_recording(self.log, camera=self.camera), self.target, self.reach)
+            self._views = RecordedViews(open_recording(self.log, camera=self.camera), self.target, self.radius_m)
 
     def inputs_digest(self) -> str | None:
         """sha256 over the world and the code that simulates it, or over the log."""
         known = (
-            simulation_digest(self.place) if self.log is None else open_recording(self.log, camera=self.camera).digest()
+            simulation_digest(self.world) if self.log is None else open_recording(self.log, camera=self.camera).digest()
         )
         return digest_text("homing grid", known)
 
@@ -109,7 +118,7 @@ class RenderedViews:
         day: int,
         target: tuple[float, float, float],
         spacing: float,
-        reach: float,
+        radius: float,
         rng: np.random.Generator,
     ) -> None:
         world = World(config, day)
@@ -118,7 +127,7 @@ class RenderedViews:
                 f"target: no room for the robot at {target[0]:g}, {target[1]:g} of world '{config.name}'; choose "
                 "another place on the floor plan (nodes.source.target)"
             )
-        points = grid_around(target, spacing, reach)
+        points = grid_around(target, spacing, radius)
         points = points[world.is_free(points, config.robot.radius)]
         seen = [in_sight(world, target, (float(x), float(y))) for x, y in points]
         points = points[np.array(seen, np.bool_)]
@@ -138,13 +147,13 @@ class RenderedViews:
 class RecordedViews:
     """Views of a log, around that which was taken closest to a point."""
 
-    def __init__(self, recording: Recording, target: tuple[float, float, float], reach: float) -> None:
+    def __init__(self, recording: Recording, target: tuple[float, float, float], radius: float) -> None:
         if recording.truth is None or not np.isfinite(recording.truth).all(axis=1).any():
             raise UnreadableRecording(f"{recording.name}: without true poses there is no target; use another log")
         metres = np.hypot(*(recording.truth[:, :2] - target[:2]).T)
         middle = int(np.nanargmin(metres))
         metres = np.hypot(*(recording.truth[:, :2] - recording.truth[middle, :2]).T)
-        others = np.flatnonzero((metres <= reach) & (metres > 0.0))
+        others = np.flatnonzero((metres <= radius) & (metres > 0.0))
         self._rows = np.concatenate([[middle], others])
         self.poses = recording.truth[self._rows]
         self.camera, self._recording = recording.camera, recording
@@ -154,12 +163,12 @@ class RecordedViews:
         return self._recording.image(int(self._rows[row]))
 
 
-def grid_around(target: tuple[float, float, float], spacing: float, reach: float) -> Array:
-    """Points (N, 2) `spacing` m apart in x and y around a target, without itself, at most `reach` m away."""
-    steps = spacing * np.arange(-math.floor(reach / spacing), math.floor(reach / spacing) + 1)
+def grid_around(target: tuple[float, float, float], spacing: float, radius: float) -> Array:
+    """Points (N, 2) `spacing` m apart in x and y around a target, without itself, at most `radius` m away."""
+    steps = spacing * np.arange(-math.floor(radius / spacing), math.floor(radius / spacing) + 1)
     y, x = np.meshgrid(steps, steps, indexing="ij")
     metres = np.hypot(x, y).ravel()
-    near = (metres <= reach + 1e-9) & (metres > 0.0)
+    near = (metres <= radius + 1e-9) & (metres > 0.0)
     return np.column_stack([x.ravel()[near] + target[0], y.ravel()[near] + target[1]])
 
 

@@ -1,4 +1,4 @@
-"""The source of recorded drives: one tick per usable picture."""
+"""The source of recorded drives: one tick per usable image."""
 
 import hashlib
 import math
@@ -30,7 +30,7 @@ DRIVE = "drive.mcap"
 
 class LogSourceState(State):
     """Where in the logs the source is: log, next frame and last used frame (-1: none) as positions in the selection,
-    ticks made, and the made-up odometry so far (x, y in metres, heading in radians)."""
+    ticks made, and the synthetic odometry so far (x, y in metres, heading in radians)."""
 
     log: int = 0
     next: int = 0
@@ -42,36 +42,50 @@ class LogSourceState(State):
 
 
 class LogSource(Source):
-    """Recorded drives, one after another: a tick for every picture that can be used.
+    """Recorded drives, one after another: a tick for every image that can be used.
 
-    `log` names one recording or several (see `open_recording`); without one, `route` of the simulated `world` is driven
-    on `day` (or one after the other on several), with `kidnappings` on its way. `first`, `stop` and `stride` select
-    frames of each. `cuts`: [[60, 300]] goes on with picture 300 of each log once the first 60 are through, and
-    odometry has not noticed: a kidnapping made of a log that has none. After a pause of more than `new_log_after`
-    seconds another log begins: several days may lie in one file.
-    Poses are metres and radians; stamps are header stamps. `motion` is the SE(2) increment of the odometry between
-    the pictures' own times, absent at the first picture of each log; where pictures are left out it spans the gap.
+    Poses are metres and radians; stamps are header stamps. `motion` is the SE(2) increment of the odometry between the
+    images' own times, absent at the first image of each log; where images are left out it spans the gap.
 
-    A recording without odometry but with positions gets a made-up one (`odometry: synthetic` in the manifest): the
-    true increment, disturbed by `disturb`, with noise drawn frame by frame from the run's seed.
+    A recording without odometry but with positions gets a synthetic one (`odometry: synthetic` in the manifest): the
+    true increment with the noise of `add_odometry_noise`, drawn frame by frame from the run's seed. Raises
+    `UnreadableRecording` for a log that cannot be read.
     """
 
     log: str | tuple[str, ...] | None = None
+    """One recording or several (see `open_recording`). Null: a drive through the simulated `world`."""
     world: WorldConfig = DEMO
+    """What is driven through where no log is named."""
     route: str | None = None
+    """Which of the world's routes is driven."""
     day: int | tuple[int, ...] = 1
+    """On which day of the world, or one after the other on several."""
     kidnappings: tuple[Kidnapping, ...] = ()
+    """When and how somebody lifts the robot on the simulated drive: {at: 30.0, turn: 1.5} or {at: 30.0, to: [x, y,
+    heading]} (s, m, rad)."""
     topics: Topics = Topics()
+    """Which topics of the log are read."""
     camera: str | None = None
+    """A camera.yaml in place of the log's own."""
     layout_folders: tuple[str, ...] = ()
+    """Folders with further descriptions of folders of images."""
     first: Annotated[int, Bounds(ge=0)] = 0
+    """The first frame of each log that is used."""
     stop: Annotated[int, Bounds(ge=1)] | None = None
+    """The first frame of each log that is not used any more; null: none."""
     stride: Annotated[int, Bounds(ge=1)] = 1
+    """Every how many frames one is used."""
     cuts: tuple[Cut, ...] = ()
-    new_log_after: Annotated[float, Bounds(gt=0)] = 3600.0
+    """A kidnapping made of a log that has none: [[60, 300]] goes on with frame 300 of each log once the first 60 are
+    through, and odometry has not noticed."""
+    new_log_after_s: Annotated[float, Bounds(gt=0)] = 3600.0
+    """A longer pause begins another log: several days may lie in one file."""
     synthetic_distance_noise: Annotated[float, Bounds(ge=0.10)] = 0.10
+    """Standard deviation of synthetic odometry's distance (m) after one metre; it grows with the root of the path."""
     synthetic_turn_noise_deg_per_m: Annotated[float, Bounds(ge=3.0)] = 3.0
+    """Standard deviation of synthetic odometry's heading after one metre."""
     synthetic_turn_noise_deg_per_rad: Annotated[float, Bounds(ge=0.0)] = 3.0
+    """Standard deviation that a turn of one radian adds to it."""
 
     class Out(Outputs):
         tick: Tick
@@ -100,7 +114,7 @@ class LogSource(Source):
         return whole.hexdigest()
 
     def length(self) -> int | None:
-        """Ticks to come if every picture can be decoded."""
+        """Ticks to come if every image can be decoded."""
         self._open()
         return sum(len(frames) for frames in self._frames)
 
@@ -130,7 +144,7 @@ class LogSource(Source):
         return {"log": str(folder / DRIVE), "world": None, "route": None, "day": None, "kidnappings": None}
 
     def step(self, ctx: Context, position: LogSourceState) -> Out | None:
-        """The next picture that can be used; None after the last."""
+        """The next image that can be used; None after the last."""
         while position.log < len(self._recordings):
             recording, frames = self._recordings[position.log], self._frames[position.log]
             while position.next < len(frames):
@@ -166,7 +180,7 @@ class LogSource(Source):
             increment = None if last is None else between(told[last], odometry)
         elif recording.truth is not None:
             if last is not None:
-                increment = self._disturbed(ctx, between(told[last], told[frame]))
+                increment = self._synthetic(ctx, between(told[last], told[frame]))
                 moved = compose((position.x, position.y, position.heading), increment)
                 position.x, position.y, position.heading = (float(value) for value in moved)
             odometry = np.array([position.x, position.y, position.heading])
@@ -181,8 +195,8 @@ class LogSource(Source):
             scan=recording.scan(frame) if ctx.is_read("scan") else None,
         )
 
-    def _disturbed(self, ctx: Context, increment: Array) -> Array:
-        return disturb(
+    def _synthetic(self, ctx: Context, increment: Array) -> Array:
+        return add_odometry_noise(
             increment,
             ctx.rng.standard_normal(2),
             self.synthetic_distance_noise,
@@ -218,7 +232,7 @@ class LogSource(Source):
                 )
             poses = recording.truth if recording.odometry is None else recording.odometry
             told = np.empty((0, 3)) if poses is None else as_if_driven(poses, self.cuts)
-            pauses = np.diff(recording.stamps[frames]) > self.new_log_after * 1e9
+            pauses = np.diff(recording.stamps[frames]) > self.new_log_after_s * 1e9
             pauses &= ~crossed(self.cuts, frames)
             for part in np.split(frames, np.flatnonzero(pauses) + 1):
                 self._recordings.append(recording)
@@ -228,7 +242,9 @@ class LogSource(Source):
         self._lost = [recording.dropped.copy() for recording in recordings]
 
 
-def disturb(increment: Array, noise: Array, distance: float, turn_per_metre: float, turn_per_radian: float) -> Array:
+def add_odometry_noise(
+    increment: Array, noise: Array, distance: float, turn_per_metre: float, turn_per_radian: float
+) -> Array:
     """An increment of motion (3,) as a poor odometry would have measured it.
 
     `noise`: two independent standard normal numbers n1, n2. With d the length of the increment (m) and t its turn

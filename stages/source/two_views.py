@@ -19,20 +19,25 @@ class TwoViewsState(State):
 class TwoViews(Source):
     """Pairs of views of points all around a camera, some of them paired wrongly: one random problem per tick.
 
-    The baseline is 1. `number` points lie within `elevation_deg` of the horizon, uniformly on that part of the sphere,
-    `nearest` to `farthest` baselines away from view 1. `noise_deg`: standard deviation of each bearing's error, along
-    each of two directions across it. A share `wrong` of the bearings of view 2 looks anywhere on that part of the
-    sphere instead. `planar`: view 2 is a robot's that drove on a floor; else it was taken anywhere, turned anyhow.
+    The baseline is 1. Points are distributed uniformly over a part of the sphere around view 1.
     """
 
     problems: Annotated[int, Bounds(ge=1)] = 100
-    number: Annotated[int, Bounds(ge=1)] = 100
-    wrong: Annotated[float, Bounds(ge=0, lt=1)] = 0.5
+    """Number of problems."""
+    pairs: Annotated[int, Bounds(ge=1)] = 100
+    """Pairs of bearings per problem."""
+    outlier_ratio: Annotated[float, Bounds(ge=0, lt=1)] = 0.5
+    """Share of the bearings of view 2 that look anywhere on that part of the sphere instead."""
     noise_deg: Annotated[float, Bounds(ge=0)] = 0.1
-    elevation_deg: Annotated[float, Bounds(gt=0, le=90)] = 90.0
-    nearest: Annotated[float, Bounds(gt=0)] = 1.5
-    farthest: Annotated[float, Bounds(gt=0)] = 6.0
+    """Standard deviation of each bearing's error, along each of two directions across it."""
+    max_elevation_deg: Annotated[float, Bounds(gt=0, le=90)] = 90.0
+    """How far from the horizon points may lie."""
+    min_distance: Annotated[float, Bounds(gt=0)] = 1.5
+    """Smallest distance of a point from view 1, in baselines."""
+    max_distance: Annotated[float, Bounds(gt=0)] = 6.0
+    """Largest distance of a point from view 1, in baselines."""
     planar: bool = True
+    """View 2 is a robot's that drove on a floor; else it was taken anywhere, turned anyhow."""
 
     class Out(Outputs):
         """`pairs`: the problem. `truth`: its answer; inliers are the pairs that are not wrong."""
@@ -57,11 +62,11 @@ class TwoViews(Source):
             translation = np.array([math.cos(along), math.sin(along), 0.0])
         else:
             rotation, translation = _any_rotation(rng), self._directions(rng, 1, 90.0)[0]
-        distance = rng.uniform(self.nearest, self.farthest, (self.number, 1))
-        points = distance * self._directions(rng, self.number, self.elevation_deg)
+        distance = rng.uniform(self.min_distance, self.max_distance, (self.pairs, 1))
+        points = distance * self._directions(rng, self.pairs, self.max_elevation_deg)
         first, second = self._seen(rng, points), self._seen(rng, (points - translation) @ rotation)
-        right = np.arange(self.number) >= round(self.wrong * self.number)
-        second[~right] = self._directions(rng, self.number - int(right.sum()), self.elevation_deg)
+        right = np.arange(self.pairs) >= round(self.outlier_ratio * self.pairs)
+        second[~right] = self._directions(rng, self.pairs - int(right.sum()), self.max_elevation_deg)
         return self.Out(
             tick=Tick(index=index, stamp=index * 10**9, frame=index, first_of_log=index == 0),
             pairs=BearingPairs(first, second),

@@ -110,12 +110,6 @@ NOT_YET_DOCUMENTED = [
     "simulator.floor_plan",
     "simulator.record_log",
     "simulator.world_rooms",
-    "source.closed_loop",
-    "source.goal_image",
-    "source.grid",
-    "source.homing_grid",
-    "source.log",
-    "source.two_views",
 ]
 """Modules whose parameters are still to be explained below their fields. It only shrinks."""
 

@@ -24,7 +24,7 @@ def problems(seed: int = 0, **how) -> list[TwoViews.Out]:
 
 @pytest.mark.parametrize("planar", [True, False])
 def test_pairs_that_are_not_wrong_fit_the_true_pose_and_the_others_do_not(planar: bool) -> None:
-    made = problems(problems=3, planar=planar, noise_deg=0.0, wrong=0.3)
+    made = problems(problems=3, planar=planar, noise_deg=0.0, outlier_ratio=0.3)
     assert [out.tick.index for out in made] == [0, 1, 2]
     for out in made:
         truth, pairs = out.truth, out.pairs
@@ -37,7 +37,7 @@ def test_pairs_that_are_not_wrong_fit_the_true_pose_and_the_others_do_not(planar
 
 
 def test_points_keep_within_the_elevations_of_a_camera() -> None:
-    for out in problems(problems=2, elevation_deg=30.0, noise_deg=0.0):
+    for out in problems(problems=2, max_elevation_deg=30.0, noise_deg=0.0):
         assert np.abs(out.pairs.first[:, 2]).max() <= math.sin(math.radians(30.0)) + 1e-12
 
 

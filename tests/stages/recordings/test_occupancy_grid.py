@@ -90,7 +90,7 @@ def test_a_map_that_cannot_be_read_is_one_line_that_names_the_file(tmp_path, tex
 
 def test_the_files_grid_comes_in_cells_of_the_wanted_size(tmp_path):
     file = written(tmp_path, [[254] * 8] * 6)
-    stage = PlaceGrid(grid=str(tmp_path), log="drive.mcap", resolution=1.0, clearance_m=0.0)
+    stage = PlaceGrid(grid=str(tmp_path), log="drive.mcap", resolution_m=1.0, clearance_m=0.0)
     out = stage.step(CTX)
     assert out.grid.cells.shape == (3, 4)
     assert len(out.free.centres) == 12
@@ -124,7 +124,7 @@ def test_poses_are_drawn_evenly_over_the_free_cells_with_all_headings():
 
 
 def test_without_a_log_it_is_the_worlds_own_grid_as_it_would_be_written(tmp_path):
-    out = PlaceGrid(resolution=0.1).step(CTX)
+    out = PlaceGrid(resolution_m=0.1).step(CTX)
     read = read_occupancy(write_grid(World(DEMO, 0), tmp_path, 0.1))
     assert out.grid.made_from == "world"
     np.testing.assert_array_equal(out.grid.cells, read.cells)
@@ -148,7 +148,7 @@ def test_a_grid_that_is_not_there_is_named(tmp_path):
 
 def test_a_stand_in_is_free_along_the_tours_path_and_walled_around_it():
     ctx = Context("grid")
-    stage = PlaceGrid(grid="from_tour", log="drive.mcap", around=2.0, resolution=0.1)
+    stage = PlaceGrid(grid="from_tour", log="drive.mcap", path_half_width=2.0, resolution_m=0.1)
     out = stage.step(ctx, a_map((0.0, 0.0), (4.0, 0.0), (4.0, 3.0)), LengthScale(0.25))
     assert out.grid.made_from == "tour"
     assert ctx.counts["grid_is_a_stand_in"] == 1
@@ -175,7 +175,7 @@ def test_a_stand_in_without_a_map_is_refused():
 def test_references_beside_the_free_space_leave_all_of_it_and_are_told_of(tmp_path):
     ctx = Context("grid")
     written(tmp_path, [[254] * 4] * 4)
-    out = PlaceGrid(grid=str(tmp_path), resolution=0.5, clearance_m=0.0).step(ctx, a_map((50.0, 50.0)))
+    out = PlaceGrid(grid=str(tmp_path), resolution_m=0.5, clearance_m=0.0).step(ctx, a_map((50.0, 50.0)))
     assert len(out.free.centres) == 16
     assert ctx.counts["references_off_the_free_space"] == 1
 

@@ -60,7 +60,7 @@ def test_it_starts_where_the_route_starts_and_ends_when_the_time_is_over():
 
 @pytest.mark.parametrize("state", ["arrived", "gave up"])
 def test_a_way_that_has_ended_ends_the_drive_a_moment_later(state):
-    loop = Loop(seconds=20.0, rest=1.0)
+    loop = Loop(seconds=20.0, rest_s=1.0)
     ways = [None, *[PlannedRoute(np.array([3]), "under way", 0)] * 5, *[PlannedRoute(np.array([3]), state, 0)] * 9]
     outs = [loop.source.step(loop.ctx, loop.state, None, way) for way in ways]
     assert [out is not None for out in outs] == [True] * 11 + [False] * 4
@@ -143,11 +143,11 @@ def test_its_pictures_are_blurred_by_its_motion_around_their_tick():
     np.testing.assert_array_equal(last[1].image.pixels, seen)
 
 
-def test_lost_pictures_are_absent_and_counted():
+def test_lost_images_are_absent_and_counted():
     loop = Loop(world=replace(WORLD, delivery=Delivery(dropped=0.4, late=0.3)))
     images = [out.image for out in (loop.step() for _ in range(40)) if out]
     lost = sum(image is None for image in images)
-    assert loop.ctx.counts["lost_picture"] + loop.ctx.counts["late_picture"] == lost
+    assert loop.ctx.counts["lost_image"] + loop.ctx.counts["late_image"] == lost
     assert 0.35 < lost / 40 < 0.8
 
 

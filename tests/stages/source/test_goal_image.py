@@ -42,7 +42,7 @@ def test_a_place_is_no_picture(goal):
 
 
 def test_a_file_that_is_not_there_is_said_before_anything_runs(tmp_path):
-    with pytest.raises(BadInput, match=r"goal: there is no file .*kitchen\.png; give a picture, or a place"):
+    with pytest.raises(BadInput, match=r"goal: there is no file .*kitchen\.png; give an image, or a place"):
         GoalImage(goal=str(tmp_path / "kitchen.png"), world=WORLD).inputs_digest()
 
 

@@ -38,7 +38,7 @@ def test_a_grid_is_round_and_leaves_its_middle_out() -> None:
 
 
 def test_the_target_is_first_and_all_others_stand_in_free_places_that_it_is_seen_from() -> None:
-    found = ticks(HomingGrid(place=WORLD, target=(*START, 0.3), reach=3.0))
+    found = ticks(HomingGrid(world=WORLD, target=(*START, 0.3), radius_m=3.0))
     assert (found[0].truth.x, found[0].truth.y, found[0].truth.heading) == (*START, 0.3)
     assert [out.tick.first_of_log for out in found] == [True] + [False] * (len(found) - 1)
     world, spots = World(WORLD, 0), np.array([(out.truth.x, out.truth.y) for out in found])
@@ -50,7 +50,7 @@ def test_the_target_is_first_and_all_others_stand_in_free_places_that_it_is_seen
 
 
 def test_the_same_seed_gives_the_same_views() -> None:
-    one, other, third = (ticks(HomingGrid(place=WORLD, target=(*START, 0.3), reach=1.0), seed) for seed in (0, 0, 1))
+    one, other, third = (ticks(HomingGrid(world=WORLD, target=(*START, 0.3), radius_m=1.0), seed) for seed in (0, 0, 1))
     assert (one[1].image.pixels == other[1].image.pixels).all()
     assert one[1].truth.heading != third[1].truth.heading
 
@@ -58,12 +58,12 @@ def test_the_same_seed_gives_the_same_views() -> None:
 def test_a_target_without_room_is_refused() -> None:
     wall = (0.0, 0.0, 0.0)
     with pytest.raises(UnreadableRecording, match="no room for the robot at 0, 0"):
-        HomingGrid(place=WORLD, target=wall).setup(Context("source", np.random.default_rng(0)))
+        HomingGrid(world=WORLD, target=wall).setup(Context("source", np.random.default_rng(0)))
 
 
 @needs_data
 def test_of_a_log_the_target_is_the_picture_taken_closest() -> None:
-    source = HomingGrid(log=f"antworld:{ANTWORLD}", target=(5.9, 4.5, 0.0), reach=0.5)
+    source = HomingGrid(log=f"antworld:{ANTWORLD}", target=(5.9, 4.5, 0.0), radius_m=0.5)
     found = ticks(source)
     assert math.hypot(found[0].truth.x - 5.9, found[0].truth.y - 4.5) < 0.15
     metres = [math.hypot(out.truth.x - found[0].truth.x, out.truth.y - found[0].truth.y) for out in found[1:]]

@@ -14,7 +14,7 @@ from omninav.pipeline import Context
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import UnreadableRecording
-from omninav.stages.source.log import LogSource, LogSourceState, disturb
+from omninav.stages.source.log import LogSource, LogSourceState, add_odometry_noise
 
 
 def context(seed: int = 0) -> Context:
@@ -134,7 +134,7 @@ def test_made_up_odometry_has_its_deviations_over_one_metre_however_it_is_cut(cu
     lengths = np.zeros(drives)
     for number in range(drives):
         for _ in range(cuts):
-            noisy = disturb(
+            noisy = add_odometry_noise(
                 np.array([1 / cuts, 0, 0]), random.standard_normal(2), 0.1, math.radians(3), math.radians(3)
             )
             lengths[number] += np.hypot(noisy[0], noisy[1])
@@ -147,9 +147,9 @@ def test_made_up_odometry_has_its_deviations_over_one_metre_however_it_is_cut(cu
 
 def test_made_up_odometry_errs_with_the_turn_and_not_when_nothing_moves() -> None:
     noise = np.random.default_rng(0).standard_normal((4000, 2))
-    still = disturb(np.zeros(3), noise[0], 0.1, 0.05, 0.05)
+    still = add_odometry_noise(np.zeros(3), noise[0], 0.1, 0.05, 0.05)
     np.testing.assert_array_equal(still, np.zeros(3))
-    turns = [disturb(np.array([0, 0, 1.0]), pair, 0.1, 0.05, 0.04)[2] - 1 for pair in noise]
+    turns = [add_odometry_noise(np.array([0, 0, 1.0]), pair, 0.1, 0.05, 0.04)[2] - 1 for pair in noise]
     assert np.std(turns) == pytest.approx(0.04, rel=0.06)
 
 
@@ -187,8 +187,10 @@ def test_a_cut_leaves_the_middle_out_and_odometry_does_not_notice(tmp_path: Path
 
 def test_a_cut_over_hours_is_no_new_log_but_a_pause_is(tmp_path: Path) -> None:
     log = str(write_mcap(tmp_path / "log.mcap"))
-    assert [out.tick.log for out in drive(LogSource(log=log, cuts=((3, 6),), new_log_after=1.0))] == [0] * (FRAMES - 3)
-    assert drive(LogSource(log=log, new_log_after=0.1))[-1].tick.log == FRAMES - 1
+    assert [out.tick.log for out in drive(LogSource(log=log, cuts=((3, 6),), new_log_after_s=1.0))] == [0] * (
+        FRAMES - 3
+    )
+    assert drive(LogSource(log=log, new_log_after_s=0.1))[-1].tick.log == FRAMES - 1
 
 
 def test_made_up_odometry_does_not_notice_a_splice_either(tmp_path: Path) -> None:
