@@ -219,6 +219,26 @@ class Collected(Stage):
         return self.Out(metrics=Metrics({"numbers": {"all": values, "present": len(present)}}))
 
 
+class Total(Stage):
+    """The sum of all numbers, after the loop."""
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, numbers: Sequence[Number | None]) -> Out:
+        return self.Out(number=Number(sum(number.value for number in numbers if number is not None)))
+
+
+class Ledgers(Stage):
+    """How many ledgers there were."""
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context, ledgers: Sequence[Ledger]) -> Out:
+        return self.Out(number=Number(float(len(ledgers))))
+
+
 class Kill(Stage):
     """Kills its own process, as `kill -9` does, at a tick, unless a file exists."""
 

@@ -184,7 +184,7 @@ class SimulatedRecording:
             exposure=sensor.exposure * (1.0 + sensor.exposure_drift * float(swing)),
             noise=sensor.noise,
             key=self._key + shot,
-            people=self._people(float(at)),
+            people=self.people_at(float(at)),
         )
 
     @cached_property
@@ -198,12 +198,12 @@ class SimulatedRecording:
     def scan_at(self, turn: int) -> Scan:
         """A turn of the range ring, by its number."""
         at, ring = self._scan_seconds[turn], self.world.ranges
-        people = round_bodies(self._people(float(at)))
+        people = round_bodies(self.people_at(float(at)))
         rng = np.random.default_rng([self._ring_key, turn])
         metres = measure(self._room, people[None], self._true(at[None]), ring, rng)[0]
         return scan_value(self.world, metres.astype(np.float32).astype(np.float64))  # as a message holds them
 
-    def _people(self, seconds: float) -> tuple[Person, ...]:
+    def people_at(self, seconds: float) -> tuple[Person, ...]:
         """Who is about, some of them because of the robot."""
         return self._world.people_at(seconds, Track(self._seconds, self.driven))
 

@@ -114,7 +114,7 @@ class World:
         return walls
 
     def _shelf(self, shelf: Shelf, number: int) -> list[Box]:
-        goods = self._goods_on(shelf, number)
+        goods = self.goods_on(shelf, number)
         wood = self._texture("wood", "shelf")
         cap = self._plain(wood, shelf.length, shelf.depth, (1.0, 1.0))
         height = shelf.height / shelf.levels
@@ -126,7 +126,7 @@ class World:
         body = Box("shelf", shelf.centre, half, shelf.yaw, 0.0, shelf.height, (*sides, cap, cap))  # type: ignore[arg-type]
         return [body, *self._stock(shelf, number)] if shelf.stock else [body]
 
-    def _goods_on(self, shelf: Shelf, number: int) -> list[I64]:
+    def goods_on(self, shelf: Shelf, number: int) -> list[I64]:
         """Textures (levels, compartments) on each of a shelf's four sides, about one compartment a metre."""
         rng = stream(self.config.seed, "goods", number)
         here = self._assortment(shelf.department)

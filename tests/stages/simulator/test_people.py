@@ -84,7 +84,7 @@ def test_over_a_drive_everybody_walks_and_nobody_jumps(route: str) -> None:
     last: dict[float, tuple[float, tuple[float, float]]] = {}
     fastest, gone, seen = 0.0, 0, 0
     for now in seconds:
-        for person in drive._people(float(now)):
+        for person in drive.people_at(float(now)):
             then, place = last.get(person.height, (now, person.position))
             seen += 1
             if now - then < 0.06:

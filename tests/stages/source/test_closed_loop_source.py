@@ -12,11 +12,12 @@ from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_
 from omninav.stages.control.clearance import free_ahead, roomier_side
 from omninav.stages.control.wall_avoider import WallAvoider, WallAvoiderState
 from omninav.stages.recordings.recording import UnreadableRecording
-from omninav.stages.simulator.cameras import shutter_times
+from omninav.stages.simulator.cameras import camera_of, camera_rays, shutter_times
 from omninav.stages.simulator.config import Delivery, Kidnapping, OdometryNoise, Ranges, Sensor, WorldConfig, mirror
 from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.obstacles import gather
 from omninav.stages.simulator.renderer import render
-from omninav.stages.simulator.robot import around, steer
+from omninav.stages.simulator.robot import around, limits, reach, steer
 from omninav.stages.simulator.world import World
 from omninav.stages.source.closed_loop import ClosedLoop, ClosedLoopState
 from omninav.stages.values.command import Command
@@ -128,18 +129,20 @@ def test_its_pictures_are_blurred_by_its_motion_around_their_tick():
         for world in (replace(quiet, sensor=replace(quiet.sensor, shutter=0.0)), quiet)
     )
     first = [loop.step() for loop in (sharp, blurred)]
-    assert all(out and out.image for out in first)
+    assert [out is not None and out.image is not None for out in first] == [True, True]
     np.testing.assert_array_equal(first[0].image.pixels, first[1].image.pixels)
     last = [[loop.step(Command(0.3, 0.5)) for _ in range(8)][-1] for loop in (sharp, blurred)]
     assert np.abs(last[0].image.pixels.astype(int) - last[1].image.pixels).mean() > 0.5
-    state, source = blurred.state.robot, blurred.source
+    state, world = blurred.state.robot, World(quiet, blurred.source.day)
+    room = gather(world.obstacles, quiet.size, reach(quiet.robot))
     poses = around(state, [-0.05, 0.0, 0.05])
     driven = np.repeat(state[None], 2, axis=0)
-    steer(driven[0], 0.3, 0.5, source._limits, 0.05, source._room)
+    steer(driven[0], 0.3, 0.5, limits(quiet.robot), 0.05, room)
     np.testing.assert_allclose(poses[2], driven[0, :3], atol=1e-3)
     np.testing.assert_array_equal(poses[1], state[:3])
     steps = around(state, shutter_times(quiet.sensor, 0.0))
-    seen = render(source._scene, source._rays, steps, quiet.eye_height)
+    rays = camera_rays(camera_of(quiet), quiet.sensor.vignetting, quiet.robot.radius)
+    seen = render(world.scene, rays, steps, quiet.eye_height)
     np.testing.assert_array_equal(last[1].image.pixels, seen)
 
 

@@ -13,6 +13,7 @@ from omninav.pipeline.mcap.log import LogReader
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
+from omninav.stages.simulator.cameras import camera_rays
 from omninav.stages.simulator.config import Day, Delivery, Kidnapping, OdometryNoise, Route, Sensor, mirror
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.record_log import RecordLog
@@ -80,16 +81,15 @@ def test_a_long_drive_sees_the_light_and_the_goods_of_several_days():
     days = (Day(), Day(rearranged=0.5), Day(light=(0.5, 0.5, 0.5)))
     still = replace(EXACT, days=days, timing=replace(EXACT.timing, images=1.0), sensor=Sensor(noise=0.0))
     lasting = replace(still, routes={"there": replace(still.routes["there"], day_duration_s=3.0)})
-    drive = SimulatedRecording(lasting, "there", 0)
-    for shot, day in ((0, 0), (2, 0), (4, 1), (7, 2)):
-        at = drive._shots[shot]
-        assert int(at // 3.0) == day
-        exposure = 1.0 + 0.04 * math.sin(2 * math.pi * at / still.sensor.exposure_period)
-        as_that_day = render(
-            World(still, day).scene, drive._rays, drive._true(at[None]), 0.9, exposure, key=drive._key + shot
-        )
-        np.testing.assert_array_equal(drive.image_of_shot(shot), as_that_day)
-    np.testing.assert_array_equal(drive.image_of_shot(0), SimulatedRecording(still, "there", 0).image_of_shot(0))
+    drive, same_day = SimulatedRecording(lasting, "there", 0), SimulatedRecording(still, "there", 0)
+    rays = camera_rays(drive.camera, still.sensor.vignetting, still.robot.radius)
+    for frame, day in ((0, 0), (2, 0), (4, 1), (7, 2)):
+        seconds = (drive.stamps[frame] - drive.times[0]) * 1e-9
+        assert int(seconds // 3.0) == day
+        exposure = 1.0 + 0.04 * math.sin(2 * math.pi * seconds / still.sensor.exposure_period)
+        as_that_day = render(World(still, day).scene, rays, drive.truth[frame : frame + 1], 0.9, exposure)
+        np.testing.assert_array_equal(drive.image(frame), as_that_day)
+        assert np.array_equal(drive.image(frame), same_day.image(frame)) == (day == 0)
 
 
 def test_what_a_robot_may_run_into_does_not_change_while_it_drives():
@@ -118,7 +118,7 @@ def test_a_log_holds_truth_up_to_the_leap_and_from_it_on(drive: SimulatedRecordi
 
 
 def test_lost_pictures_are_missing_and_overtaken_ones_are_counted(drive: SimulatedRecording, log: Path):
-    taken = len(drive._shots)
+    taken = len(SimulatedRecording(replace(WORLD, delivery=Delivery()), "there", 1, KIDNAPPED).stamps)
     assert 0 < len(drive.sent) < taken
     assert len(drive.stamps) == len(drive.sent) - drive.dropped["backward_stamp"]
     assert drive.dropped["backward_stamp"] > 0
