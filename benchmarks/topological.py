@@ -11,8 +11,11 @@ from omninav.pipeline.engine.codec import encode
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
 from omninav.stages.features.vertical_segments import FindVerticalSegments
-from omninav.stages.geometry.appearance.visual_distance import Matching, match_columns, match_patches
+from omninav.stages.geometry.appearance.feature_matching import mahalanobis_matches
+from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
+from omninav.stages.mapping.loop_closure import LoopClosure
 from omninav.stages.mapping.topological import TopologicalMapping
+from omninav.stages.mapping.view_comparison import ViewComparison
 from omninav.stages.match.visual_distance import MatchPlaces
 from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.demo import DEMO
@@ -21,10 +24,13 @@ from omninav.stages.simulator.world import World
 from omninav.stages.values.image import Image, Pixels
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.pose import Pose
+from omninav.stages.values.topological_map import TopologicalMap
 
 from .table import Row, medians
 
 IMAGES, PLACES = 545, 60
+GREY = GlobalDescriptor(np.zeros(3, np.float32))
+"""Of every view: no two can be told apart at a glance."""
 
 
 def rows() -> list[Row]:
@@ -52,19 +58,19 @@ def two_views() -> tuple[list[Pixels], HyperbolicMirror]:
 
 def _pair() -> list[Row]:
     pictures, camera = two_views()
-    sift, columns, context = RotationReducedSift(), FindVerticalSegments(), Context("features")
+    sift, finder, context = RotationReducedSift(), FindVerticalSegments(), Context("features")
     sift.setup(context)
     own = cv2.SIFT.create(nfeatures=sift.features, contrastThreshold=sift.contrast)
     brute = cv2.BFMatcher(cv2.NORM_L2)
 
     def patches() -> list[LocalFeatures]:
-        return [sift.step(context, picture=Image(pixels), camera=camera).features for pixels in pictures]
+        return [sift.step(context, image=Image(pixels), camera=camera).features for pixels in pictures]
 
     def both() -> int:
         first, second = patches()
-        pieces = [columns.step(context, picture=Image(pixels), camera=camera).columns for pixels in pictures]
-        pairs = match_patches(first, second, Matching()).first, match_columns(*pieces, Matching()).first
-        return len(pairs[0]) + len(pairs[1])
+        segments = [finder.step(context, image=Image(pixels), camera=camera).vertical_segments for pixels in pictures]
+        pairs = match_patches(first.patches(), second.patches(), ComparisonOptions())
+        return len(pairs.first) + len(mahalanobis_matches(*(each.descriptors for each in segments), 0.8).first)
 
     def plain() -> int:
         found = [own.detectAndCompute(cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY), None)[1] for pixels in pictures]
@@ -73,7 +79,7 @@ def _pair() -> list[Row]:
     taken = medians({"both": both, "patches": patches, "plain": plain}, rounds=11)
     return [
         Row(
-            "patches and columns of two views of 320x240, matched",
+            "patches and vertical segments of two views of 320x240, matched",
             taken["both"] * 1e3,
             "ms",
             "cv2.SIFT, cv2.BFMatcher of both",
@@ -105,23 +111,35 @@ def a_tour(images: int, landmarks: int = 6000, seen: int = 200) -> tuple[list[Lo
     return views, poses
 
 
+def map_of(
+    views: list[LocalFeatures], poses: list[Pose], ticks: list[Tick], comparison: ViewComparison, closure: LoopClosure
+) -> TopologicalMap:
+    """The map of a tour."""
+    compared = comparison.step(
+        Context("views"), ticks=ticks, features=views, descriptor=[GREY] * len(views), truth=poses
+    ).views
+    found = closure.step(Context("loops"), compared).hypotheses
+    return TopologicalMapping().step(Context("mapping"), compared, found).map
+
+
 def _map() -> list[Row]:
     views, poses = a_tour(IMAGES)
-    grey = GlobalDescriptor(np.zeros(3, np.float32))  # all alike: no two views can be told apart at a glance
     ticks = [Tick(row, row * 10**9) for row in range(IMAGES)]
     start = time.process_time()
-    out = TopologicalMapping().step(
-        Context("mapping"), ticks=ticks, features=views, moments=[grey] * IMAGES, truth=poses
-    )
+    made = map_of(views, poses, ticks, ViewComparison(), LoopClosure())
     taken = time.process_time() - start
-    size = len(encode(out.map)) / len(out.map.views) * PLACES / 1e6
-    few = TopologicalMapping(every_s=0.0, place_size=1e-6, support=1.0).step(
-        Context("mapping"), ticks=ticks[:PLACES], features=views[:PLACES], moments=[grey] * PLACES, truth=poses[:PLACES]
+    size = len(encode(made)) / len(made.views) * PLACES / 1e6
+    few = map_of(
+        views[:PLACES],
+        poses[:PLACES],
+        ticks[:PLACES],
+        ViewComparison(every_s=0.0),
+        LoopClosure(place_size=1e-6, min_support=1.0),
     )
-    assert len(few.map) == PLACES
+    assert len(few) == PLACES
     match, context = MatchPlaces(), Context("match")
     match.setup(context)
-    look = medians({"look": lambda: match.step(context, views[-1], grey, few.map)}, rounds=15)["look"]
+    look = medians({"look": lambda: match.step(context, views[-1], GREY, few)}, rounds=15)["look"]
     return [
         Row(f"map of {IMAGES} views, 200 patches each, none told apart at a glance", taken, "s CPU", limit=180.0),
         Row(f"{PLACES} views of it in a file", size, "MB", limit=1.68),

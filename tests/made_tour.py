@@ -2,12 +2,16 @@
 
 import itertools
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from omninav.pipeline import Context, Tick
+from omninav.stages.mapping.loop_closure import LoopClosure
 from omninav.stages.mapping.topological import TopologicalMapping
+from omninav.stages.mapping.view_comparison import ViewComparison
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
+from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
 from omninav.stages.values.pose import Pose
 
 
@@ -49,10 +53,17 @@ def along(corners: list[tuple[float, float]], step: float) -> list[Pose]:
     return poses
 
 
+class Mapped(NamedTuple):
+    """What the three stages make of a tour."""
+
+    map: TopologicalMap
+    hypotheses: LoopHypotheses
+
+
 def mapped(
-    world: Landmarks, tours: list[list[Pose]], truth: bool = True, known: object = None, **parameters: object
-) -> TopologicalMapping.Out:
-    """The map of tours, a picture a second."""
+    world: Landmarks, tours: list[list[Pose]], truth: bool = True, known: TopologicalMap | None = None, **parameters
+) -> Mapped:
+    """The map of tours, an image a second; `parameters` are those of any of the three stages."""
     poses = [pose for tour in tours for pose in tour]
     logs = [log for log, tour in enumerate(tours) for _ in tour]
     seconds = [second for tour in tours for second in range(len(tour))]
@@ -60,13 +71,19 @@ def mapped(
         Tick(row, 10**9 * (1000 * log + second), log, second, second == 0)
         for row, (log, second) in enumerate(zip(logs, seconds, strict=True))
     ]
-    stage = TopologicalMapping(**parameters)
-    return stage.step(
-        Context("mapping"),
+    comparison, closure, mapping = (
+        stage(**{key: parameters.pop(key) for key in list(parameters) if key in stage.__dataclass_fields__})
+        for stage in (ViewComparison, LoopClosure, TopologicalMapping)
+    )
+    assert not parameters
+    views = comparison.step(
+        Context("views"),
         ticks=ticks,
         features=[world.seen(pose) for pose in poses],
         descriptor=[GlobalDescriptor(np.zeros(3, np.float32)) for _ in poses],
         odometry=poses,
         truth=poses if truth else [None] * len(poses),
         known=known,
-    )
+    ).views
+    found = closure.step(Context("loops"), views).hypotheses
+    return Mapped(mapping.step(Context("mapping"), views, found, known).map, found)

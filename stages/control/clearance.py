@@ -14,12 +14,14 @@ def free_ahead(ranges: F64, azimuths: F64, radius: float, margin: float) -> floa
 
 
 def roomier_side(ranges: F64, azimuths: F64) -> float:
-    """Where there is more room in front: the mean way (m) to the left of (N,) ranges, negative to the right."""
+    """Where there is more room in front: the mean distance (m) to the left of (N,) ranges, negative to the right."""
     front = np.cos(azimuths) > -0.1
     return float((ranges * np.sin(azimuths))[front].mean())
 
 
-def way_through(ranges: F64, azimuths: F64, wanted: float, room: float, radius: float, margin: float) -> float | None:
+def free_direction(
+    ranges: F64, azimuths: F64, wanted: float, room: float, radius: float, margin: float
+) -> float | None:
     """The direction (rad) closest to `wanted` in which a disc can go `room` m straight on.
 
     In steps of 5 degrees, of two equally close ones that with more room; None where there is none up to 90 degrees off.

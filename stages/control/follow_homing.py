@@ -1,75 +1,64 @@
-"""Where the homing vector points, as fast as is safe."""
+"""Drives where the homing vector points, as fast as is safe."""
 
 import math
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.command import Command
 from omninav.stages.values.homing import DrivingStatus, HomingVector, PathProgress
 from omninav.stages.values.scan import Scan
 
-from .clearance import free_ahead, roomier_side, way_through
-from .wall_avoider import wandering
+from .clearance import free_ahead, free_direction
 
-F64 = npt.NDArray[np.float64]
+NARROW_MARGIN, NARROW_SPEED = 0.2, 0.5
+"""Shares of the margin and of the speed with which the robot passes where there is no room for all of the margin."""
+SLOW_RATIO = 0.3
+"""Share of the way to the last view at which a robot that knows no metres begins to slow down."""
 
 
 class FollowHomingState(State):
-    """For how many ticks in a row the target has been lost, and for how many there has been no way through.
+    """Since when (ns) the target has been lost, and since when no direction has been free; None: not now."""
 
-    `target`: the one it goes to; `closest`: the least ratio of the way to it that was left; ticks since then in all
-    (`since`), those in which something stood in the straight way (`around`), and those for which it has stood because
-    of that (`stood`). `side`: see `wandering`.
-    """
-
-    lost: int = 0
-    blocked: int = 0
-    target: int = -1
-    closest: float = math.inf
-    since: int = 0
-    around: int = 0
-    stood: int = 0
-    side: int = 0
+    lost_since: int | None = None
+    blocked_since: int | None = None
 
 
 class FollowHoming(Stage):
-    """Turns towards the homing vector and drives, around what the ring of ranges says is in the way, and docks.
+    """Turns towards the homing vector and drives around obstacles, slows down at the last view and turns to its heading.
 
-    Goedemé et al. 2007, section 7.2.4, on a lower level of its own. `speed` (m/s) and `turning` (rad/s) are limits; it
-    turns by `gain` (1/s) times the angle that is left, on the spot beyond `on_the_spot_deg`. Close to the last view it
-    slows down: to `closing` (1/s) times the metres left where odometry has told the unit, else by the share of the way
-    that is left, not below `creep` m/s. While it docks it only turns.
-
-    Towards a direction it drives if a disc of `radius` m has `room` m free there, `margin` m clear on both sides, or
-    what is left of the way; else towards the free direction closest to it. Where there is none it tries with a fifth
-    of the margin, at half the speed. Less than `stop_at` m free straight ahead, or than what is left of the way, stop
-    it. Where no direction is free for `patience` ticks it stands and is `blocked`; so it is where it has gone around
-    something for `detour` ticks, or about for `idle` ticks, and came no closer to the target (by a tenth of what was
-    left): what stands in the way may be a closed door. If nobody gives it another target it tries again after `detour`
-    ticks. A lost target: it goes on to where it was believed for
-    `patience` ticks, and only where metres are known; then it stands and is `lost`. Both say why on `status`, for
-    whoever re-localises and plans anew. Nothing may be known where it stands: lost for `restless` ticks in a row, it
-    wanders until it sees where to go; null: it stands.
+    Goedemé et al. 2007, section 7.2.4. Without a `scan` nothing is taken to be in the way. A lost target is approached
+    for a while where its distance in metres is known. Then the robot stands and is `lost`, or drives by the `wander`
+    command, if that is wired, until it sees where to go. It is `blocked` where no direction is free, or where `stalled`
+    says so. `status` gives the reason to whoever plans.
     """
 
-    speed: Annotated[float, Bounds(gt=0)] = 0.4
-    turning: Annotated[float, Bounds(gt=0)] = 0.8
-    gain: Annotated[float, Bounds(gt=0)] = 1.5
-    closing: Annotated[float, Bounds(gt=0)] = 0.7
-    creep: Annotated[float, Bounds(gt=0)] = 0.05
-    on_the_spot_deg: Annotated[float, Bounds(gt=0)] = 35.0
-    radius: Annotated[float, Bounds(gt=0)] = 0.25
-    margin: Annotated[float, Bounds(ge=0)] = 0.1
-    room: Annotated[float, Bounds(gt=0)] = 0.8
-    stop_at: Annotated[float, Bounds(gt=0)] = 0.15
-    patience: Annotated[int, Bounds(ge=1)] = 10
-    detour: Annotated[int, Bounds(ge=1)] = 50
-    idle: Annotated[int, Bounds(ge=1)] = 150
-    restless: Annotated[int, Bounds(ge=1)] | None = None
+    max_speed: Annotated[float, Bounds(gt=0)] = 0.4
+    """m/s."""
+    max_angular_speed: Annotated[float, Bounds(gt=0)] = 0.8
+    """rad/s."""
+    heading_gain: Annotated[float, Bounds(gt=0)] = 1.5
+    """Angular speed over the angle that is left (1/s)."""
+    approach_gain: Annotated[float, Bounds(gt=0)] = 0.7
+    """Largest speed over the metres that are left to the last view (1/s)."""
+    min_speed: Annotated[float, Bounds(gt=0)] = 0.05
+    """Close to the last view (m/s)."""
+    turn_in_place_deg: Annotated[float, Bounds(gt=0)] = 35.0
+    """Angle beyond which the robot turns on the spot."""
+    robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
+    """Of the robot's body."""
+    margin_m: Annotated[float, Bounds(ge=0)] = 0.1
+    """Room that the robot keeps on both sides; where that leaves no way, a fifth of it at half the speed."""
+    lookahead_m: Annotated[float, Bounds(gt=0)] = 0.8
+    """Free distance, or what is left of the way, that a direction needs."""
+    stop_distance_m: Annotated[float, Bounds(gt=0)] = 0.15
+    """Free distance straight ahead at which the robot stops."""
+    blocked_after_s: Annotated[float, Bounds(gt=0)] = 2.0
+    """Time for which the robot waits for a free direction, or goes on towards a lost target."""
+    wander_after_s: Annotated[float, Bounds(gt=0)] = 5.0
+    """Time after which a robot whose target is lost wanders."""
 
     class Out(Outputs):
         command: Command
@@ -78,82 +67,75 @@ class FollowHoming(Stage):
     def step(
         self,
         ctx: Context,
-        patience: FollowHomingState,
+        state: FollowHomingState,
+        tick: Tick,
         vector: HomingVector | None = None,
         progress: PathProgress | None = None,
         scan: Scan | None = None,
+        stalled: DrivingStatus | None = None,
+        wander: Command | None = None,
     ) -> Out:
-        """The command of this tick. Without a `scan` it trusts that nothing is in the way."""
+        """The command of this tick."""
         if progress is not None and progress.arrived:
             return self._stand("arrived", "")
         if vector is None:
             return self._stand("waiting", "there is no target")
-        patience.lost = patience.lost + 1 if vector.state == "lost" else 0
-        if vector.state == "lost" and (patience.lost > self.patience or vector.metres is None):
-            if scan is not None and self.restless is not None and patience.lost > self.restless:
+        state.lost_since, lost_s = _since(state.lost_since, vector.state == "lost", tick)
+        if vector.state == "lost" and (lost_s >= self.blocked_after_s or vector.metres is None):
+            if wander is not None and lost_s >= self.wander_after_s:
                 ctx.count("wandered_lost")
-                return self._wander(patience, scan, vector.why)
+                return self.Out(command=wander, status=DrivingStatus("lost", f"it looks about: {vector.why}"))
             ctx.count("stood_lost")
             return self._stand("lost", vector.why)
         if progress is not None and progress.docking:
             return self.Out(command=Command(0.0, self._turn(vector.turn)), status=DrivingStatus("docking"))
+        if stalled is not None:
+            ctx.count("stood_blocked")
+            return self._stand("blocked", stalled.why)
         left = math.inf if vector.metres is None else vector.metres
-        direction: float | None = vector.direction
-        squeezed = 1.0
-        if scan is not None:
-            ranges = np.minimum(scan.ranges, scan.farthest)
-            around = scan.azimuths()
-            if why := self._kept_away(patience, vector, ranges, around):
-                ctx.count("stood_blocked")
-                return self._stand("blocked", why)
-            direction = way_through(ranges, around, vector.direction, min(self.room, left), self.radius, self.margin)
-            if direction is None:  # a target, or a door, closer to a wall than one would keep
-                squeezed = 0.5
-                room = min(self.room, left)
-                direction = way_through(ranges, around, vector.direction, room, self.radius, 0.2 * self.margin)
-        patience.blocked = patience.blocked + 1 if direction is None else 0
+        direction, speed = self._free_direction(vector, scan, left)
+        state.blocked_since, blocked_s = _since(state.blocked_since, direction is None, tick)
         if direction is None:
-            if patience.blocked <= self.patience:  # somebody may be passing by
+            if blocked_s < self.blocked_after_s:  # somebody may be passing by
                 return self._stand("driving", "waiting for a way through")
             ctx.count("stood_blocked")
-            return self._stand("blocked", f"nothing is free for {self.room:g} m towards the target")
-        direction = float(wrap(direction))
-        if abs(direction) > math.radians(self.on_the_spot_deg):
+            return self._stand("blocked", f"nothing is free for {self.lookahead_m:g} m towards the target")
+        if abs(direction) > math.radians(self.turn_in_place_deg):
             return self.Out(command=Command(0.0, self._turn(direction)), status=DrivingStatus("driving"))
-        speed = squeezed * self.speed * math.cos(direction)
+        speed *= math.cos(direction)
         if progress is None or progress.last:
-            slowed = self.closing * left if vector.metres is not None else self.speed * vector.ratio / 0.3
-            speed = min(speed, max(self.creep, slowed))
-        if scan is not None and free_ahead(ranges, scan.azimuths(), self.radius, 0.0) < min(self.stop_at, left):
-            speed = 0.0
+            known = vector.metres is not None
+            slowed = self.approach_gain * left if known else self.max_speed * vector.ratio / SLOW_RATIO
+            speed = min(speed, max(self.min_speed, slowed))
+        if scan is not None:
+            ranges = np.minimum(scan.ranges, scan.farthest)
+            if free_ahead(ranges, scan.azimuths(), self.robot_radius_m, 0.0) < min(self.stop_distance_m, left):
+                speed = 0.0
         return self.Out(command=Command(speed, self._turn(direction)), status=DrivingStatus("driving"))
 
-    def _kept_away(self, patience: FollowHomingState, vector: HomingVector, ranges: F64, around: F64) -> str:
-        """Why it will not come closer to the target than it has been, "" as long as it may."""
-        if vector.number != patience.target:
-            patience.target, patience.closest = vector.number, math.inf
-        if patience.stood >= self.detour:
-            patience.closest = math.inf
-        if vector.ratio < 0.9 * patience.closest:
-            patience.closest, patience.since, patience.around, patience.stood = vector.ratio, 0, 0, 0
-        elif vector.state != "lost":
-            left = self.room if vector.metres is None else min(self.room, vector.metres)
-            in_the_way = free_ahead(ranges, around - vector.direction, self.radius, 0.2 * self.margin) < left
-            patience.since, patience.around = patience.since + 1, patience.around + in_the_way
-        patience.stood += patience.around > self.detour or patience.since > self.idle
-        if patience.around > self.detour:
-            return f"something stands in the way, and going around it for {self.detour} ticks led no closer"
-        return f"{self.idle} ticks have led no closer" if patience.since > self.idle else ""
-
-    def _wander(self, patience: FollowHomingState, scan: Scan, why: str) -> Out:
-        ranges, around = np.minimum(scan.ranges, scan.farthest), scan.azimuths()
-        room = (free_ahead(ranges, around, self.radius, self.margin) - self.stop_at) / self.room
-        speed, turning, patience.side = wandering(room, roomier_side(ranges, around), patience.side)
-        command = Command(0.5 * self.speed * speed, self.turning * turning)
-        return self.Out(command=command, status=DrivingStatus("lost", f"it looks about: {why}"))
+    def _free_direction(self, vector: HomingVector, scan: Scan | None, left: float) -> tuple[float | None, float]:
+        """Where to drive (rad), None where nothing is free, and how fast at most."""
+        if scan is None:
+            return float(wrap(vector.direction)), self.max_speed
+        ranges, room = np.minimum(scan.ranges, scan.farthest), min(self.lookahead_m, left)
+        for margin, speed in ((1.0, 1.0), (NARROW_MARGIN, NARROW_SPEED)):
+            direction = free_direction(
+                ranges, scan.azimuths(), vector.direction, room, self.robot_radius_m, margin * self.margin_m
+            )
+            if direction is not None:
+                return float(wrap(direction)), speed * self.max_speed
+        return None, 0.0
 
     def _turn(self, angle: float) -> float:
-        return max(-self.turning, min(self.turning, self.gain * angle))
+        return max(-self.max_angular_speed, min(self.max_angular_speed, self.heading_gain * angle))
 
-    def _stand(self, state: str, why: str) -> Out:
-        return self.Out(command=Command(0.0, 0.0), status=DrivingStatus(state, why))  # type: ignore[arg-type]
+    def _stand(self, state: Literal["waiting", "driving", "arrived", "lost", "blocked"], why: str) -> Out:
+        return self.Out(command=Command(0.0, 0.0), status=DrivingStatus(state, why))
+
+
+def _since(stamp: int | None, now: bool, tick: Tick) -> tuple[int | None, float]:
+    # Since when something holds (ns), and for how many seconds.
+    if not now:
+        return None, 0.0
+    stamp = tick.stamp if stamp is None else stamp
+    return stamp, (tick.stamp - stamp) / 1e9

@@ -1,4 +1,4 @@
-"""Driving about without bumping into anything."""
+"""Wandering without touching anything."""
 
 import math
 from dataclasses import field
@@ -16,54 +16,52 @@ from .clearance import free_ahead, roomier_side
 F64 = npt.NDArray[np.float64]
 
 
-def _no_ranges() -> F64:
-    return np.zeros(0)
-
-
 class WallAvoiderState(State):
     """Which way it turns away (1 left, -1 right, 0 undecided), and the ranges of the tick before."""
 
     side: int = 0
-    ranges: F64 = field(default_factory=_no_ranges)
+    ranges: F64 = field(default_factory=lambda: np.zeros(0))
 
 
 class WallAvoider(Stage):
     """Wanders: straight on where there is room, towards the roomier side where not, on the spot where there is none.
 
-    It reads nothing but the ring of ranges. Speed is such that it can stop within what is free ahead. A
-    reading counts as free where it had no echo twice. A robot that turns away keeps its side until there is room again.
+    It reads the ring of ranges alone. Its speed lets it stop within what is free ahead. A range counts as free where
+    there was no echo twice. A robot that turns away keeps its side until there is room again.
     """
 
-    speed: Annotated[float, Bounds(gt=0)] = 0.4
-    turning: Annotated[float, Bounds(gt=0)] = 0.8
-    radius: Annotated[float, Bounds(gt=0)] = 0.25
-    margin: Annotated[float, Bounds(ge=0)] = 0.15
-    """Room (m) that it keeps on all sides."""
-    stop_at: Annotated[float, Bounds(gt=0)] = 0.25
-    """Free way (m) at which it turns on the spot."""
-    slow_at: Annotated[float, Bounds(gt=0)] = 1.2
-    """Free way (m) at which it begins to turn away."""
+    max_speed: Annotated[float, Bounds(gt=0)] = 0.4
+    """m/s."""
+    max_angular_speed: Annotated[float, Bounds(gt=0)] = 0.8
+    """rad/s."""
+    robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
+    """Of the robot's body."""
+    margin_m: Annotated[float, Bounds(ge=0)] = 0.15
+    """Room that the robot keeps on all sides."""
+    stop_distance_m: Annotated[float, Bounds(gt=0)] = 0.25
+    """Free distance at which the robot turns on the spot."""
+    slow_distance_m: Annotated[float, Bounds(gt=0)] = 1.2
+    """Free distance at which the robot begins to turn away."""
 
     class Out(Outputs):
         command: Command
 
-    def step(self, ctx: Context, scan: Scan, memory: WallAvoiderState) -> Out:
-        """The command that this ring of ranges asks for."""
-        heard = np.minimum(scan.ranges, scan.farthest)
-        ranges = np.minimum(heard, memory.ranges) if len(memory.ranges) == len(heard) else heard
-        memory.ranges = heard
-        free = free_ahead(ranges, scan.azimuths(), self.radius, self.margin)
-        roomier = roomier_side(ranges, scan.azimuths())
-        room = (free - self.stop_at) / (self.slow_at - self.stop_at)
-        speed, turning, memory.side = wandering(room, roomier, memory.side)
-        return self.Out(command=Command(self.speed * speed, self.turning * turning))
+    def step(self, ctx: Context, scan: Scan, state: WallAvoiderState) -> Out:
+        """The command for this ring of ranges."""
+        present = np.minimum(scan.ranges, scan.farthest)
+        ranges = np.minimum(present, state.ranges) if len(state.ranges) == len(present) else present
+        state.ranges = present
+        free = free_ahead(ranges, scan.azimuths(), self.robot_radius_m, self.margin_m)
+        room = (free - self.stop_distance_m) / (self.slow_distance_m - self.stop_distance_m)
+        speed, turning, state.side = wandering(room, roomier_side(ranges, scan.azimuths()), state.side)
+        return self.Out(command=Command(self.max_speed * speed, self.max_angular_speed * turning))
 
 
 def wandering(room: float, roomier: float, side: int) -> tuple[float, float, int]:
-    """Shares of the greatest speed and turning with which to wander, and the side to which it turns away.
+    """Shares of the largest speed and angular speed with which to wander, and the side to which the robot turns away.
 
-    `room`: the free way ahead, 0 where it must stop, 1 where it need not turn yet. `roomier`: see `roomier_side`.
-    `side`: the one of the tick before, 1 left, -1 right, 0 undecided.
+    `room`: the free distance ahead, 0 where it must stop, 1 where it need not turn yet. `roomier`: see `roomier_side`.
+    `side`: that of the tick before, 1 left, -1 right, 0 undecided.
     """
     if room > 1.0:
         return 1.0, 0.5 * math.tanh(roomier), 0

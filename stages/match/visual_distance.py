@@ -8,32 +8,36 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.visual_distance import (
-    Matching,
-    Measure,
-    Ready,
-    colours_apart,
+    ComparisonOptions,
+    ViewFeatures,
+    colour_distances,
     compare,
-    made_ready,
 )
-from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, VerticalSegments
+from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, VerticalSegments, view_features
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
 
 
 class MatchPlaces(Stage):
-    """Visual distance to every place of a map: colours of the whole first, local features where these leave it open.
+    """Visual distance to every place of a map: global colours first, local features where these leave it open.
 
-    Goedeme et al. 2007, section 4.2: equations 3 and 4 as erratum 27 reads them, against each place's medoid; inf where
-    the views' colours lie further apart than `colour` or fewer than `least_matches` features match. Parameters mean
-    what they mean in mapping (`mapping.topological`). Raises BadInput where the map's descriptors are others.
+    Goedemé et al. 2007, section 4.2: equations 3 and 4 (erratum 27) against each place's medoid. The distance is inf
+    where the global colours differ too much or too few features match. Raises BadInput where the map's descriptors
+    are of another kind.
     """
 
-    colour: Annotated[float, Bounds(gt=0)] = 0.5
+    max_global_distance: Annotated[float, Bounds(gt=0)] = 0.5
+    """Between the global colours of two views (Euclidean, of three correlations)."""
     ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
-    column_ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
-    patch_colour: Annotated[float, Bounds(gt=0)] = 0.5
-    least_matches: Annotated[int, Bounds(ge=2)] = 8
-    least_angle_deg: Annotated[float, Bounds(ge=0)] = 0.5
+    """Of a match's distance to that of the second nearest of either patch."""
+    segment_ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
+    """The same of vertical segments."""
+    max_colour_distance: Annotated[float, Bounds(gt=0)] = 0.5
+    """Between the colours of two patches (Euclidean, of three correlations)."""
+    min_matches: Annotated[int, Bounds(ge=2)] = 8
+    """With fewer two views have nothing in common."""
+    min_angle_deg: Annotated[float, Bounds(ge=0)] = 0.5
+    """Smallest mean angle between matches that counts."""
 
     class Out(Outputs):
         """How far each place is."""
@@ -43,7 +47,7 @@ class MatchPlaces(Stage):
     def setup(self, ctx: Context) -> None:
         """No map yet."""
         self._map: TopologicalMap | None = None
-        self._places: list[Ready] = []
+        self._places: list[ViewFeatures] = []
 
     def step(
         self,
@@ -55,26 +59,27 @@ class MatchPlaces(Stage):
     ) -> Out:
         """Compare one view with all places."""
         if self._map is not map:
-            self._places = [self._ready(map, int(view)) for view in map.places]
+            self._places = [map.views.view_features(int(view)) for view in map.places]
             self._map = map
         if len(features) and features.descriptors.shape[1] != map.views.descriptors.shape[1]:
             raise BadInput(
                 f"match: descriptors of {features.descriptors.shape[1]} numbers against a map of "
                 f"{map.views.descriptors.shape[1]}; use the features it was made with, or make it anew"
             )
-        here = made_ready(features, vertical_segments)
-        matching = Matching(self.ratio, self.column_ratio, self.patch_colour)
-        measure = Measure(self.least_matches, math.radians(self.least_angle_deg))
-        near = colours_apart(map.views.moments[map.places], descriptor.values) <= self.colour
+        here = view_features(features, vertical_segments)
+        options = ComparisonOptions(
+            self.ratio,
+            self.segment_ratio,
+            self.max_colour_distance,
+            min_matches=self.min_matches,
+            min_angle=math.radians(self.min_angle_deg),
+        )
+        close = colour_distances(map.views.moments[map.places], descriptor.values) <= self.max_global_distance
         distances, turns = np.full(len(map), math.inf), np.zeros(len(map))
         matches = np.zeros(len(map), np.int64)
-        for place in np.flatnonzero(near):
-            found = compare(self._places[place], here, matching, measure)
+        for place in np.flatnonzero(close):
+            found = compare(self._places[place], here, options)
             distances[place], turns[place], matches[place] = found.distance, found.turn, found.matches
         if not np.isfinite(distances).any():
-            ctx.count("nothing_in_common", detail="match: a picture that has too little in common with every place")
+            ctx.count("nothing_in_common", detail="match: an image that has too little in common with every place")
         return self.Out(distances=VisualDistances(distances, turns, matches))
-
-    def _ready(self, map: TopologicalMap, view: int) -> Ready:
-        beside = map.views.columns(view)
-        return made_ready(map.views.features(view), beside if len(beside) else None)

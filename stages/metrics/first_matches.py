@@ -12,7 +12,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, one_way_matches
-from omninav.stages.geometry.appearance.visual_distance import Matching, match_patches
+from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.true_matches import Motion, angles_between, right_by_depth, right_by_epipolar
 from omninav.stages.values.depths import Depths
@@ -117,7 +117,9 @@ class FirstMatches(Stage):
 
     def _patches(self, one: LocalFeatures, other: LocalFeatures) -> Pairs:
         if self.search == "both_ways":
-            return match_patches(one, other, Matching(self.ratio, colour=self.colour))
+            return match_patches(
+                one.patches(), other.patches(), ComparisonOptions(self.ratio, max_colour_distance=self.colour)
+            )
         if not len(one) or not len(other):
             return NO_PAIRS
         pairs = one_way_matches(one.descriptors, other.descriptors, self.ratio)

@@ -1,13 +1,14 @@
-"""What is kept of a view to find it again from elsewhere: local features, columns, and its colours as a whole.
+"""What is kept of a view to find it again from elsewhere: local features, vertical segments, and a global descriptor.
 
-They are three values and not one: homing needs the local features alone, each can be exchanged for another by one wire,
-and one that is not wired is not there.
+They are three values: homing needs the local features alone, each can be replaced by one wire, and one that is not
+wired is absent.
 """
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
+from omninav.stages.geometry.appearance.visual_distance import Patches, Segments, ViewFeatures, patches
 
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
@@ -37,6 +38,10 @@ class LocalFeatures(Value):
         return LocalFeatures(
             self.bearings[rows], self.points[rows], self.descriptors[rows], self.colours[rows], self.sizes[rows]
         )
+
+    def patches(self) -> Patches:
+        """What they are matched by."""
+        return patches(self.descriptors, self.colours, self.bearings)
 
 
 class VerticalSegments(Value):
@@ -74,3 +79,11 @@ class GlobalDescriptor(Value):
     """The colours of a whole view. `values` (3,) float32: correlations as in `LocalFeatures`, over all of it."""
 
     values: Floats
+
+
+def view_features(features: LocalFeatures | None, segments: VerticalSegments | None) -> ViewFeatures:
+    """A view prepared for comparison with others."""
+    return ViewFeatures(
+        None if features is None else features.patches(),
+        None if segments is None else Segments(segments.descriptors, segments.azimuths),
+    )

@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
+from omninav.stages.geometry.appearance.visual_distance import ViewFeatures
 
-from .local_features import GlobalDescriptor, LocalFeatures, VerticalSegments
+from .local_features import GlobalDescriptor, LocalFeatures, VerticalSegments, view_features
 from .pose import PoseSource
 
 Array = npt.NDArray[np.float64]
@@ -72,6 +73,11 @@ class StoredViews(Value):
             self.column_weights[rows].astype(np.float32),
             np.full((len(angles), 2, 2), np.nan),
         )
+
+    def view_features(self, view: int) -> ViewFeatures:
+        """A view prepared for comparison with others."""
+        segments = self.columns(view)
+        return view_features(self.features(view), segments if len(segments) else None)
 
     def global_moments(self, view: int) -> GlobalDescriptor:
         """The colours of a view as a whole."""

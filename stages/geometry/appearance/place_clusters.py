@@ -1,5 +1,6 @@
-"""Places along a drive, by visual distance alone: clusters, their parts along the drive, and what stands for them."""
+"""Places along a drive, by visual distance alone: clusters, their parts along the drive, and their medoids."""
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -37,7 +38,7 @@ def complete_linkage(distances: Array, size: float) -> Ints:
 
 
 def groups(number: int, pairs: Ints) -> Ints:
-    """What hangs together (number,) by `pairs` (M, 2), numbered in order."""
+    """Connected components (number,) of the graph with edges `pairs` (M, 2), numbered in order."""
     ones = np.ones(len(pairs))
     graph: Any = coo_matrix(  # type: ignore[no-untyped-call]
         (ones, (pairs[:, 0], pairs[:, 1])), shape=(number, number)
@@ -45,15 +46,15 @@ def groups(number: int, pairs: Ints) -> Ints:
     return renumbered(connected_components(graph, directed=False)[1])
 
 
-def subclusters(cluster: Ints, tour: Ints, skipped: int = 0) -> Ints:
+def subclusters(cluster: Ints, tour: Ints, max_gap: int = 0) -> Ints:
     """Parts (N,) of clusters that the drive passed through without leaving them (section 4.4.2), in the drive's order.
 
-    `tour` (N,): views of different tours were not driven one after the other. Up to `skipped` views in between may
+    `tour` (N,): views of different tours were not driven one after the other. Up to `max_gap` views in between may
     belong elsewhere.
     """
     number = len(cluster)
     rows = []
-    for step in range(1, skipped + 2):
+    for step in range(1, max_gap + 2):
         first = np.arange(max(number - step, 0))
         same = (cluster[first] == cluster[first + step]) & (tour[first] == tour[first + step])
         rows.append(np.column_stack([first[same], first[same] + step]))
@@ -61,9 +62,33 @@ def subclusters(cluster: Ints, tour: Ints, skipped: int = 0) -> Ints:
 
 
 def medoid(distances: Array, rows: Ints) -> int:
-    """The one of some views that is least far from the others, the first of several."""
-    apart = np.minimum(distances[np.ix_(rows, rows)], 1e6)  # views of one place need not have anything in common
-    return int(rows[np.argmin(apart.sum(axis=1))])
+    """The view with the least sum of distances to the others, the first of several."""
+    gaps = np.minimum(distances[np.ix_(rows, rows)], 1e6)  # views of one place need not have anything in common
+    return int(rows[np.argmin(gaps.sum(axis=1))])
+
+
+def medoids(distances: Array, labels: Ints) -> Ints:
+    """The medoid of each group of views: (G,)."""
+    return np.array([medoid(distances, np.flatnonzero(labels == label)) for label in range(int(labels.max()) + 1)])
+
+
+def nearest_views(distances: Array, subcluster: Ints, pairs: Ints) -> Ints:
+    """Of each two subclusters (H, 2) the two views, one of each, with the least distance: (H, 2)."""
+    members = [np.flatnonzero(subcluster == number) for number in range(int(subcluster.max()) + 1)]
+    nearest = np.empty((len(pairs), 2), np.int64)
+    for row, (one, other) in enumerate(pairs):
+        between = distances[np.ix_(members[one], members[other])]
+        first, second = np.unravel_index(int(between.argmin()), between.shape)
+        nearest[row] = members[one][first], members[other][second]
+    return nearest
+
+
+def rms_within(distances: Array, labels: Ints) -> float:
+    """Root mean square of the finite distances within groups; 1 without any."""
+    inside = distances[np.triu(labels[:, None] == labels[None], 1)]
+    inside = inside[np.isfinite(inside)]
+    spread = math.sqrt(float(np.mean(inside**2))) if len(inside) else 0.0
+    return spread if spread > 0.0 else 1.0
 
 
 class Hypotheses(NamedTuple):
@@ -85,7 +110,7 @@ def hypotheses(cluster: Ints, subcluster: Ints, medoids: Ints) -> Hypotheses:
 
 
 def between_hypotheses(medoids: Ints, frames: Ints) -> Array:
-    """Distances (H, H) between hypotheses, d_H of equation 8: the sum of their views', in pictures of the drive.
+    """Distances (H, H) between hypotheses, d_H of equation 8: the sum of their views', in views of the drive.
 
     `medoids` (H, 2): views; `frames` (N,): their numbers along the drive. Views are paired in the order that is nearer.
     """
@@ -95,19 +120,19 @@ def between_hypotheses(medoids: Ints, frames: Ints) -> Array:
     return either
 
 
-def path_images(matches: Callable[[int, int], int], way: Ints, least: int, most: int) -> Ints:
-    """As few of the views of a way as lead along it: each has `least` matches with the one before, where that can be.
+def path_images(matches: Callable[[int, int], int], way: Ints, min_matches: int, max_step: int) -> Ints:
+    """The fewest views of a way that lead along it, each with `min_matches` with the one before, where that is possible.
 
     `matches`: of one view with another one further along. `way`: views in the order of the drive; the first and the
-    last are given and are not part of the answer. No two are more than `most` views apart, however alike they look:
-    along a wall that repeats itself that says nothing.
+    last are given and are not part of the answer. No two are more than `max_step` views apart, however similar: along
+    a wall that repeats itself similarity says nothing.
     """
     views = way.tolist()
     chosen: list[int] = []
     at = 0
     while at < len(views) - 1:
-        ahead = range(min(at + most, len(views) - 1), at, -1)
-        at = next((view for view in ahead if matches(views[at], views[view]) >= least), at + 1)
+        ahead = range(min(at + max_step, len(views) - 1), at, -1)
+        at = next((view for view in ahead if matches(views[at], views[view]) >= min_matches), at + 1)
         if at < len(views) - 1:
             chosen.append(views[at])
     return np.array(chosen, np.int64)

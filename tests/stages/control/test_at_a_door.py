@@ -7,6 +7,7 @@ import numpy as np
 
 from omninav.pipeline import Context
 from omninav.stages.control.follow_homing import FollowHoming, FollowHomingState
+from omninav.stages.control.stall_monitor import StallMonitor, StallMonitorState
 from omninav.stages.simulator.config import Day, Door, Room, mirror
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.source.closed_loop import ClosedLoop, ClosedLoopState
@@ -31,14 +32,16 @@ def vector(here: Pose) -> HomingVector:
 
 def drive(day: int, ticks: int) -> list[tuple[ClosedLoop.Out, FollowHoming.Out]]:
     source, driving = ClosedLoop(world=WORLD, day=day, start=(1.5, 5.0, 0.0), seconds=60.0), FollowHoming()
-    simulation, patience, ctx = ClosedLoopState(), FollowHomingState(), Context("source", np.random.default_rng(0))
+    monitor, monitored = StallMonitor(), StallMonitorState()
+    simulation, state, ctx = ClosedLoopState(), FollowHomingState(), Context("source", np.random.default_rng(0))
     source.setup(ctx)
     progress = PathProgress(0, 0, 1, 0, last=True, docking=False, arrived=False)
     command, done = None, []
     for _ in range(ticks):
         seen = source.step(ctx, simulation, command)
         assert seen is not None
-        told = driving.step(Context("driving"), patience, vector(seen.truth), progress, seen.scan)
+        stalled = monitor.step(ctx, monitored, seen.tick, seen.scan, vector(seen.truth), progress).status
+        told = driving.step(Context("control"), state, seen.tick, vector(seen.truth), progress, seen.scan, stalled)
         command = told.command
         done.append((seen, told))
     return done

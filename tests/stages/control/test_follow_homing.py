@@ -5,9 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from omninav.pipeline import Context
-from omninav.stages.control.clearance import free_ahead, way_through
+from omninav.pipeline import Context, Tick
+from omninav.stages.control.clearance import free_ahead, free_direction
 from omninav.stages.control.follow_homing import FollowHoming, FollowHomingState
+from omninav.stages.control.stall_monitor import StallMonitor, StallMonitorState
+from omninav.stages.control.wall_avoider import WallAvoider, WallAvoiderState
 from omninav.stages.values.homing import HomingVector, PathProgress
 from omninav.stages.values.scan import Scan
 
@@ -30,8 +32,27 @@ def scan(*blocks: tuple[float, float, float]) -> Scan:
     return Scan(ranges, -math.pi, math.radians(2.0), 0.05, 8.0)
 
 
-def drive(said, at=None, ring=None, patience: FollowHomingState | None = None, **parameters) -> FollowHoming.Out:
-    return FollowHoming(**parameters).step(Context("driving"), patience or FollowHomingState(), said, at, ring)
+class Robot:
+    """The stages of driving, wired as in the variants, at five ticks a second."""
+
+    def __init__(self, detour_s=10.0, stalled_after_s=30.0, wander_after_s=5.0, wanders=False) -> None:
+        self.monitor = StallMonitor(detour_s=detour_s, stalled_after_s=stalled_after_s)
+        self.follow, self.wanders = FollowHoming(wander_after_s=wander_after_s), wanders
+        self.monitored, self.followed, self.wandered = StallMonitorState(), FollowHomingState(), WallAvoiderState()
+        self.ticks = 0
+
+    def drive(self, vector, at=None, ring=None) -> FollowHoming.Out:
+        tick, ctx = Tick(self.ticks, 10**15 + self.ticks * 200_000_000), Context("control")
+        self.ticks += 1
+        stalled = wander = None
+        if ring is not None:
+            stalled = self.monitor.step(ctx, self.monitored, tick, ring, vector, at).status
+            wander = WallAvoider().step(ctx, ring, self.wandered).command if self.wanders else None
+        return self.follow.step(ctx, self.followed, tick, vector, at, ring, stalled, wander)
+
+
+def drive(said, at=None, ring=None) -> FollowHoming.Out:
+    return Robot().drive(said, at, ring)
 
 
 def test_it_drives_where_the_vector_points_within_its_limits() -> None:
@@ -71,71 +92,74 @@ def test_around_what_stands_in_the_way() -> None:
 def test_the_way_through_is_the_free_direction_closest_to_the_wanted_one() -> None:
     ring = scan((-4.0, 12.0, 0.6))
     ranges = np.minimum(ring.ranges, 8.0)
-    at = way_through(ranges, ring.azimuths(), 0.0, 0.8, 0.25, 0.1)
+    at = free_direction(ranges, ring.azimuths(), 0.0, 0.8, 0.25, 0.1)
     assert at is not None
     assert free_ahead(ranges, ring.azimuths() - at, 0.25, 0.1) >= 0.8
     nearer = np.arange(-abs(at) + 0.1, abs(at) - 0.01, math.radians(5.0))
     assert all(free_ahead(ranges, ring.azimuths() - other, 0.25, 0.1) < 0.8 for other in nearer)
-    assert way_through(np.full(180, 0.4), ring.azimuths(), 0.0, 0.8, 0.25, 0.1) is None
+    assert free_direction(np.full(180, 0.4), ring.azimuths(), 0.0, 0.8, 0.25, 0.1) is None
 
 
 def test_a_blocked_way_stops_it_at_once_and_is_said_when_it_stays_so() -> None:
-    patience, closed = FollowHomingState(), scan((-180.0, 180.0, 0.4))
+    robot, closed = Robot(), scan((-180.0, 180.0, 0.4))
     states = []
     for _ in range(12):
-        out = drive(vector(0.0), progress(), closed, patience)
+        out = robot.drive(vector(0.0), progress(), closed)
         assert (out.command.speed, out.command.turning) == (0.0, 0.0)
         states.append(out.status.state)
     assert states == ["driving"] * 10 + ["blocked"] * 2
     assert out.status.why == "nothing is free for 0.8 m towards the target"
-    assert drive(vector(0.0), progress(), scan(), patience).command.speed == 0.4
+    assert robot.drive(vector(0.0), progress(), scan()).command.speed == 0.4
 
 
 def test_before_a_closed_door_it_goes_from_side_to_side_only_for_so_long() -> None:
     # The target lies 1 m ahead, behind a wall that is free to the left and to the right: a way to everywhere but there.
-    patience, wall = FollowHomingState(), scan((-50.0, 50.0, 0.5))
-    said = [drive(vector(0.0, metres=1.0), progress(), wall, patience, detour=20) for _ in range(23)]
+    robot, wall = Robot(detour_s=4.0), scan((-50.0, 50.0, 0.5))
+    said = [robot.drive(vector(0.0, metres=1.0), progress(), wall) for _ in range(23)]
     assert {out.status.state for out in said[:21]} == {"driving"}
     assert all(out.command.turning for out in said[:21])
     assert (said[-1].status.state, said[-1].command.speed, said[-1].command.turning) == ("blocked", 0.0, 0.0)
-    assert said[-1].status.why == "something stands in the way, and going around it for 20 ticks led no closer"
-    another = drive(HomingVector(1, 0.0, 0.0, 1.0, 1.0, 0.3, 1.0, 20, "new"), progress(), wall, patience, detour=20)
+    assert said[-1].status.why == "something stands in the way, and going around it for 4 s led no closer"
+    another = robot.drive(HomingVector(1, 0.0, 0.0, 1.0, 1.0, 0.3, 1.0, 20, "new"), progress(), wall)
     assert another.status.state == "driving"
 
 
 def test_who_comes_closer_on_the_way_around_is_not_blocked() -> None:
-    patience, wall = FollowHomingState(), scan((-50.0, 50.0, 0.5))
+    robot, wall = Robot(detour_s=2.0), scan((-50.0, 50.0, 0.5))
     ratios = 0.95 ** np.arange(40)
-    said = [drive(vector(0.0, ratio, metres=ratio), progress(), wall, patience, detour=10) for ratio in ratios]
+    said = [robot.drive(vector(0.0, ratio, metres=ratio), progress(), wall) for ratio in ratios]
     assert {out.status.state for out in said} == {"driving"}
 
 
 def test_if_nothing_else_is_planned_it_tries_again_after_a_while() -> None:
-    patience, wall = FollowHomingState(), scan((-50.0, 50.0, 0.5))
-    said = [drive(vector(0.0, metres=1.0), progress(), wall, patience, detour=20) for _ in range(80)]
+    robot, wall = Robot(detour_s=4.0), scan((-50.0, 50.0, 0.5))
+    said = [robot.drive(vector(0.0, metres=1.0), progress(), wall) for _ in range(80)]
     states = [out.status.state for out in said]
     assert states == ["driving"] * 21 + ["blocked"] * 20 + ["driving"] * 21 + ["blocked"] * 18
 
 
 def test_neither_may_it_turn_and_turn_in_the_open_for_ever() -> None:
-    patience = FollowHomingState()
-    said = [drive(vector(3.0), progress(), scan(), patience, idle=30) for _ in range(33)]
+    robot = Robot(stalled_after_s=6.0)
+    said = [robot.drive(vector(3.0), progress(), scan()) for _ in range(33)]
     assert [out.status.state for out in said] == ["driving"] * 31 + ["blocked"] * 2
-    assert said[-1].status.why == "30 ticks have led no closer"
+    assert said[-1].status.why == "6 s have led no closer"
 
 
 def test_who_is_lost_for_long_wanders_until_the_target_is_seen() -> None:
-    patience = FollowHomingState()
+    robot = Robot(wander_after_s=1.0, wanders=True)
     lost = vector(state="lost", why="2 of 9 matches agree")
-    said = [drive(lost, progress(), scan((-20.0, 0.0, 0.6)), patience, restless=5) for _ in range(7)]
+    said = [robot.drive(lost, progress(), scan((-20.0, 0.0, 0.6))) for _ in range(7)]
     assert [(out.command.speed, out.command.turning) for out in said[:5]] == [(0.0, 0.0)] * 5
     assert said[-1].command.turning > 0.0  # away from what stands ahead, a little to the right
     assert (said[-1].status.state, said[-1].status.why) == ("lost", "it looks about: 2 of 9 matches agree")
-    assert drive(vector(), progress(), scan(), patience).status.state == "driving"
-    patient = [drive(lost, progress(), scan(), patience) for _ in range(60)]
-    assert {(out.command.speed, out.command.turning) for out in patient} == {(0.0, 0.0)}
-    blind = [drive(lost, progress(), None, patience, restless=5) for _ in range(7)]
-    assert blind[-1].command.turning == 0.0
+    assert robot.drive(vector(), progress(), scan()).status.state == "driving"
+
+
+def test_a_lost_robot_stands_where_no_wander_command_is_wired() -> None:
+    robot = Robot(wander_after_s=1.0)
+    lost = vector(state="lost", why="2 of 9 matches agree")
+    said = [robot.drive(lost, progress(), scan()) for _ in range(60)]
+    assert {(out.command.speed, out.command.turning) for out in said} == {(0.0, 0.0)}
 
 
 def test_a_target_close_before_a_wall_can_be_reached() -> None:
@@ -151,9 +175,9 @@ def test_through_a_door_that_is_hardly_wide_enough_it_goes_slowly() -> None:
 
 
 def test_a_lost_target_is_followed_a_little_where_metres_are_known_and_then_it_stands() -> None:
-    patience = FollowHomingState()
+    robot = Robot()
     lost = vector(0.0, state="lost", metres=1.0, why="2 of 9 matches agree")
-    speeds = [drive(lost, progress(), scan(), patience) for _ in range(12)]
+    speeds = [robot.drive(lost, progress(), scan()) for _ in range(12)]
     assert [out.command.speed > 0.0 for out in speeds] == [True] * 10 + [False] * 2
     assert (speeds[-1].status.state, speeds[-1].status.why) == ("lost", "2 of 9 matches agree")
     unknown = drive(vector(0.0, state="lost", why="none"), progress(), scan())

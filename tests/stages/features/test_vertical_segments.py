@@ -16,7 +16,7 @@ from omninav.stages.features.vertical_segments import (
     prototypes,
     segments_of,
 )
-from omninav.stages.geometry.appearance.visual_distance import Matching, match_columns
+from omninav.stages.geometry.appearance.feature_matching import mahalanobis_matches
 from omninav.stages.values.image import Image, Panorama
 from omninav.stages.values.local_features import VerticalSegments
 
@@ -66,7 +66,7 @@ def test_a_descriptor_does_not_change_with_the_light() -> None:
 @pytest.mark.parametrize("turn", [0.7, 2.9])
 def test_a_robot_that_turns_sees_the_same_segments_turned_the_other_way(kind: str, turn: float) -> None:
     one, other = found(look(kind, 0.0)), found(look(kind, turn))
-    pairs = match_columns(one, other, Matching(column_ratio=0.8))
+    pairs = mahalanobis_matches(one.descriptors, other.descriptors, 0.8)
     off = np.abs(wrapped(other.azimuths[pairs.second] - one.azimuths[pairs.first] + turn))
     assert len(off) > 60
     assert (off < math.radians(4.0)).mean() > 0.85

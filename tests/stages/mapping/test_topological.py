@@ -20,7 +20,7 @@ from omninav.stages.geometry.appearance.place_clusters import (
     path_images,
     subclusters,
 )
-from omninav.stages.geometry.appearance.visual_distance import Matching, match_patches
+from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
 from omninav.stages.geometry.probability.dempster_shafer import support
 from omninav.stages.mapping.topological import with_names
 from omninav.stages.match.visual_distance import MatchPlaces
@@ -66,7 +66,7 @@ def test_a_cluster_falls_into_the_parts_that_the_drive_did_not_leave() -> None:
     cluster = np.array([0, 0, 1, 0, 0, 1, 1, 1])
     tour = np.array([0, 0, 0, 0, 0, 0, 1, 1])
     assert subclusters(cluster, tour).tolist() == [0, 0, 1, 2, 2, 3, 4, 4]
-    assert subclusters(cluster, tour, skipped=1).tolist() == [0, 0, 1, 0, 0, 2, 3, 3]
+    assert subclusters(cluster, tour, max_gap=1).tolist() == [0, 0, 1, 0, 0, 2, 3, 3]
 
 
 def test_every_two_parts_of_a_cluster_are_a_hypothesis() -> None:
@@ -115,7 +115,7 @@ def test_a_ring_driven_once_is_a_ring_of_places(once: tuple[TopologicalMap, Loop
         way = [int(view) for view in (made.places[one], *made.way(link), made.places[other])]
         for here, there in itertools.pairwise(way):
             seen = [WORLD.seen(Pose(*(float(number) for number in made.poses[view]))) for view in (here, there)]
-            found = len(match_patches(*seen, Matching()).first)
+            found = len(match_patches(*(view.patches() for view in seen), ComparisonOptions()).first)
             assert found >= 20 or abs(made.frames[here] - made.frames[there]) == 1
 
 
@@ -167,7 +167,7 @@ def test_a_view_is_kept_small_and_can_still_be_matched(once: tuple[TopologicalMa
         view = int(made.places[place])
         pose = Pose(*(float(number) for number in made.poses[view]))
         kept, seen = made.views.features(view), WORLD.seen(pose)
-        pairs = match_patches(kept, seen, Matching())
+        pairs = match_patches(kept.patches(), seen.patches(), ComparisonOptions())
         assert len(pairs.first) == len(kept) <= 80
         apart = np.arccos(np.clip((kept.bearings[pairs.first] * seen.bearings[pairs.second]).sum(axis=1), -1.0, 1.0))
         assert apart.max() < math.radians(0.01)
@@ -228,7 +228,7 @@ def test_the_reach_of_evidence_is_counted_in_pictures_that_take_part() -> None:
 
 
 def test_an_isolated_hypothesis_is_not_accepted_however_alike_its_views_are() -> None:
-    found = mapped(WORLD, [along(SQUARE + SQUARE[1:], 1.2)], reach=0.1).hypotheses
+    found = mapped(WORLD, [along(SQUARE + SQUARE[1:], 1.2)], neighbour_distance=0.1).hypotheses
     assert (support(found.masses) > 0.5).any()
     assert not found.accepted.any()
 
@@ -245,7 +245,7 @@ def test_poses_are_the_tours_truth_or_its_odometry_and_say_which() -> None:
     assert known.pose_source == "odometry"
     with pytest.raises(BadInput, match="no frame in common"):
         mapped(WORLD, [tour], known=known)
-    with pytest.raises(BadInput, match=r"nodes\.mapping\.supervised=auto"):
+    with pytest.raises(BadInput, match=r"nodes\.views\.supervised=auto"):
         mapped(WORLD, [tour], truth=False, supervised="truth")
 
 

@@ -15,15 +15,13 @@ from omninav.stages.geometry.appearance.feature_matching import (
     tree_matches,
 )
 from omninav.stages.geometry.appearance.visual_distance import (
-    Matching,
-    Measure,
-    Ready,
+    ComparisonOptions,
+    ViewFeatures,
     alignment,
     compare,
     local_distance,
-    made_ready,
 )
-from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.local_features import LocalFeatures, view_features
 
 
 def by_hand(squares: np.ndarray, ratio: float) -> set[tuple[int, int]]:
@@ -90,15 +88,15 @@ def test_elements_count_by_their_spread_and_one_that_never_varies_not_at_all() -
 
 def test_the_measure_is_equation_4_worked_by_hand() -> None:
     angles = np.array([0.3, 0.5, 0.3, 0.5])  # aligned by 0.4: 0.1 rad left on average
-    distance, turn = local_distance(angles, 30, 50, Measure(least_matches=2, least_angle=0.0))
+    distance, turn = local_distance(angles, 30, 50, ComparisonOptions(min_matches=2, min_angle=0.0))
     assert distance == pytest.approx((30 + 50) * 0.4 / (2.0 * math.pi) / (2 * 4**2))
     assert turn == pytest.approx(0.4)
 
 
 def test_one_match_is_no_perfect_match_and_none_is_infinitely_far() -> None:
-    measure = Measure(least_matches=3, least_angle=0.01)
+    measure = ComparisonOptions(min_matches=3, min_angle=0.01)
     assert local_distance(np.array([0.2, 0.2]), 10, 10, measure)[0] == math.inf
-    assert local_distance(np.empty(0), 10, 10, Measure(0, 0.01))[0] == math.inf
+    assert local_distance(np.empty(0), 10, 10, ComparisonOptions(min_matches=0, min_angle=0.01))[0] == math.inf
     assert local_distance(np.full(4, 0.2), 8, 8, measure)[0] == pytest.approx(
         2 * 4 / 4 * 0.01 / (2.0 * math.pi)
     )  # the floor of the angle
@@ -110,19 +108,19 @@ def test_alignment_goes_around_the_circle() -> None:
     assert sorted(left) == pytest.approx([-0.2, 0.2])
 
 
-def ready(azimuths: np.ndarray, seed: int = 0) -> Ready:
+def ready(azimuths: np.ndarray, seed: int = 0) -> ViewFeatures:
     number = len(azimuths)
     bearings = np.stack([np.cos(azimuths), np.sin(azimuths), np.zeros(number)], axis=-1)
     looks = np.random.default_rng(seed).integers(0, 120, (number, 128), dtype=np.uint8)
     grey = np.zeros((number, 3), np.float32)
     patches = LocalFeatures(bearings, np.zeros((number, 2)), looks, grey, np.ones(number, np.float32))
-    return made_ready(patches, None)
+    return view_features(patches, None)
 
 
 @given(st.floats(-3.1, 3.1))
 def test_a_robot_turned_on_the_spot_is_at_no_distance_and_its_turn_is_told(turn: float) -> None:
     around = np.linspace(-3.0, 3.0, 40)
-    compared = compare(ready(around), ready(around - turn), Matching(), Measure(8, 0.0))
+    compared = compare(ready(around), ready(around - turn), ComparisonOptions(min_angle=0.0))
     assert compared.matches == 40
     assert compared.distance == pytest.approx(0.0, abs=1e-6)
     assert math.cos(compared.turn - turn) == pytest.approx(1.0)
@@ -132,8 +130,8 @@ def test_colours_part_what_looks_alike_in_grey() -> None:
     around = np.linspace(-3.0, 3.0, 20)
     one, other = ready(around), ready(around)
     other.patches.colours[::2] = 0.9
-    assert compare(one, other, Matching(), Measure()).matches == 10
-    assert compare(one, other, Matching(colour=9.0), Measure()).matches == 20
-    assert compare(one, other, Matching(search="kd_tree"), Measure()).matches == 10
-    assert compare(one, made_ready(None, None), Matching(), Measure()).distance == math.inf
+    assert compare(one, other, ComparisonOptions()).matches == 10
+    assert compare(one, other, ComparisonOptions(max_colour_distance=9.0)).matches == 20
+    assert compare(one, other, ComparisonOptions(search="kd_tree")).matches == 10
+    assert compare(one, view_features(None, None), ComparisonOptions()).distance == math.inf
     assert matching.NO_PAIRS.first.size == 0

@@ -1,0 +1,93 @@
+"""Notices that a robot comes no closer to its target."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
+from omninav.stages.values.homing import DrivingStatus, HomingVector, PathProgress
+from omninav.stages.values.scan import Scan
+
+from .clearance import free_ahead
+
+CLOSER = 0.9
+"""Share of the smallest distance so far that counts as having come closer."""
+NARROW_MARGIN = 0.2
+"""Share of the margin with which a direct way still counts as free."""
+
+
+class StallMonitorState(State):
+    """The target, the smallest ratio of the way to it that was left, and times (ns) since then.
+
+    `stalled`: in all; `detour`: in which something stood in the direct way; `blocked`: in which it was said to be
+    blocked. `stamp`: of the tick before.
+    """
+
+    target: int = -1
+    closest: float = math.inf
+    stalled: int = 0
+    detour: int = 0
+    blocked: int = 0
+    stamp: int = 0
+
+
+class StallMonitor(Stage):
+    """Says that the way is blocked where the robot has driven for long and come no closer to its target.
+
+    What stands in the direct way may be a closed door, around which there is no way. The robot is no longer blocked as
+    soon as it has another target, or after `detour_s`, so that it tries again if nobody plans anew. The time in which
+    the target is lost does not count.
+    """
+
+    robot_radius_m: Annotated[float, Bounds(gt=0)] = 0.25
+    """Of the robot's body."""
+    margin_m: Annotated[float, Bounds(ge=0)] = 0.1
+    """Room that the robot keeps on both sides."""
+    lookahead_m: Annotated[float, Bounds(gt=0)] = 0.8
+    """Free distance at which the direct way counts as free."""
+    detour_s: Annotated[float, Bounds(gt=0)] = 10.0
+    """Time around an obstacle that may lead no closer."""
+    stalled_after_s: Annotated[float, Bounds(gt=0)] = 30.0
+    """Time in all that may lead no closer."""
+
+    class Out(Outputs):
+        """`blocked`, with the reason; absent where nothing speaks against driving on."""
+
+        status: DrivingStatus | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        state: StallMonitorState,
+        tick: Tick,
+        scan: Scan,
+        vector: HomingVector | None = None,
+        progress: PathProgress | None = None,
+    ) -> Out:
+        """Look at one tick."""
+        elapsed, state.stamp = tick.stamp - state.stamp, tick.stamp
+        if vector is None or (progress is not None and (progress.docking or progress.arrived)):
+            return self.Out()
+        if vector.number != state.target or state.blocked >= self.detour_s * 1e9:
+            state.target, state.closest = vector.number, math.inf
+        if vector.ratio < CLOSER * state.closest:
+            state.closest, state.stalled, state.detour, state.blocked = vector.ratio, 0, 0, 0
+        elif vector.state != "lost":
+            state.stalled += elapsed
+            state.detour += elapsed if self._obstructed(vector, scan) else 0
+        why = ""
+        if state.detour > self.detour_s * 1e9:
+            why = f"something stands in the way, and going around it for {self.detour_s:g} s led no closer"
+        elif state.stalled > self.stalled_after_s * 1e9:
+            why = f"{self.stalled_after_s:g} s have led no closer"
+        if not why:
+            return self.Out()
+        state.blocked += elapsed
+        return self.Out(status=DrivingStatus("blocked", why))
+
+    def _obstructed(self, vector: HomingVector, scan: Scan) -> bool:
+        ranges = np.minimum(scan.ranges, scan.farthest)
+        left = self.lookahead_m if vector.metres is None else min(self.lookahead_m, vector.metres)
+        margin = NARROW_MARGIN * self.margin_m
+        return free_ahead(ranges, scan.azimuths() - vector.direction, self.robot_radius_m, margin) < left

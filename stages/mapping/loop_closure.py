@@ -1,0 +1,103 @@
+"""Places of a tour: clusters of views, and Dempster-Shafer evidence that two parts of the drive are one place."""
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.appearance import place_clusters
+from omninav.stages.geometry.probability import dempster_shafer
+from omninav.stages.values.compared_views import ComparedViews
+from omninav.stages.values.topological_map import LoopHypotheses
+
+Ints = npt.NDArray[np.int64]
+
+
+class LoopClosure(Stage):
+    """Groups views into places, and decides by evidence which parts of a drive are the same place.
+
+    Goedemé et al. 2007, section 4.4. Views that are all close to each other make a cluster; its parts along the drive
+    are subclusters, and each two subclusters of a cluster a hypothesis: they are one place. A hypothesis starts with
+    the similarity of the two views that stand for its subclusters (erratum 28), and neighbours along the drive add
+    evidence in one pass (erratum 31). It is accepted where its support is large enough and some neighbour has spoken:
+    nothing can be decided of an isolated one (section 4.4.3). Places of a known map stay together.
+    """
+
+    place_size: Annotated[float, Bounds(gt=0)] = 0.5
+    """Largest visual distance between two views of a cluster."""
+    max_gap: Annotated[int, Bounds(ge=0)] = 0
+    """Views in a row that may belong elsewhere, within a subcluster."""
+    between: Literal["nearest", "medoids"] = "nearest"
+    """Which views stand for two subclusters: the `nearest` two, or the paper's `medoids`, which lie apart where a drive
+    returns between its images."""
+    min_share: Annotated[float, Bounds(ge=0, le=1)] = 0.4
+    """Of the features that match, for two views to be similar: a wall that repeats itself matches exactly, but only on
+    one side of the robot."""
+    similarity: Literal["ratio", "exponential", "gaussian"] = "gaussian"
+    """How a visual distance becomes a similarity, scaled by the root mean square distance within subclusters."""
+    ignorance: Annotated[float, Bounds(ge=0.01, le=1)] = 0.25
+    """Of a hypothesis before its neighbours have spoken."""
+    neighbour_distance: Annotated[float, Bounds(gt=0)] = 20.0
+    """Views along the drive within which another hypothesis is a neighbour."""
+    min_support: Annotated[float, Bounds(ge=0, le=1)] = 0.5
+    """Support that an accepted hypothesis must exceed."""
+    accepted: Literal["merge", "link"] = "merge"
+    """Whether the subclusters of an accepted hypothesis become one place, or two that are linked."""
+
+    class Out(Outputs):
+        """The place of each view, and what became of each hypothesis."""
+
+        hypotheses: LoopHypotheses
+
+    def step(self, ctx: Context, views: ComparedViews) -> Out:
+        """The whole tour at once."""
+        distances, owners = views.distances, views.owners
+        cluster = place_clusters.complete_linkage(distances, self.place_size)
+        subcluster = subclusters_of(cluster, views, self.max_gap)
+        number = int(subcluster.max()) + 1
+        medoids = place_clusters.medoids(distances, subcluster)
+        found = place_clusters.hypotheses(cluster, subcluster, medoids)
+        known = owners[medoids]
+        open_ = (known[found.pairs] < 0).any(axis=1)  # two places of a known map are not questioned again
+        pairs, ends = found.pairs[open_], found.medoids[open_]
+        if self.between == "nearest":
+            ends = place_clusters.nearest_views(distances, subcluster, pairs)
+        apart = distances[ends[:, 0], ends[:, 1]]
+        enough = views.shares[ends[:, 0], ends[:, 1]] >= self.min_share
+        spread = place_clusters.rms_within(distances, subcluster)
+        similarity = dempster_shafer.similarity_of(np.where(enough, apart, math.inf), spread, self.similarity)
+        initial = dempster_shafer.masses(similarity, 1.0 - self.ignorance)
+        gaps = place_clusters.between_hypotheses(ends, views.orders)
+        masses = dempster_shafer.gather(initial, gaps, self.neighbour_distance)
+        informed = dempster_shafer.unknown(masses) < dempster_shafer.unknown(initial)
+        accepted = (dempster_shafer.support(masses) > self.min_support) & informed
+        joined = [pairs[accepted]] if self.accepted == "merge" else []
+        for place in range(int(known.max(initial=-1)) + 1):
+            parts = np.flatnonzero(known == place)
+            joined.append(np.column_stack([parts[:-1], parts[1:]]))
+        together = np.concatenate([np.zeros((0, 2), np.int64), *joined])
+        place_of_part = place_clusters.groups(number, together)
+        return self.Out(
+            hypotheses=LoopHypotheses(
+                poses=views.poses,
+                cluster=cluster,
+                subcluster=subcluster,
+                place=place_clusters.renumbered(place_of_part[subcluster]),
+                tour=views.tours,
+                pairs=ends,
+                apart=apart,
+                initial=initial,
+                masses=masses,
+                accepted=accepted,
+                pose_source=views.pose_source,
+            )
+        )
+
+
+def subclusters_of(cluster: Ints, views: ComparedViews, max_gap: int) -> Ints:
+    """Subclusters (N,) along the drive; of a known map's views those of one place and one cluster."""
+    along = place_clusters.subclusters(cluster, views.tours, max_gap)
+    known = len(cluster) + views.owners * (int(cluster.max()) + 1) + cluster
+    return place_clusters.renumbered(np.where(views.owners >= 0, known, along))
