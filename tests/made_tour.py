@@ -11,8 +11,8 @@ from omninav.stages.mapping.loop_closure import LoopClosure
 from omninav.stages.mapping.topological import TopologicalMapping
 from omninav.stages.mapping.view_comparison import ViewComparison
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
-from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
 from omninav.stages.values.pose import Pose
+from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
 
 
 class Landmarks:

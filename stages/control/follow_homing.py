@@ -27,7 +27,7 @@ class FollowHomingState(State):
 
 
 class FollowHoming(Stage):
-    """Turns towards the homing vector and drives around obstacles, slows down at the last view and turns to its heading.
+    """Turns towards the homing vector and drives around obstacles; docks at the last view.
 
     Goedemé et al. 2007, section 7.2.4. Without a `scan` nothing is taken to be in the way. A lost target is approached
     for a while where its distance in metres is known. Then the robot stands and is `lost`, or drives by the `wander`

@@ -121,7 +121,7 @@ def between_hypotheses(medoids: Ints, frames: Ints) -> Array:
 
 
 def path_images(matches: Callable[[int, int], int], way: Ints, min_matches: int, max_step: int) -> Ints:
-    """The fewest views of a way that lead along it, each with `min_matches` with the one before, where that is possible.
+    """The fewest views of a way along it, each with `min_matches` with the one before, where that is possible.
 
     `matches`: of one view with another one further along. `way`: views in the order of the drive; the first and the
     last are given and are not part of the answer. No two are more than `max_step` views apart, however similar: along
