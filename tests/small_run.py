@@ -94,8 +94,8 @@ def mixture_run(run: SmallRun) -> tuple[ViewMixtures, list[GaussianMixture], lis
         map.put_mixtures(np.array([0, 0]), start, covariances, np.array([share, 1 - share]), np.ones(2))
         removed = np.empty(0, np.int64)
         if number % 5 == 4:
-            removed = map.names[1:2].copy()
-            map.keep_views(map.names != removed[0])
+            removed = map.ids[1:2].copy()
+            map.keep_views(map.ids != removed[0])
         map.step()
         inserted, changed = np.array([number]), np.array([0])
         heaviest = int(share < 0.5)
@@ -104,5 +104,5 @@ def mixture_run(run: SmallRun) -> tuple[ViewMixtures, list[GaussianMixture], lis
         counts = len(map), len(map.weights)
         events.append(ViewEvent(*counts, inserted, inserted, removed, why, changed, weight, place, np.array([2])))
         fields = ("views", "kind", "names", "born", "owner", "means", "covariances", "weights", "counts")
-        after.append(ViewMixtures(*(getattr(map, name) for name in fields), map.steps, map.next_name, map.pose_source))
+        after.append(ViewMixtures(*(getattr(map, name) for name in fields), map.steps, map.next_id, map.pose_source))
     return map, beliefs, events, after

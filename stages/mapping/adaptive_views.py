@@ -1,4 +1,4 @@
-"""A map of views that follows what the robot sees: it learns places, trusts them more or less, and forgets them."""
+"""A map of views that adapts: it learns places, weights them by confirmation and forgets them."""
 
 from typing import Annotated, Literal
 
@@ -28,74 +28,81 @@ from .view_events import view_event
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
-UNMEASURED_M = 0.3
+DEFAULT_LENGTH_SCALE_M = 0.3
+"""Distance over which views are similar where the threshold does not tell."""
 Forgetting = Literal["active", "passive", "none"]
-Doubt = Literal["once", "again"]
+StateCovariance = Literal["first", "every_update"]
 Components = tuple[Array, Array, Array, Array]
 
 
 class AdaptiveViews(Stage):
-    """Learns views and the places they are seen from, with weights that grow where they fit and fade where they do not.
+    """Learns views and the poses they are seen from, with weights that grow by confirmation and fade otherwise.
 
-    Gross, Koenig & Mueller 2005, section 2.3, for each lesson (a view and the state in which it was seen):
+    Gross, Koenig & Mueller 2005, section 2.3, for each update (a view and the state in which it was seen):
 
-    1. A view whose distance to all kept ones is at or above the limit (E_max) is kept as a new one, with no place yet.
-    2. Views alike by S >= `least_similarity` take the state in as a new component, its heading turned to theirs
-       (erratum 12), with weight 0 and count S over the sum of S of all views (equation 11, erratum 6). Components
-       nearer than `merge_below` become one (equations 12 to 14, divided by the counts' sum: erratum 7), weights added
-       and capped at 1 (erratum 8). `doubt` says what the state's own covariance does to a component it merges with.
-    3. Weights of views nearer than the limit: w = beta S + (1 - beta S) w of components that fit the state, squared
+    1. A view at or above the novelty threshold (E_max) from all others is inserted as a new one, without components.
+    2. Views with a similarity S of at least `min_similarity` get the state as a new component, its heading turned to
+       theirs (erratum 12), with weight 0 and count S over the sum of S of all views (equation 11, erratum 6).
+       Components closer than `merge_below` are merged (equations 12 to 14, divided by the counts' sum: erratum 7),
+       weights added and capped at 1 (erratum 8).
+    3. Weights of views within the threshold: w = beta S + (1 - beta S) w of components that fit the state, at squared
        distance <= `fits_below` (equation 16); w = (1 - beta S) w of the others (17), unless `forgetting` is `none`.
-       With `forgetting: active`, components of all other views within `near_m` of the state: w = (1 - b) w with b =
-       beta_forget max(1 - distance / fade_m, 0) gain_m / (sigma_x + sigma_y), in [0, 1] (18, 19, errata 10 and 11).
-    4. Components below `least_weight` go, and views without any (erratum 9: after the weights have grown; checked to be
-       below beta least_similarity, so that none dies at birth). Above `max_views` (0: no limit) the weakest views go.
+       With `forgetting: active`, components of all other views near the state: w = (1 - b) w with b = beta_forget
+       max(1 - distance / forget_fade_m, 0) forget_gain_m / (sigma_x + sigma_y), in [0, 1] (18, 19, errata 10 and 11).
+    4. Components below `min_weight` are removed, and views without any (erratum 9: after the weights have grown).
 
-    MapUpdates wait until there is a limit, all but the first of a map.
-
-    `forgetting: passive` is the model of Porta & Kroese that Table 1 compares with. A state of several modes, which the
-    paper does not learn from, teaches each mode by its weight p: it is taken in where S p >= `least_similarity`, the
-    count is p times as much, and w = beta S p + (1 - beta S) w with p of all modes that fit. `least_m` and `least_deg`
-    are the least standard deviations with which a place is taken in: a view looks alike over some way. `near_m` and
-    `fade_m`: none is the way over which the limit says that views look alike (0.3 m where it does not say). `gain_m`:
-    none is twice that way, so that a state as uncertain as views look alike forgets at `beta_forget`.
-
-    `doubt: again` is equation 14 to the letter: each state adds its covariance to that of the component, which holds
-    the spread of the means already. But the state has most of its covariance from the same map, so that the map teaches
-    itself its own doubt, again and again: covariances grow without end, covariance intersection never takes any back,
-    and forgetting, which equation 19 divides by them, dies down. With `once` a place has the covariance of the first
-    state it was seen in, which fades as states confirm it: they add the spread of their means, and no more doubt of
-    their own than `least_m` and `least_deg` ("coding a stable and reliable estimation", section 2.2).
+    Updates wait until there is a threshold, all but a map's first. The paper does not learn from a state of several
+    modes. Here each mode of weight p updates the views with S p >= `min_similarity`, with p times the count, and w =
+    beta S p + (1 - beta S) w with p of all modes that fit.
     """
 
     shape: Shape = "linear"
+    """Similarity over distance: linear, quadratic (1 - d^2/E^2), cosine, or step (1 up to the threshold)."""
     forgetting: Forgetting = "active"
+    """`active`; `passive`, the model of Porta & Kroese that Table 1 compares with; or `none`."""
     beta: Annotated[float, Bounds(gt=0, le=1)] = 0.1
-    least_similarity: Annotated[float, Bounds(gt=0, le=1)] = 0.2
+    """Learning rate of the weights."""
+    min_similarity: Annotated[float, Bounds(gt=0, le=1)] = 0.2
+    """Similarity from which a view learns the state."""
     merge_below: Annotated[float, Bounds(ge=0)] = 7.81
+    """Squared Mahalanobis distance below which components are merged."""
     fits_below: Annotated[float, Bounds(gt=0)] = 7.81
-    doubt: Doubt = "once"
+    """Squared Mahalanobis distance up to which a component fits the state."""
+    state_covariance: StateCovariance = "first"
+    """How often a state's covariance counts: in the `first` update of a component, or in `every_update` (equation 14 to
+    the letter). The state has most of its covariance from the same map, so that with `every_update` covariances grow
+    without end and forgetting, which equation 19 divides by them, ceases. With `first` later states add the spread of
+    their means and the minimal covariance ("coding a stable and reliable estimation", section 2.2)."""
     beta_forget: Annotated[float, Bounds(ge=0, le=1)] = 0.2
-    near_m: Annotated[float, Bounds(gt=0)] | None = None
-    fade_m: Annotated[float, Bounds(gt=0)] | None = None
-    gain_m: Annotated[float, Bounds(gt=0)] | None = None
-    least_weight: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
-    least_m: Annotated[float, Bounds(ge=0)] = 0.1
-    least_deg: Annotated[float, Bounds(ge=0)] = 2.0
+    """Rate of active forgetting."""
+    forget_radius_m: Annotated[float, Bounds(gt=0)] | None = None
+    """Distance from the state within which components are forgotten; null: the distance over which views are similar,
+    as measured with the threshold (0.3 m where it is not)."""
+    forget_fade_m: Annotated[float, Bounds(gt=0)] | None = None
+    """Distance over which forgetting falls to 0; null: the same."""
+    forget_gain_m: Annotated[float, Bounds(gt=0)] | None = None
+    """Sum of a state's sigmas at which it forgets with `beta_forget`; null: twice that distance."""
+    min_weight: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
+    """Weight below which a component is removed; below beta * min_similarity, so that none is removed at once."""
+    min_sigma_m: Annotated[float, Bounds(ge=0)] = 0.1
+    """Smallest standard deviation of a state's position: a view looks similar over some distance."""
+    min_sigma_deg: Annotated[float, Bounds(ge=0)] = 2.0
+    """Smallest standard deviation of its heading."""
     max_views: Annotated[int, Bounds(ge=0)] = 0
+    """Views of the map, above which the weakest are removed; 0: no limit."""
 
     class Out(Outputs):
-        """The map, and what this tick did to it."""
+        """The map and its changes in this tick."""
 
         map: ViewMixtures
         events: ViewEvent | None = None
 
     def __post_init__(self) -> None:
-        """A component's first weight must outlive its first tick."""
-        if self.least_weight > (1.0 - 1e-9) * self.beta * self.least_similarity:
+        """A component's first weight must be above `min_weight`."""
+        if self.min_weight > (1.0 - 1e-9) * self.beta * self.min_similarity:
             raise ValueError(
-                f"least_weight: {self.least_weight:g} is not below beta * least_similarity = "
-                f"{self.beta * self.least_similarity:g}, so that a new place could be dropped as it is learned"
+                f"min_weight: {self.min_weight:g} is not below beta * min_similarity = "
+                f"{self.beta * self.min_similarity:g}, so that a new place could be dropped as it is learned"
             )
 
     def step(
@@ -106,46 +113,48 @@ class AdaptiveViews(Stage):
         map: ViewMixtures,
         waiting: BeforeThreshold,
     ) -> Out:
-        """Learn from what this tick has to teach."""
-        map.take_limit(threshold)
+        """Apply the updates of this tick."""
+        map.keep_threshold(threshold)
         ready = due(() if updates is None else updates.items, threshold, map, waiting)
         if not ready:
             return self.Out(map=map)
-        before = map.names
+        before = map.ids
         changed: list[Ints] = []
         seen: dict[int, int] = {}
         full = False
-        for lesson in ready:
-            seen[map.next_name] = lesson.index  # if it is a new one
-            changed.append(self._learn(lesson, threshold, map))
+        for update in ready:
+            seen[map.next_id] = update.index  # if the view is new
+            changed.append(self._apply(update, threshold, map))
             kept = within_cap(map, self.max_views)
             full = full or not kept.all()
             map.keep_views(kept)
             map.step()
-        names = np.concatenate([*changed, np.array(list(seen))])
-        return self.Out(map=map, events=view_event(map, before, names, seen, "full" if full else "forgotten"))
+        ids = np.concatenate([*changed, np.array(list(seen))])
+        return self.Out(map=map, events=view_event(map, before, ids, seen, "full" if full else "forgotten"))
 
-    def _learn(self, lesson: MapUpdate, limit: NoveltyThreshold | None, map: ViewMixtures) -> Ints:
-        # The names of the views whose places changed.
-        view = lesson.view
-        state = _floored(lesson.state, self.least_m, np.radians(self.least_deg))
+    def _apply(self, update: MapUpdate, threshold: NoveltyThreshold | None, map: ViewMixtures) -> Ints:
+        # Gives the ids of the views whose components changed.
+        view = update.view
+        state = _floored(update.state, self.min_sigma_m, np.radians(self.min_sigma_deg))
         if not len(state):
             return np.empty(0, np.int64)
         map.check_kind(view)
         distances = view.distances(map.views) if len(map) else np.empty(0)
-        within = 0.0 if limit is None else limit.distance
+        within = 0.0 if threshold is None else threshold.distance
         matched = distances < within
         if not matched.any():
             map.add_view(view.values, type(view).__name__)
             distances, matched = np.append(distances, 0.0), np.append(matched, True)
-        alike = np.where(matched, similarity(distances, within, self.shape), 0.0)
+        similarities = np.where(matched, similarity(distances, within, self.shape), 0.0)
         rows = np.flatnonzero(matched)
         turns = np.zeros(len(map))
         turns[rows] = view.turns(map.views[rows])
-        self._take_in(state, alike, turns, map)
+        self._add_components(state, similarities, turns, map)
         weights = np.empty(len(map.weights))
-        alike_m = (limit.metres if limit is not None and limit.settled else 0.0) or UNMEASURED_M
-        _weigh(
+        length_scale_m = (
+            threshold.metres if threshold is not None and threshold.settled else 0.0
+        ) or DEFAULT_LENGTH_SCALE_M
+        _update_weights(
             state.means,
             state.covariances,
             state.weights,
@@ -154,39 +163,39 @@ class AdaptiveViews(Stage):
             map.covariances,
             map.weights,
             matched,
-            alike,
+            similarities,
             turns,
             self.beta,
             self.fits_below,
             self.forgetting != "none",
             self.beta_forget if self.forgetting == "active" else 0.0,
-            self.near_m or alike_m,
-            self.fade_m or alike_m,
-            self.gain_m or 2.0 * alike_m,
+            self.forget_radius_m or length_scale_m,
+            self.forget_fade_m or length_scale_m,
+            self.forget_gain_m or 2.0 * length_scale_m,
             weights,
         )
-        touched: Ints = map.names[np.unique(map.owner[weights != map.weights])]
+        touched: Ints = map.ids[np.unique(map.owner[weights != map.weights])]
         map.put_weights(weights)
-        map.keep_components(map.weights >= self.least_weight)
+        map.keep_components(map.weights >= self.min_weight)
         map.keep_views(np.bincount(map.owner, minlength=len(map)) > 0)
         return touched
 
-    def _take_in(self, state: GaussianMixture, alike: Array, turns: Array, map: ViewMixtures) -> None:
-        # Phase 2: the state becomes a component of each view that is alike enough.
-        total = alike.sum()
-        rows = np.flatnonzero(alike * state.weights.max() >= self.least_similarity)
-        least = np.diag([self.least_m, self.least_m, np.radians(self.least_deg)]) ** 2
+    def _add_components(self, state: GaussianMixture, similarities: Array, turns: Array, map: ViewMixtures) -> None:
+        # Phase 2: the state becomes a component of each view that is similar enough.
+        total = similarities.sum()
+        rows = np.flatnonzero(similarities * state.weights.max() >= self.min_similarity)
+        min_covariance = np.diag([self.min_sigma_m, self.min_sigma_m, np.radians(self.min_sigma_deg)]) ** 2
         mixtures = []
         for row in rows.tolist():
-            kept = alike[row] * state.weights >= self.least_similarity
+            kept = similarities[row] * state.weights >= self.min_similarity
             means = state.means[kept]
             means[:, 2] = wrap(means[:, 2] - turns[row])
             mine = map.owner == row
             known = (map.means[mine], map.covariances[mine], map.counts[mine], map.weights[mine])
-            counts = state.weights[kept] * (alike[row] / total)
+            counts = state.weights[kept] * (similarities[row] / total)
             new = (means, state.covariances[kept], counts, np.zeros(len(means)))
-            if self.doubt == "once":
-                known, new = _confirmed(known, new, self.merge_below, least)
+            if self.state_covariance == "first":
+                known, new = _confirm(known, new, self.merge_below, min_covariance)
             means, covariances, counts, weights = (np.concatenate(both) for both in zip(known, new, strict=True))
             mixtures.append(merged(means, covariances, counts, self.merge_below, shares=weights))
         if len(rows):
@@ -195,9 +204,9 @@ class AdaptiveViews(Stage):
             map.put_mixtures(owners, means, covariances, np.minimum(weights, 1.0), counts)
 
 
-def _confirmed(known: Components, new: Components, below: float, least: Array) -> tuple[Components, Components]:
-    # The known components, each having taken in the means of those new ones that it is the nearest to, with the least
-    # doubt instead of their own; and the new ones that are not near any.
+def _confirm(known: Components, new: Components, below: float, min_covariance: Array) -> tuple[Components, Components]:
+    # The known components, each merged with the means of the new ones nearest to it, which get the minimal covariance
+    # instead of their own; and the new ones that are near none.
     means, covariances, counts, weights = (each.copy() for each in known)
     left = np.ones(len(new[0]), np.bool_)
     if len(means):
@@ -208,13 +217,15 @@ def _confirmed(known: Components, new: Components, below: float, least: Array) -
                 continue
             left[k] = False
             means[j], covariances[j], counts[j] = moments(
-                np.stack([means[j], new[0][k]]), np.stack([covariances[j], least]), np.array([counts[j], new[2][k]])
+                np.stack([means[j], new[0][k]]),
+                np.stack([covariances[j], min_covariance]),
+                np.array([counts[j], new[2][k]]),
             )
     return (means, covariances, counts, weights), (new[0][left], new[1][left], new[2][left], new[3][left])
 
 
 def _floored(state: GaussianMixture, metres: float, radians: float) -> GaussianMixture:
-    # The state with weights that sum to 1, each mode no more certain than that.
+    # The state with weights that sum to 1 and a minimal covariance.
     present = state.weights > 0.0
     covariances = state.covariances[present]
     if metres > 0.0 and radians > 0.0 and len(covariances):
@@ -224,7 +235,7 @@ def _floored(state: GaussianMixture, metres: float, radians: float) -> GaussianM
 
 
 @numba.njit(cache=True, nogil=True)
-def _weigh(
+def _update_weights(
     means: Array,
     covariances: Array,
     shares: Array,
@@ -233,13 +244,13 @@ def _weigh(
     spreads: Array,
     weights: Array,
     matched: npt.NDArray[np.bool_],
-    alike: Array,
+    similarities: Array,
     turns: Array,
     beta: float,
     fits_below: float,
     passive: bool,
     beta_forget: float,
-    near: float,
+    radius: float,
     fade: float,
     gain: float,
     out: Array,
@@ -257,7 +268,7 @@ def _weigh(
                     continue
                 if squared_distance(mode, covariances[k], places[c], spreads[c]) <= fits_below:
                     fitting += shares[k]
-            gained = beta * alike[row]
+            gained = beta * similarities[row]
             fading = gained if passive else gained * fitting
             out[c] = min(gained * fitting + (1.0 - fading) * weights[c], 1.0)
         else:
@@ -265,7 +276,7 @@ def _weigh(
             if beta_forget > 0.0:
                 for k in range(len(shares)):
                     distance = np.hypot(places[c, 0] - means[k, 0], places[c, 1] - means[k, 1])
-                    if distance < near and distance < fade:
+                    if distance < radius and distance < fade:
                         spread = np.sqrt(covariances[k, 0, 0]) + np.sqrt(covariances[k, 1, 1])
                         lost = beta_forget * (1.0 - distance / fade) * gain / spread
                         kept *= 1.0 - shares[k] * min(lost, 1.0)

@@ -1,4 +1,4 @@
-"""How far the look of a place reaches, measured on a finished map."""
+"""Measures the appearance length scale of a finished map."""
 
 import math
 from typing import Annotated
@@ -15,22 +15,23 @@ from omninav.stages.values.maps import ReferenceGraph
 Array = npt.NDArray[np.float64]
 
 
-def excess_by_distance(distances: Array, alike: Array, bins: int = 30) -> tuple[Array, Array]:
-    """How much more alike than strangers views are, by their distance: bin centres (B,) in metres and means (B,).
+def excess_by_distance(distances: Array, similarity: Array, bins: int = 30) -> tuple[Array, Array]:
+    """The excess similarity of views over their distance: bin centres (B,) in metres and means (B,).
 
-    `distances` (samples, references) from each sample view to all references, 0 to itself; `alike`, the same shape,
-    their similarities, NaN where they are not to be compared. A sample's strangers are its median reference: the excess
-    is (S - median) / (1 - median), 1 at its own place. Bins are equal ratios of distance and hold five pairs at least.
+    `distances` (samples, references): from each sample view to all references, 0 to itself; `similarity`, the same
+    shape, NaN where views are not to be compared. The median over the references is a sample's background: the excess
+    is (S - median) / (1 - median), 1 at its own place. Bins have equal ratios of distance and hold at
+    least five pairs.
     """
-    strangers = np.nanmedian(alike, axis=1, keepdims=True)
-    excess = ((alike - strangers) / np.maximum(1.0 - strangers, 1e-9)).ravel()
-    apart = distances.ravel()
-    compared = (apart > 1e-6) & np.isfinite(excess)
-    excess, apart = excess[compared], apart[compared]
-    if not len(apart):
+    background = np.nanmedian(similarity, axis=1, keepdims=True)
+    excess = ((similarity - background) / np.maximum(1.0 - background, 1e-9)).ravel()
+    gaps = distances.ravel()
+    compared = (gaps > 1e-6) & np.isfinite(excess)
+    excess, gaps = excess[compared], gaps[compared]
+    if not len(gaps):
         return np.zeros(0), np.zeros(0)
-    edges = np.geomspace(max(apart.min(), apart.max() / 1000), apart.max() * (1 + 1e-9), bins + 1)
-    which = np.digitize(apart, edges) - 1
+    edges = np.geomspace(max(gaps.min(), gaps.max() / 1000), gaps.max() * (1 + 1e-9), bins + 1)
+    which = np.digitize(gaps, edges) - 1
     inside = (which >= 0) & (which < bins)
     counts = np.bincount(which[inside], minlength=bins)
     sums = np.bincount(which[inside], excess[inside], minlength=bins)
@@ -39,39 +40,43 @@ def excess_by_distance(distances: Array, alike: Array, bins: int = 30) -> tuple[
 
 
 class AppearanceLengthScale(Stage):
-    """The distance at which the map's own views have lost half of their excess similarity.
+    """Measures the distance at which the map's views have lost half of their excess similarity, a correlation length.
 
-    Not in the paper, whose maps are all of one store; it replaces thresholds in metres by one that is measured on each
-    map. `samples` references, spread evenly over the map, are compared with all others at all headings by their mean
-    segment similarity. Views of one segment, pictures that look one way, only with those that look the same way to
-    `alike_deg`, half of a picture's field: of one place, too, pictures that look other ways are strangers. `share` of
-    the excess that is left there. A map of fewer than `least` references has nothing to measure: then `otherwise_m`.
+    Not in the paper, whose maps are all of one store: it replaces thresholds in metres. Sample references are compared
+    with all others at all headings by their mean segment similarity. Views of one segment, which look one way, are
+    compared only with those of about the same heading. Manifest fact `appearance_length_scale_m`.
     """
 
     samples: Annotated[int, Bounds(ge=1)] = 40
+    """References, spread evenly over the map, that are compared with all others."""
     share: Annotated[float, Bounds(gt=0, lt=1)] = 0.5
+    """Excess similarity left at the length scale."""
     headings: Annotated[int, Bounds(ge=1)] = 36
-    alike_deg: Annotated[float, Bounds(gt=0, le=180)] = 30.0
-    least: Annotated[int, Bounds(ge=2)] = 10
-    otherwise_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """Headings at which views are compared."""
+    max_heading_difference_deg: Annotated[float, Bounds(gt=0, le=180)] = 30.0
+    """Difference of heading up to which views of one segment are compared, about half of the field of view."""
+    min_references: Annotated[int, Bounds(ge=2)] = 10
+    """References a map needs to be measured."""
+    default_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """Length scale of a map that cannot be measured."""
 
     class Out(Outputs):
-        """`reach` of the map's views."""
+        """The length scale of the map's views."""
 
         length_scale: LengthScale
 
     def step(self, ctx: Context, map: ReferenceGraph) -> Out:
         """Measure one map."""
         metres = self._measured(map)
-        ctx.fact("view_reach_m", round(metres, 3))
+        ctx.fact("appearance_length_scale_m", round(metres, 3))
         return self.Out(length_scale=LengthScale(metres))
 
     def _measured(self, map: ReferenceGraph) -> float:
-        if len(map) < self.least:
-            return self.otherwise_m
+        if len(map) < self.min_references:
+            return self.default_m
         chosen = np.unique(np.linspace(0, len(map) - 1, min(self.samples, len(map))).astype(np.int64))
         histograms = map.kind == "histograms"
-        alike = np.stack(
+        similarity = np.stack(
             [
                 similarities(map.features, map.features[n], self.headings, histograms, False, 0.0).max(axis=1)
                 for n in chosen
@@ -79,9 +84,9 @@ class AppearanceLengthScale(Stage):
         ).astype(np.float64)
         gap = map.poses[chosen, None] - map.poses
         if map.features.shape[1] == 1:
-            alike[np.abs(wrap(gap[..., 2])) > math.radians(self.alike_deg)] = np.nan
-        centres, excess = excess_by_distance(np.hypot(gap[..., 0], gap[..., 1]), alike)
+            similarity[np.abs(wrap(gap[..., 2])) > math.radians(self.max_heading_difference_deg)] = np.nan
+        centres, excess = excess_by_distance(np.hypot(gap[..., 0], gap[..., 1]), similarity)
         below = np.flatnonzero(excess < self.share)
         if not len(centres):
-            return self.otherwise_m
+            return self.default_m
         return float(centres[below[0]] if len(below) else centres[-1])

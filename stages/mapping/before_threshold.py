@@ -1,4 +1,4 @@
-"""Lessons that come before there is a limit that says which views are new."""
+"""Holds updates back until there is a novelty threshold."""
 
 from collections.abc import Iterable
 from dataclasses import field
@@ -10,16 +10,16 @@ from omninav.stages.values.views import NoveltyThreshold
 
 
 class BeforeThreshold(State):
-    """The lessons that wait until there is a limit, in the order in which they came."""
+    """Updates that wait for a threshold, in their order."""
 
     waiting: list[MapUpdate] = field(default_factory=list)
 
 
 def due(
-    lessons: Iterable[MapUpdate], limit: NoveltyThreshold | None, map: ViewMixtures, before: BeforeThreshold
+    updates: Iterable[MapUpdate], threshold: NoveltyThreshold | None, map: ViewMixtures, before: BeforeThreshold
 ) -> list[MapUpdate]:
-    """Take lessons in, and give those that can be learned now: without a limit a map's first one only, with one all."""
-    before.waiting += lessons
-    now = len(before.waiting) if limit is not None else 0 if len(map) else 1
+    """Queue updates, and return those that can be applied now: all with a threshold, else only a map's first."""
+    before.waiting += updates
+    now = len(before.waiting) if threshold is not None else 0 if len(map) else 1
     ready, before.waiting = before.waiting[:now], before.waiting[now:]
     return ready

@@ -1,4 +1,4 @@
-"""A limit that is given."""
+"""A given novelty threshold."""
 
 from typing import Annotated
 
@@ -9,12 +9,13 @@ from omninav.stages.values.views import NoveltyThreshold, WholeView
 
 
 class FixedThreshold(Stage):
-    """A given distance between views, in their own unit. It needs nothing of what the others measure."""
+    """Gives a fixed threshold."""
 
     distance: Annotated[float, Bounds(gt=0)] = 100.0
+    """Distance between views at which a view is new, in the views' unit."""
 
     class Out(Outputs):
-        """The limit."""
+        """The threshold."""
 
         threshold: NoveltyThreshold
 
@@ -25,5 +26,5 @@ class FixedThreshold(Stage):
         motion: Motion | None = None,
         known: ViewMixtures | None = None,
     ) -> Out:
-        """Give it."""
+        """Give the threshold."""
         return self.Out(threshold=NoveltyThreshold(self.distance))

@@ -1,4 +1,4 @@
-"""What still waits to be learned as the last log ends."""
+"""Flushes pending map updates at the end of the last log."""
 
 from collections.abc import Sequence
 
@@ -7,17 +7,17 @@ from omninav.stages.values.map_update import MapUpdates
 
 
 class FlushPending(Stage):
-    """Gives out, once the last log has ended, the lessons that would have waited for the next one.
+    """Gives, after the last log, the updates that still wait.
 
-    No tick tells that it is the last. So this stage runs after the loop, which is all that `ticks` is collected for; a
-    second node of the map's own class learns from what it gives (`last_map`), and that map is the one to save.
+    No tick tells that it is the last, so this stage runs after the loop: `ticks` is collected for that only. A second
+    node of the map's class (`final_map`) applies the updates, and its map is saved.
     """
 
     class Out(Outputs):
-        """What is left, in the order in which it was seen."""
+        """The pending updates, in the order in which their views were seen."""
 
         updates: MapUpdates | None = None
 
     def step(self, ctx: Context, ticks: Sequence[Tick], waiting: MapUpdates | None = None) -> Out:
-        """Give it all out."""
+        """Give all of them."""
         return self.Out(updates=waiting)

@@ -1,4 +1,4 @@
-"""A map of views that is used and not changed."""
+"""A map of views that does not change."""
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.map_update import MapUpdates
@@ -7,10 +7,10 @@ from omninav.stages.values.views import NoveltyThreshold
 
 
 class Frozen(Stage):
-    """The map as it came: the robot localises with it and learns nothing (`mapping=frozen map=FILE`)."""
+    """Passes the map on unchanged, for localisation only (`mapping=frozen map=FILE`)."""
 
     class Out(Outputs):
-        """The map, unchanged, and nothing that was done to it."""
+        """The map."""
 
         map: ViewMixtures
         events: ViewEvent | None = None
@@ -22,5 +22,5 @@ class Frozen(Stage):
         updates: MapUpdates | None = None,
         threshold: NoveltyThreshold | None = None,
     ) -> Out:
-        """Hand the map on."""
+        """Pass the map on."""
         return self.Out(map=map)

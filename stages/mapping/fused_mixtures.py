@@ -1,4 +1,4 @@
-"""A map of views whose places are fused with the state that was believed each time they were seen."""
+"""A map of views that fuses each view's mixture with the states in which it is seen."""
 
 import math
 from dataclasses import field
@@ -16,7 +16,7 @@ from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import NoveltyThreshold
 
-from .applied_update import AppliedUpdate, taught_by
+from .applied_update import AppliedUpdate, record_update
 from .before_threshold import BeforeThreshold, due
 from .view_cap import within_cap
 from .view_events import view_event
@@ -28,41 +28,40 @@ Average = Literal["visits", "halves"]
 
 
 class FusedMixturesState(BeforeThreshold):
-    """Lessons that wait for a limit, and those that can be taken back."""
+    """Updates that wait for a threshold, and applied ones that can be undone."""
 
     open: list[AppliedUpdate] = field(default_factory=list)
 
 
 class FusedMixtures(Stage):
-    """A view that is new becomes a map point; one that is known adds its state to those it resembles, half and half.
+    """Inserts new views as map points; fuses the mixtures of known ones with the state, half and half.
 
-    Porta & Kroese 2004, section 3.2. A view is new where none in the map is within the limit (delta_y); it is stored
-    with the state in which it was seen. Else each view within the limit takes that state in, its headings turned to the
-    stored view's: the two mixtures side by side, the closest pairs merged while their squared Mahalanobis distance is
-    below `merge_below` (7.81: places that are the same at 95 %), weights made to sum to 1, and components below
-    `least_weight` dropped. So a place that is not confirmed loses half of its weight each time, and is gone after the
-    seventh at 0.01. MapUpdates wait until there is a limit, all but the first view of a map. `spread`: whether a merged
-    covariance holds how far apart the two means were; the paper's does not and is over-confident (erratum 16).
-    `max_views` 0: no limit; else the weakest views go first.
+    Porta & Kroese 2004, section 3.2. A view is new where none in the map is within the threshold (delta_y): it is
+    inserted with the state in which it was seen. Otherwise each view within the threshold is fused with that state, its
+    headings turned to the stored view's: both mixtures side by side, the closest pairs merged, weights normalised,
+    light components dropped. So an unconfirmed component loses half of its weight each time. Updates wait until there
+    is a threshold, all but a map's first.
 
-    `average`: how much each counts where components become one. `halves`: by their weights, as in the paper: the last
-    state counts as much as all before, so that a place follows the last one or two, which had come from the map
-    itself, and the map drifts (docs/experiments/cml_defaults.md). `visits`: each state alike, but for how alike the
-    two views are (S from 1 to 0 at the limit): eta of Gross, Koenig & Mueller 2005, equations 11 to 14. How much a
-    place weighs against the others of its view is the paper's either way.
-
-    MapUpdates that may be given again (`MapUpdates.open_from`) are taken back when they are: all since the first of them is
-    undone, and learned again with the states as they are known now. No view comes or goes by it.
+    Updates that are repeated (`MapUpdates.open_from`) replace the earlier ones: all since the first of them are undone
+    and applied redone with the new states. No view is inserted or removed by this.
     """
 
     merge_below: Annotated[float, Bounds(ge=0)] = 7.81
+    """Squared Mahalanobis distance below which components are merged; 7.81: equal at 95 %."""
     spread: bool = True
+    """Whether a merged covariance includes the spread of the means; the paper's does not and is over-confident
+    (erratum 16)."""
     average: Average = "visits"
-    least_weight: Annotated[float, Bounds(ge=0, lt=0.5)] = 0.01
+    """Shares of merged components. `halves`: their weights, as in the paper: the last state counts as much as all
+    before, so that the map drifts (docs/experiments/cml_defaults.md). `visits`: the number of visits, weighted by
+    similarity (eta of Gross, Koenig & Mueller 2005, equations 11 to 14)."""
+    min_weight: Annotated[float, Bounds(ge=0, lt=0.5)] = 0.01
+    """Weight below which a component is removed."""
     max_views: Annotated[int, Bounds(ge=0)] = 0
+    """Views of the map, above which the weakest are removed; 0: no limit."""
 
     class Out(Outputs):
-        """The map, and what this tick did to it."""
+        """The map and its changes in this tick."""
 
         map: ViewMixtures
         events: ViewEvent | None = None
@@ -73,88 +72,88 @@ class FusedMixtures(Stage):
         updates: MapUpdates | None,
         threshold: NoveltyThreshold | None,
         map: ViewMixtures,
-        learned: FusedMixturesState,
+        pending: FusedMixturesState,
     ) -> Out:
-        """Learn from what this tick has to teach."""
-        map.take_limit(threshold)
+        """Apply the updates of this tick."""
+        map.keep_threshold(threshold)
         updates = MapUpdates(()) if updates is None else updates
         open_from = math.inf if updates.open_from is None else updates.open_from
-        learned.open = [taught for taught in learned.open if taught.index >= open_from]
-        before = map.names.copy()
-        new, changed = (
-            self._put_right(ctx, updates.items, learned, map) if open_from < math.inf else (updates.items, [])
-        )
+        pending.open = [applied for applied in pending.open if applied.index >= open_from]
+        before = map.ids.copy()
+        new, changed = self._redo(ctx, updates.items, pending, map) if open_from < math.inf else (updates.items, [])
         seen: dict[int, int] = {}
-        for lesson in due(new, threshold, map, learned):
-            seen[map.next_name] = lesson.index  # if it is a new one
-            taught = self._learn(lesson, threshold, map)
-            changed.append(taught.names)
-            if lesson.index >= open_from:
-                learned.open.append(taught)
+        for update in due(new, threshold, map, pending):
+            seen[map.next_id] = update.index  # if it is a new one
+            applied = self._apply(update, threshold, map)
+            changed.append(applied.ids)
+            if update.index >= open_from:
+                pending.open.append(applied)
         if not changed:
             return self.Out(map=map)
         over = within_cap(map, self.max_views)
         if not over.all():
             map.keep_views(over)
-            learned.open = [taught.within(map) for taught in learned.open]
+            pending.open = [applied.within(map) for applied in pending.open]
         why: Literal["", "full"] = "" if over.all() else "full"
         return self.Out(map=map, events=view_event(map, before, np.concatenate(changed), seen, why))
 
-    def _put_right(
-        self, ctx: Context, lessons: tuple[MapUpdate, ...], learned: FusedMixturesState, map: ViewMixtures
+    def _redo(
+        self, ctx: Context, updates: tuple[MapUpdate, ...], pending: FusedMixturesState, map: ViewMixtures
     ) -> tuple[tuple[MapUpdate, ...], list[Ints]]:
-        # Those of the lessons that are new, and the names of the views that changed because of the others.
-        fresh = {lesson.index: lesson for lesson in lessons}
-        learned.waiting = [fresh.pop(lesson.index, lesson) for lesson in learned.waiting]
-        first = next((row for row, taught in enumerate(learned.open) if taught.index in fresh), len(learned.open))
-        again, learned.open = learned.open[first:], learned.open[:first]
-        for taught in reversed(again):
-            taught.undo(map)
-        for taught in again:
-            state = fresh.pop(taught.index).state if taught.index in fresh else taught.state
-            learned.open.append(self._take_in(state, taught.index, taught.names, taught.turns, taught.alike, map))
-        if again:
-            ctx.count("lesson_taken_back", len(lessons) - len(fresh))
-        return tuple(fresh.values()), [taught.names for taught in again]
+        # Gives the updates that are new, and the ids of the views that the others changed.
+        new = {update.index: update for update in updates}
+        pending.waiting = [new.pop(update.index, update) for update in pending.waiting]
+        first = next((row for row, applied in enumerate(pending.open) if applied.index in new), len(pending.open))
+        redone, pending.open = pending.open[first:], pending.open[:first]
+        for applied in reversed(redone):
+            applied.undo(map)
+        for applied in redone:
+            state = new.pop(applied.index).state if applied.index in new else applied.state
+            pending.open.append(
+                self._fuse_state(state, applied.index, applied.ids, applied.turns, applied.similarities, map)
+            )
+        if redone:
+            ctx.count("update_undone", len(updates) - len(new))
+        return tuple(new.values()), [applied.ids for applied in redone]
 
-    def _learn(self, lesson: MapUpdate, limit: NoveltyThreshold | None, map: ViewMixtures) -> AppliedUpdate:
-        view = lesson.view
-        distances = view.distances(map.views) if len(map) and limit else np.empty(0)
-        rows = np.flatnonzero(distances < limit.distance) if limit else np.empty(0, np.int64)
-        if limit and len(rows):
-            alike, turns = similarity(distances[rows], limit.distance, "linear"), view.turns(map.views[rows])
+    def _apply(self, update: MapUpdate, threshold: NoveltyThreshold | None, map: ViewMixtures) -> AppliedUpdate:
+        view = update.view
+        distances = view.distances(map.views) if len(map) and threshold else np.empty(0)
+        rows = np.flatnonzero(distances < threshold.distance) if threshold else np.empty(0, np.int64)
+        if threshold and len(rows):
+            similarities, turns = similarity(distances[rows], threshold.distance, "linear"), view.turns(map.views[rows])
         else:
             rows = np.array([map.add_view(view.values, type(view).__name__)])
-            alike, turns = np.ones(1), np.zeros(1)
+            similarities, turns = np.ones(1), np.zeros(1)
         map.step()
-        return self._take_in(lesson.state, lesson.index, map.names[rows], turns, alike, map)
+        return self._fuse_state(update.state, update.index, map.ids[rows], turns, similarities, map)
 
-    def _take_in(
-        self, state: GaussianMixture, index: int, names: Ints, turns: Array, alike: Array, map: ViewMixtures
+    def _fuse_state(
+        self, state: GaussianMixture, index: int, ids: Ints, turns: Array, similarities: Array, map: ViewMixtures
     ) -> AppliedUpdate:
-        taught = taught_by(state, index, names, turns, alike, map)
+        applied = record_update(state, index, ids, turns, similarities, map)
         mixtures = [
-            fused([places, parts(state, turn, s)], self.merge_below, self.spread, self.least_weight, self.average)
-            for places, turn, s in zip(taught.places(), turns.tolist(), alike.tolist(), strict=True)
+            fuse([places, parts(state, turn, s)], self.merge_below, self.spread, self.min_weight, self.average)
+            for places, turn, s in zip(applied.places(), turns.tolist(), similarities.tolist(), strict=True)
         ]
-        owners = np.repeat(taught.rows(map), [len(weights) for _, _, weights, _ in mixtures])
+        owners = np.repeat(applied.rows(map), [len(weights) for _, _, weights, _ in mixtures])
         if mixtures:
             map.put_mixtures(owners, *(np.concatenate(fields) for fields in zip(*mixtures, strict=True)))
-        return taught
+        return applied
 
 
-def parts(state: GaussianMixture, turn: float, alike: float) -> Parts:
-    """A state as places of a view from which the robot stood turned by `turn`, counter-clockwise: means, covariances,
-    weights, and counts, `alike` (S) in all.
+def parts(state: GaussianMixture, turn: float, similarity: float) -> Parts:
+    """A state as components of a view from which the robot is turned by `turn`, counter-clockwise: means, covariances,
+    weights, and counts, which sum to `similarity`.
     """
     means = state.means.copy()
     means[:, 2] = wrap(means[:, 2] - turn)
-    return means, state.covariances, state.weights, state.weights * alike
+    return means, state.covariances, state.weights, state.weights * similarity
 
 
-def fused(mixtures: list[Parts], merge_below: float, spread: bool, least_weight: float, average: Average) -> Parts:
-    """Mixtures of equal say as one: close components merged, weights made to sum to 1, weak ones dropped; where all are
-    weak the heaviest stays.
+def fuse(mixtures: list[Parts], merge_below: float, spread: bool, min_weight: float, average: Average) -> Parts:
+    """Fuse mixtures with equal shares: merge close components, normalise the weights, drop weak components; the
+    heaviest stays.
     """
     means, covariances, weights, counts = (np.concatenate(rows) for rows in zip(*mixtures, strict=True))
     if average == "visits":
@@ -162,6 +161,6 @@ def fused(mixtures: list[Parts], merge_below: float, spread: bool, least_weight:
     else:
         means, covariances, weights, counts = merged(means, covariances, weights, merge_below, spread, counts)
     weights = weights / weights.sum()
-    kept = weights >= min(least_weight, weights.max())
+    kept = weights >= min(min_weight, weights.max())
     weights = weights[kept] / weights[kept].sum()
     return means[kept], covariances[kept], weights, counts[kept]

@@ -1,4 +1,4 @@
-"""Learns a database of images: one reference for each picture of a tour."""
+"""Learns an image database: one reference for each image of a tour."""
 
 import math
 from typing import Annotated
@@ -15,7 +15,7 @@ from .pose_of_view import Supervised, pose_of_view
 
 
 class ImageDatabaseState(State):
-    """The picture taken last: its first reference, where the robot stood, and what its neighbours are joined to."""
+    """The last image taken: its first reference, and the robot's pose."""
 
     reference: int = -1
     x: float = 0.0
@@ -24,22 +24,23 @@ class ImageDatabaseState(State):
 
 
 class ImageDatabase(Stage):
-    """One reference for each picture of a tour, described by its features only.
+    """Adds one reference for each image of a tour, described by its features only.
 
-    Wolf, Burgard & Burkhardt 2005, section VI: images from different positions in the environment. A picture is
-    taken where the robot has moved at least `apart_m` or turned at least `apart_deg` since the last one; a rule of 0 is
-    off, and with both off every picture is. A panorama is one reference; of windows each is one of its own, at the
-    robot's heading turned to where the window looks. Edges join references in the order of the drive. Poses are the
-    tour's truth; without it (`supervised: auto`) its odometry; the map says which. Raises BadInput where
-    `supervised: truth` finds none.
+    Wolf, Burgard & Burkhardt 2005, section VI: images from different positions in the environment. An image is taken
+    where the robot has moved or turned far enough since the last one. A panorama is one reference; each window is one
+    of its own, at the robot's heading plus the window's direction. Edges join references in the order of the drive.
+    Raises BadInput where `supervised` is `truth` and the tour has none.
     """
 
-    apart_m: Annotated[float, Bounds(ge=0)] = 0.0
-    apart_deg: Annotated[float, Bounds(ge=0, le=180)] = 0.0
+    min_distance_m: Annotated[float, Bounds(ge=0)] = 0.0
+    """Distance between two images that are taken; 0: this rule is off, and with both off every image is taken."""
+    min_turn_deg: Annotated[float, Bounds(ge=0, le=180)] = 0.0
+    """Or turn between them; 0: off."""
     supervised: Supervised = "auto"
+    """Source of the poses: `truth`, `odometry`, or `auto`: truth where the tour has it. The map keeps it."""
 
     class Out(Outputs):
-        """The grown map, and the first reference that this tick added to it."""
+        """The grown map, and the first reference that this tick added."""
 
         map: ReferenceGraph
         events: ReferenceEvent | None = None
@@ -78,8 +79,10 @@ class ImageDatabase(Stage):
         return self.Out(map=map, events=ReferenceEvent(added[0], "first" if first else "far"))
 
     def _far(self, pose: Pose, last: ImageDatabaseState) -> bool:
-        if last.reference < 0 or (self.apart_m <= 0.0 and self.apart_deg <= 0.0):
+        if last.reference < 0 or (self.min_distance_m <= 0.0 and self.min_turn_deg <= 0.0):
             return True
         moved = math.hypot(pose.x - last.x, pose.y - last.y)
         turned = math.degrees(abs(float(wrap(pose.heading - last.heading))))
-        return (self.apart_m > 0.0 and moved >= self.apart_m) or (self.apart_deg > 0.0 and turned >= self.apart_deg)
+        return (self.min_distance_m > 0.0 and moved >= self.min_distance_m) or (
+            self.min_turn_deg > 0.0 and turned >= self.min_turn_deg
+        )

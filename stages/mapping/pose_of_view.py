@@ -1,4 +1,4 @@
-"""Where a view was taken: by the tour's truth, or by its odometry."""
+"""The pose at which a view was taken, from ground truth or odometry."""
 
 from typing import Literal
 
@@ -13,11 +13,11 @@ Supervised = Literal["auto", "truth", "odometry"]
 def pose_of_view(
     ctx: Context, odometry: Pose | None, truth: Pose | None, map: ReferenceGraph, supervised: Supervised
 ) -> Pose | None:
-    """The pose to keep with a view; None where there is none, which is counted.
+    """The pose to store with a view; None, and counted, where there is none.
 
-    The first view settles for the whole map where poses come from: truth where there is any and `supervised` is not
-    odometry. Raises BadInput where `supervised` is truth and there is none, and where a second log follows one whose
-    poses are odometry.
+    The first view settles the source for the whole map: truth where there is any and `supervised` is not odometry.
+    Raises BadInput where `supervised` is truth and there is none, and where a second log follows one whose poses are
+    odometry.
     """
     if ctx.tick.first_of_log and ctx.tick.log and len(map) and map.pose_source == "odometry":
         raise BadInput(
@@ -28,12 +28,12 @@ def pose_of_view(
         source: PoseSource = "truth" if truth is not None and supervised != "odometry" else "odometry"
         if supervised == "truth" and truth is None:
             raise BadInput(
-                "mapping: the tour has no ground truth for its first picture; "
+                "mapping: the tour has no ground truth for its first image; "
                 "use a tour with /ground_truth/pose, or nodes.mapping.supervised=auto"
             )
         map.take_poses_from(source)
         ctx.fact("map_poses", source)
     pose = truth if map.pose_source == "truth" else odometry
     if pose is None:
-        ctx.count("view_without_pose", detail=f"mapping: pictures without {map.pose_source} are not mapped")
+        ctx.count("view_without_pose", detail=f"mapping: images without {map.pose_source} are not mapped")
     return pose

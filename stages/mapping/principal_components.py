@@ -1,4 +1,4 @@
-"""The projection that keeps most of a tour's pictures."""
+"""Learns the projection that keeps most of the variance of a tour's images."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -14,20 +14,20 @@ Array = npt.NDArray[np.float64]
 FloatArray = npt.NDArray[np.float32]
 
 
-def principal_components(pictures: FloatArray, number: int, headings: int = 1) -> tuple[Array, Array]:
-    """Directions of greatest variance of pictures (N, P), and their shares of it: (D, P) orthonormal, (D,).
+def principal_components(images: FloatArray, number: int, headings: int = 1) -> tuple[Array, Array]:
+    """Directions of greatest variance of images (N, P), and their shares of it: (D, P) orthonormal, (D,).
 
-    With `headings` H > 1 over all H turned copies of each: a picture runs column by column around the robot, a turn
+    With `headings` H > 1 over all H turned copies of each: a image runs column by column around the robot, a turn
     moves it by P / H. From the eigenvectors of the scatter matrix, which are the right singular vectors of the centred
-    pictures. A direction's largest number is positive. D is `number`, or less where there is less to tell apart.
+    images. A direction's largest number is positive. D is `number`, or less where there is less to tell apart.
     """
-    centred = pictures.astype(np.float64) - pictures.mean(axis=0, dtype=np.float64)
+    centred = images.astype(np.float64) - images.mean(axis=0, dtype=np.float64)
     if headings > 1:
-        centred = pictures.astype(np.float64)
-        ring = centred.reshape(len(pictures), headings, -1).mean(axis=(0, 1))  # the mean of all turned copies
+        centred = images.astype(np.float64)
+        ring = centred.reshape(len(images), headings, -1).mean(axis=(0, 1))  # the mean of all turned copies
         centred = centred - np.tile(ring, headings)
     scatter = centred.T @ centred
-    step = pictures.shape[1] // headings
+    step = images.shape[1] // headings
     scatter = sum(
         (np.roll(scatter, (step * h, step * h), axis=(0, 1)) for h in range(headings)), np.zeros_like(scatter)
     )
@@ -40,16 +40,16 @@ def principal_components(pictures: FloatArray, number: int, headings: int = 1) -
 
 
 class LearnPrincipalComponents(Stage):
-    """Principal components of a tour's averaged panoramas.
+    """Learns the principal components of a tour's averaged panoramas.
 
-    Porta & Kröse 2004, section 2: the eigenvectors with the largest eigenvalues become the rows of the projection
-    matrix W. `components`: how many (the paper does not say). `headings` 1 learns from the pictures as they are, as the
-    paper; more, from each picture at so many turns, so that the projection serves a robot that comes from elsewhere. It
-    must divide the pictures' columns.
+    Porta & Kröse 2004, section 2: the eigenvectors with the largest eigenvalues are the rows of the projection W.
     """
 
     components: Annotated[int, Bounds(ge=1)] = 128
+    """Components; the paper does not give their number."""
     headings: Annotated[int, Bounds(ge=1)] = 36
+    """Turns of each image that are learned from, so that the projection serves any heading; must divide the columns. 1:
+    the images as they are, as in the paper."""
 
     class Out(Outputs):
         """The projection."""

@@ -1,4 +1,4 @@
-"""Learns a graph of reference views while the robot is driven around."""
+"""Learns a graph of reference views during a tour."""
 
 from typing import Annotated, Literal
 
@@ -14,27 +14,29 @@ from .pose_of_view import Supervised, pose_of_view
 
 
 class LearnReferenceGraphState(State):
-    """The reference the drive is at: the next one is joined to it."""
+    """The current reference, to which the next one is joined."""
 
     reference: int = -1
 
 
 class LearnReferenceGraph(Stage):
-    """Reference views learned on the fly: a new one where the last are too far away or look too different.
+    """Adds a reference view where the others are too far away or too dissimilar.
 
-    Gross & Koenig 2004, section 2: a reference is inserted where no other lies within `distance_m`, or where the
-    similarity (selective, at the known relative heading) to all references within `vicinity_m` is below `similarity`; 0
-    switches that rule off. Edges join references in the order of the drive. Poses are the tour's truth; without it
-    (`supervised: auto`) its odometry; the map says which. Raises BadInput where `supervised: truth` finds none.
+    Gross & Koenig 2004, section 2. Similarity is selective, at the known relative heading. Edges join references in the
+    order of the drive. Raises BadInput where `supervised` is `truth` and the tour has none.
     """
 
     distance_m: Annotated[float, Bounds(gt=0)] = 0.02
+    """Distance from all references beyond which a new one is added."""
     vicinity_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """Distance within which references are compared."""
     similarity: Annotated[float, Bounds(ge=0, le=1)] = 0.6
+    """Similarity to all of them below which a new reference is added; 0: this rule is off."""
     supervised: Supervised = "auto"
+    """Source of the poses: `truth`, `odometry`, or `auto`: truth where the tour has it. The map keeps it."""
 
     class Out(Outputs):
-        """The grown map, and what this tick did to it."""
+        """The grown map, and its change in this tick."""
 
         map: ReferenceGraph
         events: ReferenceEvent | None = None
@@ -46,15 +48,15 @@ class LearnReferenceGraph(Stage):
         odometry: Pose | None,
         truth: Pose | None,
         map: ReferenceGraph | None,
-        along: LearnReferenceGraphState,
+        state: LearnReferenceGraphState,
     ) -> Out:
         """Take one view into the map, or not; without a map, begin one."""
         map = ReferenceGraph.empty() if map is None else map
         if ctx.tick.first_of_log:
-            along.reference = -1
+            state.reference = -1
         pose = pose_of_view(ctx, odometry, truth, map, self.supervised)
         if pose is None:
-            along.reference = -1  # no edge across a gap
+            state.reference = -1  # no edge across a gap
             return self.Out(map=map)
         near = within(map.poses, pose.x, pose.y, max(self.distance_m, self.vicinity_m))
         reason = self._reason(features, pose, map, near)
@@ -64,9 +66,9 @@ class LearnReferenceGraph(Stage):
             event = ReferenceEvent(here, reason)
         else:
             here = int(near[0])
-        if along.reference >= 0:
-            map.join(along.reference, here)
-        along.reference = here
+        if state.reference >= 0:
+            map.join(state.reference, here)
+        state.reference = here
         return self.Out(map=map, events=event)
 
     def _reason(
@@ -83,7 +85,7 @@ class LearnReferenceGraph(Stage):
         if self.similarity > 0.0:
             turns = pose.heading - map.poses[near, 2]
             histograms = map.kind == "histograms"
-            alike = similarity_at(map.features[near], features.values, turns, histograms)
-            if float(alike.max()) < self.similarity:
+            similarities = similarity_at(map.features[near], features.values, turns, histograms)
+            if float(similarities.max()) < self.similarity:
                 return "unlike"
         return None

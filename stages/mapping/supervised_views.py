@@ -1,4 +1,4 @@
-"""A map of views made in one go from a tour whose poses are known."""
+"""Makes a map of views from a tour with known poses."""
 
 import math
 from collections.abc import Sequence
@@ -15,15 +15,17 @@ from omninav.stages.values.views import WholeView
 
 
 class SupervisedViews(Stage):
-    """Each of the tour's views with one Gaussian at its true pose: the training set of appearance-based localisation.
+    """Stores each view of a tour with one Gaussian at its true pose: the training set of appearance-based localisation.
 
-    Porta & Kröse 2004, section 2: T = {(x_i, z_i)} and the Gaussians phi(x|x_j) of equation 4, whose spread (here
-    `sigma_m`, `sigma_deg`) is not given. With `projection` wired, views are projected by it first, so that projection
-    and map come from one tour. Views without a true pose are left out. Raises BadInput where none has one.
+    Porta & Kröse 2004, section 2: T = {(x_i, z_i)} and the Gaussians phi(x|x_j) of equation 4, whose spread is not
+    given. With `projection` wired, views are projected by it first. Views without a true pose are left out. Raises
+    BadInput where none has one.
     """
 
     sigma_m: Annotated[float, Bounds(gt=0)] = 0.25
+    """Standard deviation of the position."""
     sigma_deg: Annotated[float, Bounds(gt=0)] = 10.0
+    """Standard deviation of the heading."""
 
     class Out(Outputs):
         """The map."""
@@ -43,7 +45,7 @@ class SupervisedViews(Stage):
         covariance = np.diag([self.sigma_m**2, self.sigma_m**2, math.radians(self.sigma_deg) ** 2])
         for view, pose in zip(views, truth, strict=True):
             if view is None or pose is None:
-                ctx.count("view_without_pose", detail="mapping: pictures without truth are not mapped")
+                ctx.count("view_without_pose", detail="mapping: images without truth are not mapped")
                 continue
             values = view.values if projection is None else projection.components @ view.values
             row = map.add_view(values, type(view).__name__)

@@ -1,4 +1,4 @@
-"""Small pictures of a map's references or views, for people: the map itself holds none."""
+"""Thumbnails of a map's references or views, for reports: the map itself holds no images."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -15,25 +15,27 @@ from omninav.stages.values.topological_map import TopologicalMap
 
 
 class ReferenceThumbnails(Value):
-    """Pictures of the references that a tick added to a map, as JPEG bytes, in the map's order."""
+    """Thumbnails of the references that a tick added to a map, as JPEG bytes, in the map's order."""
 
     jpegs: tuple[bytes, ...]
 
 
 class ThumbnailsState(State):
-    """How many references have their picture."""
+    """Number of references with a thumbnail."""
 
     references: int = 0
 
 
 class ReferenceSnapshot(Stage):
-    """Encodes the pictures of references as they come into a map: JPEG, at most `columns` wide.
+    """Encodes thumbnails of references as they are added to a map.
 
-    A panorama is one reference, of windows each is one. Read the map behind the stage that adds to it.
+    A panorama is one reference, each window is one. Wire the map from the stage that adds to it.
     """
 
     columns: Annotated[int, Bounds(ge=16)] = 160
+    """Largest width (pixels)."""
     quality: Annotated[int, Bounds(ge=1, le=100)] = 75
+    """JPEG quality."""
 
     class Out(Outputs):
         """`pictures`: absent where the map did not grow."""
@@ -52,29 +54,31 @@ class ReferenceSnapshot(Stage):
 
 
 class CollectThumbnails(Stage):
-    """Binds the pictures of all references into an album, which is kept in a file of its own."""
+    """Collects the thumbnails of all references of a map, to be saved in a file of their own."""
 
     class Out(Outputs):
-        """A picture per reference of the map."""
+        """A thumbnail per reference of the map."""
 
         thumbnails: Thumbnails
 
     def step(self, ctx: Context, pictures: Sequence[ReferenceThumbnails]) -> Out:
         """The whole tour at once."""
-        return self.Out(thumbnails=bound([jpeg for some in pictures for jpeg in some.jpegs]))
+        return self.Out(thumbnails=joined([jpeg for some in pictures for jpeg in some.jpegs]))
 
 
 class TourSnapshot(Stage):
-    """Encodes every picture of a tour: JPEG, at most `columns` wide; of a mirror's or a lens's picture the disc.
+    """Encodes a thumbnail of every image of a tour, of a mirror's or a fisheye's image the disc only.
 
-    Which of them a map keeps is only known at its end.
+    Which of them a topological map keeps is known at its end only.
     """
 
     columns: Annotated[int, Bounds(ge=16)] = 240
+    """Largest width (pixels)."""
     quality: Annotated[int, Bounds(ge=1, le=100)] = 75
+    """JPEG quality."""
 
     class Out(Outputs):
-        """One picture."""
+        """One thumbnail."""
 
         pictures: ReferenceThumbnails
 
@@ -85,10 +89,10 @@ class TourSnapshot(Stage):
 
 
 class ViewThumbnails(Stage):
-    """Binds the pictures of a topological map's views into an album; those of a `known` map's views are not known."""
+    """Collects the thumbnails of a topological map's views; those of a `known` map's views are missing."""
 
     class Out(Outputs):
-        """A picture per view of the map."""
+        """A thumbnail per view of the map."""
 
         thumbnails: Thumbnails
 
@@ -104,10 +108,10 @@ class ViewThumbnails(Stage):
         first = 0 if known is None or not len(known.frames) else 1 + int(known.frames.max())
         rows = (map.frames - first).tolist()
         found = [pictures[row] if row >= 0 else None for row in rows]
-        return self.Out(thumbnails=bound([b"" if some is None else some.jpegs[0] for some in found]))
+        return self.Out(thumbnails=joined([b"" if some is None else some.jpegs[0] for some in found]))
 
 
-def bound(jpegs: Sequence[bytes]) -> Thumbnails:
-    """Pictures as an album; an empty one stands for a picture that is not known."""
+def joined(jpegs: Sequence[bytes]) -> Thumbnails:
+    """Thumbnails in one value; b"" stands for a missing one."""
     ends = np.cumsum([0, *(len(jpeg) for jpeg in jpegs)], dtype=np.int64)
     return Thumbnails(np.frombuffer(b"".join(jpegs), np.uint8), ends)

@@ -1,4 +1,4 @@
-"""Whether a state says where the robot is."""
+"""Tests whether a state is unimodal."""
 
 import numpy as np
 import numpy.typing as npt
@@ -9,20 +9,20 @@ from omninav.stages.values.belief import GaussianMixture
 Array = npt.NDArray[np.float64]
 
 
-def certain_state(
-    state: GaussianMixture, least_share: float = 0.5, near_below: float = 7.81
+def unimodal_state(
+    state: GaussianMixture, min_share: float = 0.5, near_below: float = 7.81
 ) -> tuple[Array, Array] | None:
-    """Mean (3,) and covariance (3, 3) of a state that is certain, else None.
+    """Mean (3,) and covariance (3, 3) of a unimodal state, else None.
 
-    Certain: the components nearer to the heaviest than `near_below` (squared Mahalanobis distance) hold more than
-    `least_share` of the weight. The moments are theirs.
+    Unimodal: the components nearer to the heaviest than `near_below` (squared Mahalanobis distance) hold more than
+    `min_share` of the weight. The moments are theirs.
     """
     if not len(state):
         return None
     top = int(np.argmax(state.weights))
     centre = (state.means[top : top + 1], state.covariances[top : top + 1])
     near = squared_distances(*centre, state.means, state.covariances)[0] <= near_below
-    if state.weights[near].sum() <= least_share * state.weights.sum():
+    if state.weights[near].sum() <= min_share * state.weights.sum():
         return None
     mean, covariance, _ = moments(state.means[near], state.covariances[near], state.weights[near])
     return mean, covariance

@@ -1,4 +1,4 @@
-"""What a tick did to a map of views."""
+"""Describes the changes of a tick to a map of views."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -13,20 +13,19 @@ Ints = npt.NDArray[np.int64]
 
 def view_event(
     map: ViewMixtures,
-    names_before: Ints,
+    ids_before: Ints,
     changed: Ints,
     seen: Mapping[int, int],
     why: Literal["", "forgotten", "merged", "full"] = "",
 ) -> ViewEvent:
-    """The event of a tick: what came and went since the map held `names_before` (R0,), and how the changed ones stand.
+    """The event of a tick: views inserted and removed since the map had `ids_before` (R0,), and the changed ones.
 
-    `changed`: names (any order, also several times) of views whose mixtures were changed; those that are gone are left
-    out. `seen`: of each name given since then, the tick in which the view was seen. `why`: of the removals, where there
-    are any.
+    `changed`: ids (any order, repeated or not) of views whose mixtures changed; removed ones are left out. `seen`: for
+    each id given since then, the tick in which the view was seen. `why`: the reason of removals.
     """
-    removed = np.setdiff1d(names_before, map.names, assume_unique=True)
-    inserted = np.setdiff1d(map.names, names_before, assume_unique=True)
-    names, rows, _ = np.intersect1d(map.names, changed, return_indices=True)
+    removed = np.setdiff1d(ids_before, map.ids, assume_unique=True)
+    inserted = np.setdiff1d(map.ids, ids_before, assume_unique=True)
+    ids, rows, _ = np.intersect1d(map.ids, changed, return_indices=True)
     weights, places, parts = np.zeros(len(rows)), np.zeros((len(rows), 2)), np.zeros(len(rows), np.int64)
     if len(rows) and len(map.owner):
         by_owner = np.lexsort((map.weights, map.owner))  # each view's heaviest component comes last
@@ -42,7 +41,7 @@ def view_event(
         seen=np.array([seen[name] for name in inserted.tolist()], np.int64),
         removed=removed,
         why=why if len(removed) else "",
-        changed=names,
+        changed=ids,
         weights=weights,
         places=places,
         parts=parts.astype(np.int64),

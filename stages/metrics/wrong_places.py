@@ -82,10 +82,10 @@ def wrong_shares(
             for name in event.removed.tolist():
                 now.pop(name, None)
         if parts is not None:
-            for name in np.unique(parts.names).tolist():
+            for name in np.unique(parts.ids).tolist():
                 if name not in seen or not np.isfinite(path[seen[name]]).all():
                     continue
-                mine = parts.names == name
+                mine = parts.ids == name
                 weights = parts.weights[mine].astype(np.float64)
                 off = np.hypot(*(parts.means[mine, :2] - path[seen[name]]).T) > wrong_m
                 begins = event is not None and name in event.inserted and off[np.argmax(weights)]

@@ -18,7 +18,7 @@ class ChangedMixtures(Stage):
         """One tick; the map as it left it."""
         if events is None or not len(events.changed):
             return self.Out()
-        mine = np.flatnonzero(np.isin(map.names[map.owner], events.changed))
-        names = map.names[map.owner[mine]]
+        mine = np.flatnonzero(np.isin(map.ids[map.owner], events.changed))
+        names = map.ids[map.owner[mine]]
         means, weights = map.means[mine].astype(np.float32), map.weights[mine].astype(np.float32)
         return self.Out(mixtures=MixturesNow(names, means, weights))

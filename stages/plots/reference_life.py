@@ -60,7 +60,7 @@ class ReferenceLife(Stage):
         seen = []
         path = drive.truth[:, :2]
         for row, now in enumerate(mixtures):
-            if now is not None and (mine := now.names == name).any():
+            if now is not None and (mine := now.ids == name).any():
                 moments.append((row, now.means[mine, :2].astype(np.float64), now.weights[mine].astype(np.float64)))
                 seen.append(row)
         if not moments:

@@ -1,13 +1,13 @@
-"""How far the look of a place reaches."""
+"""The appearance length scale."""
 
 from omninav.pipeline import Value
 
 
 class LengthScale(Value):
-    """The distance at which two views of a map have lost half of what makes them more alike than strangers.
+    """The distance at which two views of a map have lost half of their excess similarity, a correlation length.
 
-    `metres`: some tenths in a room, some hundredths between blades of grass. It is the unit in which "near a reference"
-    is meant, so that one configuration serves all of them.
+    `metres`: some tenths in a room, some hundredths between blades of grass. Distances from references are given in
+    this unit, so that one configuration serves all places.
     """
 
     metres: float

@@ -1,4 +1,4 @@
-"""What a map learns from: views with the state in which they were seen."""
+"""Updates of a map: views with the state in which they were seen."""
 
 from omninav.pipeline import Value
 
@@ -7,10 +7,10 @@ from .views import WholeView
 
 
 class MapUpdate(Value):
-    """A view and where the robot was believed to be when it saw it: one Gaussian, or a mixture of them.
+    """A view and the robot's state when it was seen, a mixture of Gaussians.
 
-    `index`: the tick at which the view was seen. `reconstructed`: whether the state was worked out afterwards, between
-    two states that were certain.
+    `index`: the tick at which the view was seen. `reconstructed`: the state was computed afterwards, between two
+    unimodal states.
     """
 
     view: WholeView
@@ -20,10 +20,10 @@ class MapUpdate(Value):
 
 
 class MapUpdates(Value):
-    """What a tick has to teach, in the order in which it was seen; often nothing.
+    """The updates of a tick, in the order in which the views were seen; often none.
 
-    `open_from`: lessons seen in this tick or later may be given once more, their states better known by then, and take
-    the place of what was learned. None: a lesson that is given again is one more.
+    `open_from`: updates of views seen in this tick or later may be repeated with better states, and then replace the
+    earlier ones. None: a repeated update is one more.
     """
 
     items: tuple[MapUpdate, ...]

@@ -1,12 +1,11 @@
-"""Maps that are learned while they are used: views, and for each the places where it may be seen."""
+"""Maps that are learned while they are used: views, each with the poses from which it may be seen."""
 
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, Value
 
 from .growable_arrays import GrowableArrays
 from .pose import PoseSource
@@ -21,20 +20,20 @@ class ViewMixtures(GrowableArrays, Value):
     """Views and for each a mixture of Gaussians over the poses from which it is seen (Porta & Kroese 2004, section 3;
     Gross, Koenig & Mueller 2005, equations 9 and 10). Changed in place by the stage that learns it.
 
-    Views: `views` (R, D) float32 as `WholeView.values`; `kind` the class of view; `names` (R,), numbers that are never
-    given again; `born` (R,), the map's step at which each came. Components, of all views in one list: `owner` (C,) row
-    of the view; `means` (C, 3) x, y (m), heading (rad); `covariances` (C, 3, 3); `weights` (C,) in [0, 1], which need
-    not sum to 1; `counts` (C,) how many observations each has taken in (eta). A component's heading is that of a robot
-    that sees the view as it was kept: the pose that fits a view seen turned by t has the heading plus t.
-    `steps`: views learned from so far. `next_name`: the number for the next view. `pose_source`: what the first pose
-    came from. `limit`: the settled limit within which its views count as the same place's, None until there is one.
+    Views: `views` (R, D) float32 as `WholeView.values`; `kind` the class of view; `ids` (R,), never used again; `born`
+    (R,), the map's step at which each was inserted. Components, of all views in one list: `owner` (C,) row of the view;
+    `means` (C, 3) x, y (m), heading (rad); `covariances` (C, 3, 3); `weights` (C,) in [0, 1], which need not sum to 1;
+    `counts` (C,) how many observations each has taken in (eta). A component's heading is that of a robot that sees the
+    view as it was kept: the pose that fits a view seen turned by t has the heading plus t. `steps`: views learned from
+    so far. `next_id`: the id of the next view. `pose_source`: the source of the first pose. `threshold`: the settled
+    novelty threshold, None until there is one.
     """
 
     in_place = True
 
     views: npt.NDArray[np.float32]
     kind: str
-    names: Ints
+    ids: Ints
     born: Ints
     owner: Ints
     means: Array
@@ -42,9 +41,9 @@ class ViewMixtures(GrowableArrays, Value):
     weights: Array
     counts: Array
     steps: int
-    next_name: int
+    next_id: int
     pose_source: PoseSource
-    limit: NoveltyThreshold | None = None
+    threshold: NoveltyThreshold | None = None
 
     @classmethod
     def empty(cls) -> "ViewMixtures":
@@ -74,19 +73,19 @@ class ViewMixtures(GrowableArrays, Value):
         if len(self) and (self.kind != kind or self.views.shape[1] != size):
             raise BadInput(
                 f"map: its views are {self.kind} of {self.views.shape[1]} numbers, the current one is {kind} of "
-                f"{size}; use the features it was learned with, or learn it anew"
+                f"{size}; use the features it was learned with, or learn a new one"
             )
 
     def add_view(self, values: npt.NDArray[np.float32], kind: str) -> int:
         """Keep a view, with no place yet; gives its row. Raises ValueError where it is not of the map's kind."""
-        if not len(self) and not self.next_name:
+        if not len(self) and not self.next_id:
             self.put(views=np.empty((0, len(values)), np.float32), kind=kind)
         if kind != self.kind or len(values) != self.views.shape[1]:
             raise ValueError(f"{kind} of {len(values)} numbers in a map of {self.kind} of {self.views.shape[1]}")
         self.append("views", values)
-        self.append("names", np.int64(self.next_name))
+        self.append("ids", np.int64(self.next_id))
         self.append("born", np.int64(self.steps))
-        self.put(next_name=self.next_name + 1)
+        self.put(next_id=self.next_id + 1)
         return len(self) - 1
 
     def add_component(self, owner: int, mean: Array, covariance: Array, weight: float, count: float) -> int:
@@ -121,7 +120,7 @@ class ViewMixtures(GrowableArrays, Value):
         self.keep_components(kept[self.owner])
         row = np.cumsum(kept) - 1
         self.put(owner=row[self.owner])
-        for name in ("views", "names", "born"):
+        for name in ("views", "ids", "born"):
             self.put(**{name: getattr(self, name)[kept]})
 
     def step(self) -> None:
@@ -132,19 +131,19 @@ class ViewMixtures(GrowableArrays, Value):
         """Say where the first pose came from."""
         self.put(pose_source=source)
 
-    def take_limit(self, limit: NoveltyThreshold | None) -> None:
-        """Keep the limit it is learned with, once that is settled."""
-        if limit is not None and limit.settled:
-            self.put(limit=limit)
+    def keep_threshold(self, threshold: NoveltyThreshold | None) -> None:
+        """Keep the novelty threshold with which the map is learned, once that is settled."""
+        if threshold is not None and threshold.settled:
+            self.put(threshold=threshold)
 
 
 class ViewEvent(Value):
-    """What a tick did to a map of views: small, so that its life can be told when the drive has ended.
+    """The changes of a tick to a map of views, small enough to be collected over a drive.
 
-    `views` and `components`: how many there are after the tick. `inserted`: (m,) names of the views that came, and
-    `seen` (m,) the ticks in which they had been seen, which may be long before. `removed`: names of those that went;
-    `why`: of the removal. `changed`: (n,) names of views whose mixtures were changed, with, of each, `weights` (n,) of
-    its heaviest component, `places` (n, 2) its x, y (m), and `parts` (n,) how many components it has.
+    `views` and `components`: their number after the tick. `inserted`: (m,) ids of new views, and `seen` (m,) the ticks
+    in which they were seen, perhaps long before. `removed`: ids of removed views; `why`: the reason. `changed`: (n,)
+    ids of views whose mixtures changed, with the weight `weights` (n,) and the x, y (m) `places` (n, 2) of the heaviest
+    component of each, and `parts` (n,), its number of components.
     """
 
     views: int
@@ -160,8 +159,8 @@ class ViewEvent(Value):
 
 
 class MixturesNow(Value):
-    """Components of some views after a tick: `names` (C,) of their views, `means` (C, 3) m and rad, `weights` (C,)."""
+    """Components of some views after a tick: `ids` (C,) of their views, `means` (C, 3) m and rad, `weights` (C,)."""
 
-    names: npt.NDArray[np.int64]
+    ids: npt.NDArray[np.int64]
     means: npt.NDArray[np.float32]
     weights: npt.NDArray[np.float32]

@@ -1,4 +1,4 @@
-"""Whole views as one vector each: what a map that is learned while it is used keeps of a view."""
+"""Whole views as one vector each, as maps learned during their use keep them."""
 
 from abc import abstractmethod
 
@@ -66,10 +66,10 @@ class Spectrum(WholeView):
 
 
 class NoveltyThreshold(Value):
-    """The distance between views within which they count as the same place's: delta_y, E_max. In the views' unit.
+    """The distance between views above which a view is new: delta_y, E_max. In the views' unit.
 
-    `settled`: False while it is still being measured. `metres`: how far a robot drives until what it sees is beyond the
-    limit, as far as is known by now, 0 where nobody measured that.
+    `settled`: False while it is still being measured. `metres`: the distance driven until a view is new, as measured so
+    far; 0 where it is not known.
     """
 
     distance: float
@@ -78,11 +78,11 @@ class NoveltyThreshold(Value):
 
 
 class Neighbours(Value):
-    """The map's views within the limit of the present one, nearest first.
+    """The map's views within the novelty threshold of the current one, nearest first.
 
     `rows`: (J,) their rows in the map. `distances`: (J,) in the views' unit. `similarities`: (J,) in [0, 1], 1 at
-    distance 0, falling to 0 at the limit. `turns`: (J,) how far the robot stands turned, counter-clockwise, from its
-    heading in each of them, radians. `nearest`: the distance to the nearest view of the whole map, inf without one.
+    distance 0, falling to 0 at the threshold. `turns`: (J,) how far the robot stands turned, counter-clockwise, from
+    its heading in each of them, radians. `nearest`: the distance to the nearest view of the whole map, inf without one.
     """
 
     rows: npt.NDArray[np.int64]

@@ -11,10 +11,11 @@ import pytest
 from omninav.pipeline import Context, Tick
 from omninav.stages.fusion.agreement import Agreement
 from omninav.stages.fusion.growing_prior import ParticlesInMap
-from omninav.stages.fusion.particle_clustering import Clusters
+from omninav.stages.fusion.particle_clustering import ParticleClustering
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.mapping.delayed_by_distance import DelayedByDistance, DelayedByDistanceState
 from omninav.stages.mapping.fused_mixtures import FusedMixtures, FusedMixturesState
+from omninav.stages.mapping.past_states import CorrectPastStates, CorrectPastStatesState
 from omninav.stages.match.neighbours import ViewNeighbours
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.sensor.superposition import Superposition
@@ -61,7 +62,7 @@ def drive(places: list[int], drift: float) -> tuple[list[Array], list[Motion | N
 
 
 def run(
-    retrace: bool = True,
+    reconstruct_path: bool = True,
     places: list[int] = CARRIED,
     drift: float = 0.0,
     back_propagate: bool = False,
@@ -72,18 +73,20 @@ def run(
     ctx = {
         name: Context(name, np.random.default_rng(n)) for n, name in enumerate(("first", "motion", "fusion", "rest"))
     }
-    known, limit, behind, learned = (
+    correct = CorrectPastStates(reconstruct_path=reconstruct_path, back_propagate=back_propagate)
+    known, limit, queue, path, learned = (
         ViewMixtures.empty(),
         NoveltyThreshold(LIMIT),
         DelayedByDistanceState(),
+        CorrectPastStatesState(),
         FusedMixturesState(),
     )
     start, move, fuse = ParticlesInMap(number=500), RotationTranslationRotation(), Agreement(**filter_options)
-    match, sensor, gather, teach, learn = (
+    match, sensor, gather, delay, learn = (
         ViewNeighbours(),
         Superposition(),
-        Clusters(),
-        DelayedByDistance(retrace=retrace, back_propagate=back_propagate),
+        ParticleClustering(),
+        DelayedByDistance(),
         FusedMixtures(),
     )
     errors, wrong, belief = [], [], None
@@ -98,8 +101,9 @@ def run(
         moved = move.step(ctx["motion"], belief, motion)
         belief = fuse.step(ctx["fusion"], moved.belief, hypothesis).belief
         state = gather.step(ctx["rest"], belief).state
-        lessons = teach.step(ctx["rest"], view, state, moved.model, behind, neighbours, known).updates
-        known = learn.step(ctx["rest"], lessons, limit, known, learned).map
+        past = correct.step(ctx["rest"], view, state, moved.model, path, neighbours, known).corrections
+        updates = delay.step(ctx["rest"], view, state, moved.model, queue, past).updates
+        known = learn.step(ctx["rest"], updates, limit, known, learned).map
         at = belief.estimate().pose
         errors.append(math.hypot(at.x - pose[0], at.y - pose[1]))
         wrong.append(wrong_weight(known))
@@ -136,15 +140,15 @@ def test_a_wrong_place_is_forgotten_lap_by_lap_and_removed() -> None:
     assert max(after[4:]) == 0.0
 
 
-def test_once_back_at_the_start_the_way_from_b_is_put_right_and_the_error_falls() -> None:
+def test_once_back_at_the_start_the_path_from_b_is_corrected_and_the_error_falls() -> None:
     errors, _, laps, _ = run()
     lap = [float(errors[laps == n].mean()) for n in range(LAPS)]
     assert lap[0] > lap[1] > lap[2] > lap[3]
     assert max(lap[3:]) < 0.3
 
 
-def test_without_retracing_the_wrong_stretch_travels_round() -> None:
-    errors, _, laps, _ = run(retrace=False)
+def test_without_path_reconstruction_the_wrong_stretch_moves_on() -> None:
+    errors, _, laps, _ = run(reconstruct_path=False)
     place = np.arange(STEPS)
     right_up_to = []
     for lap in (1, 3, 6):

@@ -127,13 +127,13 @@ def test_a_saved_map_is_read_only_or_grows_on_and_forgetting_is_a_word(whole: Pa
     before = content(whole)
 
     def limit(run: Path):
-        return json.loads((run / "manifest.json").read_text())["facts"]["view_limit"]
+        return json.loads((run / "manifest.json").read_text())["facts"]["novelty_threshold"]
 
     frozen = drive("frozen", "mapping=frozen")
     assert encode(content(frozen)) == encode(before)
-    assert limit(frozen) == limit(whole) == round(before.limit.distance, 4)
+    assert limit(frozen) == limit(whole) == round(before.threshold.distance, 4)
     grown = content(drive("grown", "forgetting=passive"))
     assert grown.steps > before.steps
-    assert np.isin(before.names, grown.names).mean() > 0.9
+    assert np.isin(before.ids, grown.ids).mean() > 0.9
     config = (tmp_path / "grown" / "runs" / "latest" / "config.yaml").read_text()
     assert "forgetting: passive" in config

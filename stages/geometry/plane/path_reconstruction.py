@@ -1,4 +1,4 @@
-"""Where the robot was between two places that are certain: the way along the odometry, worked out from both ends."""
+"""Reconstructs a path between two known poses from the odometry, by smoothing from both ends."""
 
 import numba
 import numpy as np
@@ -9,7 +9,7 @@ from .se2 import chain, compose, wrap
 Array = npt.NDArray[np.float64]
 
 
-def reconstructed(
+def reconstruct_path(
     first: Array,
     first_covariance: Array,
     motions: Array,
@@ -19,37 +19,39 @@ def reconstructed(
     independent: bool = True,
     rounds: int = 5,
 ) -> tuple[Array, Array, float]:
-    """Poses along a way whose two ends are known, each as a Gaussian: means (N + 1, 3), covariances (N + 1, 3, 3).
+    """Poses along a path whose ends are known, each as a Gaussian: means (N + 1, 3), covariances (N + 1, 3, 3).
 
-    `first`, `last`: (3,) x, y (m), heading (rad), with covariances (3, 3). `motions`: (N, 3) increments along the way,
+    `first`, `last`: (3,) x, y (m), heading (rad), with covariances (3, 3). `motions`: (N, 3) increments along the path,
     each in the frame of where it began; `noise`: (N, 3, 3) their covariances in that frame. Row 0 is the first end, row
     N the last.
 
-    `independent`: what is known of the last end does not come from the first one, and the last pose is what the way
-    from the first end says of it, times the last end. Otherwise the last end is a filter's state, which knows the first
-    end and the motions already and would count them twice: it is the last pose as it is. Either way only what is known
-    of the last pose beyond the way goes back along it (Rauch, Tung & Striebel 1965), which for independent ends is what
-    ten Hagen & Kroese 2002 have forwards and backwards. Motions are linearised around the result of the round before,
-    so that the result is the most likely way, also where the headings had to turn a lot.
+    `independent`: the last end is independent of the first, and the last pose is the product of both estimates.
+    Otherwise the last end is a filter's state, which has used the first end and the motions already: it is the last
+    pose as it is. Either way only the new information about the last pose is propagated back (Rauch, Tung & Striebel
+    1965), which for independent ends equals the forward and backward passes of ten Hagen & Kroese 2002. Motions are
+    linearised around the result of the previous round, so that the result is the most likely path, also with large
+    turns.
 
     The third value is the squared Mahalanobis distance by which odometry misses the last end (3 degrees of freedom): a
-    large one says that the robot was lifted, or that an end is wrong.
+    large one means that the robot was kidnapped or that an end is wrong.
     """
     first, last = np.ascontiguousarray(first, np.float64), np.ascontiguousarray(last, np.float64)
     first_covariance = np.ascontiguousarray(first_covariance, np.float64)
     last_covariance = np.ascontiguousarray(last_covariance, np.float64)
     motions = np.ascontiguousarray(motions, np.float64).reshape(-1, 3)
     noise = np.ascontiguousarray(noise, np.float64).reshape(-1, 3, 3)
-    # The way around which motions are linearised: at first where odometry leads.
+    # The path around which motions are linearised: at first that of the odometry.
     at, missed = np.vstack([first, compose(first, chain(motions))]), 0.0
     for turn in range(rounds):
-        ahead, ahead_covariance = _ahead(first, first_covariance, motions, noise, at)
-        gap, both = _wrapped(last - ahead[-1]), ahead_covariance[-1] + last_covariance
+        forward, forward_covariance = _forward(first, first_covariance, motions, noise, at)
+        gap, both = _wrapped(last - forward[-1]), forward_covariance[-1] + last_covariance
         if turn == 0:
             missed = float(gap @ np.linalg.solve(both, gap))
-        share = ahead_covariance[-1] @ np.linalg.inv(both) if independent else np.eye(3)
+        share = forward_covariance[-1] @ np.linalg.inv(both) if independent else np.eye(3)
         covariance = share @ last_covariance
-        at, covariances = _back(motions, noise, at, ahead, ahead_covariance, ahead[-1] + share @ gap, covariance)
+        at, covariances = _backward(
+            motions, noise, at, forward, forward_covariance, forward[-1] + share @ gap, covariance
+        )
     return np.column_stack([at[:, :2], wrap(at[:, 2])]), covariances, missed
 
 
@@ -71,31 +73,37 @@ def _linearised(pose: Array, motion: Array, noise: Array) -> tuple[Array, Array,
 
 
 @numba.njit(cache=True, nogil=True)
-def _ahead(first: Array, first_covariance: Array, motions: Array, noise: Array, at: Array) -> tuple[Array, Array]:
-    # What the first end and the motions say of each pose.
-    ahead, covariance = np.empty((len(at), 3)), np.empty((len(at), 3, 3))
-    ahead[0], covariance[0] = first, first_covariance
+def _forward(first: Array, first_covariance: Array, motions: Array, noise: Array, at: Array) -> tuple[Array, Array]:
+    # The forward pass: each pose from the first end and the motions.
+    forward, covariance = np.empty((len(at), 3)), np.empty((len(at), 3, 3))
+    forward[0], covariance[0] = first, first_covariance
     for k in range(len(motions)):
         end, slope, spread = _linearised(at[k], motions[k], noise[k])
-        ahead[k + 1] = end + slope @ _wrapped(ahead[k] - at[k])
+        forward[k + 1] = end + slope @ _wrapped(forward[k] - at[k])
         covariance[k + 1] = slope @ covariance[k] @ slope.T + spread
-    return ahead, covariance
+    return forward, covariance
 
 
 @numba.njit(cache=True, nogil=True)
-def _back(
-    motions: Array, noise: Array, at: Array, ahead: Array, ahead_covariance: Array, last: Array, last_covariance: Array
+def _backward(
+    motions: Array,
+    noise: Array,
+    at: Array,
+    forward: Array,
+    forward_covariance: Array,
+    last: Array,
+    last_covariance: Array,
 ) -> tuple[Array, Array]:
-    # All poses, from what the way so far says of them and what is known of the last one.
-    fresh, covariances = np.empty(ahead.shape), np.empty(ahead_covariance.shape)
+    # The backward pass: all poses, from the forward pass and the last pose.
+    smoothed, covariances = np.empty(forward.shape), np.empty(forward_covariance.shape)
     n = len(motions)
-    fresh[n], covariances[n] = last, 0.5 * (last_covariance + last_covariance.T)
+    smoothed[n], covariances[n] = last, 0.5 * (last_covariance + last_covariance.T)
     for k in range(n - 1, -1, -1):
         slope = _linearised(at[k], motions[k], noise[k])[1]
-        gain = ahead_covariance[k] @ slope.T @ np.linalg.inv(ahead_covariance[k + 1])
-        fresh[k] = ahead[k] + gain @ _wrapped(fresh[k + 1] - ahead[k + 1])
-        # As a sum of what stays uncertain whatever the end is, and of the end's share: both are positive.
-        kept = ahead_covariance[k] - gain @ slope @ ahead_covariance[k]
+        gain = forward_covariance[k] @ slope.T @ np.linalg.inv(forward_covariance[k + 1])
+        smoothed[k] = forward[k] + gain @ _wrapped(smoothed[k + 1] - forward[k + 1])
+        # The sum of two positive parts: the uncertainty left with a known end, and the end's share.
+        kept = forward_covariance[k] - gain @ slope @ forward_covariance[k]
         both = kept + gain @ covariances[k + 1] @ gain.T
         covariances[k] = 0.5 * (both + both.T)
-    return fresh, covariances
+    return smoothed, covariances

@@ -16,7 +16,7 @@ from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Coefficients, NoveltyThreshold, Spectrum
 
 LIMIT = NoveltyThreshold(1.0)
-FREE = {"least_m": 0.0, "least_deg": 0.0}
+FREE = {"min_sigma_m": 0.0, "min_sigma_deg": 0.0}
 
 
 def view(*values):
@@ -36,7 +36,7 @@ def learn(map, view, state, **options):
     return stage.step(Context("mapping"), lessons, LIMIT, map, BeforeThreshold()).events
 
 
-def test_a_view_unlike_all_others_is_kept_with_its_place_and_weight_beta():
+def test_a_new_view_is_inserted_with_its_state_and_weight_beta():
     map = ViewMixtures.empty()
     event = learn(map, view(0, 0), state([1, 2, 0.5]))
     assert event.inserted.tolist() == [0]
@@ -48,7 +48,7 @@ def test_a_view_unlike_all_others_is_kept_with_its_place_and_weight_beta():
     assert event.inserted.tolist() == [1], "a distance at the limit is a new view's"
 
 
-def test_counts_share_one_observation_among_the_views_it_resembles():
+def test_one_observation_is_shared_among_the_similar_views():
     map = ViewMixtures.empty()
     learn(map, view(0, 0), state([0, 0, 0]))
     learn(map, view(1.1, 0), state([4, 0, 0]))
@@ -62,7 +62,7 @@ def test_merged_places_are_the_counts_mean_and_not_their_sum():
     row = map.add_view(np.zeros(2, np.float32), "Coefficients")
     map.add_component(row, np.array([10.0, 5.0, 0.0]), np.eye(3) * 4.0, 0.5, 5.0)
     # Erratum 7: eta 5 and 0.4 must not move (10, 5) to (54, 27). Here eta 5 and 1 at (10, 5) and (13, 5).
-    learn(map, view(0, 0), state([13, 5, 0], sigma=2.0), doubt="again")
+    learn(map, view(0, 0), state([13, 5, 0], sigma=2.0), state_covariance="every_update")
     assert len(map.weights) == 1
     np.testing.assert_allclose(map.means[0], [10 + 3 / 6, 5, 0])
     # Equation 14: (5 (4 + 0.5^2) + 1 (4 + 2.5^2)) / 6 along x, 4 along y.
@@ -71,27 +71,27 @@ def test_merged_places_are_the_counts_mean_and_not_their_sum():
     assert map.weights.tolist() == [0.1 + 0.9 * 0.5]
 
 
-def test_a_place_that_is_confirmed_learns_how_far_the_means_are_apart_and_not_the_doubt_again():
+def test_a_confirmed_component_adds_the_spread_of_the_means_and_not_the_covariance_again():
     map = ViewMixtures.empty()
     row = map.add_view(np.zeros(2, np.float32), "Coefficients")
     map.add_component(row, np.array([10.0, 5.0, 0.0]), np.eye(3) * 4.0, 0.5, 5.0)
-    learn(map, view(0, 0), state([13, 5, 0], sigma=2.0), least_m=0.1)
+    learn(map, view(0, 0), state([13, 5, 0], sigma=2.0), min_sigma_m=0.1)
     # As above, but what comes has 0.1 m instead of 2 m: (5 (4 + 0.5^2) + 1 (0.1^2 + 2.5^2)) / 6 along x.
     np.testing.assert_allclose(np.diag(map.covariances[0]), [(5 * 4.25 + 6.26) / 6, 20.01 / 6, 20 / 6])
-    learn(map, view(0, 0), state([30, 5, 0], sigma=2.0), least_m=0.1)
+    learn(map, view(0, 0), state([30, 5, 0], sigma=2.0), min_sigma_m=0.1)
     new = map.means[:, 0] == 30
     np.testing.assert_allclose(np.diag(map.covariances[new][0]), 4.0, err_msg="elsewhere it is a place of its own")
 
 
-@pytest.mark.parametrize(("doubt", "grows"), [("once", False), ("again", True)])
-def test_a_map_that_teaches_itself_grows_ever_more_doubtful_only_where_doubt_counts_each_time(doubt, grows):
+@pytest.mark.parametrize(("state_covariance", "grows"), [("first", False), ("every_update", True)])
+def test_covariances_grow_without_end_only_where_each_state_adds_its_own(state_covariance, grows):
     # The state is the map's own place and one picture's motion noise; the view is seen from within 0.2 m of it.
     rng = np.random.default_rng(0)
     map, spreads = ViewMixtures.empty(), []
     for step in range(2000):
         covariance = map.covariances[0] if len(map) else np.eye(3) * 0.01
         noisy = GaussianMixture(rng.uniform(-0.2, 0.2, (1, 3)), (covariance + np.eye(3) * 0.003)[None], np.ones(1))
-        learn(map, view(0, 0), noisy, doubt=doubt, least_m=0.1)
+        learn(map, view(0, 0), noisy, state_covariance=state_covariance, min_sigma_m=0.1)
         if step in (999, 1999):
             spreads.append(np.sqrt(map.covariances[0][0, 0]))
     assert len(map.weights) == 1
@@ -132,7 +132,7 @@ def test_places_that_fit_grow_and_the_others_of_the_same_view_fade():
     np.testing.assert_allclose(map.weights[np.argsort(map.means[:, 0])], [0.08 + 0.92 * 0.54, 0.46])
 
 
-def test_an_unlike_view_that_was_seen_here_is_forgotten_as_the_distance_and_the_doubt_allow():
+def test_a_dissimilar_view_seen_here_is_forgotten_by_distance_and_uncertainty():
     def made():
         map = ViewMixtures.empty()
         for name, x in enumerate((0.0, 0.3, 0.6)):
@@ -140,7 +140,13 @@ def test_an_unlike_view_that_was_seen_here_is_forgotten_as_the_distance_and_the_
             map.add_component(name, np.array([x, 0.0, 2.0]), np.eye(3) * 0.01, 0.5, 3.0)
         return map
 
-    active = {"forgetting": "active", "near_m": 0.5, "fade_m": 0.4, "beta_forget": 0.2, "gain_m": 0.1}
+    active = {
+        "forgetting": "active",
+        "forget_radius_m": 0.5,
+        "forget_fade_m": 0.4,
+        "beta_forget": 0.2,
+        "forget_gain_m": 0.1,
+    }
     map = made()
     learn(map, view(0, 0), state([0, 0, 0], sigma=0.1), **active)
     # b = 0.2 (1 - d / 0.4) 0.1 / (0.1 + 0.1): 0.1 at 0 m, 0.025 at 0.3 m, nothing at 0.6 m; headings do not matter.
@@ -153,26 +159,26 @@ def test_an_unlike_view_that_was_seen_here_is_forgotten_as_the_distance_and_the_
     np.testing.assert_allclose(map.weights[:3], 0.5)
 
 
-def test_a_state_that_is_very_certain_takes_away_a_weight_but_not_more():
+def test_a_very_certain_state_removes_at_most_the_whole_weight():
     map = ViewMixtures.empty()
     map.add_view(np.array([10.0, 0.0], np.float32), "Coefficients")
     map.add_component(0, np.zeros(3), np.eye(3) * 0.01, 0.5, 3.0)
     # b = 0.2 * 2 / 0.002 = 200: without a limit the weight would be negative (erratum 11).
-    event = learn(map, view(0, 0), state([0, 0, 0], sigma=0.001), forgetting="active", gain_m=2.0)
+    event = learn(map, view(0, 0), state([0, 0, 0], sigma=0.001), forgetting="active", forget_gain_m=2.0)
     assert event.removed.tolist() == [0]
     assert event.why == "forgotten"
-    assert map.names.tolist() == [1]
+    assert map.ids.tolist() == [1]
 
 
-def test_a_new_place_outlives_the_tick_in_which_it_is_learned_however_little_it_is_alike():
+def test_a_new_component_survives_its_first_tick_at_any_similarity():
     map = ViewMixtures.empty()
     learn(map, view(0, 0), state([0, 0, 0]))
     learn(map, view(0.79, 0), state([9, 0, 0]))
     assert 9 in map.means[:, 0].round(9), "S = 0.21: taken in, w = 0.021"
     learn(map, view(0.81, 0), state([20, 0, 0]))
     assert 20 not in map.means[:, 0].round(9), "S = 0.19 is not enough"
-    with pytest.raises(ValueError, match=r"least_weight: 0\.02 is not below"):
-        AdaptiveViews(least_weight=0.02, least_similarity=0.2, beta=0.1)
+    with pytest.raises(ValueError, match=r"min_weight: 0\.02 is not below"):
+        AdaptiveViews(min_weight=0.02, min_similarity=0.2, beta=0.1)
 
 
 def test_a_place_never_seen_again_loses_its_weight_and_a_view_without_places_goes():
@@ -186,24 +192,24 @@ def test_a_place_never_seen_again_loses_its_weight_and_a_view_without_places_goe
     assert steps == 22
 
 
-def test_a_state_of_two_modes_teaches_each_by_its_weight():
+def test_a_state_of_two_modes_updates_by_the_weight_of_each():
     map = ViewMixtures.empty()
     learn(map, view(0, 0), state([0, 0, 0], [9, 0, 0], weights=[0.6, 0.2]))
     np.testing.assert_allclose(map.weights, [0.075, 0.025])
     np.testing.assert_allclose(map.counts, [0.75, 0.25])
 
 
-def test_views_above_the_limit_go_though_lessons_come_many_at_once():
+def test_the_cap_on_views_holds_when_many_updates_come_at_once():
     map = ViewMixtures.empty()
     lessons = MapUpdates(tuple(MapUpdate(view(2 * n, 0), state([n, 0, 0]), n) for n in range(9)))
     stage = AdaptiveViews(max_views=4)
     event = stage.step(Context("mapping"), lessons, LIMIT, map, BeforeThreshold()).events
     assert len(map) == event.views == 4
-    assert 8 in map.names
-    assert event.inserted.tolist() == map.names.tolist()
+    assert 8 in map.ids
+    assert event.inserted.tolist() == map.ids.tolist()
 
 
-def test_before_there_is_a_limit_only_the_first_view_is_kept_and_the_others_wait():
+def test_before_there_is_a_threshold_only_the_first_update_is_applied():
     map, stage, waiting = ViewMixtures.empty(), AdaptiveViews(**FREE), BeforeThreshold()
     for n in range(3):
         lessons = MapUpdates((MapUpdate(view(2 * n, 0), state([n, 0, 0]), n),))
@@ -237,7 +243,7 @@ def test_weights_stay_in_0_to_1_and_covariances_positive_definite_over_10000_upd
 
     for _ in range(1000):
         forgetting, beta = str(rng.choice(["active", "passive", "none"])), rng.uniform(0.1, 1.0)
-        stage = AdaptiveViews(forgetting=forgetting, beta=beta, gain_m=5.0, max_views=12, **FREE)
+        stage = AdaptiveViews(forgetting=forgetting, beta=beta, forget_gain_m=5.0, max_views=12, **FREE)
         least = 10.0 ** rng.uniform(-6, -1)
         stage.step(Context("m"), MapUpdates(tuple(random_lesson(least) for _ in range(10))), LIMIT, map, waiting)
         assert (map.weights >= 0).all()

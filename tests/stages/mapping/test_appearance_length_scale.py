@@ -36,7 +36,12 @@ def test_views_reach_as_far_however_many_ways_pictures_look_from_each_place(dire
 
 
 def test_pictures_that_look_other_ways_are_strangers_where_they_are_compared():
-    assert AppearanceLengthScale(alike_deg=180.0).step(Context("reach"), along_a_wall(4, 1)).length_scale.metres < 0.2
+    assert (
+        AppearanceLengthScale(max_heading_difference_deg=180.0)
+        .step(Context("reach"), along_a_wall(4, 1))
+        .length_scale.metres
+        < 0.2
+    )
 
 
 def test_pairs_that_are_not_to_be_compared_count_nowhere():

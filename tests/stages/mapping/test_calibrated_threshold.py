@@ -27,42 +27,42 @@ def told(limit: NoveltyThreshold | None) -> tuple[float, bool] | None:
 
 
 def test_the_limit_is_a_share_of_the_median_distance_of_views_far_enough_apart() -> None:
-    found, ctx = limits(CalibratedThreshold(views=5, apart=2), [0, 1, 3, 7, 8, 100, 200])
+    found, ctx = limits(CalibratedThreshold(views=5, min_separation=2), [0, 1, 3, 7, 8, 100, 200])
     # Pairs two or more apart: 3; 7, 6; 8, 7, 5: medians 3, 6, 6.5.
     settled = (3.25, True)
     assert [told(limit) for limit in found] == [None, None, (1.5, False), (3.0, False), settled, settled, settled]
-    assert ctx.facts["view_limit"] == 3.25
+    assert ctx.facts["novelty_threshold"] == 3.25
 
 
 def test_one_apart_all_pairs_count() -> None:
-    found, _ = limits(CalibratedThreshold(views=4, apart=1), [0.0, 4.0, 6.0, 12.0, 100.0])
+    found, _ = limits(CalibratedThreshold(views=4, min_separation=1), [0.0, 4.0, 6.0, 12.0, 100.0])
     # Pairs: 4; 6, 2; 12, 8, 6: medians 4, 4, 6.
     assert [told(limit) for limit in found] == [None, (2.0, False), (2.0, False), (3.0, True), (3.0, True)]
 
 
 @pytest.mark.parametrize("views", [5, 100], ids=["settled", "being measured"])
 def test_a_limit_says_how_far_a_robot_drives_until_it_is_reached(views: int) -> None:
-    limit = limits(CalibratedThreshold(views=views, apart=2), [0, 1, 3, 7, 8])[0][-1]
+    limit = limits(CalibratedThreshold(views=views, min_separation=2), [0, 1, 3, 7, 8])[0][-1]
     assert limit is not None
     # From 0 the first view at 3.25 or more is 7, three steps of 0.1 m on; from 1 and from 3 it is 7 too: 0.3, 0.2, 0.1.
     assert limit.metres == pytest.approx(0.2)
 
 
 def test_views_of_a_robot_that_stands_do_not_count() -> None:
-    assert limits(CalibratedThreshold(views=5, apart=2), [0, 1, 3, 7], metres=0.0)[0] == [None] * 4
-    found, _ = limits(CalibratedThreshold(apart=1, share=1.0), [0.0, 1.0, 2.0, 3.0], metres=0.004)
+    assert limits(CalibratedThreshold(views=5, min_separation=2), [0, 1, 3, 7], metres=0.0)[0] == [None] * 4
+    found, _ = limits(CalibratedThreshold(min_separation=1, share=1.0), [0.0, 1.0, 2.0, 3.0], metres=0.004)
     assert [told(limit) for limit in found] == [None, None, None, (3.0, False)]  # 12 mm from the first
 
 
 def test_what_was_measured_is_let_go_of_once_it_is_settled() -> None:
     first = CalibratedThresholdState()
-    limits(CalibratedThreshold(views=3, apart=1), [0.0, 1.0, 2.0, 3.0], first=first)
-    assert told(first.limit) == (0.5, True)
+    limits(CalibratedThreshold(views=3, min_separation=1), [0.0, 1.0, 2.0, 3.0], first=first)
+    assert told(first.threshold) == (0.5, True)
     assert not len(first.views)
     assert not first.table
-    assert not first.ways
+    assert not first.gaps_m
 
 
 def test_there_must_be_a_pair_that_far_apart() -> None:
-    with pytest.raises(ValueError, match="apart: of 20 views none"):
-        CalibratedThreshold(views=20, apart=20)
+    with pytest.raises(ValueError, match="min_separation: of 20 views none"):
+        CalibratedThreshold(views=20, min_separation=20)

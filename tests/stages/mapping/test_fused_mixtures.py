@@ -97,7 +97,7 @@ def test_a_lesson_given_again_leaves_the_map_as_if_it_had_been_known_in_the_firs
         ):
             stage.step(Context("mapping"), MapUpdates(tuple(lessons), open_from=0), NoveltyThreshold(1.0), map, learned)
         maps.append(map)
-    assert maps[0].names.tolist() == maps[1].names.tolist()
+    assert maps[0].ids.tolist() == maps[1].ids.tolist()
     for row in range(len(maps[0])):
         for mine, expected in zip(*([getattr(m, f)[m.owner == row] for f in HELD] for m in maps), strict=True):
             np.testing.assert_array_equal(mine, expected)
@@ -184,7 +184,7 @@ def test_a_map_never_holds_more_views_than_it_may() -> None:
     assert len(map) == 3
     assert events[-1].why == "full"
     assert len(events[-1].removed) == 1
-    assert map.names.tolist()[-1] == 5
+    assert map.ids.tolist()[-1] == 5
 
 
 @pytest.mark.parametrize("average", ["visits", "halves"])

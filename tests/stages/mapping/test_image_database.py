@@ -42,12 +42,12 @@ def test_every_picture_is_a_reference_by_default_and_they_are_joined_in_order() 
 
 
 def test_pictures_are_as_far_apart_as_asked() -> None:
-    map = learned(ImageDatabase(apart_m=0.45), STRAIGHT, SegmentHistograms(views(4)))
+    map = learned(ImageDatabase(min_distance_m=0.45), STRAIGHT, SegmentHistograms(views(4)))
     assert np.allclose(map.poses[:, 0], [0.0, 0.5, 1.0, 1.5, 2.0])
     turning: Tour = [(0.0, 0.0, math.radians(10.0 * number)) for number in range(37)]
-    map = learned(ImageDatabase(apart_m=0.45, apart_deg=25.0), turning, SegmentHistograms(views(4)))
+    map = learned(ImageDatabase(min_distance_m=0.45, min_turn_deg=25.0), turning, SegmentHistograms(views(4)))
     assert np.allclose(np.degrees(map.poses[:, 2]), np.arange(0, 361, 30))
-    assert len(learned(ImageDatabase(apart_m=0.45), turning, SegmentHistograms(views(4)))) == 1
+    assert len(learned(ImageDatabase(min_distance_m=0.45), turning, SegmentHistograms(views(4)))) == 1
 
 
 def test_each_window_is_a_reference_that_looks_its_own_way() -> None:
@@ -66,7 +66,7 @@ def test_each_window_is_a_reference_that_looks_its_own_way() -> None:
 def test_poses_are_odometry_where_there_is_no_truth_unless_truth_is_asked_for() -> None:
     map = learned(ImageDatabase(), STRAIGHT, SegmentHistograms(views(4)), odometry_only=True)
     assert map.pose_source == "odometry"
-    with pytest.raises(BadInput, match="no ground truth for its first picture"):
+    with pytest.raises(BadInput, match="no ground truth for its first image"):
         learned(ImageDatabase(supervised="truth"), STRAIGHT, SegmentHistograms(views(4)), odometry_only=True)
 
 

@@ -18,10 +18,10 @@ def belief(tick, shares=(1.0,), covariance=NARROW):
 
 
 class Drive:
-    """Steps a queue through a drive around a ring; `split` ticks are in two minds."""
+    """Steps a queue through a drive around a ring; at `split` ticks the state has two modes."""
 
     def __init__(self, split=(), starts=(0,), shift=0.0, **options):
-        self.stage, self.waiting, self.ctx = UnimodalQueue(**options), UnimodalQueueState(), Context("lessons")
+        self.stage, self.pending, self.ctx = UnimodalQueue(**options), UnimodalQueueState(), Context("map_update")
         self.split, self.starts, self.shift = split, starts, shift
         self.came: dict[int, list] = {}
 
@@ -34,79 +34,79 @@ class Drive:
                 state = GaussianMixture(state.means + np.array([self.shift, 0, 0]), state.covariances, state.weights)
             view = Coefficients(look(n), look(n)[None])
             out = self.stage.step(
-                self.ctx, view=view, state=state, model=None if first else way(n), waiting=self.waiting
+                self.ctx, view=view, state=state, model=None if first else way(n), pending=self.pending
             )
             self.came[n] = list(out.updates.items)
         return self
 
     def order(self):
-        return [(lesson.index, tick) for tick, lessons in self.came.items() for lesson in lessons]
+        return [(update.index, tick) for tick, updates in self.came.items() for update in updates]
 
 
-def test_a_lesson_comes_so_many_ticks_after_its_view():
+def test_an_update_is_given_length_ticks_after_its_view():
     assert Drive(length=3).to(6).order() == [(0, 3), (1, 4), (2, 5)]
     assert Drive(length=0).to(3).order() == [(0, 0), (1, 1), (2, 2)]
 
 
-def test_at_the_next_log_what_waits_comes_at_once():
+def test_at_the_next_log_all_waiting_updates_are_given():
     assert Drive(length=3, starts=(0, 4)).to(5).order() == [(0, 3), (1, 4), (2, 4), (3, 4)]
 
 
-def test_views_between_two_certain_states_come_with_the_way_worked_out_and_in_their_order():
+def test_views_between_two_unimodal_states_get_reconstructed_states_in_order():
     drive = Drive(split=range(5, 9), length=2).to(14)
-    lessons = [lesson for tick in drive.came.values() for lesson in tick]
-    assert [lesson.index for lesson in lessons] == list(range(12))
-    assert [lesson.index for lesson in lessons if lesson.reconstructed] == [5, 6, 7, 8]
-    assert [lesson.index for lesson in drive.came[9]] == [5, 6, 7], "8 has not waited long enough"
-    for lesson in lessons:
-        assert len(lesson.state) == 1
-        assert lesson.state.weights.tolist() == [1.0]
-        np.testing.assert_allclose(lesson.state.means[0, :2], place(lesson.index)[:2], atol=1e-6)
+    updates = [update for tick in drive.came.values() for update in tick]
+    assert [update.index for update in updates] == list(range(12))
+    assert [update.index for update in updates if update.reconstructed] == [5, 6, 7, 8]
+    assert [update.index for update in drive.came[9]] == [5, 6, 7], "8 has not waited long enough"
+    for update in updates:
+        assert len(update.state) == 1
+        assert update.state.weights.tolist() == [1.0]
+        np.testing.assert_allclose(update.state.means[0, :2], place(update.index)[:2], atol=1e-6)
     assert drive.ctx.counts == {"view_reconstructed": 4}
 
 
-@pytest.mark.parametrize("options", [{"reconstruct": False}, {"longest": 2}, {"shift": 1.5}])
-def test_views_in_between_are_dropped_where_the_way_cannot_be_known(options):
+@pytest.mark.parametrize("options", [{"reconstruct": False}, {"max_waiting": 2}, {"shift": 1.5}])
+def test_views_in_between_are_dropped_where_the_path_is_unknown(options):
     shift = options.pop("shift", 0.0)  # where the robot finds itself again is not where odometry led
     drive = Drive(split=range(5, 9), length=0, shift=shift, **options).to(12)
     assert [index for index, _ in drive.order()] == [*range(5), 9, 10, 11]
     assert drive.ctx.counts == {"view_not_learned": 4}
 
 
-def test_a_lifted_robots_way_is_worked_out_where_that_is_asked_for():
-    drive = Drive(split=range(5, 9), length=0, shift=1.5, missed_below=0.0).to(12)
+def test_without_a_gate_a_kidnapped_robots_path_is_reconstructed():
+    drive = Drive(split=range(5, 9), length=0, shift=1.5, odometry_gate=0.0).to(12)
     assert len(drive.order()) == 12
 
 
-def test_a_way_is_not_worked_out_across_two_logs():
+def test_no_path_is_reconstructed_across_two_logs():
     drive = Drive(split=range(3, 6), starts=(0, 5), length=0).to(8)
     assert [index for index, _ in drive.order()] == [0, 1, 2, 6, 7]
-    assert drive.waiting.seen == []
+    assert drive.pending.seen == []
 
 
-def certain(stage, state):
+def given(stage, state):
     view = Coefficients(look(0), look(0)[None])
-    ctx = Context("lessons")
+    ctx = Context("map_update")
     ctx.tick = Tick(0, 0, 0, 0, True)
-    return stage.step(ctx, view=view, state=state, model=None, waiting=UnimodalQueueState()).updates.items
+    return stage.step(ctx, view=view, state=state, model=None, pending=UnimodalQueueState()).updates.items
 
 
-def test_a_state_is_certain_by_the_share_of_what_is_near_its_heaviest_part():
-    stage = UnimodalQueue(length=0, least_share=0.9)
-    assert certain(stage, belief(0, (0.91, 0.09)))
-    assert not certain(stage, belief(0, (0.89, 0.11)))
+def test_a_state_is_unimodal_by_the_share_near_its_heaviest_component():
+    stage = UnimodalQueue(length=0, min_share=0.9)
+    assert given(stage, belief(0, (0.91, 0.09)))
+    assert not given(stage, belief(0, (0.89, 0.11)))
     near = belief(0, (0.6, 0.4))
     near.means[1] = near.means[0] + (0.2, 0.0, 0.0)  # 0.2^2 / 0.02 = 2 < 7.81
-    (lesson,) = certain(stage, near)
+    (update,) = given(stage, near)
     # The two as one: 0.4 of the way, with 0.6 * 0.4 * 0.2^2 more variance along it.
-    np.testing.assert_allclose(lesson.state.means[0], place(0) + np.array([0.08, 0.0, 0.0]))
-    np.testing.assert_allclose(lesson.state.covariances[0, 0, 0], 0.01 + 0.24 * 0.04)
-    assert not certain(UnimodalQueue(length=0, unimodal="single"), near)
+    np.testing.assert_allclose(update.state.means[0], place(0) + np.array([0.08, 0.0, 0.0]))
+    np.testing.assert_allclose(update.state.covariances[0, 0, 0], 0.01 + 0.24 * 0.04)
+    assert not given(UnimodalQueue(length=0, unimodal="single"), near)
 
 
-def test_a_state_that_is_one_part_but_as_wide_as_the_map_is_not_certain():
+def test_a_single_component_as_wide_as_the_map_is_not_unimodal():
     anywhere = np.diag([9.0, 9.0, np.pi**2 / 3])
-    assert not certain(UnimodalQueue(length=0), belief(0, covariance=anywhere))
+    assert not given(UnimodalQueue(length=0), belief(0, covariance=anywhere))
     adrift = np.diag([9.0, 9.0, 0.1])
-    assert certain(UnimodalQueue(length=0), belief(0, covariance=adrift))
-    assert not certain(UnimodalQueue(length=0, most_m=1.0), belief(0, covariance=adrift))
+    assert given(UnimodalQueue(length=0), belief(0, covariance=adrift))
+    assert not given(UnimodalQueue(length=0, max_sigma_m=1.0), belief(0, covariance=adrift))

@@ -20,7 +20,7 @@ def made_map(weights, counts=None):
 
 def test_an_event_names_what_came_and_what_went():
     map = made_map([[0.5], [0.2], [0.9]])
-    before = map.names
+    before = map.ids
     map.keep_views(np.array([True, False, True]))
     map.add_view(np.array([7.0, 0.0], np.float32), "Coefficients")
     event = view_event(map, before, np.array([2, 2, 1]), {3: 17}, "forgotten")
@@ -34,7 +34,7 @@ def test_an_event_names_what_came_and_what_went():
 
 def test_an_event_has_the_heaviest_part_of_each_changed_view():
     map = made_map([[0.1, 0.6, 0.3], [0.2], []])
-    event = view_event(map, map.names, np.array([2, 0, 1]), {})
+    event = view_event(map, map.ids, np.array([2, 0, 1]), {})
     assert event.changed.tolist() == [0, 1, 2]
     assert event.weights.tolist() == [0.6, 0.2, 0.0]
     assert event.places.tolist() == [[0.0, 1.0], [1.0, 0.0], [0.0, 0.0]]

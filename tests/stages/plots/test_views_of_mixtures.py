@@ -107,7 +107,7 @@ def test_of_two_components_near_the_same_place_the_closer_one_is_its_future():
 def test_the_mixtures_that_are_kept_are_those_of_the_changed_views(run, learned):
     _, _, events, after = learned
     kept = ChangedMixtures().step(CTX, after[3], events[3]).mixtures
-    assert kept.names.tolist() == [0, 0]
+    assert kept.ids.tolist() == [0, 0]
     assert sorted(kept.weights.tolist()) == pytest.approx([0.125, 0.875])
     assert ChangedMixtures().step(CTX, after[3], None).mixtures is None
 

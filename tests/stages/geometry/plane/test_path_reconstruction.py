@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from omninav.stages.geometry.plane.path_reconstruction import reconstructed
+from omninav.stages.geometry.plane.path_reconstruction import reconstruct_path
 from omninav.stages.geometry.plane.se2 import chain, compose, wrap
 
 
@@ -54,14 +54,14 @@ def way():
 
 
 def test_means_are_those_of_the_whole_problem_solved_by_least_squares(way):
-    means, _, _ = reconstructed(*way, rounds=20)
+    means, _, _ = reconstruct_path(*way, rounds=20)
     expected, _ = solved_as_a_whole(*way)
     np.testing.assert_allclose(means[:, :2], expected[:, :2], atol=2e-3)
     np.testing.assert_allclose(wrap(means[:, 2] - expected[:, 2]), 0.0, atol=2e-3)
 
 
 def test_covariances_are_those_of_the_whole_problem_up_to_the_slopes_of_the_noise(way):
-    _, covariances, _ = reconstructed(*way, rounds=20)
+    _, covariances, _ = reconstruct_path(*way, rounds=20)
     _, expected = solved_as_a_whole(*way)
     for mine, theirs in zip(covariances, expected, strict=True):
         np.testing.assert_allclose(mine, theirs, atol=0.06 * np.abs(theirs).max())
@@ -71,7 +71,7 @@ def test_an_end_that_odometry_reaches_exactly_leaves_the_way_where_odometry_has_
     motions = np.array([[0.5, 0.0, 0.3]] * 6)
     first = np.array([0.0, 0.0, 0.0])
     noise = np.stack([np.diag([1e-3, 1e-3, 1e-3])] * 6)
-    means, covariances, missed = reconstructed(
+    means, covariances, missed = reconstruct_path(
         first, np.eye(3) * 1e-4, motions, noise, chain(motions)[-1], np.eye(3) * 1e-4
     )
     np.testing.assert_allclose(means, np.vstack([first, chain(motions)]), atol=1e-9)
@@ -84,13 +84,13 @@ def test_the_distance_missed_is_in_units_of_the_whole_ways_uncertainty():
     motions, noise = np.array([[1.0, 0.0, 0.0]]), np.diag([0.3**2, 1.0, 1.0])[None]
     # 0.5 m missed along a variance of 0.3^2 + 0.4^2 from the ends' x: 0.25 / 0.25.
     ends = np.diag([0.08, 1e-6, 1e-6])
-    *_, missed = reconstructed(np.zeros(3), ends, motions, noise, np.array([1.5, 0.0, 0.0]), ends)
+    *_, missed = reconstruct_path(np.zeros(3), ends, motions, noise, np.array([1.5, 0.0, 0.0]), ends)
     assert missed == pytest.approx(1.0, rel=1e-9)
 
 
 def test_a_way_of_no_motion_is_the_product_of_its_two_ends():
     # Two equal Gaussians 0.2 apart: half way, with half the covariance.
-    means, covariances, _ = reconstructed(
+    means, covariances, _ = reconstruct_path(
         np.zeros(3), np.eye(3), np.empty((0, 3)), np.empty((0, 3, 3)), np.array([0.2, 0.0, 0.0]), np.eye(3)
     )
     np.testing.assert_allclose(means, [[0.1, 0.0, 0.0]], atol=1e-12)
@@ -100,8 +100,8 @@ def test_a_way_of_no_motion_is_the_product_of_its_two_ends():
 def test_a_filters_end_that_knows_no_more_than_odometry_says_nothing_of_the_way(way):
     first, certain, motions, noise, *_ = way
     nothing = np.eye(3) * 1e12
-    forwards, covariances, _ = reconstructed(first, certain, motions, noise, first, nothing, rounds=1)
-    means, after, _ = reconstructed(first, certain, motions, noise, forwards[-1], covariances[-1], independent=False)
+    forwards, covariances, _ = reconstruct_path(first, certain, motions, noise, first, nothing, rounds=1)
+    means, after, _ = reconstruct_path(first, certain, motions, noise, forwards[-1], covariances[-1], independent=False)
     np.testing.assert_allclose(means, forwards, atol=1e-6)
     np.testing.assert_allclose(after, covariances, rtol=1e-6, atol=1e-12)
 
@@ -110,7 +110,7 @@ def test_what_a_filter_learned_by_its_end_goes_back_along_the_way_as_in_the_whol
     # The whole problem has the measurement; the smoother only the filter's state after it.
     first, certain, motions, noise, measured, _ = way
     expected, expected_covariances = solved_as_a_whole(first, certain, motions, noise, measured, certain * 2.0)
-    means, covariances, _ = reconstructed(
+    means, covariances, _ = reconstruct_path(
         first, certain, motions, noise, expected[-1], expected_covariances[-1], independent=False, rounds=20
     )
     np.testing.assert_allclose(means[:, :2], expected[:, :2], atol=5e-3)
@@ -131,7 +131,7 @@ def drawn(seed, number, gap):
 def test_smoothed_covariances_are_positive_definite_whatever_the_end(seed, number, gap):
     first, motions, noise, last, rng = drawn(seed, number, gap)
     ends = np.diag(rng.uniform(1e-4, 0.5, 3)), np.diag(rng.uniform(1e-4, 5.0, 3))
-    means, covariances, _ = reconstructed(first, ends[0], motions, noise, last, ends[1], independent=False)
+    means, covariances, _ = reconstruct_path(first, ends[0], motions, noise, last, ends[1], independent=False)
     assert np.isfinite(means).all()
     assert (np.linalg.eigvalsh(covariances) > 0).all()
 
@@ -141,7 +141,7 @@ def test_smoothed_covariances_are_positive_definite_whatever_the_end(seed, numbe
 def test_covariances_are_positive_definite_and_never_larger_than_forwards_alone(seed, number, gap):
     first, motions, noise, last, rng = drawn(seed, number, gap)
     ends = np.diag(rng.uniform(1e-4, 0.5, 3))
-    means, covariances, _ = reconstructed(first, ends, motions, noise, last, ends)
+    means, covariances, _ = reconstruct_path(first, ends, motions, noise, last, ends)
     assert np.isfinite(means).all()
     assert (np.abs(means[:, 2]) <= math.pi + 1e-12).all()
     np.testing.assert_array_equal(covariances, covariances.transpose(0, 2, 1))

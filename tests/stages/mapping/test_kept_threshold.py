@@ -58,10 +58,10 @@ THEN = [FIRST[-1] - 0.7 * STEP_M * n for n in range(60)]
 def test_a_map_takes_the_limit_once_it_is_settled(mapping: str) -> None:
     map, first = ViewMixtures.empty(), CalibratedThresholdState()
     assert drive(FIRST[:39], mapping, map, first)[-1].settled is False
-    assert map.limit is None
+    assert map.threshold is None
     limit = drive(FIRST[39:], mapping, map, first)[-1]
     assert limit.settled
-    assert map.limit is limit
+    assert map.threshold is limit
     assert limit.metres > 0.0
 
 
@@ -78,7 +78,7 @@ def test_a_saved_map_is_compared_by_its_own_limit_from_the_first_picture_on(mapp
     ctx, alone = Context("limit"), CalibratedThresholdState()
     limit = CalibratedThreshold(views=40).step(ctx, seen_at(THEN[0]), None, alone, loaded).threshold
     assert limit is not None
-    assert ctx.facts["view_limit"] == round(limit.distance, 4)
+    assert ctx.facts["novelty_threshold"] == round(limit.distance, 4)
     near = ViewNeighbours().step(ctx, seen_at(THEN[0]), loaded, limit).neighbours
     assert near is not None
     assert math.isclose(loaded.means[loaded.owner == near.rows[0], 0][0], THEN[0], abs_tol=limit.metres)
