@@ -31,12 +31,12 @@ class Rename:
 
 @dataclass(frozen=True)
 class Frames:
-    """Where the pictures are and when they were taken.
+    """Where the images are and when they were taken.
 
-    `csv`: a table with one row per picture, its path relative to the recording's folder and with wildcards; without
-    one, `images` names the pictures by wildcards, in the order of the numbers in their names. `file`: the column with
+    `csv`: a table with one row per image, its path relative to the recording's folder and with wildcards; without
+    one, `images` names the images by wildcards, in the order of the numbers in their names. `file`: the column with
     file names, changed by `rename`, then sought in the folder `images` beside the table (or in the recording's folder
-    where that starts with '/'). `time`: the column with times; without one, pictures are `period` seconds apart.
+    where that starts with '/'). `time`: the column with times; without one, images are `period` seconds apart.
     """
 
     csv: str | None = None
@@ -53,8 +53,8 @@ class Frames:
 class Positions:
     """Where the camera was. `csv` null: columns of the frames' own table, row by row.
 
-    A table of its own is joined by time, interpolated linearly: a picture taken at t is looked up at
-    t + `clock_offset` (seconds). A picture further than `max_gap` seconds from both neighbours' time, or outside the
+    A table of its own is joined by time, interpolated linearly: an image taken at t is looked up at
+    t + `clock_offset` (seconds). An image further than `max_gap` seconds from both neighbours' time, or outside the
     table's time, has no position. `offset_x`, `offset_y` (metres) are added to all positions.
     """
 

@@ -30,7 +30,7 @@ class ImageFolder:
     """A described folder of images as a `Recording`. It has positions (as truth) and no odometry.
 
     Counted in `dropped`: `missing_image`, `no_position`, `no_time`, `duplicate_frame`, `backward_stamp`, and when
-    pictures are read `undecodable_image`, `blank_image`, `wrong_size`.
+    images are read `undecodable_image`, `blank_image`, `wrong_size`.
     Raises `UnreadableRecording` for a file or column that is not there, and where nothing usable remains.
     """
 
@@ -59,7 +59,7 @@ class ImageFolder:
         self.camera = self._find_camera(camera)
 
     def image(self, frame: int) -> Pixels | None:
-        """The picture of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
+        """The image of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
         path = self._paths_kept[frame]
         try:
             pixels = decode_image(path.read_bytes())
@@ -79,7 +79,7 @@ class ImageFolder:
         """A folder of images holds no range readings."""
 
     def digest(self) -> str:
-        """sha256 over the tables, the description and every picture that is used."""
+        """sha256 over the tables, the description and every image that is used."""
         whole = hashlib.sha256(repr(self._description).encode())
         for path in [*self._sources, *self._paths_kept]:
             whole.update(digest_file(path).encode())
@@ -115,9 +115,7 @@ class ImageFolder:
             pattern = frames.images.replace("{which}", self._description.which)
             found = [path for path in self._folder.glob(pattern or "*") if path.is_file()]
             if not pattern or not found:
-                raise UnreadableRecording(
-                    f"{self._folder}: no picture fits '{pattern}' (frames.images in {self._where})"
-                )
+                raise UnreadableRecording(f"{self._folder}: no image fits '{pattern}' (frames.images in {self._where})")
             return sorted(found, key=lambda path: [int(n) if n.isdigit() else n for n in re.split(r"(\d+)", path.name)])
         if frames.file is None:
             raise UnreadableRecording(f"{self._where}: frames.file is missing: the column with file names")
@@ -173,7 +171,7 @@ class ImageFolder:
             pixels = cv2.imread(str(path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
             if pixels is not None:
                 return int(pixels.shape[1]), int(pixels.shape[0])
-        raise UnreadableRecording(f"{self._folder}: not one of its {len(self._paths_kept)} pictures can be decoded")
+        raise UnreadableRecording(f"{self._folder}: not one of its {len(self._paths_kept)} images can be decoded")
 
 
 class DescribedFolder(Format):

@@ -1,4 +1,4 @@
-"""ROS messages as what they mean here: poses in the plane, and pictures."""
+"""ROS messages as what they mean here: poses in the plane, and images."""
 
 import math
 from typing import Any
@@ -14,7 +14,7 @@ POSE_TYPES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", "geometr
 SCAN_TYPE = "sensor_msgs/msg/LaserScan"
 IMAGE_TYPES = ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image")
 LEVELS_OF_A_BLANK = 2
-"""A constant picture may differ by this much after JPEG compression (rounding of one level to either side)."""
+"""A constant image may differ by this much after JPEG compression (rounding of one level to either side)."""
 
 _AS_BGR = {
     "bgr8": (3, None),
@@ -33,7 +33,7 @@ _AS_BGR = {
 
 
 class Undecodable(ValueError):
-    """Bytes that are no picture; the message says what is wrong with them."""
+    """Bytes that are no image; the message says what is wrong with them."""
 
 
 def pose_of(message: Any) -> tuple[float, float, float]:
@@ -64,7 +64,7 @@ def scan_of(message: Any) -> Scan:
 
 
 def pixels_of(message: Any) -> Pixels:
-    """The picture of an Image or CompressedImage message, (height, width, 3) uint8 blue-green-red.
+    """The image of an Image or CompressedImage message, (height, width, 3) uint8 blue-green-red.
 
     Raises `Undecodable`.
     """
@@ -72,7 +72,7 @@ def pixels_of(message: Any) -> Pixels:
 
 
 def decode_image(data: bytes) -> Pixels:
-    """A JPEG, PNG or other picture file's bytes as (height, width, 3) uint8 blue-green-red.
+    """A JPEG, PNG or other image file's bytes as (height, width, 3) uint8 blue-green-red.
 
     Raises `Undecodable`; also for a JPEG or PNG that was cut off, whose missing part OpenCV would fill with grey.
     """
@@ -85,12 +85,12 @@ def decode_image(data: bytes) -> Pixels:
     except cv2.error as error:
         raise Undecodable(str(error.err or error)) from None
     if pixels is None:
-        raise Undecodable(f"{len(data)} bytes that are no picture OpenCV knows")
+        raise Undecodable(f"{len(data)} bytes that are no image OpenCV knows")
     return np.asarray(pixels, dtype=np.uint8)
 
 
 def is_blank(pixels: Pixels) -> bool:
-    """Whether a picture is constant: no channel spans more than `LEVELS_OF_A_BLANK` grey levels."""
+    """Whether an image is constant: no channel spans more than `LEVELS_OF_A_BLANK` grey levels."""
     if np.ptp(pixels[::8, ::8], axis=(0, 1)).max() > LEVELS_OF_A_BLANK:
         return False
     return bool(np.ptp(pixels, axis=(0, 1)).max() <= LEVELS_OF_A_BLANK)

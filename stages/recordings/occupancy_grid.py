@@ -13,24 +13,24 @@ from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 
 
 def read_occupancy(file: Path) -> OccupancyGrid:
-    """The grid in a map_server pair (`map.yaml`, which names its picture). Raises BadInput where it cannot be read.
+    """The grid in a map_server pair (`map.yaml`, which names its image). Raises BadInput where it cannot be read.
 
     Occupied is what is darker than `occupied_thresh` says (lighter with `negate`), free what is lighter than
     `free_thresh`, and what lies between is unknown, in the modes `trinary` and `scale`. In the mode `raw` levels are
     per cent, and those above 100 unknown. A turned origin is refused.
     """
     try:
-        said = yaml.safe_load(file.read_text())
-        resolution, (x, y, turn) = float(said["resolution"]), map(float, said["origin"])
-        occupied, free = float(said.get("occupied_thresh", 0.65)), float(said.get("free_thresh", 0.196))
-        negate, mode = bool(said.get("negate", 0)), str(said.get("mode", "trinary"))
-        picture = file.parent / str(said["image"])
+        content = yaml.safe_load(file.read_text())
+        resolution, (x, y, turn) = float(content["resolution"]), map(float, content["origin"])
+        occupied, free = float(content.get("occupied_thresh", 0.65)), float(content.get("free_thresh", 0.196))
+        negate, mode = bool(content.get("negate", 0)), str(content.get("mode", "trinary"))
+        image = file.parent / str(content["image"])
     except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError) as error:
         why = " ".join(str(error).split())
-        raise BadInput(f"{file}: not a map_server map ({why}); give the .yaml beside a map's picture") from None
-    levels = cv2.imread(str(picture), cv2.IMREAD_GRAYSCALE)
+        raise BadInput(f"{file}: not a map_server map ({why}); give the .yaml beside a map's image") from None
+    levels = cv2.imread(str(image), cv2.IMREAD_GRAYSCALE)
     if levels is None:
-        raise BadInput(f"{file}: its picture {picture.name} cannot be read")
+        raise BadInput(f"{file}: its image {image.name} cannot be read")
     if mode not in ("trinary", "scale", "raw"):
         raise BadInput(f"{file}: its mode is '{mode}'; map_server knows trinary, scale and raw")
     if turn:

@@ -24,8 +24,8 @@ class UnreadableRecording(BadInput):
 class Recording(Protocol):
     """One recorded drive, its frames in the order of their header stamps.
 
-    `name`: what the user wrote. `camera`: how its pictures are to be read. `stamps`: (N,) int64 header stamps in
-    nanoseconds, strictly ascending, of the frames that can be used as far as is known without decoding a picture.
+    `name`: what the user wrote. `camera`: how its images are to be read. `stamps`: (N,) int64 header stamps in
+    nanoseconds, strictly ascending, of the frames that can be used as far as is known without decoding an image.
     `odometry`: (N, 3) odometry pose at each stamp in the odometry's own frame, or None. `truth`: (N, 3) true pose in
     the map frame, rows of NaN where it is not known, or None. `dropped`: how many records were left out, by kind, and
     `details`: the first case of each kind in words.
@@ -47,7 +47,7 @@ class Recording(Protocol):
     def details(self) -> dict[str, str]: ...
 
     def image(self, frame: int) -> Pixels | None:
-        """The picture of a frame, (height, width, 3) uint8 blue-green-red; None where it cannot be decoded or is blank.
+        """The image of a frame, (height, width, 3) uint8 blue-green-red; None where it cannot be decoded or is blank.
 
         What is wrong with it is counted in `dropped` at that moment, under `undecodable_image` or `blank_image`.
         """

@@ -41,7 +41,7 @@ class Feed(Protocol):
 
 
 class TopicRecording:
-    """Frames from an image topic with poses from pose topics; a `Recording`. Pictures are read when asked for."""
+    """Frames from an image topic with poses from pose topics; a `Recording`. Images are read when asked for."""
 
     def __init__(
         self,
@@ -51,12 +51,12 @@ class TopicRecording:
         odometry: Array | None,
         truth: Array | None,
         feed: Feed,
-        picture: Callable[[int], Pixels],
+        read_image: Callable[[int], Pixels],
         files: Sequence[Path],
         scans: Sequence[Record] = (),
     ) -> None:
         self.name, self.camera, self.stamps, self.odometry, self.truth = name, camera, stamps, odometry, truth
-        self._feed, self._picture, self._files, self._scans = feed, picture, files, scans
+        self._feed, self._read_image, self._files, self._scans = feed, read_image, files, scans
         self._scan_stamps = np.array([record.stamp for record in scans], dtype=np.int64)
 
     @property
@@ -70,10 +70,10 @@ class TopicRecording:
         return self._feed.details
 
     def image(self, frame: int) -> Pixels | None:
-        """The picture of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
-        where = f"{self.name}: picture {frame} (stamp {self.stamps[frame] / 1e9:.3f} s)"
+        """The image of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
+        where = f"{self.name}: image {frame} (stamp {self.stamps[frame] / 1e9:.3f} s)"
         try:
-            pixels = self._picture(frame)
+            pixels = self._read_image(frame)
         except BadMessage as error:
             self._feed.drop("bad_message", str(error))
         except Undecodable as error:

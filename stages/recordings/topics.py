@@ -48,10 +48,10 @@ def record_topics(name: str, feed: Feed, topics: Topics, camera: Path | None, fi
             continue
         found[record.topic].append(record._replace(data=b""))
 
-    image = _image_topic(name, feed, topics, found)
+    image_topic = _image_topic(name, feed, topics, found)
     odometry = _track(name, feed, "odometry", topics.odometry, found, poses)
     truth = _track(name, feed, "truth", topics.truth, found, poses)
-    frames = _in_order(feed, name, image, found[image], "duplicate_frame")
+    frames = _in_order(feed, name, image_topic, found[image_topic], "duplicate_frame")
     stamps = np.array([frame.stamp for frame in frames], dtype=np.int64)
     keep = np.ones(len(frames), dtype=bool)
     if odometry is not None:
@@ -63,10 +63,10 @@ def record_topics(name: str, feed: Feed, topics: Topics, camera: Path | None, fi
     frames, stamps = [frame for frame, kept in zip(frames, keep, strict=True) if kept], stamps[keep]
     if not frames:
         lost = ", ".join(f"{count} {kind}" for kind, count in sorted(feed.dropped.items())) or "it is empty"
-        raise UnreadableRecording(f"{name}: no picture on {image} can be used ({lost})")
+        raise UnreadableRecording(f"{name}: no image on {image_topic} can be used ({lost})")
 
-    def picture(frame: int) -> Pixels:
-        return pixels_of(feed.decode(image, feed.fetch(frames[frame].location)))
+    def read_image(frame: int) -> Pixels:
+        return pixels_of(feed.decode(image_topic, feed.fetch(frames[frame].location)))
 
     view, camera_files = find_camera(name, feed, camera, files, infos)
     recording = TopicRecording(
@@ -76,11 +76,11 @@ def record_topics(name: str, feed: Feed, topics: Topics, camera: Path | None, fi
         odometry=None if odometry is None else poses_at(*odometry, stamps),
         truth=None if truth is None else poses_at(*truth, stamps),
         feed=feed,
-        picture=picture,
+        read_image=read_image,
         files=[*files, *camera_files],
         scans=_scans(name, feed, topics.scan, found),
     )
-    _check_size(recording, picture)
+    _check_size(recording, read_image)
     return recording
 
 
@@ -97,7 +97,7 @@ def find_camera(
     if infos:
         return camera_from_info(infos[0], f"{name}: camera_info"), []
     raise UnreadableRecording(
-        f"{name}: nothing says how its pictures are to be read: no camera.yaml is attached or lies beside it; "
+        f"{name}: nothing says how its images are to be read: no camera.yaml is attached or lies beside it; "
         "give camera=PATH/camera.yaml"
     )
 
@@ -121,14 +121,14 @@ def _image_topic(name: str, feed: Feed, topics: Topics, found: dict[str, list[Re
         if found[topic]:
             if feed.topics[topic] not in IMAGE_TYPES:
                 raise UnreadableRecording(
-                    f"{name}: {topic} carries {feed.topics[topic]}, not pictures; {_pictures(feed)}"
+                    f"{name}: {topic} carries {feed.topics[topic]}, not images; {_known_image_topics(feed)}"
                 )
             return topic
     empty = next((topic for topic in candidates if topic in feed.topics), None)
     if empty is not None:
-        raise UnreadableRecording(f"{name}: there is no readable picture on {empty} ({_losses(feed)})")
+        raise UnreadableRecording(f"{name}: there is no readable image on {empty} ({_losses(feed)})")
     raise UnreadableRecording(
-        f"{name}: no topic {' or '.join(candidates)}; {_pictures(feed, candidates[0])} "
+        f"{name}: no topic {' or '.join(candidates)}; {_known_image_topics(feed, candidates[0])} "
         f"(topics: {', '.join(feed.topics) or 'none'})"
     )
 
@@ -137,10 +137,10 @@ def _losses(feed: Feed) -> str:
     return ", ".join(f"{count} {kind}" for kind, count in sorted(feed.dropped.items())) or "the topic is empty"
 
 
-def _pictures(feed: Feed, wanted: str = "") -> str:
+def _known_image_topics(feed: Feed, wanted: str = "") -> str:
     options = [topic for topic, kind in feed.topics.items() if kind in IMAGE_TYPES]
     if not options:
-        return "it holds no pictures at all"
+        return "it holds no images at all"
     return f"type topics.image={nearest(wanted, options) or options[0]}"
 
 
@@ -206,21 +206,21 @@ def _in_order(feed: Feed, name: str, topic: str, records: list[Record], repeats:
 
 def _drop_frames(feed: Feed, name: str, kind: str, stamps: Stamps, lost: npt.NDArray[np.bool_], why: str) -> None:
     for stamp in stamps[lost]:
-        feed.drop(kind, f"{name}: picture with stamp {stamp} ns lies {why}")
+        feed.drop(kind, f"{name}: image with stamp {stamp} ns lies {why}")
 
 
-def _check_size(recording: TopicRecording, picture: Callable[[int], Pixels]) -> None:
-    """Refuse a camera that does not belong to the pictures, by the first picture that can be decoded."""
+def _check_size(recording: TopicRecording, read_image: Callable[[int], Pixels]) -> None:
+    """Refuse a camera that does not belong to the images, by the first image that can be decoded."""
     for frame in range(len(recording.stamps)):
         try:
-            height, width = picture(frame).shape[:2]
+            height, width = read_image(frame).shape[:2]
         except (BadMessage, Undecodable):
             continue
         camera = recording.camera
         if (height, width) != (camera.height_px, camera.width):
             raise UnreadableRecording(
-                f"{recording.name}: its pictures are {width} x {height}, but its camera says "
+                f"{recording.name}: its images are {width} x {height}, but its camera says "
                 f"{camera.width} x {camera.height_px}; give camera=PATH/camera.yaml"
             )
         return
-    raise UnreadableRecording(f"{recording.name}: not one of its {len(recording.stamps)} pictures can be decoded")
+    raise UnreadableRecording(f"{recording.name}: not one of its {len(recording.stamps)} images can be decoded")

@@ -19,7 +19,7 @@ def check_cuts(cuts: Sequence[Cut], frames: int, name: str) -> None:
         if not end < after < to < frames:
             raise UnreadableRecording(
                 f"{name}: the cut [{after}, {to}] does not lead onwards between {end} and {frames - 1}; type "
-                "cuts=[[60,300]] to go on with picture 300 once the first 60 are through"
+                "cuts=[[60,300]] to go on with image 300 once the first 60 are through"
             )
         end = to
 
@@ -42,10 +42,10 @@ def crossed(cuts: Sequence[Cut], frames: npt.NDArray[np.int64]) -> npt.NDArray[n
 def as_if_driven(poses: Array, cuts: Sequence[Cut]) -> Array:
     """Poses (N, 3) as an odometry gives them that knows nothing of the cuts.
 
-    What was measured on the way from picture `to - 1` to picture `to` is measured from the last one before the cut.
+    What was measured on the way from image `to - 1` to image `to` is measured from the last one before the cut.
     """
-    told = poses.copy()
+    unaware = poses.copy()
     for after, to in cuts:
-        moved = between(told[to - 1], told[to:])
-        told[to:] = compose(told[after - 1], moved)
-    return told
+        moved = between(unaware[to - 1], unaware[to:])
+        unaware[to:] = compose(unaware[after - 1], moved)
+    return unaware

@@ -174,13 +174,13 @@ class LogSource(Source):
         )
         truth = None if recording.truth is None else recording.truth[frame]
         odometry, increment = None, None
-        told = self._told[position.log]
+        measured = self._odometry[position.log]
         if recording.odometry is not None:
-            odometry = told[frame]
-            increment = None if last is None else between(told[last], odometry)
+            odometry = measured[frame]
+            increment = None if last is None else between(measured[last], odometry)
         elif recording.truth is not None:
             if last is not None:
-                increment = self._synthetic(ctx, between(told[last], told[frame]))
+                increment = self._synthetic(ctx, between(measured[last], measured[frame]))
                 moved = compose((position.x, position.y, position.heading), increment)
                 position.x, position.y, position.heading = (float(value) for value in moved)
             odometry = np.array([position.x, position.y, position.heading])
@@ -221,7 +221,7 @@ class LogSource(Source):
             raise UnreadableRecording("no recording is named; type log=PATH")
         else:
             recordings = [open_recording(str(name), self.topics, self.camera, self.layout_folders) for name in names]
-        self._recordings, self._frames, self._told = [], [], []
+        self._recordings, self._frames, self._odometry = [], [], []
         for recording in recordings:
             check_cuts(self.cuts, len(recording.stamps), recording.name)
             frames = remaining_frames(self.cuts, len(recording.stamps))[self.first : self.stop : self.stride]
@@ -231,13 +231,13 @@ class LogSource(Source):
                     "type nodes.source.first=0 nodes.source.stop=null"
                 )
             poses = recording.truth if recording.odometry is None else recording.odometry
-            told = np.empty((0, 3)) if poses is None else as_if_driven(poses, self.cuts)
+            unaware = np.empty((0, 3)) if poses is None else as_if_driven(poses, self.cuts)
             pauses = np.diff(recording.stamps[frames]) > self.new_log_after_s * 1e9
             pauses &= ~crossed(self.cuts, frames)
             for part in np.split(frames, np.flatnonzero(pauses) + 1):
                 self._recordings.append(recording)
                 self._frames.append(part)
-                self._told.append(told)
+                self._odometry.append(unaware)
         self._opened = recordings
         self._lost = [recording.dropped.copy() for recording in recordings]
 

@@ -66,13 +66,13 @@ def test_columns_units_clock_and_heading_conventions_are_configuration(tmp_path:
     assert recording.image(0).shape == (4, 16, 3)
 
 
-def test_missing_pictures_are_counted(tmp_path: Path) -> None:
+def test_missing_images_are_counted(tmp_path: Path) -> None:
     recording = open_recording(str(folder(tmp_path, skip=(2, 3))))
     assert recording.dropped == {"no_position": 2, "missing_image": 2}
     assert len(recording.stamps) == 2
 
 
-def test_pictures_without_a_clock_come_at_a_constant_rate(tmp_path: Path) -> None:
+def test_images_without_a_clock_come_at_a_constant_rate(tmp_path: Path) -> None:
     description = """
     frames: {csv: frames.csv, file: 0, header: false, images: pictures, period: 0.5}
     positions: {x: {column: 1, unit: m}, y: {column: 2, unit: m}}
@@ -189,7 +189,7 @@ def test_antworld_headings_point_along_the_walk() -> None:
 
 
 @needs_data
-def test_sussex_pictures_turn_with_the_tangent_of_the_track() -> None:
+def test_sussex_images_turn_with_the_tangent_of_the_track() -> None:
     recording = open_recording(f"sussex_training:{DATA}/sussex-outdoor-route")
     spectra = np.fft.fft(
         [

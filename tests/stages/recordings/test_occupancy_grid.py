@@ -52,7 +52,7 @@ def test_levels_are_read_as_map_server_reads_them(tmp_path, more, levels, states
     assert grid.made_from == "map"
 
 
-def test_row_0_is_the_pictures_last_and_cells_are_found_by_their_points(tmp_path):
+def test_row_0_is_the_images_last_and_cells_are_found_by_their_points(tmp_path):
     grid = read_occupancy(written(tmp_path, [[254, 0], [205, 254]]))
     assert grid.cells.tolist() == [[UNKNOWN, FREE], [FREE, OCCUPIED]]
     assert grid.origin == (-1.0, 2.0)

@@ -42,7 +42,7 @@ def only(topic: str):
     return decorate
 
 
-def test_a_whole_log_gives_every_picture_with_poses_at_its_own_stamp(tmp_path: Path) -> None:
+def test_a_whole_log_gives_every_image_with_poses_at_its_own_stamp(tmp_path: Path) -> None:
     recording = open_recording(str(write_mcap(tmp_path / "log.mcap")))
     assert len(recording.stamps) == FRAMES
     assert not recording.dropped
@@ -94,7 +94,7 @@ def test_a_cut_log_is_used_up_to_the_cut(tmp_path: Path) -> None:
     np.testing.assert_array_equal(recording.image(3), picture(3))
 
 
-def test_a_bad_chunk_costs_its_pictures_and_no_others(tmp_path: Path) -> None:
+def test_a_bad_chunk_costs_its_images_and_no_others(tmp_path: Path) -> None:
     path = write_mcap(tmp_path / "log.mcap")
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 4
@@ -118,7 +118,7 @@ def test_a_pose_that_is_no_number_is_counted(tmp_path: Path) -> None:
     assert len(recording.stamps) == FRAMES
 
 
-def test_a_picture_with_a_stamp_far_ahead_costs_only_itself(tmp_path: Path) -> None:
+def test_an_image_with_a_stamp_far_ahead_costs_only_itself(tmp_path: Path) -> None:
     @only(IMAGE)
     def late(made: Made, number: int) -> list[Made]:
         if number != 4:
@@ -146,7 +146,7 @@ def test_stamps_that_jump_back_and_frames_that_come_twice_are_counted(tmp_path: 
     assert np.all(np.diff(recording.stamps) > 0)
 
 
-def test_undecodable_cut_off_and_blank_pictures_are_left_out_when_met(tmp_path: Path) -> None:
+def test_undecodable_cut_off_and_blank_images_are_left_out_when_met(tmp_path: Path) -> None:
     bad = {
         3: b"no picture",
         6: encoded(picture(6), ".jpg")[:-200],
@@ -166,7 +166,7 @@ def test_undecodable_cut_off_and_blank_pictures_are_left_out_when_met(tmp_path: 
     assert recording.dropped == {"undecodable_image": 4, "blank_image": 1, "wrong_size": 1}
 
 
-def test_pictures_outside_the_odometrys_time_are_counted(tmp_path: Path) -> None:
+def test_images_outside_the_odometrys_time_are_counted(tmp_path: Path) -> None:
     first, last = START + 2_000_000_000, START + 8_000_000_000
     made = (m for m in messages() if m.topic != ODOMETRY or first <= m.stamp <= last)
     recording = open_recording(str(write_mcap(tmp_path / "log.mcap", made)))
@@ -175,7 +175,7 @@ def test_pictures_outside_the_odometrys_time_are_counted(tmp_path: Path) -> None
     assert recording.dropped == {"outside_odometry": FRAMES - len(recording.stamps)}
 
 
-def test_without_odometry_pictures_without_a_position_are_counted(tmp_path: Path) -> None:
+def test_without_odometry_images_without_a_position_are_counted(tmp_path: Path) -> None:
     last = START + 8_000_000_000
     made = (m for m in messages() if m.topic != ODOMETRY and not (m.topic == TRUTH and m.stamp > last))
     recording = open_recording(str(write_mcap(tmp_path / "log.mcap", made)))
@@ -184,7 +184,7 @@ def test_without_odometry_pictures_without_a_position_are_counted(tmp_path: Path
     assert np.isfinite(recording.truth).all()
 
 
-def test_truth_that_ends_early_leaves_pictures_without_truth(tmp_path: Path) -> None:
+def test_truth_that_ends_early_leaves_images_without_truth(tmp_path: Path) -> None:
     last = START + 8_000_000_000
     made = (m for m in messages() if m.topic != TRUTH or m.stamp <= last)
     recording = open_recording(str(write_mcap(tmp_path / "log.mcap", made)))
@@ -207,7 +207,7 @@ def test_a_missing_topic_is_refused_with_what_to_type(tmp_path: Path) -> None:
     recording = open_recording(path, Topics(image="/omni/image", odometry="/wheels/odom"))
     assert len(recording.stamps) == FRAMES
     assert open_recording(path, Topics(image="/omni/image", odometry=None)).odometry is None
-    with pytest.raises(UnreadableRecording, match=r"/wheels/odom carries nav_msgs/msg/Odometry, not pictures"):
+    with pytest.raises(UnreadableRecording, match=r"/wheels/odom carries nav_msgs/msg/Odometry, not images"):
         open_recording(path, Topics(image="/wheels/odom"))
 
 
@@ -223,7 +223,7 @@ def test_every_user_error_is_one_line(tmp_path: Path) -> None:
         (tmp_path / "text.bag", "not a readable bag"),
         (tmp_path / "notes.txt", "not a recording"),
         (tmp_path / "gone.mcap", "no such file"),
-        (nothing, "no pictures"),
+        (nothing, "no images"),
         (no_camera, "give camera="),
         (wrong_camera, "48 x 16, but its camera says 64 x 16"),
     ):
@@ -277,7 +277,7 @@ def test_bayer_patterns_keep_their_colours(pattern: str) -> None:
     np.testing.assert_array_equal(pixels[4:12, 4:44].reshape(-1, 3), np.tile([200, 100, 20], (8 * 40, 1)))
 
 
-def test_a_picture_is_blank_only_when_it_is_constant() -> None:
+def test_an_image_is_blank_only_when_it_is_constant() -> None:
     assert is_blank(decode_image(encoded(np.full((16, 48, 3), (10, 200, 90), np.uint8), ".jpg")))
     one_pixel = np.zeros((16, 48, 3), np.uint8)
     one_pixel[3, 5] = 255
@@ -309,13 +309,13 @@ needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"sample data is missi
 
 
 @needs_data
-@pytest.mark.parametrize(("name", "pictures"), [("tour", 279), ("drive", 130)])
-def test_the_house_is_read_completely_and_its_truth_is_right(name: str, pictures: int) -> None:
+@pytest.mark.parametrize(("name", "images"), [("tour", 279), ("drive", 130)])
+def test_the_house_is_read_completely_and_its_truth_is_right(name: str, images: int) -> None:
     folder = DATA / "photoreal-house"
     recording = open_recording(str(folder / f"{name}.mcap"))
     table = np.loadtxt(folder / f"{name}_truth.tum")
-    assert len(recording.stamps) == len(table) == pictures
-    assert sum(recording.image(frame) is not None for frame in range(pictures)) == pictures
+    assert len(recording.stamps) == len(table) == images
+    assert sum(recording.image(frame) is not None for frame in range(images)) == images
     assert not recording.dropped
     np.testing.assert_allclose(recording.stamps / 1e9, table[:, 0], atol=1e-6)
     # linear between truths 50 ms apart; the robot's acceleration makes that wrong by up to 0.3 mm and 0.07 degrees

@@ -18,7 +18,7 @@ WORLD = replace(DEMO, camera=mirror(columns=16))
 PIXELS = np.random.default_rng(0).integers(0, 255, (12, 16, 3)).astype(np.uint8)
 
 
-def test_a_picture_that_was_written_is_read_again_pixel_by_pixel_with_the_robots_camera(tmp_path):
+def test_an_image_that_was_written_is_read_again_pixel_by_pixel_with_the_robots_camera(tmp_path):
     ImageFile().step(Context("picture_file", folder=tmp_path), [Image(PIXELS), Image(255 - PIXELS)])
     stage = GoalImage(goal=str(tmp_path / "picture.png"), world=WORLD)
     found = stage.step(Context("goal_picture"))
@@ -35,7 +35,7 @@ def test_without_a_goal_nothing_runs(goal):
 
 
 @pytest.mark.parametrize("goal", [3, "3", "kitchen", "png"])
-def test_a_place_is_no_picture(goal):
+def test_a_place_is_no_image(goal):
     stage = GoalImage(goal=goal, world=WORLD)
     assert stage.step(Context("goal_picture")).image is None
     assert stage.inputs_digest() is None
@@ -53,7 +53,7 @@ def test_a_file_that_is_no_image_is_refused(tmp_path, content):
         GoalImage(goal=str(tmp_path / "kitchen.jpg"), world=WORLD).step(Context("goal_picture"))
 
 
-def test_a_picture_of_another_camera_is_refused(tmp_path):
+def test_an_image_of_another_camera_is_refused(tmp_path):
     cv2.imwrite(str(tmp_path / "kitchen.png"), PIXELS[:6])
     with pytest.raises(BadInput, match=r"has 16 x 6 pixels, and the robot's camera takes 16 x 12"):
         GoalImage(goal=str(tmp_path / "kitchen.png"), world=WORLD).step(Context("goal_picture"))

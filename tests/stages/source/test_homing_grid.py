@@ -62,7 +62,7 @@ def test_a_target_without_room_is_refused() -> None:
 
 
 @needs_data
-def test_of_a_log_the_target_is_the_picture_taken_closest() -> None:
+def test_of_a_log_the_target_is_the_image_taken_closest() -> None:
     source = HomingGrid(log=f"antworld:{ANTWORLD}", target=(5.9, 4.5, 0.0), radius_m=0.5)
     found = ticks(source)
     assert math.hypot(found[0].truth.x - 5.9, found[0].truth.y - 4.5) < 0.15

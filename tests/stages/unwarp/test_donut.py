@@ -27,7 +27,7 @@ def ring_picture(centre: tuple[float, float], outer: float, inner: float, seed: 
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_ring_is_found_in_the_picture(seed: int) -> None:
+def test_the_ring_is_found_in_the_image(seed: int) -> None:
     rng = np.random.default_rng(seed)
     centre = (320 + rng.uniform(-40, 40), 240 + rng.uniform(-15, 15))
     outer, inner = rng.uniform(190, 215), rng.uniform(35, 60)
@@ -50,7 +50,7 @@ ALVIN = [
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"no sample data in {DATA}")
 @pytest.mark.parametrize(("name", "ring"), CALIBRATION + ALVIN, ids=lambda value: str(value).split("/")[-1])
-def test_the_ring_is_found_in_every_real_mirror_picture(name: str, ring: tuple[float, float, float, float]) -> None:
+def test_the_ring_is_found_in_every_real_mirror_image(name: str, ring: tuple[float, float, float, float]) -> None:
     # Where the circles were laid by eye over the pictures, to about 1 % of their width: one camera each, that stands
     # still. Its rim is cut off above in the calibration pictures, and a plain wall behind it is as grey as its picture.
     pixels = cv2.imread(str(DATA / name))
@@ -67,7 +67,7 @@ def test_the_ring_of_the_photoreal_mirror_is_its_mask_in_the_camera_file() -> No
     assert np.allclose(find_ring(pixels), (319.5, 239.5, 34, 238), atol=6)
 
 
-def test_a_picture_without_a_ring_says_so() -> None:
+def test_an_image_without_a_ring_says_so() -> None:
     noise = np.random.default_rng(0).integers(0, 256, (480, 640, 3), dtype=np.uint8)
     for pixels in (np.full((480, 640, 3), 90, np.uint8), noise, cv2.GaussianBlur(noise, (0, 0), 8)):
         with pytest.raises(RingNotFound):
@@ -84,7 +84,7 @@ def test_each_log_has_a_ring_of_its_own() -> None:
         assert math.hypot(found.centre_x - centre[0], found.centre_y - centre[1]) < 3.0
 
 
-def test_what_was_found_once_stays_for_all_pictures() -> None:
+def test_what_was_found_once_stays_for_all_images() -> None:
     ctx, stage, found = Context("unwarp"), DonutUnwarp(), DonutUnwrapState()
     stage.setup(ctx)
     camera = Donut(640, 480)

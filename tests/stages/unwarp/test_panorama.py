@@ -67,7 +67,7 @@ def test_a_strip_in_the_common_form_and_size_comes_back_unchanged() -> None:
     assert np.array_equal(unwarped(Cylindrical(360, 80, 180.0), pixels).pixels, pixels)
 
 
-def test_an_equirectangular_picture_keeps_rows_at_their_elevations() -> None:
+def test_an_equirectangular_image_keeps_rows_at_their_elevations() -> None:
     pixels = np.zeros((180, 360, 3), np.uint8)
     pixels[90:] = 255  # below the horizon
     camera = Equirectangular(360, 180, 180.0, elevation_top=math.pi / 2, elevation_bottom=-math.pi / 2)

@@ -82,7 +82,7 @@ def test_what_the_camera_does_not_see_is_black_and_said() -> None:
     assert windows(MIRROR, white, field_deg=50.0).seen is None
 
 
-def test_an_ordinary_camera_s_picture_is_as_it_is() -> None:
+def test_an_ordinary_camera_s_image_is_as_it_is() -> None:
     picture = np.random.default_rng(0).integers(0, 256, (240, 320, 3), dtype=np.uint8)
     same = windows(PERSPECTIVE, picture)
     assert np.array_equal(same.pixels[0], picture)

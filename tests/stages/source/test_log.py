@@ -39,7 +39,7 @@ def without(*topics: str):
     return messages(lambda made: [] if made.topic in topics else [made])
 
 
-def test_every_picture_is_a_tick_and_motions_chain_to_the_odometry(tmp_path: Path) -> None:
+def test_every_image_is_a_tick_and_motions_chain_to_the_odometry(tmp_path: Path) -> None:
     ctx = context()
     outs = drive(LogSource(log=str(write_mcap(tmp_path / "log.mcap"))), ctx)
     assert [out.tick.index for out in outs] == [out.tick.frame for out in outs] == list(range(FRAMES))
@@ -53,7 +53,7 @@ def test_every_picture_is_a_tick_and_motions_chain_to_the_odometry(tmp_path: Pat
     assert not ctx.drew
 
 
-def test_motion_spans_pictures_that_cannot_be_used(tmp_path: Path) -> None:
+def test_motion_spans_images_that_cannot_be_used(tmp_path: Path) -> None:
     def spoilt(made: Made) -> list[Made]:
         bad = made.topic == IMAGE and round((made.stamp - START) / 5e8 - 0.534) in (0, 4, 5)
         return [made._replace(content=compressed(made.stamp, b"no picture"))] if bad else [made]
@@ -68,7 +68,7 @@ def test_motion_spans_pictures_that_cannot_be_used(tmp_path: Path) -> None:
     odometry = open_recording(path).odometry
     np.testing.assert_allclose(row(outs[3].motion), between(odometry[3], odometry[6]))
     assert ctx.counts == {"undecodable_image": 3}
-    assert "log.mcap: picture 0" in ctx.details["undecodable_image"]
+    assert "log.mcap: image 0" in ctx.details["undecodable_image"]
 
 
 def test_several_logs_follow_each_other_with_their_boundaries_marked(tmp_path: Path) -> None:

@@ -121,7 +121,7 @@ def test_somebody_who_lifts_it_is_not_seen_by_its_wheels():
     assert abs(after.motion.x) < 0.05
 
 
-def test_its_pictures_are_blurred_by_its_motion_around_their_tick():
+def test_its_images_are_blurred_by_its_motion_around_their_tick():
     """What it sees is the mean over where it is about to be and has just been; at rest it is one picture."""
     quiet = replace(EXACT, sensor=Sensor(noise=0.0, exposure_drift=0.0, shutter=0.1))
     sharp, blurred = (

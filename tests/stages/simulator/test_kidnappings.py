@@ -117,7 +117,7 @@ def test_a_log_holds_truth_up_to_the_leap_and_from_it_on(drive: SimulatedRecordi
     assert kidnappings[1]["to"] == [5.0, 1.4, 0.2]
 
 
-def test_lost_pictures_are_missing_and_overtaken_ones_are_counted(drive: SimulatedRecording, log: Path):
+def test_lost_images_are_missing_and_overtaken_ones_are_counted(drive: SimulatedRecording, log: Path):
     taken = len(SimulatedRecording(replace(WORLD, delivery=Delivery()), "there", 1, KIDNAPPED).stamps)
     assert 0 < len(drive.sent) < taken
     assert len(drive.stamps) == len(drive.sent) - drive.dropped["backward_stamp"]
@@ -126,7 +126,7 @@ def test_lost_pictures_are_missing_and_overtaken_ones_are_counted(drive: Simulat
     assert (np.diff(drive.stamps) > 0).all()
 
 
-def test_losing_pictures_does_not_change_those_that_arrive(drive: SimulatedRecording):
+def test_losing_images_does_not_change_those_that_arrive(drive: SimulatedRecording):
     whole = SimulatedRecording(replace(WORLD, delivery=Delivery()), "there", 1, KIDNAPPED)
     frame = int(np.flatnonzero(whole.stamps == drive.stamps[5])[0])
     assert frame > 5
