@@ -5,8 +5,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Stage
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive, known
 
@@ -14,22 +13,24 @@ Index = npt.NDArray[np.int64]
 
 
 class ErrorCurves(Stage):
-    """How the error of the estimate and of odometry alone goes on, in parts of the last log that has ground truth.
+    """Follows the error of the estimate and of odometry alone along the last log that has ground truth.
 
     `laps`: a list with an entry for each lap: `frames`, the mean, median and largest position error and the mean
-    heading error, and the mean of `odometry_error_m`. A lap ends where the robot is nearest to its start again, within
-    `home_m` and headed as it was there, after it has left that circle by as much again; who leaves by one side, comes
-    back and leaves by the other has not ended a lap. What comes behind the last visit is an entry too.
-    `over_steps`: lists of `points` entries, each the mean over a share of the frames: `step` (its middle),
-    `position_error_m`, `odometry_error_m`. `over_distance`: the same over the true distance from the first true
-    position, in steps of `distance_m`, with the odometry error of the first lap alone beside it
-    (`first_lap_odometry_error_m`); None where no frame lies at that distance. Odometry alone starts at the first true
-    pose and is not aligned. Nothing without ground truth.
+    heading error, and the mean of `odometry_error_m`. A lap ends where the robot is nearest to its start again, headed
+    as it was there; a robot that leaves by one side, comes back and leaves by the other has not ended a lap. What
+    comes after the last visit is an entry too.
+    `over_steps`: lists, each entry the mean over an equal part of the frames: `step` (its middle), `position_error_m`,
+    `odometry_error_m`. `over_distance`: the same over the true distance from the first true position, with the odometry
+    error of the first lap alone beside it (`first_lap_odometry_error_m`); None where no frame lies at that distance.
+    Odometry alone starts at the first true pose and is not aligned. Nothing without ground truth.
     """
 
     home_m: Annotated[float, Bounds(gt=0)] = 2.0
+    """Radius (m) of the circle around the start; a lap leaves twice as far and comes back into it."""
     points: Annotated[int, Bounds(ge=1)] = 60
+    """Length of the lists of `over_steps`."""
     distance_m: Annotated[float, Bounds(gt=0)] = 1.0
+    """Width (m) of a step of `over_distance`."""
 
     class Out(Outputs):
         """`metrics`: the entries `laps`, `over_steps` and `over_distance` of metrics.json."""

@@ -7,9 +7,8 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.graph.results import Metrics
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, one_way_matches
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
@@ -33,35 +32,52 @@ class Seen(NamedTuple):
     depths: Depths | None
 
 
+QUANTITIES = {
+    "matches.all.right_share": Quantity(title="Matches, share right", unit="%", better="higher"),
+    "matches.all.first_right": Quantity(title="Matches right before the first wrong one, median", better="higher"),
+    "matches.all.right": Quantity(title="Matches right, median", better="higher"),
+    "matches.all.by_chance": Quantity(title="Wrong partners that pass as right", unit="%"),
+    "matches.all.pairs": Quantity(title="Pairs of images", context=True),
+}
+
+
 class FirstMatches(Stage):
-    """Goes through the matches of pairs of pictures from the best to the worst, up to the first that is wrong.
+    """Counts how many matches of pairs of images are right, from the best to the worst, up to the first wrong one.
 
-    Goedemé et al. 2007, section 3.2: of a pair "the first 13 matches are correct". For each of `apart_m` there are
-    `pairs` pairs, the first picture of each evenly along the log, the second the next one that was taken so far away
-    (straight). `by`: of patches, of columns, or of both. `search`: as in the paper's section 3.4 (`both_ways`: each
-    other's nearest, clearly nearer than the second of either), or Lowe's (`one_way`: the second view's nearest, clearly
-    nearer than its second). `best`: the `clearest` (by that ratio), or the `nearest` descriptors (which of two kinds
-    are not to be compared). `ratio`, `column_ratio`, `colour`: as in `MatchFeatures`.
+    Goedemé et al. 2007, section 3.2: of a pair "the first 13 matches are correct". The first image of each pair lies
+    evenly along the log, the second is the next one that was taken a given distance away (straight).
 
-    A match of patches is right where its point, by its depth in one view, is seen in the other within `within_deg` of
-    its partner, or within half the patch's diameter, if that is more; one of columns where both of its ends are, within
-    `column_within_deg`. Without depths: where its bearings lie within `epipolar_deg` of a plane with the way and meet
-    in front of both views. Under `matches`, by distance and over `all`: `first_right` and `right` (medians over pairs),
-    `right_share`; `by_chance`: the share of wrong partners that would be counted as right. Raises BadInput where no
-    truth says where pictures were taken.
+    A match of patches is right where its point, by its depth in one view, is seen in the other close to its partner, or
+    within half the patch's diameter, if that is more; one of columns where both of its ends are. Without depths: where
+    its bearings lie close to a plane with the direction of travel and meet in front of both views. Under `matches`, by
+    distance and over `all`: `first_right` and `right` (medians over pairs), `right_share`; `by_chance`: the share of
+    wrong partners that would be counted as right. Raises BadInput where no truth says where images were taken.
     """
 
     apart_m: tuple[float, ...] = (0.5, 1.0, 2.0)
+    """Distances (m) between the images of a pair."""
     pairs: Annotated[int, Bounds(ge=1)] = 30
+    """Pairs for each distance."""
     by: Literal["patches", "columns", "both"] = "patches"
+    """What is matched: patches, vertical segments, or both."""
     search: Literal["both_ways", "one_way"] = "both_ways"
+    """`both_ways` (the paper, section 3.4): each other's nearest, clearly nearer than the second of either; `one_way`
+    (Lowe): the second view's nearest, clearly nearer than its second."""
     best: Literal["clearest", "nearest"] = "clearest"
+    """What comes first: the clearest match by that ratio, or the nearest descriptors (not to be compared between two
+    kinds)."""
     ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
+    """Largest ratio of the nearest to the second nearest patch."""
     column_ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
+    """The same of vertical segments."""
     colour: Annotated[float, Bounds(gt=0)] = 0.5
+    """Largest distance between the colours of two patches."""
     within_deg: Annotated[float, Bounds(gt=0)] = 2.0
+    """Largest angle (degrees) between a patch and where its partner's point is seen."""
     column_within_deg: Annotated[float, Bounds(gt=0)] = 3.0
+    """The same of a vertical segment's ends."""
     epipolar_deg: Annotated[float, Bounds(gt=0)] = 1.0
+    """Largest angle (degrees) to the epipolar plane, where depths are not known."""
 
     class Out(Outputs):
         """`metrics`: the entry `matches` of metrics.json."""
@@ -93,7 +109,7 @@ class FirstMatches(Stage):
         found: dict[str, Any] = {"depths_known": int(any(view.depths is not None for view in views))}
         found["apart"] = [{"m": far, **summary(pairs)} for far, pairs in zip(self.apart_m, told, strict=True)]
         found["all"] = summary([pair for pairs in told for pair in pairs])
-        return self.Out(metrics=Metrics({"matches": found}))
+        return self.Out(metrics=Metrics({"matches": found}, QUANTITIES, ("matches.all.right_share",)))
 
     def _judged(self, one: Seen, other: Seen, lens: Camera | None) -> tuple[Bools, float]:
         """Which matches are right, the best first, and the share of wrong partners that pass as right."""

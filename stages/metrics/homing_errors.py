@@ -6,25 +6,34 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.homing import HomingVector, PathProgress
 
+QUANTITIES = {
+    "homing.end_error_m": Quantity(title="Distance to the target at the end", better="lower"),
+    "homing.end_turn_deg": Quantity(title="Heading error at the end", better="lower"),
+    "homing.arrived": Quantity(title="Arrived", better="higher"),
+    "homing.time_s": Quantity(title="Time until it arrived", better="lower", absent="never"),
+    "homing.lost_rate": Quantity(title="Target lost", better="lower"),
+    "homing.direction_error_deg": Quantity(title="Error of the homing direction", better="lower"),
+    "homing.start_m": Quantity(title="Distance to the target at the start", context=True),
+}
+
 
 class HomingErrors(Stage):
-    """Where a robot ends that goes back to where it stood at the first tick, and what its homing vectors were worth.
+    """Measures where a robot ends that returns to its first pose, and the errors of its homing vectors.
 
     Under `homing`: `start_m`, how far away it was put; `arrived` (1 or 0); `end_error_m` and `end_turn_deg`, from the
-    first pose to the last (and `end`, the same as pages that pool runs read it); `time_s` until it arrived;
-    `lost_rate`, the share of ticks in which the target was lost; `direction_error_deg` (median, p90, max over ticks
-    further than `from_m` from the target), between the homing vector and the true way; `inliers`, median; `first`:
-    `direction_error_deg`, `turn_error_deg` and `inliers` of the first vector, None where the target was not found at
-    first.
+    first pose to the last (and `end`, the same as experiments that pool runs read it); `time_s` until it arrived;
+    `lost_rate`, the share of ticks in which the target was lost; `direction_error_deg` (median, p90, max), between the
+    homing vector and the true direction of the target; `inliers`, median; `first`: `direction_error_deg`,
+    `turn_error_deg` and `inliers` of the first vector, None where the target was not found at first.
     """
 
     from_m: Annotated[float, Bounds(ge=0)] = 0.3
+    """Distance (m) to the target beyond which the homing direction is measured."""
 
     class Out(Outputs):
         """Absent where there was never a vector, or no truth."""
@@ -72,7 +81,8 @@ class HomingErrors(Stage):
                 "inliers": after[first].inliers,
             },
         }
-        return self.Out(metrics=Metrics({"homing": values}))
+        headlines = ("homing.end_error_m", "homing.arrived")
+        return self.Out(metrics=Metrics({"homing": values}, QUANTITIES, headlines, details=("homing.end",)))
 
 
 def _off(vector: HomingVector, way: np.ndarray) -> tuple[float, float]:

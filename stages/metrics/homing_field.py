@@ -8,8 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.values.drive import pose_rows
 from omninav.stages.values.homing import HomingVector
@@ -19,17 +18,28 @@ from omninav.stages.values.pose import Pose
 Array = npt.NDArray[np.float64]
 
 
+QUANTITIES = {
+    "homing_field.views": Quantity(title="Views", context=True),
+    "homing_field.found_rate": Quantity(title="Views with a homing vector", better="higher"),
+    "homing_field.median_deg": Quantity(title="Error of the direction, median", better="lower"),
+    "homing_field.of_found_deg": Quantity(title="Error of the direction where found, median", better="lower"),
+    "homing_field.turn_deg": Quantity(title="Error of the turn, median", better="lower"),
+}
+
+
 class HomingFieldErrors(Stage):
-    """Angles between homing vectors and the true way to the first pose, over all ticks and by distance.
+    """Measures the angles between homing vectors and the true direction of the first pose, also by distance.
 
     Under `homing_field`: `views`; `found_rate`, of those from which there is a vector; `median_deg`, in which a view
     without one counts as 180 degrees, and `of_found_deg`, without these; `turn_deg`, the median error of the turn.
-    `by_distance`: lists of the same for each of the `rings`, `width_m` wide, out to `to_m`; `within`: over all views
-    inside of each ring's outer edge. None where no view is.
+    `by_distance`: lists of the same for each ring around the target, out to `to_m`; `within`: over all views inside of
+    each ring's outer edge. None where no view is.
     """
 
     width_m: Annotated[float, Bounds(gt=0)] = 1.0
+    """Width (m) of a ring."""
     rings: Annotated[int, Bounds(ge=1)] = 8
+    """Number of rings around the target."""
 
     class Out(Outputs):
         """`field`: for the picture. Both absent without a view beside the target's."""
@@ -52,7 +62,8 @@ class HomingFieldErrors(Stage):
         for name, parts in (("by_distance", rings), ("within", [metres < high for high in edges[1:]])):
             told = [summary(found.errors[part], turns[part]) for part in parts]
             values[name] = {"to_m": edges[1:].tolist(), **{key: [each[key] for each in told] for key in told[0]}}
-        return self.Out(metrics=Metrics({"homing_field": values}), field=found)
+        headlines = ("homing_field.median_deg", "homing_field.found_rate")
+        return self.Out(metrics=Metrics({"homing_field": values}, QUANTITIES, headlines), field=found)
 
 
 def field_of(poses: Array, rows: Sequence[int], vectors: Sequence[HomingVector | None]) -> HomingField:

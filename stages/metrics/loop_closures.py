@@ -6,30 +6,48 @@ import networkx
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.pipeline.engine.artifact import artifact_bytes
-from omninav.pipeline.graph.results import Metrics
 from omninav.stages.geometry.probability.dempster_shafer import support
 from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
 
 Array = npt.NDArray[np.float64]
 
 
-class LoopClosures(Stage):
-    """Precision and recall of accepted loop hypotheses against truth, and how large the map is.
+QUANTITIES = {
+    "loops.loop_closures.precision": Quantity(title="Loop closures, precision", unit="%", better="higher"),
+    "loops.loop_closures.recall": Quantity(title="Loop closures, recall", unit="%", better="higher"),
+    "loops.loop_closures.average_precision": Quantity(
+        title="Loop closures, area under precision-recall", unit="%", better="higher"
+    ),
+    "precision": Quantity(unit="%", better="higher"),
+    "recall": Quantity(unit="%", better="higher"),
+    "wrong": Quantity(title="Accepted wrongly", better="lower"),
+    "map.places": Quantity(title="Places in the map"),
+    "map.size_bytes": Quantity(title="Map size", better="lower"),
+    "map.place_size_bytes": Quantity(title="Size of a place", better="lower"),
+    "map.step_m": Quantity(title="Distance between path images"),
+}
+HEADLINES = ("loops.loop_closures.precision", "loops.loop_closures.recall")
 
-    A hypothesis is right where some picture of one of its subclusters was taken within `near_m` of some picture of the
-    other. Precision is the share of accepted ones that are right, recall the share of right ones that are accepted;
-    None where there are none, or where the map's poses are not truth. `far_in_drive` leaves out those whose views are
-    less than `apart` pictures apart; `merged`, of these: counts as accepted what became one place, be it through third
-    ones. `parts`: between which no way leads; more than one where a map was added to from a tour that it does not
-    know. `at_supports` is what they would be with other thresholds of support. `step_m`:
-    how far apart neighbouring path images were taken. `size_bytes`: of the map's file, but for what it says of
-    its making.
+
+class LoopClosures(Stage):
+    """Measures precision and recall of accepted loop hypotheses against truth, and the size of the map.
+
+    A hypothesis is right where some image of one of its subclusters was taken near some image of the other. Precision
+    is the share of accepted ones that are right, recall the share of right ones that are accepted; None where there are
+    none, or where the map's poses are not truth. `loop_closures` leaves out those between views of one stretch of the
+    drive, and adds `average_precision`, the area under the precision-recall curve over the support; `merged`, of
+    these: counts as accepted what became one place, be it through third ones. `at_supports` is what they would be with
+    other thresholds of support. `parts`: between which no path leads; more than one where a map was added to from a
+    tour that it does not know. `step_m`: how far apart neighbouring path images were taken. `size_bytes`: of the map's
+    file, but for what it says of its making.
     """
 
     near_m: Annotated[float, Bounds(gt=0)] = 2.5
-    apart: Annotated[int, Bounds(ge=1)] = 10
+    """Largest distance (m) between two images of one place."""
+    min_images_between: Annotated[int, Bounds(ge=1)] = 10
+    """Images of the tour that must lie between two views for their hypothesis to be a loop closure."""
 
     class Out(Outputs):
         """`metrics`: the entries `map` and `loops` of metrics.json."""
@@ -53,16 +71,19 @@ class LoopClosures(Stage):
             held["step_m"] = {"median": float(np.median(steps)), "p90": float(np.quantile(steps, 0.9)),
                               "max": float(steps.max())}  # fmt: skip
         gaps = hypothesis_gaps(hypotheses) if hypotheses.pose_source == "truth" else None
-        far = np.abs(np.diff(hypotheses.pairs, axis=1))[:, 0] >= self.apart
+        far = np.abs(np.diff(hypotheses.pairs, axis=1))[:, 0] >= self.min_images_between
         one, other = hypotheses.place[hypotheses.pairs].T
         told, near = support(hypotheses.masses), None if gaps is None else gaps[far]
         loops = {
             **counted(hypotheses.accepted, gaps, self.near_m),
-            "far_in_drive": counted(hypotheses.accepted[far], near, self.near_m),
+            "loop_closures": {
+                **counted(hypotheses.accepted[far], near, self.near_m),
+                "average_precision": None if near is None else average_precision(told[far], near <= self.near_m),
+            },
             "merged": counted((one == other)[far], near, self.near_m),
             "at_supports": at_supports(told[far], near, self.near_m),
         }
-        return self.Out(metrics=Metrics({"map": held, "loops": loops}))
+        return self.Out(metrics=Metrics({"map": held, "loops": loops}, QUANTITIES, HEADLINES))
 
 
 def parts_of(map: TopologicalMap) -> int:
@@ -92,6 +113,20 @@ def counted(accepted: npt.NDArray[np.bool_], gaps: Array | None, near: float) ->
         "precision": found / int(accepted.sum()) if accepted.any() else None,
         "recall": found / int(right.sum()) if right.any() else None,
     }
+
+
+def average_precision(support: Array, right: npt.NDArray[np.bool_]) -> float | None:
+    """Area under the precision-recall curve of hypotheses (H,) accepted by falling support; None where none is right.
+
+    The sum of precision times the increase of recall, with hypotheses of equal support accepted together.
+    """
+    if not right.any():
+        return None
+    order = np.argsort(-support, kind="stable")
+    last_of_equals = np.append(np.diff(support[order]) != 0, True)
+    accepted = (np.arange(len(order)) + 1)[last_of_equals]
+    found = np.cumsum(right[order])[last_of_equals]
+    return float((found / accepted * np.diff(found, prepend=0)).sum() / right.sum())
 
 
 def at_supports(support: Array, gaps: Array | None, near: float) -> dict[str, list[float | int | None]]:

@@ -6,8 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.view_mixtures import ViewEvent
@@ -18,25 +17,33 @@ from .trajectory_errors import spread
 Ints = npt.NDArray[np.int64]
 
 
+QUANTITIES = {
+    "map.inserted": Quantity(title="References added"),
+    "map.removed": Quantity(title="References removed"),
+    "map.new_after_first_lap_rate": Quantity(title="References added after the first lap", better="lower"),
+}
+
+
 class MapHistory(Stage):
-    """How many references came and went, and how far odometry had drifted while the first of them were learned.
+    """Counts how many references came and went, and measures the odometry drift while the first of them were learned.
 
     A reference comes in the frame in which it was seen, however much later it is learned, and goes in the frame in
     which it is removed; `references` and `components` are those the map has after a frame. What is learned once the
     last log has ended, `after_last`, counts to the last frame.
 
     Under `map`: `inserted`, `removed`; `new_after_first_lap_rate`, what came after the first lap over what had come by
-    its end. `map_over_steps`: lists of `points` entries over the frames of all logs: `step`, and `references`,
-    `components`, `inserted`, `removed` so far. `map_per_lap`: lists with an entry for each lap of the first log and for
-    each later log: the same counts, of that part alone. `first_map`: the drift that odometry
-    put into it up to the last new ground of the first log (the robot has not been within `home_m` of it before):
-    `frames`, `driven_m`, and of `odometry_alone` (from the first true pose, unaligned) and of the `estimate` the errors
-    over it and how far off each ended. Laps are those of `ErrorCurves`. Without ground truth there are no laps and no
-    errors.
+    its end. `map_over_steps`: lists over the frames of all logs: `step`, and `references`, `components`, `inserted`,
+    `removed` so far. `map_per_lap`: lists with an entry for each lap of the first log and for each later log: the same
+    counts, of that part alone. `first_map`: the drift that odometry put into it up to the last new ground of the first
+    log: `frames`, `driven_m`, and of `odometry_alone` (from the first true pose, unaligned) and of the `estimate` the
+    errors over it and how far off each ended. Laps are those of `ErrorCurves`. Without ground truth there are no laps
+    and no errors.
     """
 
     home_m: Annotated[float, Bounds(gt=0)] = 2.0
+    """Radius (m) of the circle around the start within which a lap ends, and around any place that is no new ground."""
     points: Annotated[int, Bounds(ge=1)] = 60
+    """Length of the lists of `map_over_steps`."""
 
     class Out(Outputs):
         """`metrics`: the entries `map`, `map_over_steps`, `map_per_lap` and `first_map` of metrics.json."""
@@ -77,7 +84,7 @@ class MapHistory(Stage):
         }
         if logs[0].has_truth:
             values["first_map"] = first_map(logs[0], self.home_m)
-        return self.Out(metrics=Metrics(values))
+        return self.Out(metrics=Metrics(values, QUANTITIES, details=("first_map",)))
 
 
 def counted(events: Sequence[ViewEvent | None], after_last: ViewEvent | None = None) -> Ints:

@@ -1,12 +1,17 @@
 """How much a map takes."""
 
-from omninav.pipeline import Context, Outputs, Stage
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.values.maps import ReferenceGraph
+
+QUANTITIES = {
+    "map.references": Quantity(title="References in the map"),
+    "map.size_bytes": Quantity(title="Map size", better="lower"),
+    "map.reference_size_bytes": Quantity(title="Size of a reference", better="lower"),
+}
 
 
 class MapSize(Stage):
-    """Size of the map: bytes of its arrays as stored, references, edges, and where its poses come from."""
+    """Measures the size of the map: bytes of its arrays as stored, references, edges, and where its poses come from."""
 
     class Out(Outputs):
         """`metrics`: the entry `map` of metrics.json."""
@@ -17,16 +22,11 @@ class MapSize(Stage):
         """The map at the end of the run."""
         size = map.features.nbytes + map.poses.nbytes + map.edges.nbytes
         ctx.fact("map_poses", map.pose_source)
-        return self.Out(
-            metrics=Metrics(
-                {
-                    "map": {
-                        "size_bytes": size,
-                        "references": len(map),
-                        "edges": len(map.edges),
-                        "reference_size_bytes": size / len(map) if len(map) else None,
-                        "pose_source": map.pose_source,
-                    }
-                }
-            )
-        )
+        values = {
+            "size_bytes": size,
+            "references": len(map),
+            "edges": len(map.edges),
+            "reference_size_bytes": size / len(map) if len(map) else None,
+            "pose_source": map.pose_source,
+        }
+        return self.Out(metrics=Metrics({"map": values}, QUANTITIES))

@@ -9,30 +9,43 @@ import networkx
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.topological_map import TopologicalMap
 
+QUANTITIES = {
+    "navigation.reached_rate": Quantity(title="Goal reached", better="higher"),
+    "navigation.collision_free_rate": Quantity(title="Goal reached without a collision", better="higher"),
+    "navigation.collisions": Quantity(title="Collisions", better="lower"),
+    "navigation.end_error_m": Quantity(title="Distance to the goal at the end", better="lower"),
+    "navigation.reached_error_m": Quantity(title="Distance to the goal, where reached", better="lower"),
+    "navigation.path_length_ratio": Quantity(title="Path length / shortest path", better="lower"),
+    "navigation.time_per_metre_s": Quantity(title="Time per metre of the shortest path", better="lower"),
+    "navigation.time_s": Quantity(title="Time", better="lower"),
+    "navigation.path_length_m": Quantity(title="Path length"),
+    "navigation.shortest_m": Quantity(title="Shortest path", context=True),
+    "navigation.routes": Quantity(title="Routes planned", better="lower"),
+}
+
 
 class Navigation(Stage):
-    """How a drive to a goal ended: the entry `navigation` of metrics.json.
+    """Measures how a drive to a goal ended: the entry `navigation` of metrics.json.
 
-    `reached`: the robot said that it has arrived, within `within_m` of where the medoid of the way's last place was
-    taken; `end_error_m`: how far from there it ended. `collisions`; `path_length_m`: driven; `shortest_m`: from where
-    it began along the pictures of the map, the shortest way that it could have known; `time_s`: until it said that it
-    has arrived or given up, else all of it. `ways`: how many it planned; `state` and `why`: what it last said.
-    `reached_rate` and `clean_rate` (without a collision): 1 or 0, for means over drives. Of drives that reached their
-    goal alone: `detour`, the way driven over the shortest; `pace`, seconds for a metre of the shortest;
-    `reached_error_m`, how far from the place it ended. Truth is used to score alone; of a map whose poses are not truth
-    nothing is said that needs them.
+    `reached`: the robot said that it has arrived, close to where the medoid of the route's last place was taken;
+    `end_error_m`: how far from there it ended. `collisions`; `path_length_m`: driven; `shortest_m`: from where it began
+    along the images of the map, the shortest path that it could have known; `time_s`: until it said that it has arrived
+    or given up, else all of it. `routes`: how many it planned; `state` and `reason`: what it last said. `reached_rate`
+    and `collision_free_rate`: 1 or 0, for means over drives. Only of drives that reached their goal:
+    `path_length_ratio`, the path driven over the shortest; `time_per_metre_s`, seconds for a metre of the shortest;
+    `reached_error_m`, how far from the place it ended. Truth of the map's poses that is not known gives None.
     """
 
     within_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """Largest distance (m) from the goal at which it is reached."""
 
     class Out(Outputs):
-        """`metrics`: absent where no way was ever planned and no truth is known."""
+        """`metrics`: absent where no route was ever planned and no truth is known."""
 
         metrics: Metrics | None = None
 
@@ -65,23 +78,24 @@ class Navigation(Stage):
             "path_length_m": driven,
             "shortest_m": shortest,
             "time_s": float(drive.seconds[ended]),
-            "ways": last.number + 1,
+            "routes": last.number + 1,
             "goal": goal,
             "state": last.state,
-            "why": last.why,
+            "reason": last.why,
         }
         if map.pose_source == "truth":
             reached = last.state == "arrived" and apart is not None and apart <= self.within_m
             found |= {"reached": reached, "reached_rate": float(reached)}
             if collisions is not None:
-                found["clean_rate"] = float(reached and collisions == 0)
+                found["collision_free_rate"] = float(reached and collisions == 0)
             if reached:
                 found["reached_error_m"] = apart
             if reached and shortest:
-                found["pace"] = found["time_s"] / shortest
+                found["time_per_metre_s"] = found["time_s"] / shortest
                 if driven is not None:
-                    found["detour"] = driven / shortest
-        return self.Out(metrics=Metrics({"navigation": found}))
+                    found["path_length_ratio"] = driven / shortest
+        headlines = ("navigation.reached_rate", "navigation.path_length_ratio")
+        return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, headlines))
 
 
 def shortest_metres(map: TopologicalMap, start: npt.ArrayLike, goal: int) -> float | None:

@@ -5,28 +5,38 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.topological_map import TopologicalMap
 
+QUANTITIES = {
+    "localisation.accuracy": Quantity(unit="%", better="higher"),
+    "localisation.adjacent_accuracy": Quantity(title="Accuracy, adjacent places included", unit="%", better="higher"),
+    "localisation.place_distance_m": Quantity(title="Distance of the believed place, median", better="lower"),
+    "localisation.nearest_place_distance_m": Quantity(title="Distance of the nearest place, median"),
+    "localisation.images": Quantity(title="Images localised", context=True),
+}
+
 
 class PlaceAccuracy(Stage):
-    """The share of pictures at which the belief's maximum is at the place whose medoid was taken closest to the truth.
+    """Measures how often the most probable place is the one whose medoid was taken closest to the truth.
 
-    Goedemé et al. 2007, section 8.3. Under `localisation`, over all logs: `right_rate` of all pictures; `near_rate`:
-    the believed place is the closest or one of its neighbours; `right_after`: of the first, second ... of `updates`
-    updates since the belief began (`begun`: at which pictures it did), as the paper counts, and `near_after`;
-    `within_after`: the believed place has the closest medoid, or the closest of all images that the map keeps (where a
-    place is long, its medoid lies far from its ends); `beside_after`: its medoid is at most `beside_m` further away
-    than the closest (where the tour came by twice, two medoids may lie side by side). `median_apart_m`: how far the
-    believed place's medoid lies from the truth, and `least_apart_m`, the closest one's.
+    Goedemé et al. 2007, section 8.3. Under `localisation`, over all logs: `accuracy`, the share of all images;
+    `adjacent_accuracy`: the believed place is the closest or one of its neighbours; `accuracy_after`: of the first,
+    second ... update since the belief began (`begun`: at which images it did), as the paper counts, and
+    `adjacent_accuracy_after`; `image_accuracy_after`: the believed place has the closest medoid, or the closest of all
+    images that the map keeps (where a place is long, its medoid lies far from its ends); `tolerant_accuracy_after`: its
+    medoid is hardly further away than the closest (where the tour came by twice, two medoids may lie side by side).
+    `place_distance_m`: the median distance between the believed place's medoid and the truth, and
+    `nearest_place_distance_m`, the closest one's.
     """
 
     updates: Annotated[int, Bounds(ge=1)] = 5
-    beside_m: Annotated[float, Bounds(ge=0)] = 0.5
+    """Length of the lists by update."""
+    tolerance_m: Annotated[float, Bounds(ge=0)] = 0.5
+    """How much further away (m) than the closest a medoid may be for `tolerant_accuracy_after`."""
 
     class Out(Outputs):
         """`metrics`: the entry `localisation` of metrics.json; absent where poses or the map's are not ground truth."""
@@ -59,17 +69,17 @@ class PlaceAccuracy(Stage):
             return self.Out()
         after, rights, nears, within, metres_off, least = (np.array(column) for column in zip(*rows, strict=True))
         found: dict[str, Any] = {
-            "pictures": len(rows),
-            "right_rate": float(rights.mean()),
-            "near_rate": float(nears.mean()),
-            "right_after": _after(rights, after, self.updates),
-            "near_after": _after(nears, after, self.updates),
-            "within_after": _after(within, after, self.updates),
-            "beside_after": _after(metres_off - least <= self.beside_m, after, self.updates),
-            "median_apart_m": float(np.median(metres_off)),
-            "least_apart_m": float(np.median(least)),
+            "images": len(rows),
+            "accuracy": float(rights.mean()),
+            "adjacent_accuracy": float(nears.mean()),
+            "accuracy_after": _after(rights, after, self.updates),
+            "adjacent_accuracy_after": _after(nears, after, self.updates),
+            "image_accuracy_after": _after(within, after, self.updates),
+            "tolerant_accuracy_after": _after(metres_off - least <= self.tolerance_m, after, self.updates),
+            "place_distance_m": float(np.median(metres_off)),
+            "nearest_place_distance_m": float(np.median(least)),
         }
-        return self.Out(metrics=Metrics({"localisation": found}))
+        return self.Out(metrics=Metrics({"localisation": found}, QUANTITIES, ("localisation.accuracy",)))
 
 
 def _after(hits: np.ndarray, after: np.ndarray, updates: int) -> list[float | None]:

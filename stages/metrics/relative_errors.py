@@ -5,23 +5,30 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.drive import Array, Drive, known
 
+QUANTITIES = {
+    "absolute_trajectory_error_m": Quantity(title="Absolute trajectory error (ATE)", better="lower"),
+    "relative_position_error_m": Quantity(title="Relative pose error (RPE), position", better="lower"),
+    "relative_heading_error_deg": Quantity(title="Relative pose error (RPE), heading", better="lower"),
+    "relative_error_distance_m": Quantity(title="Distance of relative pose errors"),
+}
+
 
 class RelativeErrors(Stage):
-    """Absolute trajectory error after the best rigid alignment, and relative pose error over a distance.
+    """Measures the absolute trajectory error after the best rigid alignment, and the relative pose error.
 
     Sturm et al. 2012 ("A benchmark for the evaluation of RGB-D SLAM systems", section on metrics), in the plane and
     without scale: `absolute_trajectory_error_m` is the distance that is left after the rigid motion that fits the
     estimate to the truth best in the least squares sense; `relative_position_error_m` and `relative_heading_error_deg`
-    compare estimated and true motion between frames that lie `distance_m` of true path apart, every frame being a
-    start. The last log is measured; nothing is given without ground truth.
+    compare estimated and true motion between frames a given distance apart, every frame being a start. The last log is
+    measured; nothing is given without ground truth.
     """
 
     distance_m: Annotated[float, Bounds(gt=0)] = 1.0
+    """Metres of true path between the two frames of a relative pose error."""
 
     class Out(Outputs):
         """`metrics`: for metrics.json."""
@@ -34,7 +41,7 @@ class RelativeErrors(Stage):
         drive: Drive,
     ) -> Out:
         """The whole run at once."""
-        return self.Out(metrics=Metrics(trajectory_metrics(drive.last_log, self.distance_m)))
+        return self.Out(metrics=Metrics(trajectory_metrics(drive.last_log, self.distance_m), QUANTITIES))
 
 
 def trajectory_metrics(drive: Drive, distance_m: float) -> dict[str, Any]:

@@ -21,23 +21,22 @@ QUANTITIES = {
 
 
 class TrajectoryErrors(Stage):
-    """Errors of the estimate against ground truth, with those of odometry alone and of the belief's mean beside them.
+    """Measures the errors of the estimate against ground truth, with those of odometry alone and of the belief's mean.
 
     Per log: `frames`; `driven_m`, the length of the true path; `position_error_m` and `heading_error_deg` (mean,
-    standard deviation `std`, median, p90, max); `loss_rate`, the share of frames further than `lost_m` from the
-    truth; `converged_after_frames`, how many frames went by before the error
-    stayed below 1 m and 20 degrees for ten frames (None if it never did); the errors and loss rate again under
-    `after_convergence`. `odometry_alone` starts at the first true pose, and says how far off it ended. The top level is
-    the last log, and `logs` has one entry per log where there are several. Frames without truth or without estimate are
-    left out and counted.
-
-    `settle_steps`: the errors and loss rate stand once more under `after_settling`, without so many frames at each
-    log's start: the same frames for every method, where `after_convergence` leaves out more of a method that stays lost
-    for longer. None: they do not.
+    standard deviation `std`, median, p90, max); `loss_rate`, the share of frames in which the robot was lost;
+    `converged_after_frames`, how many frames went by before the error stayed below 1 m and 20 degrees for ten frames
+    (None if it never did); the errors and loss rate again under `after_convergence`. `odometry_alone` starts at the
+    first true pose, and says how far off it ended. The top level is the last log, and `logs` has one entry per log
+    where there are several. Frames without truth or without estimate are left out and counted.
     """
 
     lost_m: Annotated[float, Bounds(gt=0)] = 2.5
+    """Position error (m) above which the robot counts as lost."""
     settle_steps: Annotated[int, Bounds(ge=0)] | None = None
+    """Frames at each log's start without which errors and loss rate stand once more under `after_settling`. These are
+    the same frames for every method, where `after_convergence` leaves out more of a method that stays lost for longer.
+    None: no such entry."""
 
     class Out(Outputs):
         """`metrics`: for metrics.json."""

@@ -6,13 +6,19 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.values.two_views import RelativeView
+
+QUANTITIES = {
+    "two_views.success_rate": Quantity(title="Solved", better="higher"),
+    "two_views.rotation_error_deg": Quantity(title="Rotation error", better="lower"),
+    "two_views.direction_error_deg": Quantity(title="Error of the translation's direction", better="lower"),
+    "two_views.samples": Quantity(title="RANSAC samples, median", better="lower"),
+}
 
 
 class TwoViewErrors(Stage):
-    """Angles between found and true relative poses, and how often both are within `within_deg`.
+    """Measures the angles between found and true relative poses, and how often both are small.
 
     Under `two_views`: `success_rate`, over all problems; `rotation_error_deg` and `direction_error_deg`, the turn that
     is left between the rotations and the angle between the translations, each median and p95 over those that were
@@ -20,8 +26,11 @@ class TwoViewErrors(Stage):
     """
 
     within_deg: Annotated[float, Bounds(gt=0)] = 3.0
+    """Largest error (degrees) of rotation and of direction at which a problem counts as solved."""
 
     class Out(Outputs):
+        """`metrics`: the entry `two_views` of metrics.json."""
+
         metrics: Metrics
 
     def step(self, ctx: Context, truth: Sequence[RelativeView], found: Sequence[RelativeView | None]) -> Out:
@@ -30,18 +39,13 @@ class TwoViewErrors(Stage):
         turns = np.array([_turn_between(true.rotation, view.rotation) for true, view in solved])
         ways = np.array([_angle_between(true.translation, view.translation) for true, view in solved])
         good = np.count_nonzero((turns <= self.within_deg) & (ways <= self.within_deg))
-        return self.Out(
-            metrics=Metrics(
-                {
-                    "two_views": {
-                        "success_rate": good / len(truth) if len(truth) else None,
-                        "rotation_error_deg": _spread(turns),
-                        "direction_error_deg": _spread(ways),
-                        "samples": float(np.median([view.samples for _, view in solved])) if solved else None,
-                    }
-                }
-            )
-        )
+        values = {
+            "success_rate": good / len(truth) if len(truth) else None,
+            "rotation_error_deg": _spread(turns),
+            "direction_error_deg": _spread(ways),
+            "samples": float(np.median([view.samples for _, view in solved])) if solved else None,
+        }
+        return self.Out(metrics=Metrics({"two_views": values}, QUANTITIES, ("two_views.success_rate",)))
 
 
 def _spread(errors: np.ndarray) -> dict[str, float | None]:

@@ -6,25 +6,33 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 Array = npt.NDArray[np.float64]
 
 
+QUANTITIES = {
+    "map.references": Quantity(title="References in the map"),
+    "map.size_bytes": Quantity(title="Map size", better="lower"),
+    "map.reference_size_bytes": Quantity(title="Size of a reference", better="lower"),
+    "map.visited_area_m2": Quantity(title="Visited area", unit="m²"),
+    "map.references_per_m2": Quantity(title="References per m²"),
+}
+
+
 class ViewMapSize(Stage):
-    """Size of a map of views and mixtures at the end of a run.
+    """Measures the size of a map of views at the end of a run, and how densely it covers what was visited.
 
     Under `map`: `references` (views), `components`, `size_bytes` of all its arrays as stored in its file (whose head,
     some kilobytes of text, is not counted), `reference_size_bytes` (a view's share of them), `pose_source`,
-    `visited_area_m2` and `references_per_m2`. The visited area is what lies within `near_m` of the path: cells of half
-    that size which the true path, or the estimates where there is no truth, comes so near to.
-    A known map may hold more than what this run visited: its density then says too much.
+    `visited_area_m2` and `references_per_m2`. A known map may hold more than what this run visited: its density then
+    says too much.
     """
 
     near_m: Annotated[float, Bounds(gt=0)] = 1.0
+    """Distance (m) from the true path (from the estimates where there is no truth) up to which the area is visited."""
 
     class Out(Outputs):
         """`metrics`: the entry `map` of metrics.json."""
@@ -51,7 +59,7 @@ class ViewMapSize(Stage):
             "visited_area_m2": area,
             "references_per_m2": len(map) / area if area else None,
         }
-        return self.Out(metrics=Metrics({"map": figures}))
+        return self.Out(metrics=Metrics({"map": figures}, QUANTITIES))
 
 
 def stored_bytes(map: ViewMixtures) -> int:

@@ -6,8 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import WholeView
@@ -15,17 +14,24 @@ from omninav.stages.values.views import WholeView
 Array = npt.NDArray[np.float64]
 
 
+QUANTITIES = {
+    "spacing.between_views.unevenness": Quantity(title="Unevenness of the map among views", better="lower"),
+    "spacing.between_places_m.unevenness": Quantity(title="Unevenness of the map on the floor", better="lower"),
+}
+
+
 class ViewSpacing(Stage):
-    """How far each view of a map is from its nearest other one, in the views' own distance and in metres.
+    """Measures how far each view of a map is from its nearest other one, in the views' own distance and in metres.
 
     Porta & Kroese 2004, section 5: learning on-line "guarantees a uniform sampling of the feature space and not of the
     geometric space, as it happens in normal appearance-based localization". Under `spacing`: `between_views` (in the
     views' unit) and `between_places_m` (between the heaviest components' x, y), each with `mean`, `median`, `p10`,
     `p90` and `unevenness`, the standard deviation over the mean, which has no unit: 0 where all lie evenly. Nothing for
-    a map of fewer than three views. Of a map of more than `most` views so many are asked, evenly picked by age.
+    a map of fewer than three views.
     """
 
-    most: Annotated[int, Bounds(ge=3)] = 500
+    max_views: Annotated[int, Bounds(ge=3)] = 500
+    """Of a larger map so many views are measured, evenly picked by age."""
 
     class Out(Outputs):
         """`metrics`: the entry `spacing` of metrics.json."""
@@ -36,10 +42,10 @@ class ViewSpacing(Stage):
         """The map at the end of the run, which `drive` waits for; `view`: the last one seen, for how to compare."""
         if len(map) < 3:
             return self.Out(metrics=Metrics({}))
-        rows = np.unique(np.linspace(0, len(map) - 1, min(self.most, len(map))).round().astype(np.int64))
+        rows = np.unique(np.linspace(0, len(map) - 1, min(self.max_views, len(map))).round().astype(np.int64))
         among, apart = nearest_views(map, view, rows), nearest_places(map)[rows]
         found = {"between_views": spaced(among), "between_places_m": spaced(apart)}
-        return self.Out(metrics=Metrics({"spacing": found}))
+        return self.Out(metrics=Metrics({"spacing": found}, QUANTITIES))
 
 
 def nearest_views(map: ViewMixtures, view: WholeView, rows: npt.NDArray[np.int64]) -> Array:

@@ -6,8 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 
@@ -15,21 +14,29 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
-class WrongPlaces(Stage):
-    """How long references keep a place at which they were learned and never were: after a kidnapping, mostly.
+QUANTITIES = {
+    "wrong_places.references": Quantity(title="References learned at a wrong place", better="lower"),
+    "wrong_places.kept": Quantity(title="Wrong places kept to the end", better="lower"),
+}
 
-    A reference counts whose heaviest component lies further than `wrong_m` from the true position of the frame in which
-    it was seen, at its coming. Of its weight, the share at places that far off is followed to the
-    end. Under `wrong_places`: `references`, how many there are; `kept`, of how many some of that weight is left at the
-    end; lists with an entry for each of them in the order in which they were seen: `along_m`, the true way (m) from
-    where the first of them was seen to where it was, and `gone_after_steps`, how many frames after it came that share
-    had become 0 (None: never), which is as many for all where all are put right in as many laps; lists of `points`
-    entries over the frames: `step`, and `weight`, the mean share of all that had come by then (None before the first).
-    `example`: `step` and `weight` of the first of them. Only `references` where there are none.
+
+class WrongPlaces(Stage):
+    """Measures how long references keep a place at which they were learned and never were: after a kidnapping, mostly.
+
+    A reference counts whose heaviest component lies far from the true position of the frame in which it was seen, at
+    its coming. Of its weight, the share at places that far off is followed to the end. Under `wrong_places`:
+    `references`, how many there are; `kept`, of how many some of that weight is left at the end; lists with an entry
+    for each of them in the order in which they were seen: `along_m`, the true path length (m) from where the first of
+    them was seen to where it was, and `gone_after_steps`, how many frames after it came that share had become 0 (None:
+    never), which is as many for all where all are corrected in as many laps; lists over the frames: `step`, and
+    `weight`, the mean share of all that had come by then (None before the first). `example`: `step` and `weight` of the
+    first of them. Only `references` where there are none.
     """
 
     wrong_m: Annotated[float, Bounds(gt=0)] = 2.0
+    """Distance (m) from the true position beyond which a place is wrong."""
     points: Annotated[int, Bounds(ge=1)] = 60
+    """Length of the lists over the frames."""
 
     class Out(Outputs):
         """`metrics`: the entry `wrong_places` of metrics.json."""
@@ -62,7 +69,7 @@ class WrongPlaces(Stage):
                 "weight": [_mean_of_those(shares[:, step], came <= step) for step in steps],
                 "example": {"step": steps.tolist(), "weight": shares[0, steps].tolist()},
             }
-        return self.Out(metrics=Metrics({"wrong_places": values}))
+        return self.Out(metrics=Metrics({"wrong_places": values}, QUANTITIES))
 
 
 def wrong_shares(

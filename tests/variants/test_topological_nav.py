@@ -102,6 +102,6 @@ def test_the_house_is_known_by_its_places(omninav, tmp_path: Path):
     omninav("variant=topological_localisation", f"tour={HOUSE}/tour.mcap", f"log={HOUSE}/drive.mcap", check=True)
     found = metrics_of(tmp_path)["localisation"]
     assert found["pictures"] == 130
-    assert found["near_rate"] > 0.7
-    assert found["median_apart_m"] < 1.0
+    assert found["adjacent_accuracy"] > 0.7
+    assert found["place_distance_m"] < 1.0
     assert (tmp_path / "runs" / "latest" / "trajectory.tum").exists()

@@ -35,9 +35,9 @@ def test_a_drive_along_the_map_has_its_length_and_ends_when_it_says_so():
     assert found["path_length_m"] == pytest.approx(7.2)
     assert found["shortest_m"] == pytest.approx(7.0)
     assert found["time_s"] == 2.0
-    assert (found["reached_rate"], found["clean_rate"]) == (1.0, 1.0)
-    assert (found["detour"], found["pace"]) == pytest.approx((7.2 / 7.0, 2.0 / 7.0))
-    assert (found["goal"], found["ways"], found["collisions"]) == (2, 1, 0)
+    assert (found["reached_rate"], found["collision_free_rate"]) == (1.0, 1.0)
+    assert (found["path_length_ratio"], found["time_per_metre_s"]) == pytest.approx((7.2 / 7.0, 2.0 / 7.0))
+    assert (found["goal"], found["routes"], found["collisions"]) == (2, 1, 0)
 
 
 @pytest.mark.parametrize(
@@ -46,14 +46,14 @@ def test_a_drive_along_the_map_has_its_length_and_ends_when_it_says_so():
 def test_who_stands_elsewhere_or_does_not_know_that_it_is_there_has_not_reached_it(last, state):
     found = ended([(0.0, 0.0), last], ["under way", state])
     assert not found["reached"]
-    assert (found["reached_rate"], found["clean_rate"]) == (0.0, 0.0)
-    assert "detour" not in found
-    assert found["why"] == ("tired" if state == "gave up" else "")
+    assert (found["reached_rate"], found["collision_free_rate"]) == (0.0, 0.0)
+    assert "path_length_ratio" not in found
+    assert found["reason"] == ("tired" if state == "gave up" else "")
 
 
 def test_who_bumped_into_something_reached_it_but_not_cleanly():
     found = ended([(0.0, 0.0), (3.0, 4.0)], ["under way", "arrived"], collisions=1)
-    assert (found["reached_rate"], found["clean_rate"]) == (1.0, 0.0)
+    assert (found["reached_rate"], found["collision_free_rate"]) == (1.0, 0.0)
 
 
 def test_of_a_map_of_odometry_it_is_not_said_where_its_places_are():

@@ -38,15 +38,15 @@ def hits(places, xs, begun):
 
 def test_a_hit_is_the_place_whose_medoid_was_taken_closest_and_a_near_one_its_neighbour():
     found = hits([0, 1, 1, 3], [0.4, 0.4, 2.4, 0.4], {0}).values["localisation"]
-    assert found["pictures"] == 4
-    assert found["right_rate"] == 0.5
-    assert found["near_rate"] == 0.75
-    assert found["median_apart_m"] == pytest.approx((0.4 + 1.6) / 2)
+    assert found["images"] == 4
+    assert found["accuracy"] == 0.5
+    assert found["adjacent_accuracy"] == 0.75
+    assert found["place_distance_m"] == pytest.approx((0.4 + 1.6) / 2)
 
 
 def test_updates_are_counted_from_where_the_belief_began():
     found = hits([3, 0, 0, 0, 3], [0.0] * 5, {0, 3}).values["localisation"]
-    assert found["right_after"] == [0.5, 0.5, 1.0]
+    assert found["accuracy_after"] == [0.5, 0.5, 1.0]
 
 
 def test_a_long_place_is_right_where_one_of_its_images_was_taken_closest():
@@ -59,18 +59,18 @@ def test_a_long_place_is_right_where_one_of_its_images_was_taken_closest():
         Context("hits"), collected([tick(0)], [Pose(1.25, 0.0, 0.0)]), beliefs, beliefs, long
     )
     found = out.metrics.values["localisation"]
-    assert found["right_after"] == [0.0]
-    assert found["within_after"] == [1.0]
+    assert found["accuracy_after"] == [0.0]
+    assert found["image_accuracy_after"] == [1.0]
 
 
 def test_a_medoid_hardly_further_than_the_closest_counts_as_beside_it():
     apart = hits([0, 0, 1], [1.2, 1.3, 1.3], {0, 1, 2}).values["localisation"]  # medoids are at 0 and 2 m
-    assert apart["right_after"][0] == pytest.approx(1 / 3)
-    assert apart["beside_after"][0] == pytest.approx(2 / 3)  # 0.4 m further, and 0.6 m
+    assert apart["accuracy_after"][0] == pytest.approx(1 / 3)
+    assert apart["tolerant_accuracy_after"][0] == pytest.approx(2 / 3)  # 0.4 m further, and 0.6 m
 
 
 def test_pictures_without_truth_do_not_count():
-    assert hits([0, 1], [None, 2.0], {0}).values["localisation"]["pictures"] == 1
+    assert hits([0, 1], [None, 2.0], {0}).values["localisation"]["images"] == 1
     assert hits([0], [None], {0}) is None
 
 

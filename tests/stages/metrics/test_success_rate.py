@@ -36,17 +36,17 @@ def test_all_frames_count_and_both_limits_hold() -> None:
     found = success([(9.0, 0.0), (1.9, 30.0), (1.9, 40.0), (0.0, 0.0), (2.1, 0.0)])
     assert found["within_rate"] == pytest.approx(2 / 5)
     assert found["at_end"] == 0.0
-    assert "carried_at" not in found
+    assert "kidnapped_at" not in found
 
 
 def test_one_mode_is_a_good_frame_in_which_it_holds_half_of_the_belief() -> None:
-    assert success([(9.0, 0.0), (0.1, 0.0), (0.1, 0.0)], [1.0, 0.45, 0.55])["one_mode_after_frames"] == 2
-    assert success([(9.0, 0.0), (0.1, 0.0)], [1.0, 0.45])["one_mode_after_frames"] is None
+    assert success([(9.0, 0.0), (0.1, 0.0), (0.1, 0.0)], [1.0, 0.45, 0.55])["unimodal_after_frames"] == 2
+    assert success([(9.0, 0.0), (0.1, 0.0)], [1.0, 0.45])["unimodal_after_frames"] is None
 
 
 def test_a_carried_robot_is_found_again_after_as_many_frames_as_it_was_not() -> None:
     found = success([(0.0, 0.0)] * 12 + [(7.0, 0.0)] * 4 + [(0.3, 5.0)] * 10, carried=12)
-    assert (found["carried_at"], found["recovered_after_frames"]) == (12, 4)
+    assert (found["kidnapped_at"], found["recovered_after_frames"]) == (12, 4)
     assert success([(0.0, 0.0)] * 12 + [(7.0, 0.0)] * 14, carried=12)["recovered_after_frames"] is None
 
 

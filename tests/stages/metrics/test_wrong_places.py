@@ -104,7 +104,7 @@ def corrected(later_by_a_lap_each: int, points: int = 12, laps: int = 9):
 
 def test_the_measure_of_the_order_of_correction_is_0_where_all_are_corrected_alike_and_positive_where_it_travels():
     entries = yaml.safe_load(KIDNAP.read_text())["measures"]
-    order, kept = ((entries[name]["of"][0], entries[name].get("take", "mean")) for name in ("order", "kept"))
+    order, kept = ((entries[name]["path"][0], entries[name].get("aggregate", "mean")) for name in ("order", "kept"))
     assert figure_at(corrected(99), *order) == pytest.approx(0.0, abs=1e-9)
     assert figure_at(corrected(4), *order) == pytest.approx(40 / 4, rel=0.15)
     some_stay = corrected(2, laps=7)

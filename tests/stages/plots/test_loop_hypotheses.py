@@ -65,8 +65,8 @@ def test_a_map_is_as_large_as_its_file_and_its_steps_are_those_of_its_ways(
     assert values["map"]["places"] == len(made.map)
     assert values["loops"]["hypotheses"] == len(hypothesis_gaps(made.hypotheses))
     merged = values["loops"]["merged"]  # through third ones too, so never fewer than were accepted themselves
-    assert merged["hypotheses"] == values["loops"]["far_in_drive"]["hypotheses"]
-    assert merged["accepted"] >= values["loops"]["far_in_drive"]["accepted"] > 0
+    assert merged["hypotheses"] == values["loops"]["loop_closures"]["hypotheses"]
+    assert merged["accepted"] >= values["loops"]["loop_closures"]["accepted"] > 0
     one, other = made.map.links[0]
     way = made.map.poses[[made.map.places[one], *made.map.way(0), made.map.places[other]], :2]
     assert path_steps(made.map)[: len(way) - 1] == pytest.approx(np.hypot(*np.diff(way, axis=0).T))

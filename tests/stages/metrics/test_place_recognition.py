@@ -1,0 +1,41 @@
+import numpy as np
+import pytest
+from small_run import small_run
+
+from omninav.pipeline import Context
+from omninav.stages.metrics.place_recognition import PlaceRecognition, RankedReferences, RankReferences, recalls
+from omninav.stages.values.similarity import Similarities
+
+CTX = Context("recognition")
+REFERENCES = np.array([(0.0, 0.0), (10.0, 0.0), (20.0, 0.0), (30.0, 0.0), (40.0, 0.0), (50.0, 0.0)])
+
+
+def test_recall_is_the_share_of_images_with_a_near_reference_among_the_best():
+    ranked = [np.array(best) for best in ([0, 1, 2, 3, 4], [5, 4, 3, 2, 1], [0, 2, 3, 4, 5], [3, 2, 1, 0, 4])]
+    found = recalls(np.full((4, 2), (10.5, 0.0)), ranked, REFERENCES, 2.0)
+    assert found["queries"] == 4
+    assert found["recall_at_1"] == 0.0
+    assert found["recall_at_5"] == 0.75
+
+
+def test_an_image_far_from_every_reference_does_not_count():
+    found = recalls(np.array([(0.5, 0.0), (5.0, 0.0)]), [np.array([0]), np.array([0])], REFERENCES, 2.0)
+    assert (found["queries"], found["recall_at_1"]) == (1, 1.0)
+    nowhere = recalls(np.array([(5.0, 0.0)]), [np.array([0])], REFERENCES, 2.0)
+    assert (nowhere["queries"], nowhere["recall_at_1"]) == (0, None)
+
+
+def test_references_are_ranked_by_their_best_heading_and_named_by_their_number_in_the_map():
+    values = np.array([[0.1, 0.2], [0.9, 0.0], [0.3, 0.5]], np.float32)
+    assert RankReferences(best=2).step(CTX, Similarities(values, None)).ranked.references.tolist() == [1, 2]
+    some = Similarities(values, np.array([7, 3, 9]))
+    assert RankReferences(best=2).step(CTX, some).ranked.references.tolist() == [3, 9]
+
+
+def test_a_run_whose_best_reference_is_always_the_nearest_has_full_recall_and_none_without_truth():
+    run = small_run(frames=20)
+    away = [np.hypot(*(run.map.poses[:, :2] - (pose.x, pose.y)).T) for pose in run.truth]
+    ranked = [RankedReferences(np.argsort(metres)) for metres in away]
+    found = PlaceRecognition().step(CTX, run.drive, ranked, run.map).metrics.values["place_recognition"]
+    assert found["recall_at_1"] == pytest.approx(1.0)
+    assert PlaceRecognition().step(CTX, run.blind, ranked, run.map).metrics is None
