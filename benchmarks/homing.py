@@ -11,7 +11,7 @@ import poselib
 
 from omninav.pipeline import Context
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
-from omninav.stages.geometry.two_views.absolute_pose import grunert, three_point_pose
+from omninav.stages.geometry.two_views.absolute_pose import three_point_pose
 from omninav.stages.geometry.two_views.epipolar import planar_two_points
 from omninav.stages.geometry.two_views.relative_pose_ransac import relative_pose
 from omninav.stages.homing.feature_tracker import FeatureTracker, FeatureTrackerState
@@ -121,13 +121,6 @@ def _absolute() -> list[Row]:
             "theirs": lambda: poselib.estimate_absolute_pose(flat, points, camera, options, {}),
         }
     )
-    inner = medians(
-        {
-            "ours": lambda: grunert(bearings[50:53], points[50:53]),
-            "theirs": lambda: poselib.p3p(bearings[50:53], points[50:53]),
-        },
-        inner=50,
-    )
     return [
         Row(
             "camera pose, 100 points, half of them wrong",
@@ -136,7 +129,6 @@ def _absolute() -> list[Row]:
             "poselib (pinhole)",
             taken["theirs"] * 1e3,
         ),
-        Row("one sample of three points", inner["ours"] * 1e6, "us", "poselib p3p", inner["theirs"] * 1e6),
     ]
 
 

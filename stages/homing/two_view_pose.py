@@ -11,16 +11,19 @@ from omninav.stages.values.two_views import BearingPairs, RelativeView
 class TwoViewPose(Stage):
     """Relative pose of two views from pairs of bearings of which many are wrong, by one of three solvers.
 
-    Goedemé et al. 2007, section 7.1.1: random samples, of which the one counts that most pairs agree with, `refine`d at
-    its local optimum where it is so said. `planar`: two pairs in a sample, for a robot on a floor; `five_point`,
-    `eight_point` (the paper's). `threshold_deg`, `confidence`, `most`: see `geometry.consensus`.
+    Goedemé et al. 2007, section 7.1.1: of random samples the one counts with which most pairs agree.
     """
 
     solver: Solver = "planar"
-    threshold_deg: Annotated[float, Bounds(gt=0)] = 0.5
+    """`planar`: two pairs in a sample, for a robot on a floor; `five_point`; `eight_point`, the paper's."""
+    max_error_deg: Annotated[float, Bounds(gt=0)] = 0.5
+    """By which the two bearings of a pair may together miss the pose."""
     confidence: Annotated[float, Bounds(gt=0, lt=1)] = 0.9999
-    most: Annotated[int, Bounds(ge=1)] = 5000
+    """With which a sample without a wrong pair is among those that are drawn."""
+    max_samples: Annotated[int, Bounds(ge=1)] = 5000
+    """That are drawn at most."""
     refine: bool = True
+    """Whether the best sample's pose is brought to its local optimum."""
 
     class Out(Outputs):
         """Absent where too few pairs were given, or no sample had a solution."""
@@ -34,9 +37,9 @@ class TwoViewPose(Stage):
             pairs.second,
             ctx.rng,
             self.solver,
-            math.radians(self.threshold_deg),
+            math.radians(self.max_error_deg),
             self.confidence,
-            self.most,
+            self.max_samples,
             self.refine,
         )
         if found is None:

@@ -1,4 +1,4 @@
-"""Linear algebra of a few dimensions inside compiled loops, where calls of LAPACK cost more than the work."""
+"""Vectors and rotations of three dimensions inside compiled loops."""
 
 import math
 
@@ -7,40 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-Complexes = npt.NDArray[np.complex128]
-
-
-@numba.njit(cache=True, nogil=True)
-def solve(matrix: Array, right: Array) -> Array:
-    """x of A x = b for A (n, n), b (n,), by elimination with pivots; zeros where A is singular."""
-    size = len(right)
-    a, x = matrix.copy(), right.copy()
-    for column in range(size):
-        pivot = column
-        for row in range(column + 1, size):
-            if abs(a[row, column]) > abs(a[pivot, column]):
-                pivot = row
-        if a[pivot, column] == 0.0:
-            return np.zeros(size)
-        for k in range(size):
-            a[column, k], a[pivot, k] = a[pivot, k], a[column, k]
-        x[column], x[pivot] = x[pivot], x[column]
-        for row in range(column + 1, size):
-            factor = a[row, column] / a[column, column]
-            for k in range(column, size):
-                a[row, k] -= factor * a[column, k]
-            x[row] -= factor * x[column]
-    for row in range(size - 1, -1, -1):
-        for k in range(row + 1, size):
-            x[row] -= a[row, k] * x[k]
-        x[row] /= a[row, row]
-    return x
-
-
-@numba.njit(cache=True, nogil=True)
-def dot(one: Array, two: Array) -> float:
-    """The product of two vectors (3,)."""
-    return float(one[0] * two[0] + one[1] * two[1] + one[2] * two[2])
 
 
 @numba.njit(cache=True, nogil=True)
@@ -56,19 +22,10 @@ def cross(one: Array, two: Array) -> Array:
 @numba.njit(cache=True, nogil=True)
 def unit(vector: Array) -> Array:
     """A vector (3,) at length 1."""
-    length = math.sqrt(dot(vector, vector))
+    length = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     out = np.empty(3)
     for i in range(3):
         out[i] = vector[i] / length
-    return out
-
-
-@numba.njit(cache=True, nogil=True)
-def applied(matrix: Array, vector: Array) -> Array:
-    """A matrix (3, 3) times a vector (3,)."""
-    out = np.empty(3)
-    for i in range(3):
-        out[i] = matrix[i, 0] * vector[0] + matrix[i, 1] * vector[1] + matrix[i, 2] * vector[2]
     return out
 
 
@@ -88,42 +45,3 @@ def rotated_by(rotation: Array, x: float, y: float, z: float) -> Array:
         for j in range(3):
             out[i, j] = turn[i, 0] * rotation[0, j] + turn[i, 1] * rotation[1, j] + turn[i, 2] * rotation[2, j]
     return out
-
-
-@numba.njit(cache=True, nogil=True)
-def quartic_roots(coefficients: Array) -> Complexes:
-    """The four roots of c0 x^4 + c1 x^3 + … + c4, all at once (Weierstrass, Durand and Kerner).
-
-    Where the first coefficient is the smaller one, those of the reversed polynomial are found and inverted; a root at
-    infinity is then a division by 0: not finite.
-    """
-    reverse = abs(coefficients[0]) < abs(coefficients[4])
-    lead = coefficients[4] if reverse else coefficients[0]
-    roots, scaled = np.full(4, np.nan + 0j), np.empty(5)
-    if lead == 0.0:
-        return roots
-    size = 0.0
-    for k in range(5):
-        scaled[k] = (coefficients[4 - k] if reverse else coefficients[k]) / lead
-        if k:
-            size = max(size, abs(scaled[k]) ** (1.0 / k))
-    root = complex(0.4, 0.9) * max(size, 1e-300)
-    for k in range(4):
-        roots[k] = root
-        root = root * complex(0.4, 0.9)
-    for _ in range(100):
-        change = 0.0
-        for k in range(4):
-            value = (((roots[k] + scaled[1]) * roots[k] + scaled[2]) * roots[k] + scaled[3]) * roots[k] + scaled[4]
-            for j in range(4):
-                if j != k:
-                    gap = roots[k] - roots[j]
-                    value /= gap if gap != 0.0 else complex(1e-300, 0.0)
-            roots[k] -= value
-            change = max(change, abs(value))
-        if change < 1e-13 * size:
-            break
-    if reverse:
-        for k in range(4):
-            roots[k] = 1.0 / roots[k] if roots[k] != 0.0 else complex(np.inf, 0.0)
-    return roots

@@ -1,4 +1,4 @@
-"""What random sampling (RANSAC) needs whatever is estimated: samples, how many of them, and what came of it."""
+"""Random sampling (RANSAC), whatever is estimated: samples, how many are needed, and the result."""
 
 import math
 from dataclasses import dataclass
@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-AT_ONCE = 32
-"""Samples that are drawn and solved before it is asked whether they were enough."""
+BATCH = 32
+"""Samples that are drawn and solved at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,12 +25,12 @@ class AgreedPose:
 
 
 def samples_of(number: int, size: int, rng: np.random.Generator) -> npt.NDArray[np.int64]:
-    """The next `AT_ONCE` samples (AT_ONCE, size) of `number` things, none twice in a sample. Draws from `rng`."""
-    return np.argsort(rng.random((AT_ONCE, number)), axis=1)[:, :size]
+    """The next `BATCH` samples (BATCH, size) of `number` rows, none twice in a sample. Draws from `rng`."""
+    return np.argsort(rng.random((BATCH, number)), axis=1)[:, :size]
 
 
 def samples_needed(share: float, size: int, confidence: float) -> float:
-    """After how many samples one is all right with that confidence, where such a share of the things is right."""
+    """After how many samples one without an outlier is among them with `confidence`, at this share of inliers."""
     good = share**size
     if good >= confidence:
         return 1.0

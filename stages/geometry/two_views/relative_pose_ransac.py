@@ -12,10 +12,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import betainc
 
-from omninav.stages.geometry.probability.small_systems import cross, rotated_by, solve, unit
+from omninav.stages.geometry.probability.small_systems import cross, rotated_by, unit
 
 from .epipolar import decompose, eight_points, five_points, planar_candidates
-from .ransac import AT_ONCE, AgreedPose, samples_needed, samples_of
+from .ransac import BATCH, AgreedPose, samples_needed, samples_of
+from .refinement import refined
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -32,7 +33,7 @@ def relative_pose(
     solver: Solver = "planar",
     threshold: float = math.radians(0.5),
     confidence: float = 0.9999,
-    most: int = 5000,
+    max_samples: int = 5000,
     refine: bool = True,
 ) -> AgreedPose | None:
     """Where view 2 was taken, seen from view 1, by what most pairs of unit bearings (N, 3) and (N, 3) agree on.
@@ -49,11 +50,11 @@ def relative_pose(
     if pairs < size:
         return None
     sine = math.sin(threshold)
-    found, least, best, drawn, wanted = None, math.inf, (0, -math.inf), 0, float(most)
-    while drawn < min(wanted, most):
+    found, least, best, drawn, needed = None, math.inf, (0, -math.inf), 0, float(max_samples)
+    while drawn < min(needed, max_samples):
         samples = samples_of(pairs, size, rng)
         rotations, translations, quality, owners = _candidates(solver, first, second, samples)
-        drawn += AT_ONCE
+        drawn += BATCH
         if not len(rotations):
             continue
         counts, costs, senses = _judge(rotations, translations, first, second, sine)
@@ -71,7 +72,7 @@ def relative_pose(
         if cost < least:
             found, least = pose, cost
             agreeing = int(np.count_nonzero(agreement(*found, first, second, threshold)))
-            wanted = samples_needed(max(agreeing, best[0]) / pairs, size, confidence)
+            needed = samples_needed(max(agreeing, best[0]) / pairs, size, confidence)
     if found is None:
         return None
     return AgreedPose(*found, agreement(*found, first, second, threshold), drawn)
@@ -196,26 +197,27 @@ def refined_pose(
     `planar`: only the turn about the vertical and the direction on the floor move.
     """
     first, second = np.ascontiguousarray(first, np.float64), np.ascontiguousarray(second, np.float64)
-    refined: tuple[Array, Array] = _refine(
-        np.ascontiguousarray(rotation), translation, first, second, math.sin(threshold), planar, steps
-    )
-    return refined
+    limit, freedoms = math.sin(threshold) ** 2, 2 if planar else 5
+
+    def cost(R: Array, t: Array) -> float:
+        return float(_tukey(R, t, first, second, limit))
+
+    def normal_equations(R: Array, t: Array) -> tuple[Array, Array]:
+        found: tuple[Array, Array] = _normal_equations(R, t, first, second, limit, freedoms)
+        return found
+
+    return refined((np.ascontiguousarray(rotation), translation), cost, normal_equations, _moved, steps)
 
 
 @numba.njit(cache=True, nogil=True)
-def _across(t: Array, planar: bool) -> tuple[Array, Array]:
-    # Two unit vectors across t, the first of them level.
+def _moved(R: Array, t: Array, step: Array) -> tuple[Array, Array]:
+    # Freedoms: the turn about the vertical, t sideways, and, unless planar, both other turns and t upwards.
     level = math.hypot(t[0], t[1])
-    side = np.array([-t[1] / level, t[0] / level, 0.0]) if planar or level > 1e-6 else np.array([1.0, 0.0, 0.0])
-    return side, cross(t, side)
-
-
-@numba.njit(cache=True, nogil=True)
-def _moved(R: Array, t: Array, side: Array, up: Array, step: Array, planar: bool) -> tuple[Array, Array]:
-    # Freedoms: the turn about the vertical, t sideways, and, where it is not planar, both other turns and t upwards.
-    if planar:
+    if len(step) == 2:
+        side = np.array([-t[1] / level, t[0] / level, 0.0])
         return rotated_by(R, 0.0, 0.0, step[0]), unit(t + step[1] * side)
-    return rotated_by(R, step[2], step[3], step[0]), unit(t + step[1] * side + step[4] * up)
+    side = np.array([-t[1] / level, t[0] / level, 0.0]) if level > 1e-6 else np.array([1.0, 0.0, 0.0])
+    return rotated_by(R, step[2], step[3], step[0]), unit(t + step[1] * side + step[4] * cross(t, side))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -228,44 +230,26 @@ def _tukey(R: Array, t: Array, first: Array, second: Array, limit: float) -> flo
 
 
 @numba.njit(cache=True, nogil=True)
-def _refine(
-    R: Array, t: Array, first: Array, second: Array, sine: float, planar: bool, steps: int
+def _normal_equations(
+    R: Array, t: Array, first: Array, second: Array, limit: float, freedoms: int
 ) -> tuple[Array, Array]:
-    # Levenberg and Marquardt over few freedoms; derivatives by difference.
-    freedoms, limit, small, damping = 2 if planar else 5, sine * sine, 1e-7, 1e-3
-    cost = _tukey(R, t, first, second, limit)
+    # Derivatives by difference.
+    small = 1e-7
     near_R, near_t = np.empty((freedoms, 3, 3)), np.empty((freedoms, 3))
-    for _ in range(steps):
-        side, up = _across(t, planar)
+    for k in range(freedoms):
+        step = np.zeros(freedoms)
+        step[k] = small
+        near_R[k], near_t[k] = _moved(R, t, step)
+    square, slope, row = np.zeros((freedoms, freedoms)), np.zeros(freedoms), np.empty(freedoms)
+    for n in range(len(first)):
+        size = _squares(R, t, first[n], second[n])[0]
+        if size >= limit:
+            continue
+        weight, value = (1.0 - size / limit) ** 2, _residual(R, t, first[n], second[n])
         for k in range(freedoms):
-            step = np.zeros(freedoms)
-            step[k] = small
-            near_R[k], near_t[k] = _moved(R, t, side, up, step, planar)
-        square, slope, row = np.zeros((freedoms, freedoms)), np.zeros(freedoms), np.empty(freedoms)
-        for n in range(len(first)):
-            size = _squares(R, t, first[n], second[n])[0]
-            if size >= limit:
-                continue
-            weight, value = (1.0 - size / limit) ** 2, _residual(R, t, first[n], second[n])
-            for k in range(freedoms):
-                row[k] = (_residual(near_R[k], near_t[k], first[n], second[n]) - value) / small
-            for k in range(freedoms):
-                slope[k] += weight * row[k] * value
-                for j in range(freedoms):
-                    square[k, j] += weight * row[k] * row[j]
-        better = False
-        while damping < 1e6:
-            damped = square.copy()
-            for k in range(freedoms):
-                damped[k, k] += damping * square[k, k] + 1e-12
-            step = -solve(damped, slope)
-            new_R, new_t = _moved(R, t, side, up, step, planar)
-            new_cost = _tukey(new_R, new_t, first, second, limit)
-            if new_cost < cost:
-                better = cost - new_cost > 1e-9 * cost
-                R, t, cost, damping = new_R, new_t, new_cost, max(0.1 * damping, 1e-9)
-                break
-            damping *= 10.0
-        if not better:
-            break
-    return R, t
+            row[k] = (_residual(near_R[k], near_t[k], first[n], second[n]) - value) / small
+        for k in range(freedoms):
+            slope[k] += weight * row[k] * value
+            for j in range(freedoms):
+                square[k, j] += weight * row[k] * row[j]
+    return square, slope

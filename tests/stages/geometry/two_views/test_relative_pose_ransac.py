@@ -98,7 +98,7 @@ def test_more_wrong_pairs_ask_for_more_samples() -> None:
 def test_the_same_seed_gives_the_same_pose() -> None:
     _, _, first, second = two_views(5, 100, wrong=0.5, noise_deg=0.1)
     for solver in SAMPLE:
-        one, two = (relative_pose(first, second, np.random.default_rng(7), solver, most=64) for _ in range(2))
+        one, two = (relative_pose(first, second, np.random.default_rng(7), solver, max_samples=64) for _ in range(2))
         assert one is not None
         assert two is not None
         assert np.array_equal(one.rotation, two.rotation)
