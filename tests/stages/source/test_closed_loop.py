@@ -205,7 +205,7 @@ def test_the_driver_goes_on_where_there_is_room_and_turns_on_the_spot_where_ther
     driver = WallAvoider()
     ctx = Context("driver")
     free = driver.step(ctx, ring(), WallAvoiderState()).command
-    assert (free.speed, free.turning) == pytest.approx((driver.speed, 0.0))
+    assert (free.speed, free.turning) == pytest.approx((driver.max_speed, 0.0))
     blocked = driver.step(ctx, ring(_8=0.4, _9=0.5), WallAvoiderState()).command
     assert blocked.speed == 0.0
     assert blocked.turning < 0.0
@@ -215,7 +215,7 @@ def test_a_single_missing_echo_does_not_free_the_way():
     driver, memory, ctx = WallAvoider(), WallAvoiderState(), Context("driver")
     driver.step(ctx, ring(_8=0.4), memory)
     assert driver.step(ctx, ring(), memory).command.speed == 0.0
-    assert driver.step(ctx, ring(), memory).command.speed == driver.speed
+    assert driver.step(ctx, ring(), memory).command.speed == driver.max_speed
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
