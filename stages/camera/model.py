@@ -50,9 +50,9 @@ class Ring(NamedTuple):
     inner: float
     outer: float
 
-    def holds(self, pixels: Array) -> Bools:
-        """Which pixels (..., 2) lie in it: (...,)."""
-        radius = np.hypot(pixels[..., 0] - self.centre_x, pixels[..., 1] - self.centre_y)
+    def holds(self, u: Array, v: Array) -> Bools:
+        """Which pixels lie in it, of columns and rows of any shapes that go together."""
+        radius = np.hypot(u - self.centre_x, v - self.centre_y)
         inside: Bools = (radius >= self.inner) & (radius <= self.outer)
         return inside
 
@@ -137,7 +137,7 @@ class Camera(Value, ABC):
         """Which pixels (..., 2), whole or not, lie in the image and, where it has one, in its ring: (...,)."""
         u, v = pixels[..., 0], pixels[..., 1]
         inside: Bools = (u >= 0.0) & (u <= self.width - 1.0) & (v >= 0.0) & (v <= self.height_px - 1.0)
-        return inside if self.ring is None else inside & self.ring.holds(pixels)
+        return inside if self.ring is None else inside & self.ring.holds(u, v)
 
     def mask(self) -> Bools:
         """Which pixels of an image (height_px, width) show the world."""

@@ -63,5 +63,6 @@ def read_picture(picture: Image | Panorama, camera: Camera | None, largest: int)
     else:
         middle = (ring.centre_x + 0.5) / scale - 0.5, (ring.centre_y + 0.5) / scale - 0.5
         ring = Ring(*middle, ring.inner / scale, ring.outer / scale)
-        seen = ring.holds(np.stack(np.meshgrid(*(np.arange(float(n)) for n in pixels.shape[1::-1])), axis=-1))
+        rows_read, columns_read = np.ogrid[: pixels.shape[0], : pixels.shape[1]]
+        seen = ring.holds(columns_read, rows_read)
     return PreparedImage(pixels, seen, scale, ring, seen_by)

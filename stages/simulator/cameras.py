@@ -75,7 +75,7 @@ def camera_rays(camera: Camera, vignetting: float = 0.0, robot_radius: float = 0
     grid, seen = camera.grid(), camera.mask()
     directions, disc = camera.unproject(grid)
     if camera.ring is not None:
-        disc &= camera.ring._replace(inner=0.0).holds(grid)
+        disc &= camera.ring._replace(inner=0.0).holds(grid[..., 0], grid[..., 1])
     own = _own_body(directions, robot_radius, camera)
     is_own = disc & np.isfinite(own).all(axis=-1)
     seen &= ~is_own
