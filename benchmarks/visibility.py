@@ -8,7 +8,9 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context
 from omninav.stages.sensor.line_of_sight import axes_of, visibility_areas
-from omninav.stages.sensor.visibility import FADED, Visibility, looks_at, seen_from
+from omninav.stages.sensor.visibility import Visibility
+from omninav.stages.sensor.visibility_index import looks_at, seen_from
+from omninav.stages.sensor.visibility_similarity import CUTOFF_SIGMAS
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.grid import FREE, OCCUPIED, FreeSpace, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
@@ -63,21 +65,21 @@ def _of(
     )
     alike = Similarities(np.random.default_rng(2).uniform(0.4, 0.9, (images, headings)).astype(np.float32))
     particles = Particles(space.draw(np.random.default_rng(3), SAMPLES), np.full(SAMPLES, 1 / SAMPLES))
-    near = Visibility().near_m or np.inf
+    near = Visibility().distance_sigma_m or np.inf
     looks = looks_at(areas, poses, each_view=True)
-    lists = seen_from(areas, looks, FADED * near)
-    listing = medians({"ours": lambda: seen_from(areas, looks, FADED * near)}, rounds=3)["ours"]
+    lists = seen_from(areas, looks, CUTOFF_SIGMAS * near)
+    listing = medians({"ours": lambda: seen_from(areas, looks, CUTOFF_SIGMAS * near)}, rounds=3)["ours"]
 
     def weighing(sensor: Visibility) -> Callable[[], object]:
         ctx = Context("sensor")
         sensor.setup(ctx)
         return lambda: sensor.step(ctx, alike, particles, whole, areas)
 
-    weights = medians({"near": weighing(Visibility()), "all": weighing(Visibility(near_m=None))}, rounds=20)
+    weights = medians({"near": weighing(Visibility()), "all": weighing(Visibility(distance_sigma_m=None))}, rounds=20)
     return [
         Row(f"visibility areas of {images} {what}, 37 x 14 m at 10 cm", taken, "s", limit=10.0),
         Row("the same, stored", areas.nbytes / 1e6, "MB", limit=2.0),
-        Row(f"lists of the views within {FADED * near:g} m of each cell", listing, "s", limit=5.0),
+        Row(f"lists of the views within {CUTOFF_SIGMAS * near:g} m of each cell", listing, "s", limit=5.0),
         Row("the same, in memory", lists.items.nbytes / 1e6, "MB"),
         Row(f"weights of {SAMPLES} samples, views near them", weights["near"] * 1e3, "ms", limit=limit),
         Row("the same, all views in sight (the paper's)", weights["all"] * 1e3, "ms", limit=5.0),

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
+from omninav.stages.geometry.plane.grid_rays import cells_along
 from omninav.stages.values.grid import FREE, OCCUPIED, Cells, FreeSpace, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visibility import VisibilityAreas
@@ -66,25 +67,15 @@ def _cast(cells: Cells, starts: Array, directions: Array) -> tuple[Ints, Ints]:
         row, column = math.floor(starts[n, 0]), math.floor(starts[n, 1])
         if not (0 <= row < rows and 0 <= column < columns) or cells[row, column] != FREE:
             continue
-        y, x = math.sin(directions[n]), math.cos(directions[n])
-        up, right = 1 if y > 0 else -1, 1 if x > 0 else -1
-        # How far along the ray the next row and the next column begin, and how far they lie apart.
-        step_y, step_x = 1.0 / max(abs(y), 1e-12), 1.0 / max(abs(x), 1e-12)
-        next_y = step_y * (row + 1 - starts[n, 0] if up > 0 else starts[n, 0] - row)
-        next_x = step_x * (column + 1 - starts[n, 1] if right > 0 else starts[n, 1] - column)
-        while True:
-            sideways = next_x < next_y
-            if sideways:
-                column, next_x = column + right, next_x + step_x
-            else:
-                row, next_y = row + up, next_y + step_y
-            if not (0 <= row < rows and 0 <= column < columns):
+        down, across = math.sin(directions[n]), math.cos(directions[n])
+        for i, j, sideways, _ in cells_along(starts[n, 0], starts[n, 1], down, across):
+            if not (0 <= i < rows and 0 <= j < columns):
                 break
-            if cells[row, column] == OCCUPIED:
-                found[n, 0], found[n, 1] = row, column
-                faces[n] = (1 if right > 0 else 0) if sideways else (3 if up > 0 else 2)
+            if cells[i, j] == OCCUPIED:
+                found[n, 0], found[n, 1] = i, j
+                faces[n] = (1 if across > 0 else 0) if sideways else (3 if down > 0 else 2)
                 break
-            if cells[row, column] != FREE:
+            if cells[i, j] != FREE:
                 break
     return found, faces
 
@@ -92,19 +83,18 @@ def _cast(cells: Cells, starts: Array, directions: Array) -> tuple[Ints, Ints]:
 @numba.njit(cache=True, nogil=True)
 def _sees(cells: Cells, row: int, column: int, to_row: float, to_column: float) -> bool:
     # Whether the line from a cell's middle to a point crosses free cells only. The point lies in a free cell.
-    y, x = to_row - (row + 0.5), to_column - (column + 0.5)
     last_row, last_column = math.floor(to_row), math.floor(to_column)
-    up, right = 1 if y > 0 else -1, 1 if x > 0 else -1
-    step_y, step_x = 1.0 / max(abs(y), 1e-12), 1.0 / max(abs(x), 1e-12)
-    next_y, next_x = 0.5 * step_y, 0.5 * step_x
-    for _ in range(abs(last_row - row) + abs(last_column - column)):
-        if next_x < next_y:
-            column, next_x = column + right, next_x + step_x
-        else:
-            row, next_y = row + up, next_y + step_y
-        if cells[row, column] != FREE:
+    steps = abs(last_row - row) + abs(last_column - column)
+    if steps == 0:
+        return True
+    i, j = row, column
+    for i, j, _, _ in cells_along(row + 0.5, column + 0.5, to_row - (row + 0.5), to_column - (column + 0.5)):  # noqa: B007
+        steps -= 1
+        if cells[i, j] != FREE:
             return False
-    return row == last_row and column == last_column
+        if steps == 0:
+            break
+    return i == last_row and j == last_column
 
 
 def grow_areas(cells: Cells, points: Array) -> tuple[Runs, npt.NDArray[np.int32]]:

@@ -8,6 +8,8 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.geometry.plane.grid_rays import cells_along
+
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 
@@ -129,23 +131,25 @@ def beam(obstacles: Obstacles, people: F64, x: float, y: float, dx: float, dy: f
             enter = along - math.sqrt(square)
             if along + math.sqrt(square) >= 0.0:
                 best = min(best, max(enter, 0.0))
-    column, row = math.floor(x / CELL), math.floor(y / CELL)
-    travelled = 0.0
-    limit = min(farthest, best)
-    while travelled <= limit and 0 <= row < obstacles.rows and 0 <= column < obstacles.columns:
-        cell = row * obstacles.columns + column
-        for k in range(obstacles.start[cell], obstacles.start[cell + 1]):
-            best = min(best, _enter(obstacles.boxes[obstacles.members[k]], x, y, dx, dy))
-        limit = min(farthest, best)
-        next_x = ((column + (dx > 0.0)) * CELL - x) / dx if dx != 0.0 else np.inf
-        next_y = ((row + (dy > 0.0)) * CELL - y) / dy if dy != 0.0 else np.inf
-        if next_x < next_y:
-            travelled = next_x
-            column += 1 if dx > 0.0 else -1
-        else:
-            travelled = next_y
-            row += 1 if dy > 0.0 else -1
+    row, column = math.floor(y / CELL), math.floor(x / CELL)
+    if not (0 <= row < obstacles.rows and 0 <= column < obstacles.columns):
+        return best if best <= farthest else np.inf
+    best = min(best, _first_box(obstacles, row, column, x, y, dx, dy))
+    for i, j, _, entered in cells_along(y / CELL, x / CELL, dy, dx):
+        outside = not (0 <= i < obstacles.rows and 0 <= j < obstacles.columns)
+        if outside or entered * CELL > min(farthest, best):
+            break
+        best = min(best, _first_box(obstacles, i, j, x, y, dx, dy))
     return best if best <= farthest else np.inf
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _first_box(obstacles: Obstacles, row: int, column: int, x: float, y: float, dx: float, dy: float) -> float:
+    """Distance at which a ray enters the first of a cell's boxes; infinite without one."""
+    best, cell = np.inf, row * obstacles.columns + column
+    for k in range(obstacles.start[cell], obstacles.start[cell + 1]):
+        best = min(best, _enter(obstacles.boxes[obstacles.members[k]], x, y, dx, dy))
+    return best
 
 
 @numba.njit(cache=True, error_model="numpy")
