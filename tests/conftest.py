@@ -13,7 +13,7 @@ from hypothesis import settings
 ROOT = Path(__file__).resolve().parents[1]
 RECORDINGS = ROOT / "tests" / "data"
 """Small recordings of a simulated home store, rendered by tests/data/make.py."""
-TOUR, DRIVE, GRID = RECORDINGS / "tour.mcap", RECORDINGS / "drive.mcap", RECORDINGS / "grid" / "map.yaml"
+TOUR, DRIVE, GRID = RECORDINGS / "tour.mcap", RECORDINGS / "drive.mcap", RECORDINGS / "map.yaml"
 DATA = ROOT.parent / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.exists(), reason=f"third parties' recordings are not here: {DATA}")
 

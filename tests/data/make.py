@@ -75,7 +75,8 @@ def main() -> None:
             "tour.mcap": "tour.mcap",
             "drive.mcap": "drive.mcap",
             "camera.yaml": "drive.camera.yaml",
-            "grid": "tour.grid",
+            "map.yaml": "tour.grid/map.yaml",
+            "map.pgm": "tour.grid/map.pgm",
             "images": "images",
         }.items():
             shutil.rmtree(HERE / name, ignore_errors=True)

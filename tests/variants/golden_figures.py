@@ -36,7 +36,7 @@ RUNS: dict[str, tuple[str, ...]] = {
     "particle_cml_baseline": (TOUR, DRIVE, EVERY_SECOND),
     "particle_cml_baseline_map": (MAPPED, EVERY_SECOND),
     "plain_matching": (TOUR, DRIVE),
-    "retrieval_mcl": (TOUR, DRIVE, f"grid={DATA / 'grid' / 'map.yaml'}", EVERY_SECOND),
+    "retrieval_mcl": (TOUR, DRIVE, f"grid={DATA / 'map.yaml'}", EVERY_SECOND),
     "retrieval_mcl_map": (MAPPED, EVERY_SECOND),
     "simulate": (
         "world=home_store_demo",
