@@ -88,7 +88,7 @@ def _sees(cells: Cells, row: int, column: int, to_row: float, to_column: float) 
     if steps == 0:
         return True
     i, j = row, column
-    for i, j, _, _ in cells_along(row + 0.5, column + 0.5, to_row - (row + 0.5), to_column - (column + 0.5)):  # noqa: B007
+    for i, j, _, _ in cells_along(row + 0.5, column + 0.5, to_row - (row + 0.5), to_column - (column + 0.5)):
         steps -= 1
         if cells[i, j] != FREE:
             return False

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 import numba
 
 
-@numba.njit(cache=True, nogil=True)
+# Not cached by itself: numba cannot call a generator that comes from its cache. Its callers are cached.
+@numba.njit(nogil=True)
 def cells_along(row: float, column: float, down: float, across: float) -> Iterator[tuple[int, int, bool, float]]:
     """The cells that a ray enters, in order and without end, by the traversal of Amanatides & Woo 1987.
 

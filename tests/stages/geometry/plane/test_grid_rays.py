@@ -13,11 +13,9 @@ from omninav.stages.geometry.plane.grid_rays import cells_along
 @numba.njit
 def first_cells(row: float, column: float, down: float, across: float, number: int) -> np.ndarray:
     out = np.empty((number, 4))
-    k = 0
-    for i, j, sideways, entered in cells_along(row, column, down, across):
+    for k, (i, j, sideways, entered) in enumerate(cells_along(row, column, down, across)):
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = i, j, sideways, entered
-        k += 1
-        if k == number:
+        if k + 1 == number:
             break
     return out
 
