@@ -124,8 +124,8 @@ def graph_on_field(variant: str, source: dict[str, Any], limit: float | None = N
     """
     from hydra import compose, initialize_config_module
 
-    from omninav.pipeline.cli.main import complete
-    from omninav.pipeline.run.run import plan
+    from omninav.pipeline.cli.composition import complete
+    from omninav.pipeline.run.plan import plan
 
     with initialize_config_module("omninav.conf", version_base="1.3"):
         config = complete(compose("config", overrides=[f"variant={variant}", *words]))

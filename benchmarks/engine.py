@@ -5,7 +5,7 @@ import time
 
 from omninav.pipeline import Context, Outputs, Source, Stage, State, Tick, Value
 from omninav.pipeline.engine.engine import Engine
-from omninav.pipeline.graph.graph import build
+from omninav.pipeline.graph.builder import build
 
 from .table import Row, medians
 

@@ -1,9 +1,11 @@
 """The groups of configuration that omninav brings: which option puts which stage into a graph."""
 
 import functools
+from collections.abc import Sequence
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
+from omninav.pipeline.graph.problems import Problem, ProblemsFound
 from omninav.pipeline.graph.registry import Entry
 
 CONF = "omninav.conf"
@@ -19,6 +21,23 @@ def group_files(group: str) -> list[Traversable]:
 def is_group(name: str) -> bool:
     """Whether configuration has a group of that name."""
     return bool(name) and files(CONF).joinpath(name).is_dir()
+
+
+def refuse_null_groups(words: Sequence[str]) -> None:
+    """Raise `ProblemsFound` at `match=null`, on which Hydra stumbles without a word about what to type."""
+    for word in words:
+        name, _, value = word.partition("=")
+        if value == "null" and name.isidentifier() and is_group(name):
+            hint = f"to take the node out, type '~nodes.{name}' '~wires.{name}'"
+            raise ProblemsFound([Problem(name, "a stage cannot be swapped for nothing", hint)])
+
+
+def settings_left_open() -> list[str]:
+    """The settings that are null until they are given: what a run may be of. A variant names those that it takes."""
+    import yaml
+
+    settings = yaml.safe_load(files(CONF).joinpath("config.yaml").read_text())
+    return [name for name, value in settings.items() if value is None and name != "variant"]
 
 
 def options_with(entry: Entry) -> list[str]:

@@ -22,8 +22,8 @@ from omninav.pipeline.graph.signature import BadStage, signature
 WITHIN_GRAPH = ("nodes.", "wires.", "artifacts.", "saves.")
 
 
-def misfits(words: Sequence[str], folders: Sequence[str], said: str) -> list[Problem]:
-    """Every word that fits no group or setting; or what Hydra `said`, where no word is to blame.
+def invalid_overrides(words: Sequence[str], folders: Sequence[str], message: str) -> list[Problem]:
+    """Every word that fits no group or setting; or Hydra's `message`, where no word is to blame.
 
     `folders` are those of `--config-dir`.
     """
@@ -38,7 +38,7 @@ def misfits(words: Sequence[str], folders: Sequence[str], said: str) -> list[Pro
         if word not in swaps and not (unknown and word.key_or_group.startswith(WITHIN_GRAPH)):
             unknown += _unknown_setting(word, plain, list(groups))
     problems += unknown
-    return problems or [Problem("command line", " ".join(said.partition("Config search path")[0].split()))]
+    return problems or [Problem("command line", " ".join(message.partition("Config search path")[0].split()))]
 
 
 def with_unlisted_parameters(words: Sequence[str], folders: Sequence[str]) -> list[str]:

@@ -1,6 +1,5 @@
-"""Static results as files: versioned, checksummed, never unpickled; and the cache in which they lie by content."""
+"""Static results as files: versioned, checksummed, never unpickled."""
 
-import fcntl
 import hashlib
 import io
 import json
@@ -100,25 +99,3 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
         raise BadInput(f"{path}: damaged, its sha256 does not fit its content; make the map again (tour=…)")
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         yield archive
-
-
-class Cache:
-    """Results by content: a folder of files named by the hash of everything that made them.
-
-    One process at a time makes a result (`lock`), so parallel jobs make each once; a lock dies with its process.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-
-    def path(self, key: str, suffix: str) -> Path:
-        """Where the result with this key lies, or would lie."""
-        return self.folder / f"{key[:32]}{suffix}"
-
-    @contextmanager
-    def lock(self, key: str) -> Iterator[None]:
-        """Hold the key: others who want the same result wait here until it is there."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        with (self.folder / f"{key[:32]}.lock").open("w") as file:
-            fcntl.flock(file, fcntl.LOCK_EX)
-            yield

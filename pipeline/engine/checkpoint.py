@@ -8,7 +8,7 @@ from omninav.pipeline.files import write_whole
 
 from .codec import BadEncoding, decode, encode, seal, unseal
 
-FORMAT = 1
+FORMAT = 2
 
 
 @dataclass
@@ -16,9 +16,9 @@ class Checkpoint:
     """Everything that decides how a run goes on.
 
     `identity`: hash of graph, inputs and seed, so that it is never used for another run. `ticks`: how many are done.
-    `ended`: the logs have ended, only "after" stages are left. `replayed`: the front came from the cache. `channels`:
+    `ended`: the logs have ended, only "after" stages are left. `replayed`: the prefix came from the cache. `channels`:
     delayed values, oldest first. `held`: last present values. `states`: fields of the stages' States. `generators`: bit
-    generators' states. `notes`: what contexts counted. `spools`: length in bytes of every growing sequence. A value
+    generators' states. `notes`: what contexts counted. `sequences`: length in bytes of every growing sequence. A value
     that stands in several places (a map that is read delayed and kept for the end) is written once and is one object
     again when loaded.
     """
@@ -32,7 +32,7 @@ class Checkpoint:
     states: dict[str, dict[str, Any]] = field(default_factory=dict)
     generators: dict[str, dict[str, Any]] = field(default_factory=dict)
     notes: dict[str, dict[str, Any]] = field(default_factory=dict)
-    spools: dict[str, int] = field(default_factory=dict)
+    sequences: dict[str, int] = field(default_factory=dict)
 
 
 def save(path: Path, checkpoint: Checkpoint) -> None:
@@ -57,7 +57,7 @@ def save(path: Path, checkpoint: Checkpoint) -> None:
         "states": checkpoint.states,
         "generators": checkpoint.generators,
         "notes": checkpoint.notes,
-        "spools": checkpoint.spools,
+        "sequences": checkpoint.sequences,
         "objects": objects,
     }
     write_whole(path, seal(encode(content)))
@@ -67,7 +67,7 @@ def load(path: Path) -> Checkpoint:
     """Read a checkpoint. Raises `BadEncoding` naming the file where it is damaged or of another version."""
     content = decode(unseal(path.read_bytes(), str(path)))
     if content.pop("format", None) != FORMAT:
-        raise BadEncoding(f"{path} was written by another version; start the run again")
+        raise BadEncoding(f"{path} was written by another version of omninav; start the run again")
     objects = content.pop("objects")
     content["channels"] = {key: [objects[n] for n in numbers] for key, numbers in content["channels"].items()}
     content["held"] = {key: objects[n] for key, n in content["held"].items()}

@@ -86,3 +86,19 @@ class DiskSequence(Sequence[Any]):
     def __iter__(self) -> Iterator[Any]:
         for offset in list(self._index()):
             yield self._read(offset)
+
+
+class Present(Sequence[Any]):
+    """The present values of a sequence on disk, without the gaps."""
+
+    def __init__(self, sequence: DiskSequence) -> None:
+        self._sequence = sequence
+        self._where = [number for number, value in enumerate(sequence) if value is not None]
+
+    def __len__(self) -> int:
+        return len(self._where)
+
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, slice):
+            return [self._sequence[number] for number in self._where[index]]
+        return self._sequence[self._where[index]]

@@ -1,71 +1,77 @@
-"""The front of a graph: what follows from the logs alone (unwarped, featured images), kept for the next run.
+"""The prefix of a graph: what follows from the logs alone (unwarped, featured images), kept for the next run.
 
-A node is in the front when it is the source of a recorded log, or gets all its inputs from the front or from before the
-loop, without delays. What other nodes read of the front is its boundary; it is spooled tick by tick under the hash of
-stages, parameters, wires and logs. The seed is part of the key only where a stage of the front, or one before the loop
-that it follows from, drew random numbers.
+A node is in the prefix when it is the source of a recorded log, or gets all its inputs from the prefix or from before
+the loop, without delays. What other nodes read of the prefix is its frontier; it is written tick by tick under the hash
+of stages, parameters, wires and logs. The seed is part of the key only where a stage of the prefix, or one before the
+loop that it follows from, drew random numbers.
 """
 
 import shutil
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from omninav.pipeline.files import digest_file, digest_text, whole_file, write_whole
 from omninav.pipeline.graph.graph import ARTIFACTS, Graph
 
-from .artifact import Cache
+from .cache import Cache, seeded
+from .code_version import graph_digest
 from .codec import BadEncoding, decode, encode, seal, unseal
 from .disk_sequence import DiskSequence
+from .engine import Engine, PrefixReplay
+
+SEQUENCE = "prefix"
+"""The name of the sequence to which an engine writes a prefix that is not in the cache yet."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class CachedPrefix:
-    """The front of a graph in a cache. `replay` is None where it is still to be computed.
-
-    `said` tells in words why it was found or not.
-    """
+    """The prefix of a graph and its place in the cache. `replay` is None where it is still to be computed."""
 
     nodes: frozenset[str]
-    boundary: tuple[str, ...]
+    frontier: tuple[str, ...]
     key: str
-    said: str
-    replay: Sequence[Mapping[str, Any]] | None = None
-    notes: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    before: Mapping[str, Any] = field(default_factory=dict)
+    """Under what it lies in the cache; '' where it is too large to be kept."""
+    reason: str
+    """Why it was found, or why not."""
+    replay: PrefixReplay | None = None
+
+    def recorded(self) -> dict[str, Sequence[str]]:
+        """What an engine has to write down so that it can be kept: for `Engine(recorded=…)`."""
+        return {SEQUENCE: self.frontier} if self.key and self.replay is None else {}
 
 
-def front_nodes(graph: Graph, artifacts: bool = False, without: Collection[str] = ()) -> frozenset[str]:
-    """The names of the front's nodes; empty where the source listens to the graph (a simulator in a closed loop).
+def prefix_nodes(graph: Graph, artifacts: bool = False, without: Collection[str] = ()) -> frozenset[str]:
+    """The names of the prefix's nodes; empty where the source reads outputs of the graph (a closed loop).
 
-    With `artifacts`, what follows from the logs and the artifacts: the front that runs share which differ in their
+    With `artifacts`, what follows from the logs and the artifacts: the prefix that runs share which differ in their
     seed only. `without` these nodes (those `following` from draws of random numbers).
     """
     source = graph.source
     if source is None or source.name in without or graph.inputs_of(source.name):
         return frozenset()
-    front = {source.name}
+    prefix = {source.name}
     before = {node.name for node in graph.of_lifetime("before")} - set(without)
     for node in graph.of_lifetime("tick"):
         wires = graph.inputs_of(node.name)
         ready = all(
             not w.delay
             and (
-                w.from_node in front
+                w.from_node in prefix
                 or (artifacts and w.from_node == ARTIFACTS)
                 or (w.from_node in before and (artifacts or not _draws_on_artifacts(graph, w.from_node)))
             )
             for w in wires
         )
         if wires and ready and node.name not in without:
-            front.add(node.name)
-    return frozenset(front)
+            prefix.add(node.name)
+    return frozenset(prefix)
 
 
-def front_boundary(graph: Graph, nodes: frozenset[str]) -> list[str]:
-    """What other nodes read of the front, and the source's tick."""
+def frontier_of(graph: Graph, nodes: frozenset[str]) -> list[str]:
+    """What other nodes read of a prefix, and the source's tick."""
     read = {wire.origin for wire in graph.wires if wire.from_node in nodes and wire.to_node not in nodes}
     return sorted(read | ({f"{graph.source.name}.tick"} if graph.source else set()))
 
@@ -77,7 +83,7 @@ def _draws_on_artifacts(graph: Graph, name: str) -> bool:
 
 
 def lineage(graph: Graph, nodes: frozenset[str]) -> frozenset[str]:
-    """The nodes of a front and those before the loop that they follow from."""
+    """The nodes of a prefix and those before the loop that they follow from."""
     before = {node.name for node in graph.of_lifetime("before")}
     closure, waiting = set(nodes), list(nodes)
     while waiting:
@@ -97,62 +103,70 @@ def following(graph: Graph, names: Collection[str]) -> frozenset[str]:
     return frozenset(found)
 
 
-def front_key(graph: Graph, nodes: frozenset[str]) -> str:
-    """The hash of everything but the seed that decides what the front gives."""
+def prefix_key(graph: Graph, nodes: frozenset[str]) -> str:
+    """The hash of everything but the seed that decides what the prefix gives."""
     closure = lineage(graph, nodes)
     digests = [f"{name}:{graph.nodes[name].stage.inputs_digest()}" for name in sorted(closure)]
-    return digest_text("front", graph.digest(closure), *digests)
+    return digest_text("prefix", graph_digest(graph, closure), *digests)
 
 
 @contextmanager
-def cached_front(graph: Graph, cache: Cache | None, seed: int) -> Iterator[CachedPrefix | None]:
-    """The front of a graph, found in the cache or to be recorded. Others who want the same one wait meanwhile."""
-    nodes = front_nodes(graph)
+def cached_prefix(graph: Graph, cache: Cache | None, seed: int) -> Iterator[CachedPrefix | None]:
+    """The prefix of a graph, found in the cache or to be recorded. Others who want the same one wait meanwhile."""
+    nodes = prefix_nodes(graph)
     if cache is None or not nodes or graph.source is None:
         yield None
         return
-    readers = [wire for wire in graph.wires if wire.from_node in nodes and wire.to_node not in nodes]
-    boundary = front_boundary(graph, nodes)
-    bulky = [origin for origin in boundary if getattr(getattr(graph.port(origin), "type", None), "bulky", False)]
-    if bulky:
-        who = ", ".join(sorted({wire.to_node for wire in readers if wire.origin == bulky[0]}))
-        yield CachedPrefix(
-            nodes, tuple(boundary), "", f"not cached: {bulky[0]} is too large to keep and is read by {who}", replay=None
-        )
+    frontier = tuple(frontier_of(graph, nodes))
+    bulky = next((origin for origin in frontier if graph.is_marked(origin, "bulky")), None)
+    if bulky is not None:
+        readers = ", ".join(name for name in graph.readers_of(bulky) if name not in nodes)
+        yield CachedPrefix(nodes, frontier, "", f"not cached: {bulky} is too large to keep and is read by {readers}")
         return
-    key = digest_text(front_key(graph, nodes), *boundary)
+    key = digest_text(prefix_key(graph, nodes), *frontier)
     with ExitStack() as held:
         held.enter_context(cache.lock(key))
         for candidate in (key, seeded(key, seed)):
-            path = cache.path(candidate, ".front")
-            if path.exists():
-                try:
-                    notes = decode(unseal(cache.path(candidate, ".notes").read_bytes(), str(path)))
-                    if digest_file(path) == notes["digest"]:
-                        spool = DiskSequence(path)
-                        held.close()
-                        said = (
-                            f"found: {', '.join(sorted(nodes))} of this log with these parameters were computed before"
-                        )
-                        yield CachedPrefix(nodes, tuple(boundary), key, said, spool, notes["nodes"])
-                        return
-                except (BadEncoding, FileNotFoundError):
-                    path.unlink(missing_ok=True)  # half a result is no result: it is made again
-        yield CachedPrefix(
-            nodes, tuple(boundary), key, "not found: code, parameters or log are new, or it never ran to its end"
-        )
+            replay = _found(cache, candidate, nodes)
+            if replay is not None:
+                held.close()
+                names = ", ".join(sorted(nodes))
+                reason = f"found: {names} of this log with these parameters were computed before"
+                yield CachedPrefix(nodes, frontier, key, reason, replay)
+                return
+        reason = "not found: code, parameters or log are new, or it never ran to its end"
+        yield CachedPrefix(nodes, frontier, key, reason)
 
 
-def seeded(key: str, seed: int) -> str:
-    """The key of a result that depends on the seed."""
-    return digest_text(key, f"seed {seed}")
+def _found(cache: Cache, key: str, nodes: frozenset[str]) -> PrefixReplay | None:
+    path, notes_path = cache.path(key, ".prefix"), cache.path(key, ".notes")
+    if not path.exists():
+        return None
+    try:
+        notes = decode(unseal(notes_path.read_bytes(), str(path)))
+        if digest_file(path) == notes["digest"]:
+            return PrefixReplay(nodes, DiskSequence(path), notes["nodes"], {})
+    except (BadEncoding, FileNotFoundError):
+        path.unlink(missing_ok=True)  # half a result is no result: it is made again
+    return None
 
 
-def keep(front: CachedPrefix, cache: Cache, seed: int, spool: Path, notes: Mapping[str, Mapping[str, Any]]) -> None:
-    """Put a recorded front into the cache. `notes` are those of its `lineage`: counts, facts, and who drew."""
+def keep_prefix(engine: Engine, prefix: CachedPrefix | None, cache: Cache | None) -> None:
+    """Put the prefix that an engine has recorded into the cache, where it was not found there."""
+    if cache is None or prefix is None or not prefix.recorded():
+        return
+    sequence = engine.sequences[SEQUENCE]
+    sequence.flush()
+    names = sorted(lineage(engine.graph, prefix.nodes))
+    _keep(prefix, cache, engine.options.seed, sequence.path, {name: engine.calls[name].ctx.notes() for name in names})
+
+
+def _keep(
+    prefix: CachedPrefix, cache: Cache, seed: int, sequence: Path, notes: Mapping[str, Mapping[str, Any]]
+) -> None:
     drew = any(note["drew"] for note in notes.values())
-    key = seeded(front.key, seed) if drew else front.key
-    with whole_file(cache.path(key, ".front")) as part:
-        shutil.copyfile(spool, part)
+    key = seeded(prefix.key, seed) if drew else prefix.key
+    with whole_file(cache.path(key, ".prefix")) as part:
+        shutil.copyfile(sequence, part)
         digest = digest_file(part)
     write_whole(cache.path(key, ".notes"), seal(encode({"digest": digest, "nodes": dict(notes)})))

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.engine.artifact import Cache
+from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
 from omninav.pipeline.report.progress import Progress
-from omninav.pipeline.run.run import Plan, plan, without_companions
+from omninav.pipeline.run.artifact_specification import without_companions
+from omninav.pipeline.run.plan import Plan, plan
 
 from .repetition import artifact_key, condition_key, finished, known_digests
 from .specification import Condition, Experiment

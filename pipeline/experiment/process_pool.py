@@ -109,7 +109,7 @@ def _run(job: Job, pipe: Any) -> None:
 
 
 def _in_one_line(error: Exception) -> str:
-    from omninav.pipeline.engine.engine import StageFailed
+    from omninav.pipeline.engine.call import StageFailed
     from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 
     known = isinstance(error, StageFailed | BadInput | ProblemsFound)

@@ -11,32 +11,35 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.engine.artifact import Cache
+from omninav.pipeline.engine.cache import Cache
+from omninav.pipeline.engine.code_version import graph_digest
 from omninav.pipeline.engine.disk_sequence import DiskSequence
-from omninav.pipeline.engine.engine import Engine
-from omninav.pipeline.engine.prefix import CachedPrefix, cached_front, following, front_boundary, front_nodes
+from omninav.pipeline.engine.engine import Engine, EngineOptions, PrefixReplay
+from omninav.pipeline.engine.prefix import (
+    CachedPrefix,
+    cached_prefix,
+    following,
+    frontier_of,
+    keep_prefix,
+    prefix_nodes,
+)
 from omninav.pipeline.files import digest_file, digest_text, write_whole
 from omninav.pipeline.graph.graph import Graph, Node
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.value import Value
 from omninav.pipeline.report.quantities import numbers
-from omninav.pipeline.run.run import (
-    ArtifactPlan,
-    Plan,
-    Run,
-    keep_front,
-    notes_of,
-    obtain,
-    plan,
-    results_of,
-    stage_times,
-    usable,
-)
+from omninav.pipeline.run.artifacts import Execution, obtain
+from omninav.pipeline.run.plan import ArtifactPlan, Plan, plan
+from omninav.pipeline.run.results import notes_of, results_of
+from omninav.pipeline.run.run_folder import Run
+from omninav.pipeline.run.timing import stage_times
 
 from .job_progress import Heartbeat
 from .process_pool import Send
 
+SHARED = "shared"
+"""The sequence that the first repetition writes for the others."""
 BASE_SEED = 0
 """Of artifacts and whatever else the repetitions share."""
 
@@ -58,7 +61,7 @@ def condition_key(planned: Plan, groups: Sequence[Sequence[str]] = ()) -> str:
     `groups`: stages whose time together is among them.
     """
     graph = measured(planned.graph)
-    parts = [graph.digest(), *known_digests(graph), *("+".join(group) for group in groups)]
+    parts = [graph_digest(graph), *known_digests(graph), *("+".join(group) for group in groups)]
     for artifact in planned.artifacts:
         parts += [artifact.name, artifact_key(artifact)]
     return digest_text("condition", *parts)
@@ -69,7 +72,7 @@ def artifact_key(artifact: ArtifactPlan) -> str:
     if artifact.graph is None:
         assert artifact.file is not None
         return digest_file(artifact.file)
-    return digest_text("artifact", artifact.graph.digest(), artifact.origin, *known_digests(artifact.graph))
+    return digest_text("artifact", graph_digest(artifact.graph), artifact.origin, *known_digests(artifact.graph))
 
 
 _DIGESTS: dict[str, str] = {}
@@ -118,19 +121,20 @@ def repeat(given: Mapping[str, Any], send: Send) -> None:
     """
     folder, seeds = Path(given["folder"]), list(given["seeds"])
     planned = plan(given["config"])
-    if planned.graph.digest() != given["code"]:
+    if planned.digest != given["code"]:
         raise BadInput("the code has changed while the experiment ran; type the same command again")
     cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
     graph = measured(planned.graph)
     run = Run(folder)
     shutil.rmtree(run.memory, ignore_errors=True)
+    execution = Execution(run, BASE_SEED, cache, math.inf, Heartbeat(send))
     artifacts: dict[str, Value] = {}
     facts: dict[str, Any] = {}
     for artifact in planned.artifacts:
-        artifacts[artifact.name], made = obtain(run, artifact, BASE_SEED, cache, math.inf, Heartbeat(send))
+        artifacts[artifact.name], made = obtain(execution, artifact)
         facts[artifact.name] = made
         (folder / f"{artifact.name}.omap").unlink(missing_ok=True)  # the cache keeps it
-    shared: CachedPrefix | None = None
+    shared: PrefixReplay | None = None
     for number, seed in enumerate(seeds):
         place = run.memory / f"seed_{seed}"
         record = bool(given["shared"]) and shared is None and number + 1 < len(seeds)
@@ -144,8 +148,8 @@ def repeat(given: Mapping[str, Any], send: Send) -> None:
         result["timing"] = stage_times(engine, given.get("groups") or ())
         result |= notes_of(engine)
         result["artifacts"] = facts
-        for spool in engine.spools.values():
-            spool.close()
+        for sequence in engine.sequences.values():
+            sequence.close()
         if recorded is None:
             shutil.rmtree(place, ignore_errors=True)
         for path in _results(folder, given["key"], seed, cache if given["shared"] else None):
@@ -160,39 +164,37 @@ def _once(
     seed: int,
     place: Path,
     cache: Cache | None,
-    shared: CachedPrefix | None,
+    shared: PrefixReplay | None,
     record: bool,
     send: Send,
-) -> tuple[Engine, CachedPrefix | None]:
-    """One repetition; with `record` also the front that the others may share. What grows in place is its own."""
+) -> tuple[Engine, PrefixReplay | None]:
+    """One repetition; with `record` also the prefix that the others may share. What grows in place is its own."""
     artifacts = {name: copy.deepcopy(value) if value.in_place else value for name, value in artifacts.items()}
-    step = Heartbeat(send).step
+    options = EngineOptions(seed, place, place, checkpoint_s=math.inf, on_tick=Heartbeat(send).step)
     if shared is not None:
-        engine = Engine(graph, artifacts, seed, place, place, every_s=math.inf, front=shared, progress=step)
+        engine = Engine(graph, artifacts, options, replay=shared)
         engine.run()
         return engine, None
-    with cached_front(graph, cache, seed) as front:
-        known = usable(front)
-        wanted = _recordable(graph, known) if record else []
-        engine = Engine(
-            graph, artifacts, seed, place, place, every_s=math.inf, front=known, progress=step, recorded=wanted
-        )
+    with cached_prefix(graph, cache, seed) as prefix:
+        replay, recorded = (prefix.replay, prefix.recorded()) if prefix is not None else (None, {})
+        wanted = _recordable(graph, prefix) if record else []
+        recorded = recorded | ({SHARED: wanted} if wanted else {})
+        engine = Engine(graph, artifacts, options, replay=replay, recorded=recorded)
         engine.run()
-        keep_front(engine, front, cache, seed)
+        keep_prefix(engine, prefix, cache)
     # Only now is it known which stages draw random numbers: they and what follows from them are run every time.
     # What grows in place has grown by now: it starts anew too.
     drew = [name for name, call in engine.calls.items() if call.ctx.drew]
     seeded = following(graph, [*drew, *(node.name for node in graph.of_lifetime("before") if _grows(node))])
-    nodes = front_nodes(graph, artifacts=True, without=seeded)
-    boundary = front_boundary(graph, nodes)
-    if not nodes or not set(boundary) <= set(wanted):
+    nodes = prefix_nodes(graph, artifacts=True, without=seeded)
+    if not nodes or not set(frontier_of(graph, nodes)) <= set(wanted):
         return engine, None
     before = [node.name for node in graph.of_lifetime("before") if node.name not in seeded]
     notes = {name: engine.calls[name].ctx.notes() for name in sorted(nodes | set(before))}
-    engine.spools.pop("shared").flush()
+    engine.sequences.pop(SHARED).flush()
     given = {origin: value for origin, value in engine.values.items() if origin.partition(".")[0] in before}
-    replay = DiskSequence(place / "shared.spool")
-    return engine, CachedPrefix(nodes | frozenset(before), tuple(boundary), "", "", replay, notes, given)
+    ticks = DiskSequence(place / f"{SHARED}.sequence")
+    return engine, PrefixReplay(nodes | frozenset(before), ticks, notes, given)
 
 
 def _grows(node: Node) -> bool:
@@ -200,13 +202,13 @@ def _grows(node: Node) -> bool:
 
 
 def _recordable(graph: Graph, known: CachedPrefix | None) -> list[str]:
-    """What may have to be shared: all that nodes read of the front, but what is too large to keep over a log.
+    """What may have to be shared: all that nodes read of the prefix, but what is too large to keep over a log.
 
-    Of the part that comes from the cache there is only its boundary.
+    Of the part that comes from the cache there is only its frontier.
     """
-    nodes = front_nodes(graph, artifacts=True)
+    nodes = prefix_nodes(graph, artifacts=True)
     inside = known.nodes if known is not None and known.replay is not None else frozenset()
     read = {wire.origin for wire in graph.wires if wire.from_node in nodes - inside}
-    small = {origin for origin in read if not getattr(getattr(graph.port(origin), "type", None), "bulky", False)}
+    small = {origin for origin in read if not graph.is_marked(origin, "bulky")}
     tick = {f"{graph.source.name}.tick"} if graph.source is not None else set()
-    return sorted(small | tick | set(known.boundary if known is not None and inside else ()))
+    return sorted(small | tick | set(known.frontier if known is not None and inside else ()))

@@ -12,7 +12,7 @@ import yaml
 
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.report.progress import Progress
-from omninav.pipeline.run.run import LIBRARIES, git_commit, version
+from omninav.pipeline.run.provenance import LIBRARIES, git_commit, version
 
 from .conditions import (
     Compose,
@@ -130,7 +130,7 @@ class ExperimentRun:
             "config": run.config,
             "folder": str(run.folder),
             "key": run.key,
-            "code": run.planned.graph.digest() if run.planned is not None else "",
+            "code": run.planned.digest if run.planned is not None else "",
             "seeds": run.missing,
             "shared": run.shared,
             "groups": timed_groups(self.experiment),

@@ -9,12 +9,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.engine.artifact import Cache
+from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.graph.graph import Node
 from omninav.pipeline.graph.recordable import Recordable
 from omninav.pipeline.graph.stage import Context
-from omninav.pipeline.run.run import Plan, Run, obtain, plan
+from omninav.pipeline.run.artifacts import Execution, obtain
+from omninav.pipeline.run.plan import Plan, plan
+from omninav.pipeline.run.run_folder import Run
 
 from .conditions import ConditionRun
 from .job_progress import Heartbeat
@@ -158,8 +160,9 @@ def make_artifact(given: Mapping[str, Any], send: Send) -> None:
     planned = plan(given["config"])
     cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
     run = Run(Path(given["folder"]))
+    execution = Execution(run, BASE_SEED, cache, math.inf, Heartbeat(send))
     run.folder.mkdir(parents=True, exist_ok=True)  # nothing else makes it where the cache has the artifact
     for artifact in planned.artifacts:
         if artifact.name == given["name"]:
-            obtain(run, artifact, BASE_SEED, cache, math.inf, Heartbeat(send))
+            obtain(execution, artifact)
     shutil.rmtree(run.memory, ignore_errors=True)

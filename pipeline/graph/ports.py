@@ -37,17 +37,17 @@ def type_name(annotation: Any) -> str:
     return getattr(annotation, "__name__", str(annotation))
 
 
-def compatible(given: Any, wanted: Any) -> bool:
-    """Whether a value of type `given` may enter a port of type `wanted`: same class, subclass, or member of a union."""
-    if wanted is Any or given is Any:
+def compatible(given: Any, expected: Any) -> bool:
+    """Whether a value of one type may enter a port of another: same class, subclass, or member of a union."""
+    if expected is Any or given is Any:
         return True
     if get_origin(given) in (Union, types.UnionType):
-        return all(compatible(option, wanted) for option in get_args(given))
-    if get_origin(wanted) in (Union, types.UnionType):
-        return any(compatible(given, option) for option in get_args(wanted))
-    if inspect.isclass(given) and inspect.isclass(wanted):
-        return issubclass(given, wanted)
-    return bool(given == wanted)
+        return all(compatible(option, expected) for option in get_args(given))
+    if get_origin(expected) in (Union, types.UnionType):
+        return any(compatible(given, option) for option in get_args(expected))
+    if inspect.isclass(given) and inspect.isclass(expected):
+        return issubclass(given, expected)
+    return bool(given == expected)
 
 
 class _Unfit(Exception):
@@ -57,37 +57,37 @@ class _Unfit(Exception):
         self.problems = problems
 
 
-def convert(value: Any, wanted: Any, where: str) -> tuple[Any, list[Problem]]:
+def convert(value: Any, expected: Any, where: str) -> tuple[Any, list[Problem]]:
     """A plain configuration value as the type a parameter asks for, or the problems that stand against it.
 
     Whole numbers pass as floats, lists as tuples, mappings as dataclasses and texts as paths; nothing else is guessed.
     """
     try:
-        return _convert(value, wanted, where), []
+        return _convert(value, expected, where), []
     except _Unfit as unfit:
         return None, unfit.problems
 
 
-def _unfit(value: Any, wanted: Any, where: str, hint: str = "") -> _Unfit:
+def _unfit(value: Any, expected: Any, where: str, hint: str = "") -> _Unfit:
     shown = repr(value) if not isinstance(value, Mapping) else "a mapping"
-    return _Unfit([Problem(where, f"{shown} ({type(value).__name__}), expected {type_name(wanted)}", hint)])
+    return _Unfit([Problem(where, f"{shown} ({type(value).__name__}), expected {type_name(expected)}", hint)])
 
 
-def _convert(value: Any, wanted: Any, where: str) -> Any:
-    origin, arguments = get_origin(wanted), get_args(wanted)
-    if wanted is Any:
+def _convert(value: Any, expected: Any, where: str) -> Any:
+    origin, arguments = get_origin(expected), get_args(expected)
+    if expected is Any:
         return value
     if origin is Annotated:
         try:
             converted = _convert(value, arguments[0], where)
         except _Unfit as unfit:
             if all(problem.where == where for problem in unfit.problems):
-                raise _unfit(value, wanted, where) from None  # so that the bounds are named too
+                raise _unfit(value, expected, where) from None  # so that the bounds are named too
             raise
         for bounds in (extra for extra in arguments[1:] if isinstance(extra, Bounds)):
             broken = bounds.violated_by(converted) if isinstance(converted, int | float) else None
             if broken:
-                raise _Unfit([Problem(where, f"{converted!r} is out of bounds, expected {type_name(wanted)}")])
+                raise _Unfit([Problem(where, f"{converted!r} is out of bounds, expected {type_name(expected)}")])
         return converted
     if origin is Literal:
         if value in arguments and not isinstance(value, bool):
@@ -95,68 +95,68 @@ def _convert(value: Any, wanted: Any, where: str) -> Any:
         if isinstance(value, bool) and any(option is value for option in arguments):
             return value
         hint = suggest(value, [str(a) for a in arguments], "choices") if isinstance(value, str) else ""
-        raise _unfit(value, wanted, where, hint)
+        raise _unfit(value, expected, where, hint)
     if origin in (Union, types.UnionType):
-        return _convert_union(value, wanted, where)
+        return _convert_union(value, expected, where)
     if origin in (list, tuple, Sequence):
-        return _convert_items(value, wanted, where)
+        return _convert_items(value, expected, where)
     if origin in (dict, Mapping):
         if not isinstance(value, Mapping):
-            raise _unfit(value, wanted, where)
+            raise _unfit(value, expected, where)
         return {str(key): _convert(item, arguments[1], f"{where}.{key}") for key, item in value.items()}
-    if dataclasses.is_dataclass(wanted) and isinstance(wanted, type):
-        if isinstance(value, wanted):
+    if dataclasses.is_dataclass(expected) and isinstance(expected, type):
+        if isinstance(value, expected):
             return value
         if not isinstance(value, Mapping):
-            raise _unfit(value, wanted, where)
-        arguments_found, problems = convert_fields(value, wanted, where)
+            raise _unfit(value, expected, where)
+        arguments_found, problems = convert_fields(value, expected, where)
         if problems:
             raise _Unfit(problems)
-        return wanted(**arguments_found)
-    return _convert_plain(value, wanted, where)
+        return expected(**arguments_found)
+    return _convert_plain(value, expected, where)
 
 
-def _convert_plain(value: Any, wanted: Any, where: str) -> Any:
-    if wanted is type(None):
+def _convert_plain(value: Any, expected: Any, where: str) -> Any:
+    if expected is type(None):
         if value is None:
             return None
-    elif wanted is bool:
+    elif expected is bool:
         if isinstance(value, bool):
             return value
-    elif wanted is int:
+    elif expected is int:
         if isinstance(value, int) and not isinstance(value, bool):
             return value
-    elif wanted is float:
+    elif expected is float:
         if isinstance(value, int | float) and not isinstance(value, bool):
             return float(value)
-    elif wanted is str:
+    elif expected is str:
         if isinstance(value, str):
             return value
-    elif wanted is Path:
+    elif expected is Path:
         if isinstance(value, str | Path):
             return Path(value)
-    elif wanted in (dict, list) and isinstance(value, wanted):
+    elif expected in (dict, list) and isinstance(value, expected):
         return value
-    raise _unfit(value, wanted, where)
+    raise _unfit(value, expected, where)
 
 
-def _convert_union(value: Any, wanted: Any, where: str) -> Any:
-    rest, optional = split_optional(wanted)
+def _convert_union(value: Any, expected: Any, where: str) -> Any:
+    rest, optional = split_optional(expected)
     if optional and value is None:
         return None
     if optional:
         return _convert(value, rest, where)
-    meant = _by_kind(value, get_args(wanted), where)
+    meant = _by_kind(value, get_args(expected), where)
     if meant is not None:
         return _convert(value, meant, where)
     several = []
-    for option in get_args(wanted):
+    for option in get_args(expected):
         try:
             return _convert(value, option, where)
         except _Unfit as unfit:
             several.append(unfit.problems)
     shaped = [p for p in several if any(problem.where != where for problem in p)]
-    raise _Unfit(shaped[0]) if shaped else _unfit(value, wanted, where)
+    raise _Unfit(shaped[0]) if shaped else _unfit(value, expected, where)
 
 
 def _by_kind(value: Any, options: Sequence[Any], where: str) -> Any:
@@ -177,13 +177,13 @@ def _by_kind(value: Any, options: Sequence[Any], where: str) -> Any:
     return kinds.get(value["kind"])
 
 
-def _convert_items(value: Any, wanted: Any, where: str) -> Any:
-    origin, arguments = get_origin(wanted), get_args(wanted)
+def _convert_items(value: Any, expected: Any, where: str) -> Any:
+    origin, arguments = get_origin(expected), get_args(expected)
     if not isinstance(value, list | tuple):
-        raise _unfit(value, wanted, where)
+        raise _unfit(value, expected, where)
     if origin is tuple and Ellipsis not in arguments:
         if len(value) != len(arguments):
-            raise _unfit(value, wanted, where, f"give {len(arguments)} values")
+            raise _unfit(value, expected, where, f"give {len(arguments)} values")
         kinds = list(arguments)
     else:
         kinds = [arguments[0]] * len(value)
@@ -199,10 +199,10 @@ def _convert_items(value: Any, wanted: Any, where: str) -> Any:
 
 
 def convert_fields(
-    given: Mapping[Any, Any], wanted: type[Any], where: str, skip: typing.Container[str] = ()
+    given: Mapping[Any, Any], expected: type[Any], where: str, skip: typing.Container[str] = ()
 ) -> tuple[dict[str, Any], list[Problem]]:
     """A mapping as the keyword arguments of a dataclass (a stage or a group of parameters), and every problem."""
-    known = read_parameters(wanted)
+    known = read_parameters(expected)
     arguments: dict[str, Any] = {}
     problems: list[Problem] = []
     for name, value in given.items():
@@ -211,12 +211,12 @@ def convert_fields(
         path = f"{where}.{name}"
         if name not in known:
             hint = suggest(str(name), known, "parameters", prefix=f"{where}.")
-            problems.append(Problem(path, f"{wanted.__name__} has no parameter '{name}'", hint))
+            problems.append(Problem(path, f"{expected.__name__} has no parameter '{name}'", hint))
             continue
         arguments[name], found = convert(value, known[name].type, path)
         problems += found
     for name, parameter in known.items():
         if parameter.default is dataclasses.MISSING and name not in given:
-            what = f"{wanted.__name__} needs '{name}' ({type_name(parameter.type)})"
+            what = f"{expected.__name__} needs '{name}' ({type_name(parameter.type)})"
             problems.append(Problem(f"{where}.{name}", what, f"type {where}.{name}=…"))
     return arguments, problems

@@ -11,7 +11,7 @@ class Problem:
     """One thing that is wrong.
 
     `where`: the config path (`nodes.match.headings`) or file; `what`: what was found and what was expected;
-    `hint`: what to type or where to look, '' where nothing useful can be said.
+    `hint`: what to type or where to look, '' where there is nothing useful to say.
     """
 
     where: str
@@ -39,10 +39,10 @@ def unreadable_yaml(error: BaseException) -> BadInput | None:
     yaml = sys.modules.get("yaml")  # who met a YAML error has imported it
     if yaml is None or not isinstance(error, yaml.YAMLError):
         return None
-    mark, said = getattr(error, "problem_mark", None), getattr(error, "problem", None) or str(error).split("\n")[0]
+    mark, message = getattr(error, "problem_mark", None), getattr(error, "problem", None) or str(error).split("\n")[0]
     where = f"{mark.name}, line {mark.line + 1}, column {mark.column + 1}" if mark else "a configuration file"
     return BadInput(
-        f"{where}: this is no YAML: {said}; mind indentation, colons, quotes and brackets around this place"
+        f"{where}: this is no YAML: {message}; mind indentation, colons, quotes and brackets around this place"
     )
 
 

@@ -38,7 +38,7 @@ class UnknownStage(Exception):
 
 @dataclass(frozen=True)
 class Entry:
-    """A row of the catalogue: a stage, or what is wrong with a plugin.
+    """A row of the registry: a stage, or what is wrong with a plugin.
 
     `name` is `role.name`; `target` what `_target_` would hold; `origin` is "built in", "installed" or "environment".
     """

@@ -104,7 +104,7 @@ class Context:
         return self._rng
 
     def count(self, kind: str, number: int = 1, detail: str = "") -> None:
-        """Count something dropped or odd; the first `detail` of a kind is kept and said once."""
+        """Count something dropped or odd; the first `detail` of a kind is kept."""
         self.counts[kind] += number
         if detail:
             self.details.setdefault(kind, detail)
@@ -158,7 +158,7 @@ class Stage:
     * `inputs_digest()`: for stages that read files, the content hash that caches and manifests use.
 
     A stage is pure when its outputs follow from its inputs alone: no State, no use of `ctx.rng`. Purity is what lets
-    the engine keep the front of a graph (unwarped, featured images of a log) for the next run.
+    the engine keep the prefix of a graph (what follows from its logs alone) for the next run.
     """
 
     if TYPE_CHECKING:

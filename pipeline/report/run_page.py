@@ -126,11 +126,11 @@ def _provenance(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
     rows += [(f"input {name} (sha256)", digest) for name, digest in (manifest.get("inputs") or {}).items()]
     for name, artifact in (manifest.get("artifacts") or {}).items():
-        origin = artifact.get("file") or f"variant {artifact.get('variant')}, {artifact.get('from')}"
-        rows.append((f"{name}", f"{origin} ({artifact.get('said', '')}; sha256 {artifact.get('sha256', '')})"))
+        origin = artifact.get("file") or f"variant {artifact.get('variant')}, {artifact.get('output')}"
+        rows.append((f"{name}", f"{origin} ({artifact.get('reason', '')}; sha256 {artifact.get('sha256', '')})"))
     for name, file in (manifest.get("saved") or {}).items():
         rows.append((f"saved {name}", f"{file['file']}, {digits(file['bytes'] / 1000)} kB, sha256 {file['sha256']}"))
-    rows += [("cached front", manifest.get("front")), ("Python", manifest.get("python"))]
+    rows += [("cached prefix", manifest.get("prefix")), ("Python", manifest.get("python"))]
     rows.append(("libraries", ", ".join(f"{k} {v}" for k, v in (manifest.get("libraries") or {}).items())))
     return [(name, str(value)) for name, value in rows if value]
 

@@ -75,7 +75,7 @@ class LearnReferenceGraph(Stage):
         self,
         features: SegmentFeatures,
         pose: Pose,
-        map: ReferenceGraph | None,
+        map: ReferenceGraph,
         near: np.ndarray[tuple[int], np.dtype[np.int64]],
     ) -> Literal["first", "far", "unlike"] | None:
         if not len(map):

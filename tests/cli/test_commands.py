@@ -75,14 +75,14 @@ def test_a_log_of_ones_own_without_a_map_says_what_to_type(omninav, tmp_path: Pa
     ended = omninav("variant=omniview_mcl", "log=drive.mcap")
     assert ended.returncode == 2
     assert "this variant needs a map" in ended.stderr
-    assert "tour=LOG" in ended.stderr
+    assert "type tour=… to make one with 'omniview_mcl_map', or map=FILE.omap to load one" in ended.stderr
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("tour=tour.mcap",), "type log=LOG"),
+        (("tour=tour.mcap",), "tour is given, but no log\n      type log=…"),
         (("tour=tour.mcap", "map=m.omap", "log=d.mcap"), "leave one of them away"),
         (("match=null",), "'~nodes.match' '~wires.match'"),
         (("check", "tour=nowhere.mcap", "log=nowhere.mcap"), "nowhere.mcap"),
@@ -105,6 +105,13 @@ def test_a_log_of_ones_own_without_a_map_says_what_to_type(omninav, tmp_path: Pa
         (("check", "~nodes.length_scale"), "if the node was taken out, type '~wires.length_scale' too"),
         (("check", "~nodes.length_scale"), "type '~wires.sensor.length_scale' if it can do without"),
         (("--config-dir=nowhere",), "there is no folder nowhere"),
+        (
+            ("variant=wander", "log=d.mcap"),
+            "variant=wander does not take it\n      leave log=… away; its `inputs` are: no input",
+        ),
+        (("variant=topological_nav",), "goal: variant=topological_nav needs it: where to go"),
+        (("+artifacts.map.set={rout: tour}",), "did you mean 'route'?"),
+        (("+artifacts.map.inheritd=[unwarp]",), "ArtifactSpecification has no parameter 'shared'"),
     ],
 )
 def test_what_a_newcomer_gets_wrong_is_answered_with_what_to_type(omninav, tmp_path: Path, words, said: str):
@@ -164,7 +171,7 @@ def test_a_map_of_other_features_is_refused_before_a_folder_is_made(
     assert what in ended.stderr
     assert type_ in ended.stderr
     assert list(tmp_path.iterdir()) == []
-    omninav("check", f"map={demo / 'map.omap'}", *words, "artifacts.map.alike=[]", check=True)
+    omninav("check", f"map={demo / 'map.omap'}", *words, "artifacts.map.must_match=[]", check=True)
 
 
 def test_stages_lists_roles_in_lines_and_one_stage_with_ports_parameters_and_source(omninav):
@@ -290,9 +297,9 @@ def test_the_trajectory_is_in_tum_format_with_ascending_header_stamps(demo: Path
 
 
 def test_who_lifts_the_robot_on_its_drive_does_not_lift_it_on_its_tour():
-    from omninav.pipeline.cli.main import _composed, complete
+    from omninav.pipeline.cli.composition import complete, composed
 
-    with _composed(["kidnappings=[{at: 30.0, turn: 1.5}]"]) as config:
+    with composed(["kidnappings=[{at: 30.0, turn: 1.5}]"]) as config:
         plain = complete(config)
     assert plain["nodes"]["source"]["kidnappings"] == [{"at": 30.0, "turn": 1.5}]
     assert plain["artifacts"]["map"]["graph"]["nodes"]["source"]["kidnappings"] == []

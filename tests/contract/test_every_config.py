@@ -11,12 +11,13 @@ import yaml
 from hydra import compose, initialize_config_module
 from omegaconf import OmegaConf
 
-from omninav.pipeline.cli.main import complete
+from omninav.pipeline.cli.composition import complete, settings_read
+from omninav.pipeline.cli.config_groups import settings_left_open
 from omninav.pipeline.experiment.specification import read_experiment
 from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.registry import resolve
 from omninav.pipeline.graph.signature import signature
-from omninav.pipeline.run.run import plan
+from omninav.pipeline.run.plan import plan
 
 CONF = Path(__file__).resolve().parents[2] / "conf"
 FILES = [
@@ -99,6 +100,13 @@ def test_every_variant_builds(path: Path):
         planned = plan(complete(compose("config", overrides=[f"variant={path.stem}"])))
     assert planned.variant == path.stem
     assert planned.graph.nodes
+
+
+@pytest.mark.parametrize("path", sorted((CONF / "variant").glob("*.yaml")), ids=lambda path: path.stem)
+def test_a_variant_declares_the_inputs_that_its_graph_reads(path: Path):
+    with initialize_config_module("omninav.conf", version_base="1.3"):
+        config = compose("config", overrides=[f"variant={path.stem}"])
+    assert set(config.inputs) == settings_read(config) & {*settings_left_open(), *config.inputs}
 
 
 @pytest.mark.parametrize("path", sorted((CONF / "experiment").rglob("*.yaml")), ids=lambda path: path.stem)

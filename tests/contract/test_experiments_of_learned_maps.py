@@ -6,9 +6,9 @@ import pytest
 from hydra import compose, initialize_config_module
 from omegaconf import OmegaConf
 
-from omninav.pipeline.cli.main import complete
+from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.experiment.specification import read_experiment, words_of
-from omninav.pipeline.run.run import plan
+from omninav.pipeline.run.plan import plan
 
 CONF = Path(__file__).resolve().parents[2] / "conf" / "experiment"
 NAMES = [

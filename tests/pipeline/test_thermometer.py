@@ -16,7 +16,9 @@ from omninav.pipeline.experiment.runner import plan_experiment
 from omninav.pipeline.report.sweep_page import write_sweep_page
 from omninav.pipeline.report.terminal_tables import compare_table
 from omninav.pipeline.run.metrics_files import read_metrics
-from omninav.pipeline.run.run import execute, plan, start
+from omninav.pipeline.run.execution import execute
+from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.run_folder import start
 
 
 def ran(config: dict[str, Any], folder: Path | None = None) -> Path:
@@ -104,7 +106,9 @@ def test_the_page_of_an_experiment_states_how_large_each_condition_was(experimen
 def test_no_stage_of_a_robot_is_imported(tmp_path: Path):
     code = (
         "import sys, pathlib, thermometer\n"
-        "from omninav.pipeline.run.run import execute, plan, start\n"
+        "from omninav.pipeline.run.execution import execute
+from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.run_folder import start\n"
         f"planned = plan(thermometer.config(pathlib.Path({str(tmp_path)!r})))\n"
         "execute(start(planned, ['omninav']), planned)\n"
         "print([name for name in sys.modules if name.startswith('omninav.stages')])\n"

@@ -11,9 +11,10 @@ from background_runs import assert_same_bytes, finished, kill, start, wait_for_c
 from conftest import DATA, needs_data
 
 from omninav.pipeline.engine.artifact import read_artifact
+from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.engine.codec import decode, encode
-from omninav.pipeline.engine.engine import Engine, StageFailed
-from omninav.pipeline.graph.graph import build
+from omninav.pipeline.engine.engine import Engine, EngineOptions
+from omninav.pipeline.graph.builder import build
 
 STAGES = "omninav.stages"
 NODES = {
@@ -36,7 +37,7 @@ WIRES = {
 
 def learned(place: Path, breaks_at: int = -1) -> bytes:
     graph = build({"nodes": {**NODES, "knows": {**NODES["knows"], "breaks_at": breaks_at}}, "wires": WIRES})
-    engine = Engine(graph, {}, 0, place, place / "memory", ["mapping.map"], identity="same", every_s=0.0)
+    engine = Engine(graph, {}, EngineOptions(0, place, place / "memory", "same", 0.0), wanted=["mapping.map"])
     return encode(engine.run()["mapping.map"])
 
 
@@ -64,7 +65,7 @@ def test_what_waits_as_the_last_log_ends_is_learned_after_it(tmp_path: Path):
         }
     )
     place = tmp_path / "after"
-    engine = Engine(graph, {}, 0, place, place / "memory", ["last_map.map"], identity="same", every_s=0.0)
+    engine = Engine(graph, {}, EngineOptions(0, place, place / "memory", "same", 0.0), wanted=["last_map.map"])
     last = engine.run()["last_map.map"]
     in_the_loop = decode(learned(tmp_path / "loop"))
     assert last.steps == in_the_loop.steps + 12

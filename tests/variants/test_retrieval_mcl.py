@@ -7,9 +7,9 @@ import pytest
 from conftest import DATA, needs_data
 from hydra import compose, initialize_config_module
 
-from omninav.pipeline.cli.main import complete
+from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.graph.problems import ProblemsFound
-from omninav.pipeline.run.run import plan
+from omninav.pipeline.run.plan import plan
 
 HOUSE = DATA / "photoreal-house"
 

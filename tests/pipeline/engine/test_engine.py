@@ -5,10 +5,13 @@ from pathlib import Path
 import pytest
 
 from omninav.pipeline import Context
-from omninav.pipeline.engine.artifact import Cache
-from omninav.pipeline.engine.engine import Engine, StageFailed
-from omninav.pipeline.engine.prefix import cached_front, front_nodes, keep
-from omninav.pipeline.graph.graph import Graph, build
+from omninav.pipeline.engine.cache import Cache
+from omninav.pipeline.engine.call import StageFailed
+from omninav.pipeline.engine.engine import Engine, EngineOptions
+from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix, prefix_nodes
+from omninav.pipeline.graph.builder import build
+from omninav.pipeline.graph.graph import Graph
+from omninav.pipeline.graph.problems import BadInput
 
 
 def graph_of(nodes: dict, wires: dict) -> Graph:
@@ -28,7 +31,7 @@ SUM_WIRES = {
 
 
 def numbers(graph: Graph, tmp_path: Path, seed: int = 0) -> list:
-    engine = Engine(graph, {}, seed, tmp_path, tmp_path / "memory", ["all.metrics"])
+    engine = Engine(graph, {}, EngineOptions(seed, tmp_path, tmp_path / "memory"), wanted=["all.metrics"])
     return engine.run()["all.metrics"].values["numbers"]["all"]
 
 
@@ -65,7 +68,7 @@ def test_a_stage_that_lacks_a_required_input_is_skipped_and_counted(tmp_path: Pa
         {**SUM, "source": {"_target_": "Count", "gap": 3}, "sum": "Scale"},
         {"sum": {"number": "source.number"}, "all": SUM_WIRES["all"]},
     )
-    engine = Engine(graph, {}, 0, tmp_path, tmp_path / "memory", ["all.metrics"])
+    engine = Engine(graph, {}, EngineOptions(0, tmp_path, tmp_path / "memory"), wanted=["all.metrics"])
     found = engine.run()["all.metrics"].values["numbers"]
     assert found == {"all": [0, 1, None, 3, 4, None, 6, 7, None, 9], "present": 7}
     assert engine.calls["sum"].ctx.counts["skipped.sum"] == 3
@@ -110,7 +113,7 @@ def test_a_stage_knows_which_of_its_outputs_are_read_by_wires_first_values_and_w
         "drive": {"number": "source.felt"},
     }
     graph = graph_of({"source": "Steered", "drive": "Scale", "stop": "Constant"}, wires)
-    engine = Engine(graph, {}, 0, wanted=["source.truth"])
+    engine = Engine(graph, wanted=["source.truth"])
     source, stop = engine.calls["source"].ctx, engine.calls["stop"].ctx
     assert [source.is_read(port) for port in ("felt", "truth", "hidden", "tick")] == [True, True, False, False]
     assert stop.is_read("number")
@@ -175,7 +178,7 @@ FULL_WIRES = {
 def test_a_run_that_was_stopped_goes_on_to_the_same_result(tmp_path: Path, at: int):
     def run(place: Path, breaks_at: int) -> list:
         graph = graph_of({**FULL, "breaks": {"_target_": "Fail", "at": breaks_at}}, FULL_WIRES)
-        engine = Engine(graph, {}, 3, place, place / "memory", ["all.metrics"], identity="same", every_s=0.0)
+        engine = Engine(graph, {}, EngineOptions(3, place, place / "memory", "same", 0.0), wanted=["all.metrics"])
         return [
             engine.run()["all.metrics"].values,
             (place / "numbers.txt").read_bytes(),
@@ -191,68 +194,76 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_result(tmp_path: Path, at: i
 
 
 def test_a_checkpoint_of_another_run_is_refused(tmp_path: Path):
-    from omninav.pipeline.graph.problems import BadInput
-
     graph = graph_of(SUM, SUM_WIRES)
-    Engine(graph, {}, 0, tmp_path, tmp_path / "memory", identity="one").run()
+    Engine(graph, {}, EngineOptions(0, tmp_path, tmp_path / "memory", "one")).run()
     with pytest.raises(BadInput, match="belongs to another run"):
-        Engine(graph, {}, 0, tmp_path, tmp_path / "memory", identity="other").run()
+        Engine(graph, {}, EngineOptions(0, tmp_path, tmp_path / "memory", "other")).run()
 
 
-FRONT = {
+PREFIX = {
     "source": "Count",
     "scale": {"_target_": "Scale", "factor": 2.0},
     "start": "Constant",
     "sum": "Add",
     "all": "Collected",
 }
-FRONT_WIRES = {
+PREFIX_WIRES = {
     "scale": {"number": "source.number"},
     "sum": {"number": "scale.number", "other": {"from": "sum.number", "delay": 1, "initial": "start.number"}},
     "all": SUM_WIRES["all"],
 }
 
 
-def test_the_front_is_what_follows_from_the_log_alone():
-    assert front_nodes(graph_of(FRONT, FRONT_WIRES)) == {"source", "scale"}
+def test_the_prefix_is_what_follows_from_the_log_alone():
+    assert prefix_nodes(graph_of(PREFIX, PREFIX_WIRES)) == {"source", "scale"}
 
 
-def test_the_front_is_computed_once_and_then_replayed_with_the_same_result(tmp_path: Path):
+def test_a_graph_whose_source_listens_to_it_has_no_prefix():
+    wires = {
+        "source": {"command": {"from": "drive.number", "delay": 1, "initial": None}},
+        "drive": {"number": "source.felt"},
+    }
+    assert prefix_nodes(graph_of({"source": "Steered", "drive": "Scale"}, wires)) == frozenset()
+
+
+def cached_run(place: Path, cache: Cache) -> tuple[list, bool]:
+    """What a graph with a prefix gave, and whether the prefix was replayed."""
+    graph = graph_of(PREFIX, PREFIX_WIRES)
+    with cached_prefix(graph, cache, 0) as prefix:
+        assert prefix is not None
+        options = EngineOptions(0, place, place / "memory")
+        engine = Engine(graph, {}, options, wanted=["all.metrics"], replay=prefix.replay, recorded=prefix.recorded())
+        values = engine.run()["all.metrics"].values["numbers"]["all"]
+        keep_prefix(engine, prefix, cache)
+        return values, prefix.replay is not None
+
+
+def test_the_prefix_is_computed_once_and_then_replayed_with_the_same_result(tmp_path: Path):
     cache = Cache(tmp_path / "cache")
-
-    def run(place: str) -> tuple[list, bool]:
-        graph = graph_of(FRONT, FRONT_WIRES)
-        with cached_front(graph, cache, 0) as front:
-            assert front is not None
-            engine = Engine(graph, {}, 0, tmp_path / place, tmp_path / place / "memory", ["all.metrics"], front=front)
-            values = engine.run()["all.metrics"].values["numbers"]["all"]
-            if front.replay is None:
-                keep(
-                    front,
-                    cache,
-                    0,
-                    engine.spools["front"].path,
-                    {n: engine.calls[n].ctx.notes() for n in front.nodes} if engine.spools["front"].size else {},
-                )
-            return values, front.replay is not None
-
-    first, second = run("a"), run("b")
+    first, second = cached_run(tmp_path / "a", cache), cached_run(tmp_path / "b", cache)
     assert first[0] == second[0]
     assert (first[1], second[1]) == (False, True)
 
 
-def test_a_front_whose_boundary_is_bulky_is_not_cached_and_says_why(tmp_path: Path):
-    graph = graph_of(
-        {**FRONT, "eat": "Swallow", "scale": "Noise"},
-        {**FRONT_WIRES, "scale": {"number": "source.number"}, "eat": {"big": "source.big"}},
-    )
-    nodes = {**FRONT, "enter": "Swallow"}
-    wires = {**FRONT_WIRES, "enter": {"big": {"from": "source.big", "hold": True}}}
-    del graph
-    with cached_front(graph_of(nodes, wires), Cache(tmp_path), 0) as front:
-        assert front is not None
-        assert front.key != ""  # Swallow itself belongs to the front: only its number leaves it
-    delayed = {"big": {"from": "source.big", "delay": 1, "initial": "source.big"}}
-    with cached_front(graph_of(nodes, {**FRONT_WIRES, "enter": delayed}), Cache(tmp_path), 0) as front:
-        assert front is not None
-        assert "source.big is too large to keep and is read by enter" in front.said
+def test_a_damaged_prefix_is_computed_again(tmp_path: Path):
+    cache = Cache(tmp_path / "cache")
+    first, _ = cached_run(tmp_path / "a", cache)
+    (kept,) = cache.folder.glob("*.prefix")
+    kept.write_bytes(kept.read_bytes()[:-5])
+    assert cached_run(tmp_path / "b", cache) == (first, False)
+
+
+def test_what_leaves_a_prefix_may_be_small_where_what_is_in_it_is_bulky(tmp_path: Path):
+    wires = {**PREFIX_WIRES, "enter": {"big": {"from": "source.big", "hold": True}}}
+    with cached_prefix(graph_of({**PREFIX, "enter": "Swallow"}, wires), Cache(tmp_path), 0) as prefix:
+        assert prefix is not None
+        assert "enter" in prefix.nodes  # only its number leaves the prefix
+        assert prefix.recorded()
+
+
+def test_a_prefix_whose_frontier_is_bulky_is_not_cached_and_says_why(tmp_path: Path):
+    wires = {**PREFIX_WIRES, "enter": {"big": {"from": "source.big", "delay": 1, "initial": "source.big"}}}
+    with cached_prefix(graph_of({**PREFIX, "enter": "Swallow"}, wires), Cache(tmp_path), 0) as prefix:
+        assert prefix is not None
+        assert prefix.reason == "not cached: source.big is too large to keep and is read by enter"
+        assert not prefix.recorded()

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from omninav.pipeline.engine.artifact import Cache
+from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.experiment.repetition import finished
 from omninav.pipeline.files import digest_text, write_whole
 

@@ -3,7 +3,7 @@
 import pytest
 
 import toys
-from omninav.pipeline.graph.graph import build
+from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.ground_truth import steering, truth_readers
 from omninav.pipeline.graph.problems import ProblemsFound
 from omninav.pipeline.graph.signature import signature

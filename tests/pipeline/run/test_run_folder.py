@@ -6,7 +6,9 @@ from typing import Any
 import pytest
 
 from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.run import run as runs
+from omninav.pipeline.run import run_folder
+from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.resume import resume
 
 CONFIG: dict[str, Any] = {
     "variant": "toy",
@@ -16,18 +18,18 @@ CONFIG: dict[str, Any] = {
 
 
 def start(root: Path) -> Path:
-    return runs.start(runs.plan({**CONFIG, "runs": str(root)}), ["omninav"]).folder
+    return run_folder.start(plan({**CONFIG, "runs": str(root)}), ["omninav"]).folder
 
 
 def test_a_folder_that_can_be_seen_can_be_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[list[str]] = []
-    write = runs.write_whole
+    write = run_folder.write_whole
 
     def watched(path: Path, content: bytes | str) -> None:
         seen.append([folder.name for folder in tmp_path.iterdir() if not folder.name.startswith(".")])
         write(path, content)
 
-    monkeypatch.setattr(runs, "write_whole", watched)
+    monkeypatch.setattr(run_folder, "write_whole", watched)
     folder = start(tmp_path)
     assert seen
     assert not any(seen)
@@ -44,4 +46,4 @@ def test_two_runs_that_start_in_one_second_have_folders_of_their_own(tmp_path: P
 
 def test_what_is_no_run_folder_is_said(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="not a run folder"):
-        runs.resume(tmp_path)
+        resume(tmp_path)

@@ -1,14 +1,15 @@
-"""What depends on the seed is never taken from a run with another seed: not from the front's cache, nor shared."""
+"""What depends on the seed is never taken from a run with another seed: neither from the cache nor shared."""
 
 from pathlib import Path
 
 import pytest
 
-from omninav.pipeline.engine.artifact import Cache
+from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.prefix import following
 from omninav.pipeline.experiment.repetition import _once
-from omninav.pipeline.graph.graph import Graph, build
-from omninav.pipeline.run.run import results_of
+from omninav.pipeline.graph.builder import build
+from omninav.pipeline.graph.graph import Graph
+from omninav.pipeline.run.results import results_of
 from toys import Ledger
 
 SEEDS = (0, 1, 2)
@@ -67,7 +68,7 @@ def test_what_does_not_depend_on_the_seed_is_still_computed_once(tmp_path: Path,
     assert repetitions(graph(added), tmp_path, None, True)[1] == [10, 0, 0]
 
 
-def test_a_front_that_follows_from_a_draw_before_the_loop_is_found_again_for_its_own_seed(tmp_path: Path):
+def test_a_prefix_that_follows_from_a_draw_before_the_loop_is_found_again_for_its_own_seed(tmp_path: Path):
     cache = Cache(tmp_path / "cache")
     drawn = graph("through a node before the loop")
     assert repetitions(drawn, tmp_path / "first", cache, False)[1] == [10, 10, 10]

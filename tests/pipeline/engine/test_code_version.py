@@ -35,7 +35,7 @@ FILES = {
 
 
 def version(place: Path) -> str:
-    imports = "import pack.stage as s; from omninav.pipeline.graph.code_version import code_version"
+    imports = "import pack.stage as s; from omninav.pipeline.engine.code_version import code_version"
     code = f"{imports}; print(code_version(s.Twice))"
     tests = str(Path(__file__).parents[2])
     environment = {"PYTHONPATH": f"{place}:{tests}", "PATH": "/usr/bin:/bin", "PYTHONDONTWRITEBYTECODE": "1"}

@@ -6,8 +6,8 @@ from array import array
 import pytest
 
 from omninav.pipeline.engine.engine import Engine
-from omninav.pipeline.graph.graph import build
-from omninav.pipeline.run.run import stage_times
+from omninav.pipeline.graph.builder import build
+from omninav.pipeline.run.timing import stage_times
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def engine() -> Engine:
             "wires": {name: {"number": f"{origin}.number"} for name, origin in wires.items()},
         }
     )
-    engine = Engine(graph, {}, 0)
+    engine = Engine(graph)
     for name, took in {
         "source": [100.0] * 5,
         "move": [1.0, 9.0, 1.0, 9.0],

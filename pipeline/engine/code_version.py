@@ -1,15 +1,29 @@
-"""Which code a stage's results follow from."""
+"""Which code, parameters and wires a graph's results follow from."""
 
 import ast
+import dataclasses
 import functools
 import inspect
+import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from omninav.pipeline.files import digest_text
+from omninav.pipeline.graph.graph import Graph
+from omninav.pipeline.graph.stage import Stage
 
-from .stage import Stage
+
+def graph_digest(graph: Graph, only: Iterable[str] | None = None) -> str:
+    """A hash over stages' code, parameters and wires: of the whole graph, or of some nodes and what enters them."""
+    names = sorted(graph.nodes if only is None else only)
+    parts = []
+    for name in names:
+        node = graph.nodes[name]
+        parameters = json.dumps(node.parameters, sort_keys=True, default=str)
+        parts += [name, node.target, code_version(type(node.stage)), parameters]
+    parts += sorted(str(dataclasses.astuple(wire)) for wire in graph.wires if wire.to_node in set(names))
+    return digest_text(*parts)
 
 
 def code_version(cls: type[Stage]) -> str:

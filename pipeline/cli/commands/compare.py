@@ -1,0 +1,26 @@
+"""`omninav compare`: several runs side by side."""
+
+import json
+from pathlib import Path
+
+import yaml
+
+from omninav.pipeline.cli.terminal import show
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.report.terminal_tables import compare_table
+from omninav.pipeline.run.metrics_files import read_metrics
+
+
+def command(arguments: list[str]) -> int:
+    """Print the figures of two or more runs, and what they differ in."""
+    if len(arguments) < 2:
+        raise BadInput("compare: give two or more run folders: omninav compare runs/A runs/B")
+    runs = []
+    for word in arguments:
+        folder = Path(word)
+        metrics = read_metrics(folder)
+        config = yaml.safe_load((folder / "config.yaml").read_text())
+        manifest = json.loads((folder / "manifest.json").read_text())
+        runs.append({"name": word.rstrip("/"), "metrics": metrics, "config": config, "manifest": manifest})
+    show(compare_table(runs))
+    return 0

@@ -1,0 +1,20 @@
+"""`omninav simulate`: a drive through the built-in world, written as a log."""
+
+from omninav.pipeline.cli.composition import complete, composed
+from omninav.pipeline.engine.engine import Engine, EngineOptions
+from omninav.pipeline.report.progress import Progress
+from omninav.pipeline.run.plan import plan
+
+
+def command(arguments: list[str]) -> int:
+    """Run the variant `simulate`, which leaves a log and no run folder."""
+    with Progress(unit="pictures") as progress:
+        progress.say("reading the configuration")
+        with composed(["variant=simulate", *arguments]) as config:
+            planned = plan(complete(config))  # of no artifacts
+
+        def on_tick(done: int, total: int | None) -> None:
+            progress.update("simulate", done, total)
+
+        Engine(planned.graph, {}, EngineOptions(planned.seed, on_tick=on_tick, on_doing=progress.say)).run()
+    return 0

@@ -1,0 +1,214 @@
+"""Configurations, composed by Hydra and completed: the graphs of artifacts too, everything resolved."""
+
+import copy
+import functools
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from hydra import compose, initialize_config_module
+from hydra._internal.utils import get_args_parser
+from hydra.core.config_store import ConfigStore
+from hydra.errors import HydraException
+from omegaconf import OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
+from omninav.pipeline.graph.registry import plugins
+from omninav.pipeline.run.artifact_specification import ArtifactSpecification, read_specifications, without_absent
+from omninav.pipeline.run.inputs import not_taken, read_inputs
+
+from .config_groups import CONF, settings_left_open
+from .overrides import invalid_overrides, search, with_unlisted_parameters
+
+OF_THE_VARIANT = ("variant", "inputs", "nodes", "wires", "artifacts", "saves")
+"""What a variant's file says of itself; everything else in a configuration is a setting."""
+OF_THE_RUN = ("seed", "runs", "cache", "checkpoint_s")
+"""Settings that every run reads, whatever its graph is."""
+UNSET = "(unset)"
+INTERPOLATION = re.compile(r"\$\{(?:oc\.select:|unless:(\w+),)?\s*(\w+)")
+
+Variants = Callable[[str], Any]
+
+
+def _unless(given: str, wanted: str, *, _root_: Any) -> Any:
+    """`${unless:log,world}`: the setting `world`, or, where `log` is given, the default of whoever reads it."""
+    return UNSET if _root_[given] is not None else _root_[wanted]
+
+
+OmegaConf.register_new_resolver("unless", _unless, replace=True)
+
+
+def read_words(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The overrides among arguments that may hold Hydra's flags, and the folders of `--config-dir`."""
+    read = get_args_parser().parse_args(list(arguments))
+    if read.config_dir and not Path(read.config_dir).is_dir():
+        raise BadInput(
+            f"--config-dir: there is no folder {read.config_dir}; it holds groups, as FOLDER/match/mine.yaml"
+        )
+    return read.overrides, [read.config_dir] if read.config_dir else []
+
+
+@contextmanager
+def composed(arguments: Sequence[str], offer: bool = True) -> Iterator[Any]:
+    """The configuration that overrides (and --config-dir) describe, for commands that run nothing."""
+    words, folders = read_words(arguments)
+    if offer:
+        offer_plugins()
+    with initialize_config_module(CONF, version_base="1.3"):
+        try:
+            config = compose("config", overrides=[*search(folders), *with_unlisted_parameters(words, folders)])
+        except HydraException as error:
+            raise ProblemsFound(invalid_overrides(words, folders, str(error))) from None
+        yield config
+
+
+def offer_plugins() -> None:
+    """Let `match=gradient` find a third party's stage `match.gradient`, as if it had a file in conf/match."""
+    for entry in plugins():
+        if entry.problem:
+            print(f"plugin left out: {entry.problem}", file=sys.stderr)
+            continue
+        name = entry.name.partition(".")[2]
+        ConfigStore.instance().store(name, {"_target_": entry.target}, group=entry.role, package=f"nodes.{entry.role}")
+
+
+def configured_variants(place: Sequence[str] = ()) -> Variants:
+    """Gives the configuration of a variant as its file has it, composed once.
+
+    `place` says where configurations are looked for, where Hydra was not started with `--config-dir`.
+    """
+
+    @functools.cache
+    def of(variant: str) -> Any:
+        return compose("config", overrides=[*place, f"variant={variant}"])
+
+    return lambda variant: copy.deepcopy(of(variant))
+
+
+def complete(config: Any, variants: Variants | None = None) -> dict[str, Any]:
+    """A composed configuration, resolved, with the graphs of its artifacts composed too: plain dicts, all written out.
+
+    An artifact's graph is its variant's, under this run's settings but for those that the artifact sets, and with the
+    nodes that it inherits. Settings that nothing reads are left out. `variants` gives the variants' configurations.
+    """
+    variants = variants or configured_variants()
+    _name_past_links(config)
+    try:
+        plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
+        specs = read_specifications(plain)
+        problems = list(not_taken(plain, settings_left_open()))
+        for name, spec in specs.items():
+            problems += _given_twice(config, name, spec)
+        if problems:
+            raise ProblemsFound(problems)
+        for name, spec in specs.items():
+            own = plain["artifacts"][name]
+            if spec.file is not None:
+                own["file"] = _past_links(spec.file)
+                continue
+            maker = spec.together_with or name
+            making = specs[maker]
+            if making.variant is None or making.file is not None:
+                continue
+            own["variant"] = making.variant
+            if missing := _missing(config, maker):
+                own["missing"] = missing
+            else:
+                own["graph"] = _graph_of(config, maker, making, variants)
+    except OmegaConfBaseException as error:
+        where = getattr(error, "full_key", None) or "config"
+        raise ProblemsFound([Problem(str(where), str(error).split("\n")[0])]) from None
+    read = {*OF_THE_VARIANT, *OF_THE_RUN, *read_inputs(plain), *settings_read(config)}
+    return _without_unset({name: value for name, value in plain.items() if name in read})
+
+
+def _graph_of(config: Any, name: str, spec: ArtifactSpecification, variants: Variants) -> dict[str, Any]:
+    other = variants(str(spec.variant))
+    OmegaConf.set_struct(other, False)
+    for key in config:
+        if str(key) not in OF_THE_VARIANT:
+            other[key] = config._get_node(key)
+    for key, value in spec.set.items():
+        if key not in other or key in OF_THE_VARIANT:
+            settings = [str(setting) for setting in other if setting not in OF_THE_VARIANT]
+            hint = suggest(key, settings, "settings")
+            raise ProblemsFound([Problem(f"artifacts.{name}.set.{key}", "there is no such setting", hint)])
+        other[key] = value
+    for node in spec.inherit:
+        other.nodes[node] = OmegaConf.to_container(config.nodes[node], resolve=False)
+    for node, changes in spec.nodes.items():
+        other.nodes[node] = OmegaConf.merge(other.nodes.get(node) or {}, changes)
+    made: dict[str, Any] = OmegaConf.to_container(other, resolve=True)  # type: ignore[assignment]
+    made = dict(without_absent(_without_unset(made)))  # what makes an artifact begins without those it can do without
+    return {key: made.get(key) for key in ("nodes", "wires", "saves")}
+
+
+# inputs of artifacts
+
+
+def _linked(config: Any, name: str) -> dict[str, str]:
+    """Settings of an artifact's graph that are other settings of this run (`set: {log: ${tour}}`): name -> that one."""
+    changed = config.artifacts[name].get("set")
+    raw: Any = OmegaConf.to_container(changed, resolve=False) if changed is not None else {}
+    links = {key: re.fullmatch(r"\$\{(\w+)\}", value) for key, value in raw.items() if isinstance(value, str)}
+    return {key: link[1] for key, link in links.items() if link}
+
+
+def _given_twice(config: Any, name: str, spec: ArtifactSpecification) -> Iterator[Problem]:
+    for key, setting in _linked(config, name).items():
+        if config.get(setting) is not None and spec.file is not None:
+            hint = f"leave one of them away: {name}=FILE uses a saved one, {setting}=… makes one"
+            yield Problem(name, f"both a file and {setting}=… to make it from are given", hint)
+        elif config.get(setting) is not None and config.get(key) is None and key in config.inputs:
+            yield Problem(key, f"{setting} is given, but no {key}", f"type {key}=…")
+
+
+def _missing(config: Any, name: str) -> list[str]:
+    """Where this run is of something that was given, so must be what its artifact is made from."""
+    return [s for key, s in _linked(config, name).items() if config.get(key) is not None and config.get(s) is None]
+
+
+def _name_past_links(config: Any) -> None:
+    """What lies among the runs may be named by way of their link, which will soon point elsewhere."""
+    runs = Path(str(config.get("runs", "runs"))).resolve()
+    for key in settings_left_open():
+        file = config.get(key)
+        if isinstance(file, str) and Path(file).is_file() and Path(file).resolve().is_relative_to(runs):
+            config[key] = _past_links(file)
+
+
+def _past_links(file: str) -> str:
+    """A file's own path where it is named by way of a link."""
+    path = Path(file)
+    return file if path.resolve() == path.absolute() else str(path.resolve())
+
+
+# settings that are read
+
+
+def settings_read(config: Any) -> set[str]:
+    """The settings that the graph and its artifacts read, directly or by way of other settings."""
+    read: set[str] = set()
+    waiting = list(OF_THE_VARIANT)
+    while waiting:
+        raw = config._get_node(waiting.pop())
+        for unless, name in INTERPOLATION.findall(OmegaConf.to_yaml(raw) if OmegaConf.is_config(raw) else str(raw)):
+            names = [unless] if unless and config.get(unless) is not None else [unless, name] if unless else [name]
+            for each in names:
+                if each in config and each not in read:
+                    read.add(each)
+                    waiting.append(each)
+    return read - set(OF_THE_VARIANT)
+
+
+def _without_unset(config: dict[str, Any]) -> dict[str, Any]:
+    """Nodes without the parameters that are unset: their classes' defaults hold."""
+    nodes = {
+        name: {key: value for key, value in spec.items() if value != UNSET} if isinstance(spec, Mapping) else spec
+        for name, spec in (config.get("nodes") or {}).items()
+    }
+    return {**config, "nodes": nodes}

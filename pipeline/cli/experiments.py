@@ -1,0 +1,53 @@
+"""Experiments on the command line: which words are for their conditions, and how these are composed."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from hydra import compose
+from hydra.errors import HydraException
+from omegaconf import OmegaConf
+
+from omninav.pipeline.experiment.runner import ExperimentRun, plan_experiment
+from omninav.pipeline.graph.problems import ProblemsFound
+
+from .composition import complete, configured_variants, read_words
+from .overrides import invalid_overrides, with_unlisted_parameters
+from .terminal import shown
+
+OF_THE_EXPERIMENT = ("experiment", "profile", "runs", "cache", "hydra")
+
+
+def condition_words(words: Sequence[str]) -> list[str]:
+    """Where an experiment is asked for, the words that are for each of its conditions and not for the experiment."""
+    keys = [word.lstrip("+~").partition("=")[0].replace("/", ".").partition(".")[0] for word in words]
+    if "experiment" not in keys:
+        return []
+    return [word for word, key in zip(words, keys, strict=True) if key not in OF_THE_EXPERIMENT]
+
+
+def run_experiment(config: Any, arguments: Sequence[str]) -> int:
+    """Run every condition and repetition of an experiment's file, and write its page. 1 where a job failed."""
+    run = planned_experiment(config, arguments)
+    well = run.run()
+    print(f"page: {shown(run.folder / (run.experiment.name + '.html'))}", flush=True)
+    return 0 if well else 1
+
+
+def planned_experiment(config: Any, arguments: Sequence[str], place: Sequence[str] = ()) -> ExperimentRun:
+    """The experiment of a composed configuration, with every condition checked. Raises `ProblemsFound`.
+
+    `place` says where configurations are looked for, where Hydra was not started with `--config-dir`.
+    """
+    plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
+    typed, folders = read_words(arguments)
+    variants = configured_variants(place)
+
+    def composed(words: Sequence[str]) -> dict[str, Any]:
+        try:
+            config = compose("config", overrides=[*place, *with_unlisted_parameters(words, folders)])
+        except HydraException as error:
+            raise ProblemsFound(invalid_overrides(words, folders, str(error))) from None
+        return complete(config, variants)
+
+    words = [*condition_words(typed), f"cache={plain['cache'] or 'null'}"]
+    return plan_experiment(plain, composed, words, ["omninav", *arguments])

@@ -1,0 +1,146 @@
+"""One job: a run or an experiment that Hydra calls, alone or as one of a sweep. It never raises and never exits."""
+
+import fcntl
+import json
+import os
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hydra.core.hydra_config import HydraConfig
+from hydra.types import RunMode
+from omegaconf import OmegaConf
+
+from omninav.pipeline.engine.call import StageFailed
+from omninav.pipeline.files import write_whole
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound, unreadable_yaml
+from omninav.pipeline.run.execution import execute
+from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.run_folder import start
+
+from .composition import complete
+from .terminal import show, shown
+
+OUTCOMES = "OMNINAV_OUTCOMES"
+"""Names the file in which the jobs of a sweep, also those in other processes, leave their exit codes."""
+NO_FOLDER = "."
+"""Hydra's `run.dir` where nobody has set it: then a run's folder is made from the date and the variant."""
+
+
+@dataclass(frozen=True)
+class SweepJob:
+    """A job of a sweep: the sweep's folder, the job's own, its number, and what it overrides."""
+
+    sweep: Path
+    folder: Path
+    number: str
+    overrides: str
+
+
+def run_job(config: Any, arguments: Sequence[str], run_experiment: Callable[[Any, Sequence[str]], int]) -> None:
+    """Run what a configuration describes. In a sweep the other jobs go on; the exit code is left in a file."""
+    sweep, folder = _sweep_job(), _folder()
+    of_experiment = config.get("experiment") is not None
+    code, error = 0, ""
+    try:
+        if of_experiment and sweep is not None:
+            raise BadInput("an experiment has its own sweep: leave out -m, and write what varies into its file")
+        if of_experiment:
+            code = run_experiment(config, arguments)
+        else:
+            _run(config, sweep, folder)
+    except (ProblemsFound, BadInput) as wrong:
+        code, error = 2, str(wrong)
+    except StageFailed as failed:
+        code, error = 1, str(failed)
+    except KeyboardInterrupt:
+        on = "the same command" if of_experiment else f"`omninav resume {shown(folder or Path('runs/latest'))}`"
+        code, error = 130, f"stopped; {on} goes on"
+    except Exception as unknown:  # a defect of ours: one line here, the trace in run.log
+        no_yaml = unreadable_yaml(unknown)
+        code, error = (2, str(no_yaml)) if no_yaml else (1, f"{type(unknown).__name__}: {unknown}")
+        if no_yaml is None and sweep is None and not isinstance(unknown, OSError):
+            traceback.print_exc()
+    if error:
+        print(f"job {sweep.number}: {error}" if sweep else error, file=sys.stderr, flush=True)
+    if error and code == 1:
+        log = (folder or Path(str(config.get("runs", "runs"))) / "latest") / "run.log"
+        print(f"the traceback is in {shown(log)}", file=sys.stderr, flush=True)
+    if sweep is not None:
+        _note_job(sweep, code, error)
+    elif folder is not None and folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()  # Hydra has made it, and nothing has run
+    if OUTCOMES in os.environ:
+        with open(os.environ[OUTCOMES], "a") as file:
+            file.write(f"{code}\n")
+
+
+def _run(config: Any, sweep: SweepJob | None, folder: Path | None) -> None:
+    from omninav.pipeline.report.progress import Progress
+    from omninav.pipeline.report.terminal_tables import results_table
+
+    planned = plan(complete(config))
+    if sweep is None and folder is not None and (folder / "manifest.json").exists():
+        raise BadInput(
+            f"{folder}: there is a run in it; `omninav resume` goes on with it, hydra.run.dir=… names another"
+        )
+    argv = ["omninav", *(sweep.overrides.split() if sweep else sys.argv[1:])]
+    run = start(planned, argv, folder, _hydra_files(config))
+    with Progress() as progress:
+        metrics = execute(run, planned, progress)
+    if sweep is None:
+        show(results_table(metrics))
+    print(f"report: {shown(run.folder / 'report.html')}", flush=True)
+
+
+def _hydra_files(config: Any) -> dict[str, str]:
+    """What Hydra's users look for in the folder of a job."""
+    settings = HydraConfig.get()
+    return {
+        ".hydra/config.yaml": OmegaConf.to_yaml(config),
+        ".hydra/hydra.yaml": OmegaConf.to_yaml(OmegaConf.create({"hydra": settings})),
+        ".hydra/overrides.yaml": OmegaConf.to_yaml(settings.overrides.task),
+    }
+
+
+def _folder() -> Path | None:
+    """Where Hydra wants the job's files; None where nobody has said so."""
+    settings = HydraConfig.get()
+    chosen = any(str(word).startswith("hydra.run.dir=") for word in settings.overrides.hydra)
+    if settings.mode == RunMode.MULTIRUN or chosen or settings.run.dir != NO_FOLDER:
+        return Path(settings.runtime.output_dir)
+    return None
+
+
+def _sweep_job() -> SweepJob | None:
+    settings = HydraConfig.get()
+    if settings.mode != RunMode.MULTIRUN:
+        return None
+    sweep, own = Path(settings.sweep.dir).resolve(), Path(settings.runtime.output_dir)
+    return SweepJob(sweep, own, str(settings.job.num), " ".join(settings.overrides.task))
+
+
+def _note_job(job: SweepJob, code: int, error: str) -> None:
+    """Put a job's end on the sweep's page at once. Jobs in other processes wait for each other here."""
+    from omninav.pipeline.report.sweep_page import write_sweep_page
+
+    file = job.folder / "manifest.json"
+    manifest = json.loads(file.read_text()) if file.exists() else {"status": "refused"}
+    manifest |= {"job": job.number, "overrides": job.overrides} | ({"error": error} if error else {})
+    write_whole(file, json.dumps(manifest, indent=1) + "\n")
+    with (job.sweep / ".page.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        write_sweep_page(job.sweep, sorted(_sweep_rows(job.sweep), key=lambda row: int(row["job"])))
+
+
+def _sweep_rows(sweep: Path) -> Iterator[dict[str, Any]]:
+    from omninav.pipeline.run.metrics_files import read_metrics
+
+    for file in sweep.rglob("manifest.json"):
+        manifest, folder = json.loads(file.read_text()), file.parent
+        if "job" in manifest:
+            metrics = read_metrics(folder) if (folder / "metrics.json").exists() else None
+            yield {"job": manifest["job"], "folder": folder, "manifest": manifest, "metrics": metrics}

@@ -1,0 +1,73 @@
+"""A node made ready to run: one call of its step each tick, from the tick's values and back into them."""
+
+import math
+import time
+from array import array
+from collections.abc import Callable
+from typing import Any
+
+from omninav.pipeline.graph.graph import Node, Wire
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.stage import Context, State
+
+from .channel import channel_key, held_key
+
+
+class StageFailed(Exception):
+    """A stage raised: which node, at which tick, and what. The cause is chained."""
+
+
+class Call:
+    """A node made ready to run: where its inputs lie and where its outputs go."""
+
+    def __init__(self, node: Node, wires: list[Wire], ctx: Context, static: set[str]) -> None:
+        self.node, self.ctx = node, ctx
+        self.step: Callable[..., Any] = node.stage.step
+        self.state: State | None = node.signature.state[1]() if node.signature.state else None
+        self.fixed: dict[str, Any] = {node.signature.state[0]: self.state} if node.signature.state else {}
+        self.outputs = [(name, f"{node.name}.{name}") for name in node.signature.outputs]
+        self.skips = f"skipped.{node.name}"
+        self.inputs: list[tuple[str, str, str | None, bool]] = []
+        for wire in wires:
+            port = node.signature.inputs[wire.to_port]
+            key, instead = wire.origin, None
+            if wire.delay:
+                key = channel_key(wire)
+                instead = wire.initial if wire.initial not in static else None
+            elif wire.hold:
+                key = held_key(wire.origin)
+            self.inputs.append((wire.to_port, key, instead, port.optional))
+        self.times = array("d")  # seconds, one for each tick; NaN where it did not run
+
+    def run(self, values: dict[str, Any]) -> bool:
+        """Run the stage on the values of this tick and put its outputs there. False where a source has ended."""
+        given = dict(self.fixed)
+        for port, key, instead, optional in self.inputs:
+            value = values.get(key)
+            if instead is not None and values.get(instead) is not None:
+                value = values[instead]
+            if value is None and not optional:
+                if self.node.lifetime != "before":  # there it is a choice, and nothing has been lost
+                    self.ctx.counts[self.skips] += 1
+                self.times.append(math.nan)
+                for _, origin in self.outputs:
+                    values[origin] = None
+                return True
+            given[port] = value
+        start = time.perf_counter()
+        try:
+            out = self.step(self.ctx, **given)
+        except BadInput:
+            raise
+        except Exception as error:
+            raise StageFailed(self._message(error)) from error
+        self.times.append(time.perf_counter() - start)
+        for name, origin in self.outputs:
+            values[origin] = getattr(out, name) if out is not None else None
+        return out is not None
+
+    def _message(self, error: Exception) -> str:
+        tick = self.ctx.tick
+        where = f"stage '{self.node.name}' ({self.node.target})"
+        when = f" at tick {tick.index} (log {tick.log}, frame {tick.frame})" if self.node.lifetime == "tick" else ""
+        return f"{where} failed{when}: {type(error).__name__}: {error}"

@@ -1,0 +1,374 @@
+"""Nodes and wires, checked: `build(config)` gives a graph that will run, or every problem at once."""
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import networkx as nx
+
+from .graph import ARTIFACTS, LIFETIMES, Graph, Lifetime, Node, Wire
+from .ground_truth import truth_in_the_loop
+from .ports import compatible, convert_fields, type_name
+from .problems import Problem, ProblemsFound, nearest, suggest
+from .registry import UnknownStage, entries, resolve
+from .signature import BadStage, Port, Signature, signature
+from .stage import Stage
+from .value import Tick
+
+
+def build(
+    config: Mapping[str, Any],
+    artifact_types: Mapping[str, Any] | None = None,
+    prefix: str = "",
+    shared: Iterable[str] = (),
+) -> Graph:
+    """The graph that a configuration describes.
+
+    `config` holds `nodes` (name -> `_target_` and parameters) and `wires` (node -> port -> wire). `artifact_types`
+    says which artifacts there are and of which type. `prefix` goes before all config paths of problems, except
+    those of `shared` nodes. Raises `ProblemsFound` with all problems; nothing has been run or read by then.
+    """
+    builder = _Builder(config, dict(artifact_types or {}), prefix, frozenset(shared))
+    graph = builder.build()
+    if builder.problems:
+        raise ProblemsFound(dict.fromkeys(builder.problems))
+    return graph
+
+
+class _Builder:
+    def __init__(
+        self, config: Mapping[str, Any], artifacts: dict[str, Any], prefix: str, shared: frozenset[str]
+    ) -> None:
+        self.config, self.artifacts, self.prefix, self.shared = config, artifacts, prefix, shared
+        self.problems: list[Problem] = []
+        self.nodes: dict[str, Node] = {}
+        self.broken: set[str] = set()
+        self.wires: list[Wire] = []
+
+    def build(self) -> Graph:
+        self._read_nodes()
+        self._read_wires()
+        self._check_missing()
+        graph = Graph(self.nodes, self.wires, self.artifacts)
+        if not self.problems:
+            lifetimes = self._lifetimes()
+            graph = self._ordered(lifetimes)
+            for where, what, hint in truth_in_the_loop(graph):
+                self._problem(where, what, hint)
+        return graph
+
+    def _problem(self, where: str, what: str, hint: str = "") -> None:
+        self.problems.append(Problem(self.prefix + where, what, hint))
+
+    # nodes
+
+    def _read_nodes(self) -> None:
+        nodes = self.config.get("nodes") or {}
+        if not isinstance(nodes, Mapping):
+            self._problem("nodes", "expected a mapping from names to stages", "write nodes: {match: {_target_: …}}")
+            return
+        for name, spec in nodes.items():
+            if spec is None:  # a node taken out of a variant
+                continue
+            node = self._read_node(str(name), spec)
+            if node is None:
+                self.broken.add(str(name))
+            else:
+                self.nodes[str(name)] = node
+
+    def _read_node(self, name: str, spec: Any) -> Node | None:
+        where = f"nodes.{name}"
+        if name == ARTIFACTS or "." in name:
+            self._problem(where, f"'{name}' cannot be the name of a node", "choose another name")
+            return None
+        if not isinstance(spec, Mapping) or not isinstance(spec.get("_target_"), str):
+            self._problem(where, "a node needs `_target_`", f"type {where}._target_=omninav.stages.…")
+            return None
+        target = spec["_target_"]
+        try:
+            cls = resolve(target)
+            read = signature(cls)
+        except UnknownStage as error:
+            known = [entry.target for entry in entries() if not entry.problem]
+            near = nearest(target, known)
+            hint = f"did you mean '{near}'?" if near else "`omninav stages` lists all stages"
+            self._problem(f"{where}._target_", str(error), hint)
+            return None
+        except BadStage as error:
+            self._problem(f"{where}._target_", str(error))
+            return None
+        path = where if name in self.shared else self.prefix + where
+        parameters, found = convert_fields(spec, cls, path, skip=("_target_",))
+        self.problems += found
+        if found:
+            return (
+                None
+                if any(p.default is dataclasses.MISSING for p in read.parameters.values())
+                else _unset(name, target, cls, read)
+            )
+        try:
+            stage = cls(**parameters)
+        except (ValueError, TypeError) as error:  # what __post_init__ says of parameters that do not go together
+            self.problems.append(Problem(path, str(error)))
+            return None
+        plain = {key: value for key, value in spec.items() if key != "_target_"}
+        return Node(name, target, stage, read, plain)
+
+    # wires
+
+    def _read_wires(self) -> None:
+        wires = self.config.get("wires") or {}
+        if not isinstance(wires, Mapping):
+            self._problem(
+                "wires",
+                "expected a mapping: node -> port -> where it comes from",
+                "write wires: {match: {map: artifacts.map}}",
+            )
+            return
+        for name, ports in wires.items():
+            if ports is None:
+                continue
+            if not isinstance(ports, Mapping):
+                self._problem(
+                    f"wires.{name}",
+                    "expected a mapping from ports to where they come from",
+                    f"write wires: {{{name}: {{port: node.port}}}}",
+                )
+            elif name not in self.nodes:
+                if name not in self.broken:
+                    near = nearest(str(name), self.nodes, 0.7)
+                    hint = f"did you mean 'wires.{near}'? " if near else ""
+                    hint += f"if the node was taken out, type '~wires.{name}' too"
+                    self._problem(f"wires.{name}", f"this feeds the node '{name}', and there is none", hint)
+            else:
+                for port, spec in ports.items():
+                    if spec is not None:
+                        self._read_wire(self.nodes[name], str(port), spec)
+
+    def _read_wire(self, node: Node, port_name: str, spec: Any) -> None:
+        where = f"wires.{node.name}.{port_name}"
+        port = node.signature.inputs.get(port_name)
+        if port is None:
+            hint = suggest(port_name, node.signature.inputs, "input ports", prefix=f"wires.{node.name}.")
+            self._problem(where, f"{type(node.stage).__name__} has no input port '{port_name}'", hint)
+            return
+        options = {"from": spec} if isinstance(spec, str) else spec
+        if not isinstance(options, Mapping) or not isinstance(options.get("from"), str):
+            self._problem(
+                where, f"{spec!r} is no wire", "write node.port, or {from: node.port, delay: 1, initial: node.port}"
+            )
+            return
+        unknown = [key for key in options if key not in ("from", "delay", "initial", "hold", "collect")]
+        for key in unknown:
+            self._problem(
+                f"{where}.{key}",
+                "a wire has no such option",
+                suggest(str(key), ("from", "delay", "initial", "hold", "collect"), "options"),
+            )
+        delay, initial = options.get("delay", 0), options.get("initial")
+        hold, collect = options.get("hold", False), options.get("collect", False)
+        if not isinstance(delay, int) or isinstance(delay, bool) or delay < 0:
+            self._problem(f"{where}.delay", f"{delay!r}, expected a whole number of ticks >= 0")
+            return
+        if not isinstance(hold, bool) or not isinstance(collect, bool):
+            self._problem(where, "hold and collect are true or false")
+            return
+        given = self._output(where, options["from"], port)
+        if given is None:
+            return
+        self._check_types(where, options["from"], given, node, port)
+        if delay and "initial" not in options:
+            hint = f"type +{where}.initial={'null, or node.port' if port.optional else 'node.port'}"
+            self._problem(where, f"a wire with delay {delay} needs a first value", hint)
+        if delay and initial is None and "initial" in options and not port.optional:
+            what = f"{type(node.stage).__name__} needs '{port_name}' at every tick, and the first value is null"
+            self._problem(f"{where}.initial", what, self._producers(port))
+        if initial is not None and not delay:
+            self._problem(where, "only a delayed wire has an initial value", f"add delay: 1 to {where}")
+        if initial is not None:
+            first = self._output(f"{where}.initial", initial, port)
+            if first is not None:
+                self._check_types(f"{where}.initial", initial, first, node, port)
+        if port.collects != collect:
+            what = "takes a whole sequence" if port.collects else "takes one value, not a sequence"
+            hint = "write {from: …, collect: true}" if port.collects else "leave collect away"
+            self._problem(where, f"port '{port_name}' of {type(node.stage).__name__} {what}", hint)
+        if collect and (delay or hold):
+            self._problem(where, "a collect wire has neither delay nor hold")
+        source_node, _, source_port = options["from"].partition(".")
+        self.wires.append(Wire(node.name, port_name, source_node, source_port, delay, hold, collect, initial))
+
+    def _output(self, where: str, origin: Any, wanted: Port) -> Port | None:
+        if not isinstance(origin, str) or origin.count(".") != 1:
+            self._problem(where, f"{origin!r} is not of the form node.port", self._producers(wanted))
+            return None
+        node, _, port = origin.partition(".")
+        if node in self.broken:
+            return None
+        if node == ARTIFACTS:
+            if port in self.artifacts:
+                return Port(port, self.artifacts[port])
+            self._problem(
+                where, f"there is no artifact '{port}'", suggest(port, self.artifacts, "artifacts", prefix="artifacts.")
+            )
+            return None
+        if node not in self.nodes:
+            near = nearest(node, self.nodes, 0.7)
+            hint = f"did you mean '{near}.{port}'? " if near else ""
+            hint += f"type '~{where}' if it can do without; " if wanted.optional and not near else ""
+            self._problem(where, f"this reads {origin}, and there is no node '{node}'", hint + self._producers(wanted))
+            return None
+        outputs = self.nodes[node].signature.outputs
+        if port not in outputs:
+            hint = suggest(port, outputs, f"outputs of {node}", prefix=f"{node}.")
+            self._problem(
+                where, f"node '{node}' ({type(self.nodes[node].stage).__name__}) has no output '{port}'", hint
+            )
+            return None
+        return outputs[port]
+
+    def _producers(self, wanted: Port) -> str:
+        """Which outputs of the graph would fit a port: what to type instead of a wrong name."""
+        found = [f"{ARTIFACTS}.{name}" for name, kind in self.artifacts.items() if compatible(kind, wanted.type)]
+        for node in self.nodes.values():
+            found += [
+                f"{node.name}.{p.name}" for p in node.signature.outputs.values() if compatible(p.type, wanted.type)
+            ]
+        kind = type_name(wanted.type)
+        return f"what gives {kind} here: {', '.join(sorted(found))}" if found else f"nothing in this graph gives {kind}"
+
+    def _check_types(self, where: str, origin: str, given: Port, node: Node, port: Port) -> None:
+        if not compatible(given.type, port.type):
+            taker = f"{node.name}.{port.name} ({type(node.stage).__name__})"
+            what = f"{origin} gives {type_name(given.type)}, {taker} takes {type_name(port.type)}"
+            self._problem(where, what, self._producers(port))
+
+    def _check_missing(self) -> None:
+        attempted = {
+            (str(name), str(port))
+            for name, ports in (self.config.get("wires") or {}).items()
+            if isinstance(ports, Mapping)
+            for port, spec in ports.items()
+            if spec is not None
+        }
+        for node in self.nodes.values():
+            for port in node.signature.inputs.values():
+                if not port.optional and (node.name, port.name) not in attempted:
+                    where = f"wires.{node.name}.{port.name}"
+                    wanted = f"{type_name(port.type)} on '{port.name}'"
+                    what = f"{type(node.stage).__name__} needs {wanted}, and nothing is wired to it"
+                    self._problem(where, what, self._producers(port))
+        sources = [node.name for node in self.nodes.values() if node.signature.is_source]
+        if len(sources) > 1:
+            self._problem(
+                "nodes",
+                f"there are several sources ({', '.join(sources)}); a graph has one",
+                "take all but one out: '~nodes.…'",
+            )
+        for name in sources:
+            tick = self.nodes[name].signature.outputs.get("tick")
+            if tick is None or tick.type is not Tick:
+                self._problem(f"nodes.{name}", "a source needs an output `tick: Tick`")
+
+    # order
+
+    def _lifetimes(self) -> dict[str, Lifetime]:
+        flow: nx.DiGraph[str] = nx.DiGraph()
+        flow.add_nodes_from(self.nodes)
+        for wire in self.wires:
+            if wire.from_node != ARTIFACTS:
+                flow.add_edge(wire.from_node, wire.to_node)
+            if wire.initial and not wire.initial.startswith(f"{ARTIFACTS}."):
+                flow.add_edge(wire.initial.partition(".")[0], wire.to_node)
+        after_roots = {wire.to_node for wire in self.wires if wire.collect}
+        tick_roots = {name for name, node in self.nodes.items() if node.signature.is_source}
+        tick_roots |= {wire.to_node for wire in self.wires if wire.delay}
+        after = after_roots | {n for root in after_roots for n in nx.descendants(flow, root)}
+        ticking = tick_roots | {n for root in tick_roots for n in nx.descendants(flow, root)}
+        for wire in self.wires:
+            if wire.to_node in after and wire.delay:
+                self._problem(
+                    wire.where,
+                    f"'{wire.to_node}' runs after the loop (something collects a sequence): no tick is before it",
+                    "leave delay away",
+                )
+        for name in sorted(after & tick_roots):
+            if self.nodes[name].signature.is_source:
+                self._problem(f"nodes.{name}", "a source cannot wait for what is collected until the end")
+        if ticking - after and not any(node.signature.is_source for node in self.nodes.values()):
+            self._problem("nodes", "there is a loop but no source that makes ticks", "add a source: source=log")
+        return {name: "after" if name in after else "tick" if name in ticking else "before" for name in self.nodes}
+
+    def _ordered(self, lifetimes: dict[str, Lifetime]) -> Graph:
+        order: nx.DiGraph[str] = nx.DiGraph()
+        order.add_nodes_from(self.nodes)
+        for wire in self.wires:
+            if wire.from_node != ARTIFACTS and not wire.delay:
+                order.add_edge(wire.from_node, wire.to_node)
+            if wire.initial and not wire.initial.startswith(f"{ARTIFACTS}."):
+                order.add_edge(wire.initial.partition(".")[0], wire.to_node)
+        cycle = _cycle(order)
+        if cycle:
+            path = " -> ".join([*cycle, cycle[0]])
+            around = zip(cycle, [*cycle[1:], cycle[0]], strict=True)
+            edges = {(start, end) for start, end in around}
+            wire = next((w for w in self.wires if (w.from_node, w.to_node) in edges and not w.delay), self.wires[0])
+            hint = f"break the loop with a delay: {wire.where}={{from: {wire.origin}, delay: 1, initial: …}}"
+            self._problem(wire.where, f"the nodes wait for each other: {path}", hint)
+            return Graph(self.nodes, self.wires, self.artifacts)
+        self._order_in_place(order, lifetimes)
+        listed = list(self.nodes)
+
+        def early(name: str) -> tuple[int, bool, int]:
+            return LIFETIMES.index(lifetimes[name]), not self.nodes[name].signature.is_source, listed.index(name)
+
+        running = nx.lexicographical_topological_sort(order, key=early)
+        nodes = {name: dataclasses.replace(self.nodes[name], lifetime=lifetimes[name]) for name in running}
+        return Graph(nodes, self.wires, self.artifacts)
+
+    def _order_in_place(self, order: "nx.DiGraph[str]", lifetimes: dict[str, Lifetime]) -> None:
+        """Readers of the delayed value run before the stage that updates it; whatever cannot be so is a problem."""
+        firsts: dict[str, str | None] = {}
+        for wire in self.wires:
+            given = (
+                self.nodes[wire.from_node].signature.outputs[wire.from_port] if wire.from_node in self.nodes else None
+            )
+            if given is None or not getattr(given.type, "in_place", False):
+                continue
+            kind = type_name(given.type)
+            if wire.collect or wire.hold or wire.delay > 1:
+                self._problem(
+                    wire.where,
+                    f"{kind} is updated in place: read it undelayed or with delay 1; it cannot be collected or held",
+                    "collect small events instead",
+                )
+            if wire.delay == 1:
+                if firsts.setdefault(wire.origin, wire.initial) != wire.initial:
+                    self._problem(
+                        f"{wire.where}.initial",
+                        f"{wire.origin} is one {kind}: all its delayed wires need the same initial value",
+                        f"write initial: {firsts[wire.origin]}",
+                    )
+                if wire.to_node != wire.from_node:
+                    order.add_edge(wire.to_node, wire.from_node)
+                    cycle = _cycle(order)
+                    if cycle:
+                        order.remove_edge(wire.to_node, wire.from_node)
+                        self._problem(
+                            wire.where,
+                            f"'{wire.to_node}' must read {kind} before '{wire.from_node}' updates it, "
+                            f"but runs after it ({' -> '.join(cycle)})",
+                            f"read it undelayed: {wire.where}={wire.origin}",
+                        )
+
+
+def _cycle(order: "nx.DiGraph[str]") -> list[str] | None:
+    try:
+        return [edge[0] for edge in nx.find_cycle(order)]
+    except nx.NetworkXNoCycle:
+        return None
+
+
+def _unset(name: str, target: str, cls: type[Stage], read: Signature) -> Node:
+    """A stand-in with default parameters for a node whose parameters are wrong, so that its wires are checked too."""
+    return Node(name, target, cls(), read, {})

@@ -1,0 +1,130 @@
+"""Artifacts: loaded from their files, found in the cache, or made by running their graphs."""
+
+import shutil
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from omninav.pipeline.engine.artifact import read_artifact, read_header, write_artifact
+from omninav.pipeline.engine.cache import Cache, seeded
+from omninav.pipeline.engine.code_version import graph_digest
+from omninav.pipeline.engine.engine import Engine, EngineOptions
+from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix
+from omninav.pipeline.files import digest_file, digest_text
+from omninav.pipeline.graph.graph import Graph
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.value import Value
+
+from .plan import ArtifactPlan, digests_of, stages_of
+from .results import notes_of
+from .run_folder import Run
+
+
+class ProgressDisplay(Protocol):
+    """Who shows how far a run is."""
+
+    def update(self, name: str, done: int, total: int | None = None) -> None:
+        """`done` ticks of `total` have gone through the graph `name`."""
+
+
+@dataclass(frozen=True)
+class Execution:
+    """With what a run's graphs are run."""
+
+    run: Run
+    seed: int
+    cache: Cache | None = None
+    checkpoint_s: float = 5.0
+    display: ProgressDisplay | None = None
+
+    def options(self, name: str, memory: Path, identity: str, folder: Path | None = None) -> EngineOptions:
+        """The engine's options for the graph that is shown as `name`."""
+
+        def on_tick(done: int, total: int | None) -> None:
+            if self.display is not None:
+                self.display.update(name, done, total)
+
+        return EngineOptions(self.seed, folder, memory, identity, self.checkpoint_s, on_tick)
+
+
+def identity(graph: Graph, seed: int, *more: str) -> str:
+    """The hash by which a checkpoint knows the run that it belongs to."""
+    return digest_text(graph_digest(graph), str(seed), *digests_of(graph).values(), *more)
+
+
+def companions(artifact: ArtifactPlan, artifacts: Sequence[ArtifactPlan]) -> list[ArtifactPlan]:
+    """The other artifacts that are outputs of the same graph: one run makes them all."""
+    if artifact.whole is None:
+        return []
+    same = graph_digest(artifact.whole)
+    others = [other for other in artifacts if other is not artifact and other.whole is not None]
+    return [other for other in others if other.whole is not None and graph_digest(other.whole) == same]
+
+
+def obtain(
+    execution: Execution, artifact: ArtifactPlan, together: Sequence[ArtifactPlan] = ()
+) -> tuple[Value, dict[str, Any]]:
+    """The artifact's value, from its file, the cache or its graph's run, with what the manifest says of it.
+
+    Where its graph has to run, what else that gives (`together`) is put into the cache too.
+    """
+    run, seed = execution.run, execution.seed
+    target = run.folder / f"{artifact.name}.omap"
+    if artifact.file is not None:
+        value = read_artifact(artifact.file)
+        shutil.copyfile(artifact.file, target)
+        loaded = {"file": str(artifact.file), "sha256": digest_file(target), "reason": "loaded from a file"}
+        return value, {**loaded, **read_header(artifact.file)["facts"]}
+    cache = execution.cache or Cache(run.memory / "artifacts")
+    key = _key(artifact)
+    with cache.lock(key):
+        found = next((path for k in (key, seeded(key, seed)) if (path := cache.path(k, ".omap")).exists()), None)
+        reason = "found: the same graph over the same log had made it before"
+        if found is None:
+            reason = "made: code, parameters or log are new to the cache"
+            for each, value, header, drew in _make(execution, [artifact, *together]):
+                own = _key(each)
+                path = cache.path(seeded(own, seed) if drew else own, ".omap")
+                write_artifact(path, value, header)
+                found = found or path  # the first is the one that is wanted
+        assert found is not None
+    value = read_artifact(found)
+    shutil.copyfile(found, target)
+    made = {"variant": artifact.variant, "output": artifact.origin, "sha256": digest_file(target), "reason": reason}
+    return value, {**made, **read_header(found)["facts"]}
+
+
+def _key(artifact: ArtifactPlan) -> str:
+    assert artifact.graph is not None
+    return digest_text("artifact", graph_digest(artifact.graph), artifact.origin, *digests_of(artifact.graph).values())
+
+
+def _make(
+    execution: Execution, wanted: Sequence[ArtifactPlan]
+) -> Iterator[tuple[ArtifactPlan, Value, dict[str, Any], bool]]:
+    """Run the graph of some artifacts; of each that it gave: value, header, and whether random numbers decided it."""
+    artifact, origins = wanted[0], [each.origin for each in wanted]
+    graph = artifact.graph if len(wanted) == 1 or artifact.whole is None else artifact.whole.leading_to(origins)
+    assert graph is not None
+    memory = execution.run.memory / artifact.name
+    options = execution.options(artifact.variant, memory, identity(graph, execution.seed))
+    with cached_prefix(graph, execution.cache, execution.seed) as prefix:
+        replay, recorded = (prefix.replay, prefix.recorded()) if prefix is not None else (None, {})
+        engine = Engine(graph, {}, options, wanted=origins, replay=replay, recorded=recorded)
+        values = engine.run()
+        keep_prefix(engine, prefix, execution.cache)
+    if not isinstance(values[artifact.origin], Value):
+        raise BadInput(
+            f"'{artifact.variant}' ran to its end and gave no {artifact.name}: was there anything usable in its log?"
+        )
+    for each in wanted:
+        value = values[each.origin]
+        if isinstance(value, Value) and each.graph is not None:
+            drew = any(engine.calls[name].ctx.drew for name in each.graph.nodes)
+            yield each, value, provenance(each.graph, engine, each.variant), drew
+
+
+def provenance(graph: Graph, engine: Engine, variant: str) -> dict[str, Any]:
+    """How an artifact was made, for its file's header: what was dropped and stated, the variant, and its stages."""
+    return {**notes_of(engine, graph.nodes), "variant": variant, "stages": stages_of(graph)}

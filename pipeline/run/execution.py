@@ -1,0 +1,134 @@
+"""Running what was planned, in its folder, to the files that are left at the end."""
+
+import json
+import logging
+import shutil
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from omninav.pipeline.engine.artifact import write_artifact
+from omninav.pipeline.engine.cache import Cache
+from omninav.pipeline.engine.call import StageFailed
+from omninav.pipeline.engine.engine import Engine
+from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix
+from omninav.pipeline.files import digest_file, write_whole
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline.graph.value import Value
+
+from .artifacts import Execution, ProgressDisplay, companions, identity, obtain, provenance
+from .metrics_files import write_metrics
+from .plan import Plan
+from .results import notes_of, results_of
+from .run_folder import Run
+from .timing import stage_times
+
+log = logging.getLogger("omninav")
+
+
+def execute(run: Run, planned: Plan, display: ProgressDisplay | None = None) -> Metrics:
+    """Run a planned configuration in its folder, from its start or from where it was left, and return its metrics.
+
+    Raises `StageFailed` or `BadInput`; by then the manifest says so and the traceback is in `run.log`.
+    """
+    with _logged(run):
+        try:
+            return _execute(run, planned, display)
+        except KeyboardInterrupt:
+            _fail(run, "interrupted", "stopped by the user")
+            raise
+        except (StageFailed, BadInput) as error:
+            _fail(run, "failed", str(error))
+            raise
+        except Exception as error:
+            _fail(run, "failed", f"{type(error).__name__}: {error}")
+            raise
+
+
+def _execute(run: Run, planned: Plan, display: ProgressDisplay | None) -> Metrics:
+    config = planned.config
+    cache = Cache(Path(str(config["cache"]))) if config.get("cache") else None
+    execution = Execution(run, planned.seed, cache, float(config.get("checkpoint_s", 5.0)), display)
+    artifacts: dict[str, Value] = {}
+    made: dict[str, Any] = {}
+    for artifact in planned.artifacts:
+        together = companions(artifact, planned.artifacts)
+        artifacts[artifact.name], made[artifact.name] = obtain(execution, artifact, together)
+    run.manifest["artifacts"] = made
+    run.save()
+    own = identity(planned.graph, planned.seed, *(facts["sha256"] for facts in made.values()))
+    options = execution.options(planned.variant, run.memory, own, run.folder)
+    with cached_prefix(planned.graph, cache, planned.seed) as prefix:
+        replay, recorded = (prefix.replay, prefix.recorded()) if prefix is not None else (None, {})
+        wanted = sorted(set(planned.saves.values()))
+        engine = Engine(planned.graph, artifacts, options, wanted=wanted, replay=replay, recorded=recorded)
+        last = engine.run()
+        keep_prefix(engine, prefix, cache)
+    for name, origin in planned.saves.items():
+        value = last[origin]
+        if isinstance(value, Value):
+            file = run.folder / f"{name}.omap"
+            write_artifact(file, value, provenance(planned.graph.leading_to([origin]), engine, planned.variant))
+            saved = {"file": file.name, "bytes": file.stat().st_size, "sha256": digest_file(file)}
+            run.manifest.setdefault("saved", {})[name] = saved
+    none = "not cached: nothing in this graph follows from its log alone"
+    return _finish(run, engine, prefix.reason if prefix is not None else none)
+
+
+def _finish(run: Run, engine: Engine, prefix_reason: str) -> Metrics:
+    from omninav.pipeline.report.run_page import write_report
+
+    metrics, figures, tables = results_of(engine)
+    notes, timing = notes_of(engine), stage_times(engine)
+    write_metrics(run.folder, metrics)
+    write_whole(run.folder / "timing.json", json.dumps(timing, indent=1) + "\n")
+    facts = {
+        f"{key} ({name})": value
+        for name, artifact in run.manifest["artifacts"].items()
+        for key, value in (artifact.get("facts") or {}).items()
+    }
+    run.manifest |= {
+        "ended": datetime.now().isoformat(timespec="seconds"),
+        "ticks": engine.ticks,
+        "dropped": notes["dropped"],
+        "facts": facts | notes["facts"],
+        "prefix": prefix_reason,
+    }
+    for kind, entry in notes["dropped"].items():
+        log.warning("%s: %s%s", kind, entry["count"], f" (first: {entry['first']})" if entry["first"] else "")
+    graph_svg, config_yaml = (run.folder / "graph.svg").read_text(), (run.folder / "config.yaml").read_text()
+    done = {**run.manifest, "status": "complete"}
+    write_report(run.folder, done, metrics, timing, graph_svg, figures, tables, config_yaml)
+    run.manifest = done
+    run.save()
+    for sequence in engine.sequences.values():
+        sequence.close()
+    shutil.rmtree(run.memory, ignore_errors=True)
+    return metrics
+
+
+def _fail(run: Run, status: str, what: str) -> None:
+    run.manifest |= {"status": status, "error": what, "ended": datetime.now().isoformat(timespec="seconds")}
+    run.save()
+    log.error("%s\n%s", what, traceback.format_exc())
+
+
+@contextmanager
+def _logged(run: Run) -> Iterator[None]:
+    handler = logging.FileHandler(run.folder / "run.log", encoding="utf-8")
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    log.addHandler(handler)
+    log.setLevel(logging.INFO)
+    log.propagate = False
+    log.disabled = False  # Hydra's logging set-up silences loggers that were there before it
+    try:
+        log.info("omninav %s", " ".join(run.manifest["argv"][1:]) or "(the embedded default)")
+        yield
+        log.info("complete: %s ticks", run.manifest.get("ticks"))
+    finally:
+        log.removeHandler(handler)
+        handler.close()

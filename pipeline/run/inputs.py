@@ -1,0 +1,45 @@
+"""What a run is of: the settings that a variant takes, and whether they are given."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from omninav.pipeline.graph.ports import convert
+from omninav.pipeline.graph.problems import Problem, ProblemsFound
+
+
+@dataclass(frozen=True)
+class Input:
+    """A setting that a variant takes. In a file a plain text is the meaning of one that need not be given."""
+
+    meaning: str
+    required: bool = False
+
+
+def read_inputs(config: Mapping[str, Any]) -> dict[str, Input]:
+    """The inputs that a plain configuration declares. Raises `ProblemsFound` where the block cannot be understood."""
+    declared, problems = convert(config.get("inputs") or {}, dict[str, str | Input], "inputs")
+    if problems:
+        raise ProblemsFound(problems)
+    return {name: Input(given) if isinstance(given, str) else given for name, given in declared.items()}
+
+
+def not_taken(config: Mapping[str, Any], settings: Iterable[str]) -> Iterator[Problem]:
+    """Which of some settings are given and not taken by this variant: its figures would be of something else."""
+    inputs = read_inputs(config)
+    for name in settings:
+        if config.get(name) is not None and name not in inputs:
+            takes = ", ".join(inputs) or "no input at all"
+            hint = f"leave {name}=… away; its `inputs` are: {takes}"
+            yield Problem(name, f"variant={config.get('variant')} does not take it", hint)
+
+
+def refuse_missing(config: Mapping[str, Any]) -> None:
+    """Raise `ProblemsFound` where an input is required and not given."""
+    problems = [
+        Problem(name, f"variant={config.get('variant')} needs it: {wanted.meaning}", f"type {name}=…")
+        for name, wanted in read_inputs(config).items()
+        if wanted.required and config.get(name) is None
+    ]
+    if problems:
+        raise ProblemsFound(problems)

@@ -1,0 +1,186 @@
+"""A configuration, checked: the graph, where its artifacts come from, and what is to be saved."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from omninav.pipeline.engine.artifact import read_header
+from omninav.pipeline.engine.code_version import graph_digest
+from omninav.pipeline.files import digest_file
+from omninav.pipeline.graph.builder import build
+from omninav.pipeline.graph.graph import Graph
+from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
+from omninav.pipeline.graph.registry import UnknownStage, entries, resolve
+from omninav.pipeline.graph.value import VALUE_TYPES
+
+from .artifact_specification import ArtifactSpecification, read_specifications, without_absent
+
+
+@dataclass(frozen=True)
+class ArtifactPlan:
+    """Where an artifact comes from: a file, or a graph whose output `origin` is taken.
+
+    `graph` is the part of the `whole` that this output depends on.
+    """
+
+    name: str
+    file: Path | None = None
+    graph: Graph | None = None
+    origin: str = ""
+    variant: str = ""
+    whole: Graph | None = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A configuration that has been checked: the graph, its artifacts, and what is to be saved."""
+
+    config: Mapping[str, Any]
+    graph: Graph
+    artifacts: tuple[ArtifactPlan, ...]
+    saves: Mapping[str, str]
+
+    @property
+    def variant(self) -> str:
+        """The variant's name."""
+        return str(self.config.get("variant"))
+
+    @property
+    def seed(self) -> int:
+        """The run's seed."""
+        return int(self.config.get("seed", 0))
+
+    @property
+    def digest(self) -> str:
+        """A hash over the graph's code, parameters and wires."""
+        return graph_digest(self.graph)
+
+
+def plan(config: Mapping[str, Any]) -> Plan:
+    """Check a plain, resolved configuration. Raises `ProblemsFound` with everything that is wrong with it."""
+    problems: list[Problem] = []
+    artifacts: list[ArtifactPlan] = []
+    types: dict[str, Any] = {}
+    config = without_absent(config)
+    specs = read_specifications(config)
+    _load_stages(config)
+    seed = config.get("seed", 0)
+    if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
+        problems.append(Problem("seed", f"{seed!r}, expected a whole number >= 0", "type seed=0"))
+    for name, spec in specs.items():
+        try:
+            made = _plan_artifact(name, spec)
+        except ProblemsFound as found:
+            problems += found.problems
+            types[name] = Any
+            continue
+        artifacts.append(made)
+        if made.graph is not None:
+            port = made.graph.port(made.origin)
+            types[name] = port.type if port else Any
+        elif made.file is not None:
+            types[name] = VALUE_TYPES.get(read_header(made.file)["type"], Any)
+    graph: Graph | None = None
+    try:
+        graph = build(config, types)
+    except ProblemsFound as found:
+        problems += found.problems
+    saves = config.get("saves") or {}
+    if graph is not None:
+        for made in artifacts:
+            if made.file is not None:
+                made_by = read_header(made.file)["facts"].get("stages") or {}
+                problems += mismatches(made.name, made_by, graph, specs[made.name].must_match)
+        for name, origin in saves.items():
+            if graph.port(str(origin)) is None:
+                problems.append(_no_output(f"saves.{name}", str(origin), graph))
+    if problems or graph is None:
+        raise ProblemsFound(dict.fromkeys(problems))
+    return Plan(config, graph, tuple(artifacts), saves)
+
+
+def _no_output(where: str, origin: str, graph: Graph) -> Problem:
+    outputs = [f"{node.name}.{port}" for node in graph.nodes.values() for port in node.signature.outputs]
+    return Problem(where, f"there is no output '{origin}'", suggest(origin, outputs, "outputs"))
+
+
+def _load_stages(config: Mapping[str, Any]) -> None:
+    """Import the stages' modules, so that the value types which a file may hold are known."""
+    for spec in (config.get("nodes") or {}).values():
+        if isinstance(spec, Mapping) and isinstance(spec.get("_target_"), str):
+            with suppress(UnknownStage):  # reported by `build`
+                resolve(spec["_target_"])
+
+
+def _plan_artifact(name: str, spec: ArtifactSpecification) -> ArtifactPlan:
+    if spec.file is not None:
+        file = Path(spec.file)
+        try:
+            read_header(file)
+        except BadInput as error:
+            raise ProblemsFound([Problem(name, str(error), f"give another one: {name}=FILE.omap")]) from None
+        return ArtifactPlan(name, file=file)
+    if spec.graph is None:
+        give = " ".join(f"{setting}=…" for setting in spec.missing)
+        make = f"type {give} to make one with '{spec.variant}', or " if give else "type "
+        what = f"this variant needs a {name}, and none is given"
+        raise ProblemsFound([Problem(name, what, f"{make}{name}=FILE.omap to load one")])
+    where = f"artifacts.{name}"
+    graph = build(spec.graph, prefix=f"{where}.", shared=spec.inherit)
+    origin = spec.output or str((spec.graph.get("saves") or {}).get(name, ""))
+    if graph.port(origin) is None:
+        raise ProblemsFound([_no_output(f"{where}.output", origin, graph)])
+    return ArtifactPlan(name, None, graph.leading_to([origin]), origin, str(spec.variant), graph)
+
+
+def stages_of(graph: Graph) -> dict[str, Any]:
+    """Class and parameters of every node but the source, as plain data: what a file says of the graph that made it."""
+    found = {}
+    for node in graph.nodes.values():
+        if not node.signature.is_source:
+            parameters = {name: getattr(node.stage, name) for name in node.signature.parameters}
+            found[node.name] = {"_target_": node.target, **json.loads(json.dumps(parameters, default=str))}
+    return found
+
+
+def mismatches(name: str, made_by: Mapping[str, Any], graph: Graph, must_match: Sequence[str]) -> Iterator[Problem]:
+    """Where an artifact's file was made by other stages than this graph has, among the nodes that must match.
+
+    `made_by` is what `stages_of` gave then. A node that it does not know is not compared.
+    """
+    present = stages_of(graph)
+    for node in must_match:
+        then, now = made_by.get(node), present.get(node)
+        if then is None or now is None:
+            continue
+        again = f"or leave {name}=FILE away, and it is made anew"
+        before, after = (spec["_target_"].replace(":", ".").rpartition(".")[2] for spec in (then, now))
+        if before != after:
+            what = f"it was made with {before} as '{node}', and this run has {after}"
+            same = next((entry for entry in entries() if entry.target == then["_target_"]), None)
+            use = f"type {same.name.replace('.', '=', 1)}" if same else f"give that stage: {then['_target_']}"
+            yield Problem(name, what, f"{use}, {again}")
+            continue
+        for key in [key for key in then if key in now and key != "_target_" and then[key] != now[key]]:
+            what = f"it was made with nodes.{node}.{key}={then[key]}, and this run has {now[key]}"
+            yield Problem(name, what, f"type nodes.{node}.{key}={then[key]}, {again}")
+
+
+def input_digests(planned: Plan) -> dict[str, str]:
+    """The content hash of every file that the run reads, by node. Raises `BadInput` where one cannot be read."""
+    digests = digests_of(planned.graph)
+    for artifact in planned.artifacts:
+        if artifact.graph is not None:
+            digests |= {f"{artifact.name}.{name}": digest for name, digest in digests_of(artifact.graph).items()}
+        elif artifact.file is not None:
+            digests[artifact.name] = digest_file(artifact.file)
+    return digests
+
+
+def digests_of(graph: Graph) -> dict[str, str]:
+    """The content hash of the files that each node of a graph reads, where it reads any."""
+    found = {node.name: node.stage.inputs_digest() for node in graph.nodes.values()}
+    return {name: digest for name, digest in found.items() if digest is not None}

@@ -1,0 +1,46 @@
+"""What the stages of a graph that has run gave: metrics, figures, tables, and what they counted and stated."""
+
+from collections.abc import Container, Iterator
+from typing import Any
+
+from omninav.pipeline.engine.engine import Engine
+from omninav.pipeline.graph.results import Figure, Metrics, Table, merged
+
+
+def results_of(engine: Engine) -> tuple[Metrics, list[Figure], list[Table]]:
+    """Metrics merged into one, figures and tables."""
+    metrics: list[Metrics] = []
+    figures: list[Figure] = []
+    tables: list[Table] = []
+    for node in engine.graph.nodes.values():
+        for port in node.signature.outputs:
+            for value in _flat(engine.last(f"{node.name}.{port}")):
+                if isinstance(value, Metrics):
+                    metrics.append(value)
+                elif isinstance(value, Figure):
+                    figures.append(value)
+                elif isinstance(value, Table):
+                    tables.append(value)
+    return merged(metrics), figures, tables
+
+
+def _flat(value: Any) -> Iterator[Any]:
+    if isinstance(value, tuple | list):
+        for item in value:
+            yield from _flat(item)
+    elif value is not None:
+        yield value
+
+
+def notes_of(engine: Engine, only: Container[str] | None = None) -> dict[str, Any]:
+    """What the stages, or only these, counted and stated, as the manifest holds it."""
+    dropped: dict[str, Any] = {}
+    facts: dict[str, Any] = {}
+    for name, call in engine.calls.items():
+        if only is not None and name not in only:
+            continue
+        for kind, number in call.ctx.counts.items():
+            first = call.ctx.details.get(kind, "")
+            dropped[kind if "." in kind else f"{name}.{kind}"] = {"count": number, "first": first}
+        facts |= call.ctx.facts
+    return {"dropped": dropped, "facts": facts}
