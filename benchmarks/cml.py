@@ -78,7 +78,7 @@ def stage_ms(variant: str, references: int) -> dict[str, np.ndarray]:
         write_artifact(file, map)
         source = {"steps": STEPS, "every": 0, "kind": kind, **field}
         graph = graph_on_field(variant, source, limit, f"map={file}", "start=truth")
-        engine = Engine(graph, {"map": map}, 0, None, None, ["mapping.map"], "benchmark")
+        engine = Engine(graph, {"map": map}, wanted=["mapping.map"])
         with patch.object(time, "perf_counter", time.process_time):  # other work on the machine must not count
             engine.run()
     behind = [node.name for node in graph.of_lifetime("tick") if not node.signature.is_source]

@@ -56,7 +56,7 @@ def rows() -> list[Row]:
     ctx = Context("plain")
 
     def engine() -> None:
-        Engine(graph, {}, 0).run()
+        Engine(graph).run()
 
     def plain() -> None:
         source, place = Ticks(), Ticks.Place()

@@ -32,7 +32,7 @@ def main() -> int:
     import numpy as np
 
     from benchmarks.changing_field import graph_on_field
-    from omninav.pipeline.engine.engine import Engine
+    from omninav.pipeline.engine.engine import Engine, EngineOptions
     from omninav.stages.metrics.view_map_size import stored_bytes
 
     steps = int(sys.argv[1]) if len(sys.argv) > 1 else 100_000
@@ -61,7 +61,12 @@ def main() -> int:
             errors.clear()
 
     with tempfile.TemporaryDirectory() as folder:
-        engine = Engine(graph, {}, 0, None, Path(folder), ["mapping.map"], "soak", 30.0, None, progress)
+        engine = Engine(
+            graph,
+            {},
+            EngineOptions(memory=Path(folder), identity="soak", checkpoint_s=30.0, on_tick=progress),
+            wanted=["mapping.map"],
+        )
         engine.run()
     table = np.array(taken)
     quarters = np.array_split(table, 4)

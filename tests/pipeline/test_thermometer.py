@@ -106,9 +106,9 @@ def test_the_page_of_an_experiment_states_how_large_each_condition_was(experimen
 def test_no_stage_of_a_robot_is_imported(tmp_path: Path):
     code = (
         "import sys, pathlib, thermometer\n"
-        "from omninav.pipeline.run.execution import execute
-from omninav.pipeline.run.plan import plan
-from omninav.pipeline.run.run_folder import start\n"
+        "from omninav.pipeline.run.execution import execute\n"
+        "from omninav.pipeline.run.plan import plan\n"
+        "from omninav.pipeline.run.run_folder import start\n"
         f"planned = plan(thermometer.config(pathlib.Path({str(tmp_path)!r})))\n"
         "execute(start(planned, ['omninav']), planned)\n"
         "print([name for name in sys.modules if name.startswith('omninav.stages')])\n"
