@@ -66,6 +66,7 @@ def camera_section(camera: Camera) -> dict[str, Any]:
     content: dict[str, Any] = {"projection": camera.projection}
     for name, parameter in read_parameters(type(camera)).items():
         value, key = getattr(camera, name), keys_of(parameter)[0]
+        value = list(value) if isinstance(value, tuple) else value
         if value is None:
             continue
         if isinstance(key.name, int):
@@ -138,7 +139,8 @@ def _value(content: dict[str, Any], parameter: Parameter, known: Keys, where: st
             value = section.get(key.name)
         if value is None:
             continue
-        if isinstance(value, dict | list) or (isinstance(value, float) and not math.isfinite(value)):
+        parts = value if isinstance(value, list) else [value]
+        if any(isinstance(part, dict | list) or part in (math.inf, -math.inf) or part != part for part in parts):
             raise UnreadableRecording(f"{where}: '{path}' must be a number or a word, not {_shown(value)}")
         converted, problems = convert(value, parameter.type, path)
         if problems:
