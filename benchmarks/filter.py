@@ -7,8 +7,9 @@ from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.sensor.near_references import NearReferences
+from omninav.stages.sensor.similarity_proposals import SimilarityProposals
 from omninav.stages.values.belief import Particles
-from omninav.stages.values.length_scale import Reach
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
@@ -37,16 +38,18 @@ def _step() -> list[Row]:
     candidates = np.flatnonzero(np.hypot(poses[:, 0] - 50, poses[:, 1] - 30) < 4)
     field = Similarities(rng.uniform(0.4, 0.9, (len(candidates), 36)).astype(np.float32), candidates)
     motion, sensor, fusion = RotationTranslationRotation(), NearReferences(), ImportanceResampling()
+    proposals = SimilarityProposals()
     ctx = Context("filter", rng)
     ctx.tick = Tick(1, 1)
-    for stage in (motion, sensor, fusion):
+    for stage in (motion, sensor, proposals, fusion):
         stage.setup(ctx)
-    moved, reach, start = Motion(0.2, 0.0, 0.05), Reach(0.6), _particles()
+    moved, length_scale, start = Motion(0.2, 0.0, 0.05), LengthScale(0.6), _particles()
 
     def ours() -> None:
         predicted = motion.step(ctx, start, moved).belief
-        weighed = sensor.step(ctx, field, predicted, whole, moved, reach)
-        fusion.step(ctx, predicted, weighed.likelihood, weighed.proposals)
+        weighted = sensor.step(ctx, field, predicted, whole, moved, length_scale)
+        proposed = proposals.step(ctx, weighted.field, whole, length_scale).proposals
+        fusion.step(ctx, predicted, weighted.likelihood, proposed)
 
     functions = {"ours": ours}
     peer = _library()

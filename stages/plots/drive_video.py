@@ -58,7 +58,7 @@ QUIET: Colour = (115, 103, 92)
 """Blue-green-red, as in `style`."""
 
 
-class Scene(NamedTuple):
+class FrameState(NamedTuple):
     """All that a frame shows. `row`: its tick. `seconds`: since the drive began. `pose`, `goal` (3,): m, m, rad."""
 
     row: int
@@ -135,7 +135,7 @@ class DriveVideo(Stage):
                 goal = np.full(3, np.nan)
             belief = None if beliefs is None else beliefs[row]
             scenes.append(
-                Scene(
+                FrameState(
                     row,
                     float(drive.seconds[row]),
                     glance,
@@ -148,7 +148,7 @@ class DriveVideo(Stage):
                     statuses[row],
                 )
             )
-        frames = Frames(scenes, path, plan, map, self.around_m)
+        frames = VideoFrames(scenes, path, plan, map, self.around_m)
         ctx.doing(f"drawing a film of {len(frames)} frames")
         film = encoded(frames, self.per_second)
         name = f"drive{film.suffix}"
@@ -190,12 +190,12 @@ def _last_tick(
     return int(np.searchsorted(stamps, stamps[end] + after, side="right")) - 1
 
 
-class Frames(Sequence[Pixels]):
+class VideoFrames(Sequence[Pixels]):
     """The frames of a film, drawn when they are asked for."""
 
     def __init__(
         self,
-        scenes: Sequence[Scene],
+        scenes: Sequence[FrameState],
         path: Array,
         plan: FloorPlan | None,
         map: TopologicalMap | None,
@@ -234,7 +234,7 @@ class Frames(Sequence[Pixels]):
             return [self._drawn(scene) for scene in self.scenes[index]]
         return self._drawn(self.scenes[index])
 
-    def _drawn(self, scene: Scene) -> Pixels:
+    def _drawn(self, scene: FrameState) -> Pixels:
         frame = np.full((self.height, 2 * HALF + GAP, 3), 255, np.uint8)
         width, high = self.view
         seen = np.asarray(cv2.resize(decoded(scene.glance.jpeg), self.view, interpolation=cv2.INTER_AREA), np.uint8)
@@ -252,7 +252,7 @@ class Frames(Sequence[Pixels]):
         self._draw_around(frame, scene)
         return written(frame, words)
 
-    def _draw_whole(self, frame: Pixels, scene: Scene) -> None:
+    def _draw_whole(self, frame: Pixels, scene: FrameState) -> None:
         window = Window(HALF + GAP, 0, HALF, self.plan_height, self.extent)
         part = frame[: self.plan_height, HALF + GAP :]
         if self._ground is None:
@@ -263,7 +263,7 @@ class Frames(Sequence[Pixels]):
         _draw_path(frame, window, self.path[: scene.row + 1], 2)
         _draw_robot(frame, window, scene.pose, 9.0)
 
-    def _draw_around(self, frame: Pixels, scene: Scene) -> None:
+    def _draw_around(self, frame: Pixels, scene: FrameState) -> None:
         top = self.plan_height + GAP
         part = frame[top:, HALF + GAP :]
         if not np.isfinite(scene.pose).all():
@@ -309,7 +309,7 @@ class Frames(Sequence[Pixels]):
             for spot in window(self.map.poses):
                 disc(frame, tuple(spot), 2.0, LINK)
 
-    def _draw_belief_and_way(self, frame: Pixels, window: Window, scene: Scene, thick: int) -> None:
+    def _draw_belief_and_way(self, frame: Pixels, window: Window, scene: FrameState, thick: int) -> None:
         if self.map is None:
             return
         if scene.way is not None and len(scene.way.places):
@@ -342,7 +342,7 @@ def _draw_robot(frame: Pixels, window: Window, pose: Array, size: float) -> None
         arrow_head(frame, spot, np.array([math.cos(pose[2]), -math.sin(pose[2])]), DARK, size)
 
 
-def _said(scene: Scene) -> list[tuple[str, Colour]]:
+def _said(scene: FrameState) -> list[tuple[str, Colour]]:
     """What stands beside the pictures, line by line."""
     lines = [(f"{scene.seconds:.1f} s", DARK)]
     if scene.belief is not None:

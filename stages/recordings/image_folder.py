@@ -20,7 +20,7 @@ from .messages import Undecodable, decode_image, is_blank
 from .positions import frame_poses
 from .recording import Format, OpenOptions, UnreadableRecording
 from .stamps import ascending
-from .tables import Table, read_table
+from .tables import CsvTable, read_table
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -102,14 +102,14 @@ class ImageFolder:
             )
         return found[0]
 
-    def _table(self, pattern: str | None, header: bool, delimiter: str) -> Table | None:
+    def _table(self, pattern: str | None, header: bool, delimiter: str) -> CsvTable | None:
         if pattern is None:
             return None
         path = self._find(pattern)
         self._sources.append(path)
         return read_table(path, header, delimiter)
 
-    def _paths(self, table: Table | None) -> list[Path]:
+    def _paths(self, table: CsvTable | None) -> list[Path]:
         frames = self._description.frames
         if table is None:
             pattern = frames.images.replace("{which}", self._description.which)
@@ -126,7 +126,7 @@ class ImageFolder:
             names = [rename(name) for name in names]
         return [base / name for name in names]
 
-    def _times(self, table: Table | None, count: int) -> list[int | None]:
+    def _times(self, table: CsvTable | None, count: int) -> list[int | None]:
         frames = self._description.frames
         if table is not None and frames.time is not None:
             return table.nanoseconds(frames.time)

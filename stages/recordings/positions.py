@@ -10,14 +10,14 @@ from omninav.stages.geometry.plane.se2 import wrap
 from .description import Description
 from .recording import UnreadableRecording
 from .stamps import ascending, poses_at
-from .tables import Angle, Table
+from .tables import Angle, CsvTable
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
 
 
 def frame_poses(
-    description: Description, where: str, frames: Table | None, own: Table | None, times: list[int | None]
+    description: Description, where: str, frames: CsvTable | None, own: CsvTable | None, times: list[int | None]
 ) -> Array:
     """Poses (N, 3) of all frames at their `times` (ns), NaN where there is none.
 
@@ -60,7 +60,7 @@ def frame_poses(
 
 
 def headings(
-    description: Description, table: Table, rows: npt.NDArray[np.int64], stamps: Stamps, x: Array, y: Array
+    description: Description, table: CsvTable, rows: npt.NDArray[np.int64], stamps: Stamps, x: Array, y: Array
 ) -> Array:
     """Headings (K,) at rows of a table, of which stamps (ns) and positions (m) are given."""
     heading, tangent = description.heading, description.tangent

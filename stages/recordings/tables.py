@@ -63,7 +63,7 @@ class Angle:
 
 
 @dataclass(frozen=True)
-class Table:
+class CsvTable:
     """A CSV file as texts: `names` of the columns (their numbers where there is no header) and `rows`."""
 
     path: Path
@@ -106,7 +106,7 @@ class Table:
         return missing if value is None else finish(value)
 
 
-def read_table(path: Path, header: bool = True, delimiter: str = ",") -> Table:
+def read_table(path: Path, header: bool = True, delimiter: str = ",") -> CsvTable:
     """A CSV file; empty lines are skipped. Raises `UnreadableRecording`."""
     try:
         with path.open(newline="", encoding="utf-8-sig", errors="replace") as file:
@@ -122,8 +122,8 @@ def read_table(path: Path, header: bool = True, delimiter: str = ",") -> Table:
     if not rows:
         raise UnreadableRecording(f"{path}: an empty table")
     if header:
-        return Table(path, tuple(cell.strip() for cell in rows[0]), rows[1:])
-    return Table(path, tuple(str(number) for number in range(len(rows[0]))), rows)
+        return CsvTable(path, tuple(cell.strip() for cell in rows[0]), rows[1:])
+    return CsvTable(path, tuple(str(number) for number in range(len(rows[0]))), rows)
 
 
 def _in_base_unit(text: str, unit: str) -> Decimal | None:

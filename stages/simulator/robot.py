@@ -31,7 +31,7 @@ X, Y, HEADING, SPEED, TURNING, IN_CONTACT, COLLISIONS, DISTANCE = range(8)
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class SimulatedDrive:
     """A drive: `times` (N,) s, `poses` (N, 3), and the poses to which the wheels had rolled, `rolled_to` (N, 3).
 
     The last two differ only where the robot was lifted. `collisions`: how often it came into contact. `kidnappings`:
@@ -130,7 +130,7 @@ def drive(
     start_heading: float | None = None,
     room: Obstacles | None = None,
     kidnappings: Sequence[Kidnapping] = (),
-) -> Drive:
+) -> SimulatedDrive:
     """Drive along waypoints (W, 2), recorded at `rate` (Hz) from time 0.
 
     Pure pursuit: the robot steers for the point of the route `look_ahead` metres on, slower the more it must turn, and
@@ -173,7 +173,7 @@ def drive(
     before = poses.copy()
     for number, pose in rolled_to.items():
         before[number] = pose
-    return Drive(np.arange(done) / rate, poses, before, int(state[COLLISIONS]), tuple(kidnapped))
+    return SimulatedDrive(np.arange(done) / rate, poses, before, int(state[COLLISIONS]), tuple(kidnapped))
 
 
 def around(state: F64, seconds: npt.ArrayLike) -> F64:
