@@ -1,16 +1,10 @@
-"""Every experiment's file is read at each of its scales."""
-
-from pathlib import Path
+"""What an experiment's file describes."""
 
 import pytest
-from hydra import compose, initialize_config_module
-from omegaconf import OmegaConf
 
 from omninav.pipeline.experiment.specification import read_experiment
 from omninav.pipeline.graph.problems import ProblemsFound
 
-FOLDER = Path(__file__).parents[3] / "conf/experiment"
-NAMES = sorted(str(file.relative_to(FOLDER).with_suffix("")) for file in FOLDER.rglob("*.yaml"))
 FILE = {
     "name": "test",
     "title": "A test",
@@ -20,15 +14,6 @@ FILE = {
     "measures": {"error": {"title": "Error", "path": ["error"]}},
     "page": {"rows": ["data"], "columns": "method"},
 }
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_an_experiment_is_read_at_every_profile(name: str):
-    with initialize_config_module("omninav.conf", version_base="1.3"):
-        config = compose("config", overrides=[f"+experiment={name}"]).experiment
-    plain = OmegaConf.to_container(config, resolve=True)
-    for profile in ("paper", *plain.get("profiles", {})):
-        assert read_experiment(plain, profile).conditions()
 
 
 def test_conditions_are_all_combinations_but_those_left_out():
