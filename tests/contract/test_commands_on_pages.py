@@ -1,0 +1,64 @@
+"""Every `omninav …` command in README and docs composes and builds with today's names."""
+
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hydra import compose, initialize_config_module
+from omegaconf import OmegaConf
+
+from omninav.pipeline.cli.main import COMMANDS, complete
+from omninav.pipeline.cli.overrides import jobs_to_try, with_unlisted_parameters
+from omninav.pipeline.run.run import plan
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md")])
+NO_GRAPH = set(COMMANDS) - {"check", "graph", "simulate"}
+"""Commands that compose no configuration."""
+OWN = {"experiment", "profile", "runs", "cache"}
+"""What is typed for an experiment and not for its conditions."""
+
+
+def commands(page: Path) -> list[str]:
+    """The lines of code blocks, and the inline code, that begin with `omninav`; without their comments."""
+    text = page.read_text()
+    found = re.findall(r"^(?:\$ )?(omninav(?: .*)?)$", "\n".join(re.findall(r"```\w*\n(.*?)```", text, re.S)), re.M)
+    found += re.findall(r"`(omninav [^`\n]+)`", re.sub(r"```.*?```", "", text, flags=re.S))
+    return list(dict.fromkeys(re.split(r"\s+#", line)[0].strip() for line in found))
+
+
+CASES = {line: page for page in PAGES for line in commands(page) if "--config-dir" not in line and "edges" not in line}
+"""Line -> a page that it is on; without those of a stage that the reader writes."""
+
+
+@pytest.mark.parametrize("line", CASES)
+def test_a_command_on_a_page_composes(line: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(ROOT)
+    words = shlex.split(line)[1:]
+    command = words.pop(0) if words and words[0] in COMMANDS else ""
+    if command in NO_GRAPH:
+        return
+    words = [word for word in words if "=" in word and "…" not in word and not word.startswith("hydra")]
+    with initialize_config_module("omninav.conf", version_base="1.3"):
+        for job in jobs_to_try(["variant=simulate", *words] if command == "simulate" else words, []):
+            composed(job)
+
+
+def composed(words: list[str]) -> None:
+    """Compose and build what a command describes; of an experiment its variant with what is typed for conditions."""
+    own = [word for word in words if word.lstrip("+").partition("=")[0].partition(".")[0] in OWN]
+    rest = [word for word in words if word not in own and not word.startswith("map=")]  # a saved map is not there
+    if any(word.startswith("+experiment=") for word in own):
+        config: Any = OmegaConf.to_container(compose("config", overrides=own), resolve=True)
+        if not rest:
+            return  # what its conditions are is checked where all experiments are
+        rest = [f"variant={config['experiment']['variant']}", *rest]
+    if len(rest) < len(words) and "variant=omniview_mcl" in rest:
+        rest.append("tour=T")
+
+    def of_variant(variant: str) -> Any:
+        return compose("config", overrides=[f"variant={variant}"])
+
+    plan(complete(compose("config", overrides=with_unlisted_parameters(rest, [])), of_variant))
