@@ -1,5 +1,6 @@
 """Occupancy grids as ROS map_server keeps them."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -10,6 +11,15 @@ import yaml
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+
+
+def grid_beside(logs: str | Sequence[str] | None) -> Path | None:
+    """The occupancy grid beside the first log that has one: `drive.grid/map.yaml` beside drive.mcap, or `map.yaml`."""
+    for path in (Path(log).expanduser() for log in ((logs,) if isinstance(logs, str) else logs or ())):
+        for grid in (path.parent / f"{path.stem}.grid" / "map.yaml", path.parent / "map.yaml"):
+            if path.exists() and grid.is_file():
+                return grid
+    return None
 
 
 def read_occupancy(file: Path) -> OccupancyGrid:

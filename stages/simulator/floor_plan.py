@@ -1,13 +1,12 @@
 """What stands on the floor, as a value: of a simulated world, or of the place where a log was recorded."""
 
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.files import digest_file
-from omninav.stages.recordings.occupancy_grid import read_grid
+from omninav.stages.recordings.occupancy_grid import grid_beside, read_grid
 from omninav.stages.values.floor_plan import FloorPlan
 
 from .config import WorldConfig
@@ -48,23 +47,15 @@ class DrivenPlan(Stage):
 
     def inputs_digest(self) -> str | None:
         """Of the grid that is read, where there is one."""
-        grid = self._grid()
+        grid = grid_beside(self.log)
         return None if grid is None else digest_file(grid)
 
     def step(self, ctx: Context) -> Out:
         """Read or make the plan."""
         if self.log is None:
             return self.Out(plan=plan_of(self.world, self.day if isinstance(self.day, int) else self.day[0]))
-        grid = self._grid()
+        grid = grid_beside(self.log)
         return self.Out(plan=None if grid is None else read_grid(grid))
-
-    def _grid(self) -> Path | None:
-        logs = () if self.log is None else (self.log,) if isinstance(self.log, str) else self.log
-        for path in (Path(log).expanduser() for log in logs):
-            for grid in (path.parent / f"{path.stem}.grid" / "map.yaml", path.parent / "map.yaml"):
-                if path.is_file() and grid.is_file():
-                    return grid
-        return None
 
 
 def plan_of(world: WorldConfig, day: int) -> FloorPlan:

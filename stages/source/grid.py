@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.files import digest_file
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.recordings.occupancy_grid import coarser, read_occupancy
+from omninav.stages.recordings.occupancy_grid import coarser, grid_beside, read_occupancy
 from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.occupancy import occupancy
@@ -104,21 +104,12 @@ class PlaceGrid(Stage):
             return file
         if self.log is None and self.tour is None:
             return None
-        beside = self._beside()
+        beside = grid_beside(self.tour) or grid_beside(self.log)
         known = f"grid={beside}" if beside is not None else "grid=FOLDER/map.yaml (of ROS map_server)"
         raise BadInput(
             f"grid: visibility areas need an occupancy grid, and a log brings none; give {known}, or grid={FROM_TOUR}, "
             "a stand-in made from the tour's free path"
         )
-
-    def _beside(self) -> Path | None:
-        for names in (self.tour, self.log):
-            for name in () if names is None else (names,) if isinstance(names, str) else names:
-                path = Path(name).expanduser()
-                for grid in (path.parent / f"{path.stem}.grid" / "map.yaml", path.parent / "map.yaml"):
-                    if grid.is_file():
-                        return grid
-        return None
 
 
 def free_space(grid: OccupancyGrid, clearance: float, references: Array | None) -> FreeSpace | None:

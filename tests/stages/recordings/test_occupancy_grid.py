@@ -137,6 +137,7 @@ def test_a_log_without_a_grid_says_what_is_missing_and_how_to_get_one(tmp_path):
         PlaceGrid(log=str(tmp_path / "drive.mcap")).inputs_digest()
     assert "\n" not in str(raised.value)
     written(tmp_path / "tour.grid", [[0]])
+    (tmp_path / "tour.mcap").touch()
     with pytest.raises(BadInput, match=f"grid={tmp_path}/tour.grid/map.yaml"):
         PlaceGrid(log=str(tmp_path / "drive.mcap"), tour=str(tmp_path / "tour.mcap")).step(CTX)
 
