@@ -310,3 +310,27 @@ class Dice(Stage):
 
     def step(self, ctx: Context) -> Out:
         return self.Out(number=Number(float(ctx.rng.random())))
+
+
+class Picky(Stage):
+    """Refuses parameters that do not go together."""
+
+    low: float = 0.0
+    high: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.low > self.high:
+            raise ValueError("low is above high")
+
+    def step(self, ctx: Context) -> None:
+        return None
+
+
+class Tickless(Source):
+    """A source that makes no ticks."""
+
+    class Out(Outputs):
+        number: Number
+
+    def step(self, ctx: Context) -> Out | None:
+        return None

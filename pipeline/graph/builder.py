@@ -244,9 +244,10 @@ class _Builder:
             self._problem(where, what, self._producers(port))
 
     def _check_missing(self) -> None:
+        wires = self.config.get("wires") or {}
         attempted = {
             (str(name), str(port))
-            for name, ports in (self.config.get("wires") or {}).items()
+            for name, ports in (wires.items() if isinstance(wires, Mapping) else ())
             if isinstance(ports, Mapping)
             for port, spec in ports.items()
             if spec is not None

@@ -109,7 +109,8 @@ def _no_output(where: str, origin: str, graph: Graph) -> Problem:
 
 def _load_stages(config: Mapping[str, Any]) -> None:
     """Import the stages' modules, so that the value types which a file may hold are known."""
-    for spec in (config.get("nodes") or {}).values():
+    nodes = config.get("nodes")
+    for spec in nodes.values() if isinstance(nodes, Mapping) else ():
         if isinstance(spec, Mapping) and isinstance(spec.get("_target_"), str):
             with suppress(UnknownStage):  # reported by `build`
                 resolve(spec["_target_"])

@@ -15,8 +15,8 @@ import thermometer
 from omninav.pipeline.experiment.runner import plan_experiment
 from omninav.pipeline.report.sweep_page import write_sweep_page
 from omninav.pipeline.report.terminal_tables import compare_table
-from omninav.pipeline.run.metrics_files import read_metrics
 from omninav.pipeline.run.execution import execute
+from omninav.pipeline.run.metrics_files import read_metrics
 from omninav.pipeline.run.plan import plan
 from omninav.pipeline.run.run_folder import start
 

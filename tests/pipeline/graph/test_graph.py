@@ -213,6 +213,72 @@ def test_a_value_updated_in_place_cannot_be_held_collected_or_delayed_further(re
     assert "is updated in place" in problem.what
 
 
+def test_a_source_cannot_wait_for_what_is_collected():
+    nodes = {"source": "Steered", "total": "Total"}
+    command = {"from": "total.number", "delay": 1, "initial": None}
+    wires = {"total": {"numbers": {"from": "source.felt", "collect": True}}, "source": {"command": command}}
+    assert "a source cannot wait for what is collected until the end" in [p.what for p in problems(nodes, wires)]
+
+
+def test_all_delayed_wires_of_a_value_updated_in_place_begin_with_the_same_one():
+    other = {**DELAYED, "initial": "other.ledger"}
+    wires = {"enter": {"number": "source.number", "ledger": DELAYED}, "look": {"ledger": other}}
+    problem = only({**LEDGER, "other": "NewLedger"}, wires)
+    assert problem.where.endswith(".ledger.initial")
+    assert "all its delayed wires need the same initial value" in problem.what
+
+
+@pytest.mark.parametrize(
+    ("graph", "where", "message"),
+    [
+        ({"nodes": ["c"]}, "nodes", "expected a mapping from names to stages"),
+        ({"nodes": {"artifacts": {"_target_": "toys.Count"}}}, "nodes.artifacts", "cannot be the name of a node"),
+        ({"nodes": {"c": {"value": 1}}}, "nodes.c", "a node needs `_target_`"),
+        ({"nodes": {"p": {"_target_": "toys.Picky", "low": 2.0}}}, "nodes.p", "low is above high"),
+        ({"nodes": {"t": {"_target_": "toys.Tickless"}}}, "nodes.t", "a source needs an output `tick: Tick`"),
+        ({"wires": ["s"]}, "wires", "expected a mapping: node -> port -> where it comes from"),
+        ({"wires": {"s": "c.number"}}, "wires.s", "expected a mapping from ports to where they come from"),
+    ],
+)
+def test_what_is_no_graph_says_what_was_expected(graph: dict, where: str, message: str):
+    with pytest.raises(ProblemsFound) as found:
+        build({"nodes": {"s": {"_target_": "toys.Count"}}} | graph)
+    assert any(p.where == where and message in p.what for p in found.value.problems), str(found.value)
+
+
+@pytest.mark.parametrize(
+    ("wire", "where", "message"),
+    [
+        (3, "", "3 is no wire"),
+        ({"delay": 1}, "", "is no wire"),
+        ("number", "", "'number' is not of the form node.port"),
+        ({"from": "c.number", "hodl": True}, ".hodl", "a wire has no such option"),
+        ({"from": "c.number", "delay": "one"}, ".delay", "'one', expected a whole number of ticks >= 0"),
+        ({"from": "c.number", "hold": 1}, "", "hold and collect are true or false"),
+        ({"from": "c.number", "initial": "c.number"}, "", "only a delayed wire has an initial value"),
+        ("c.numbre", "", "node 'c' (Constant) has no output 'numbre'"),
+    ],
+)
+def test_what_is_no_wire_says_why(wire: object, where: str, message: str):
+    found = problems({"c": "Constant", "s": "Scale"}, {"s": {"number": wire}})
+    assert any(p.where == f"wires.s.number{where}" and message in p.what for p in found), [str(p) for p in found]
+
+
+def test_a_collected_sequence_is_neither_delayed_nor_held():
+    collected = {"numbers": {"from": "source.number", "collect": True, "hold": True}}
+    problem = only({"source": "Count", "total": "Total"}, {"total": collected})
+    assert problem.what == "a collect wire has neither delay nor hold"
+
+
+def test_a_loop_needs_a_source():
+    wires = {"sum": {"number": "c.number", "other": {"from": "sum.number", "delay": 1, "initial": None}}}
+    problem = only({"c": "Constant", "sum": "Add"}, wires)
+    assert (problem.what, problem.hint) == (
+        "there is a loop but no source that makes ticks",
+        "add a source: source=log",
+    )
+
+
 def test_a_target_that_is_no_stage_is_refused_and_never_called():
     for target in (
         "toys.NotAStage",
