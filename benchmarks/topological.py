@@ -60,7 +60,7 @@ def _pair() -> list[Row]:
     pictures, camera = two_views()
     sift, finder, context = RotationReducedSift(), FindVerticalSegments(), Context("features")
     sift.setup(context)
-    own = cv2.SIFT.create(nfeatures=sift.features, contrastThreshold=sift.contrast)
+    own = cv2.SIFT.create(nfeatures=sift.max_features, contrastThreshold=sift.contrast)
     brute = cv2.BFMatcher(cv2.NORM_L2)
 
     def patches() -> list[LocalFeatures]:

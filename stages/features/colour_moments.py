@@ -11,7 +11,7 @@ Bools = npt.NDArray[np.bool_]
 Sums = npt.NDArray[np.float64]
 
 PAIRS = ((2, 1), (2, 0), (1, 0))
-"""Red with green, red with blue, green with blue: channels of a blue-green-red picture."""
+"""Red with green, red with blue, green with blue: channels of a blue-green-red image."""
 
 
 @numba.njit(cache=True, nogil=True)
@@ -40,9 +40,9 @@ def correlations(sums: Sums, out: Floats) -> None:
     blue = sums[4] - sums[1] * sums[1] / number
     green = sums[5] - sums[2] * sums[2] / number
     red = sums[6] - sums[3] * sums[3] / number
-    least = 1e-6 * number  # whole numbers in 0..255: less than this is rounding
+    rounding = 1e-6 * number  # a smaller variance of whole numbers in 0..255 is rounding
     rg, rb, gb = red * green, red * blue, green * blue
-    flat_r, flat_g, flat_b = red <= least, green <= least, blue <= least
+    flat_r, flat_g, flat_b = red <= rounding, green <= rounding, blue <= rounding
     out[0] = 0.0 if flat_r or flat_g else (sums[7] - sums[3] * sums[2] / number) / np.sqrt(rg)
     out[1] = 0.0 if flat_r or flat_b else (sums[8] - sums[3] * sums[1] / number) / np.sqrt(rb)
     out[2] = 0.0 if flat_g or flat_b else (sums[9] - sums[2] * sums[1] / number) / np.sqrt(gb)
@@ -57,12 +57,12 @@ def _disc_colours(pixels: Pixels, seen: Bools, points: Sums, radii: Sums, out: F
         radius = radii[n]
         step = max(1, int(radius / 8.0))  # some 200 pixels tell the colours of a large patch
         middle_x, middle_y = int(np.floor(points[n, 0] + 0.5)), int(np.floor(points[n, 1] + 0.5))
-        reach = int(radius / step)
-        for down in range(-reach, reach + 1):
+        steps = int(radius / step)
+        for down in range(-steps, steps + 1):
             y = middle_y + down * step
             if y < 0 or y >= rows:
                 continue
-            for right in range(-reach, reach + 1):
+            for right in range(-steps, steps + 1):
                 x = middle_x + right * step
                 if x < 0 or x >= columns or not seen[y, x]:
                     continue
@@ -82,7 +82,7 @@ def disc_colours(pixels: Pixels, seen: Bools, points: npt.ArrayLike, radii: npt.
     return out
 
 
-def picture_colours(pixels: Pixels, seen: Bools) -> Floats:
+def image_colours(pixels: Pixels, seen: Bools) -> Floats:
     """Colour correlations (3,) of all pixels with `seen` (rows, columns)."""
     chosen = pixels[seen].astype(np.float64)
     sums = np.concatenate([[len(chosen)], chosen.sum(axis=0), (chosen**2).sum(axis=0)])

@@ -1,4 +1,4 @@
-"""A picture as wide-baseline features read it: where it shows something, which way is up, where its pixels look."""
+"""An image as wide-baseline features read it: where it shows something, which way is up, where its pixels look."""
 
 import math
 from typing import NamedTuple, cast
@@ -17,7 +17,7 @@ Bools = npt.NDArray[np.bool_]
 
 
 class PreparedImage(NamedTuple):
-    """A picture made ready. `pixels` (rows, columns, 3); `seen` (rows, columns): where it shows the world.
+    """An image made ready. `pixels` (rows, columns, 3); `seen` (rows, columns): where it shows the world.
 
     `scale`: pixels of the original per pixel of this one. `ring`: of a mirror image, in these pixels; None: columns are
     upright. `camera`: of the original.
@@ -39,21 +39,21 @@ class PreparedImage(NamedTuple):
         return self.camera.unproject(points)[0]
 
     def original(self, points: Array) -> Array:
-        """Points (..., 2) of this picture in pixels of the original."""
+        """Points (..., 2) of this image in pixels of the original."""
         return (points + 0.5) * self.scale - 0.5
 
 
-def read_picture(picture: Image | Panorama, camera: Camera | None, largest: int) -> PreparedImage:
-    """Make a picture ready; one of more than `largest` pixels is made smaller.
+def prepared_image(image: Image | Panorama, camera: Camera | None, max_pixels: int) -> PreparedImage:
+    """Make an image ready; one of more than `max_pixels` pixels is made smaller.
 
     A panorama needs no camera. Raises BadInput for an image without one.
     """
-    seen_by = camera_behind(picture, camera)
+    seen_by = camera_behind(image, camera)
     if seen_by is None:
         raise BadInput("features: a camera's image without its camera; wire it: wires.features.camera=source.camera")
-    pixels, ring = picture.pixels, seen_by.ring
+    pixels, ring = image.pixels, seen_by.ring
     rows, columns = pixels.shape[:2]
-    scale = max(1.0, math.sqrt(rows * columns / largest))
+    scale = max(1.0, math.sqrt(rows * columns / max_pixels))
     if scale > 1.0:
         size = round(columns / scale), round(rows / scale)
         scale = columns / size[0]

@@ -12,7 +12,7 @@ from omninav.stages.values.image import Image, Panorama, Pixels
 from omninav.stages.values.local_features import LocalFeatures
 
 from .colour_moments import disc_colours
-from .prepared_image import PreparedImage, read_picture
+from .prepared_image import PreparedImage, prepared_image
 
 Array = npt.NDArray[np.float64]
 
@@ -23,20 +23,26 @@ SEAM = 48
 class RotationReducedSift(Stage):
     """SIFT with an orientation that a robot on a floor need not measure, and the colours of each patch.
 
-    Goedeme et al. 2007, section 3.2 (after Ledwich & Williams): OpenCV's detector and descriptor, turned outwards along
-    the radius in a mirror image and up the column in a panorama or strip; `orientation: own` is Lowe's, by the
-    strongest gradient. Pictures of more than `largest` pixels are made smaller. The `features` strongest are kept, at
-    least their own diameter away from a mirror's edges. Colours (equation 1, erratum 25) are those of a disc of
-    `colour_radius` diameters, about what the descriptor sees. Raises BadInput for an image without a camera.
+    Goedemé et al. 2007, section 3.2 (after Ledwich & Williams): OpenCV's detector and descriptor, turned outwards along
+    the radius in a mirror image and up the column in a panorama or strip. Features closer to a mirror's edges than
+    their own diameter are left out. Colours (equation 1, erratum 25) are those of a disc around each feature. Raises
+    BadInput for an image without a camera.
     """
 
     orientation: Literal["reduced", "own"] = "reduced"
-    features: Annotated[int, Bounds(ge=1)] = 300
-    largest: Annotated[int, Bounds(ge=1024)] = 76800
+    """`own`: Lowe's, by the strongest gradient."""
+    max_features: Annotated[int, Bounds(ge=1)] = 300
+    """The strongest are kept."""
+    max_pixels: Annotated[int, Bounds(ge=1024)] = 76800
+    """Larger images are made smaller; 320 x 240 is the paper's size."""
     contrast: Annotated[float, Bounds(ge=0)] = 0.04
+    """OpenCV's threshold; at 0.02 features of floors and walls that repeat come in, and maps get wrong loops."""
     edge: Annotated[float, Bounds(gt=1)] = 10.0
+    """OpenCV's threshold of the ratio of principal curvatures."""
     sigma: Annotated[float, Bounds(gt=0)] = 1.6
+    """Blur of the first octave (px)."""
     colour_radius: Annotated[float, Bounds(gt=0)] = 3.0
+    """Of the disc whose colours are taken, in diameters of the feature: about what the descriptor sees."""
 
     class Out(Outputs):
         """What was found, the strongest first; it may be none."""
@@ -50,8 +56,8 @@ class RotationReducedSift(Stage):
         )
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
-        """Describe one picture."""
-        read = read_picture(image, camera, self.largest)
+        """Describe one image."""
+        read = prepared_image(image, camera, self.max_pixels)
         pixels, seen, seam = read.pixels, read.seen, 0
         if read.circle:
             seam = min(SEAM, pixels.shape[1])
@@ -89,7 +95,7 @@ class RotationReducedSift(Stage):
         else:
             inside = (x - seam >= -0.5) & (x - seam < read.pixels.shape[1] - 0.5)
             angles = np.full(len(x), 270.0)
-        kept = np.flatnonzero(inside)[: self.features]
+        kept = np.flatnonzero(inside)[: self.max_features]
         strongest = [found[order[row]] for row in kept]
         if self.orientation == "reduced":
             for row, point in zip(kept, strongest, strict=True):

@@ -1,4 +1,4 @@
-"""Invariant column segments: what stands upright between two edges, as it looks along its line."""
+"""Invariant vertical segments: lines between two edges, described along their length."""
 
 import math
 from typing import Annotated, NamedTuple, cast
@@ -15,7 +15,7 @@ from omninav.stages.values.image import Image, Panorama, Pixels
 from omninav.stages.values.local_features import VerticalSegments
 
 from .colour_moments import add_pixel, correlations
-from .prepared_image import PreparedImage, read_picture
+from .prepared_image import PreparedImage, prepared_image
 
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
@@ -41,13 +41,13 @@ class Segments(NamedTuple):
 
 
 @numba.njit(cache=True, nogil=True)
-def _edges(steps: Floats, least: float, lines: Ints, rows: Array) -> int:
+def _edges(steps: Floats, min_step: float, lines: Ints, rows: Array) -> int:
     height, width = steps.shape
     found = 0
     for column in range(width):
         for row in range(1, height - 1):
             before, here, after = steps[row - 1, column], steps[row, column], steps[row + 1, column]
-            if here >= least and here > before and here >= after:
+            if here >= min_step and here > before and here >= after:
                 bend = before - 2.0 * here + after
                 shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
                 lines[found], rows[found] = column, row + shift
@@ -90,14 +90,16 @@ def _describe(
             out[n, 3 + c] = total / norm
 
 
-def segments_of(pixels: Pixels, circle: bool, blur: float, gradient: float, shortest: float, margin: float) -> Segments:
-    """All segments of a picture whose columns are upright lines, the upper end of each at the smaller row.
+def segments_of(
+    pixels: Pixels, circle: bool, blur: float, min_gradient: float, min_length: float, margin: float
+) -> Segments:
+    """All segments of an image whose columns are upright lines, the upper end of each at the smaller row.
 
-    An edge is a local maximum along a column of the intensity's gradient, of the picture smoothed by `blur` pixels,
-    above `gradient` standard deviations of its intensity per pixel: neither scale nor offset of the light changes it.
-    Every two neighbouring edges at least `shortest` pixels apart make a segment. Descriptors: colour correlations over
-    the segment widened by `margin` of its length on both sides; the profile's cosine coefficients 1 to 7 of 8 samples,
-    its mean taken out and its length made 1. `circle`: the columns go around.
+    An edge is a local maximum along a column of the intensity's gradient, of the image smoothed by `blur` pixels,
+    above `min_gradient` standard deviations of its intensity per pixel: neither scale nor offset of the light changes
+    it. Every two neighbouring edges at least `min_length` pixels apart make a segment. Descriptors: colour correlations
+    over the segment widened by `margin` of its length on both sides; the profile's cosine coefficients 1 to 7 of 8
+    samples, its mean taken out and its length made 1. `circle`: the columns go around.
     """
     seam = min(max(2, math.ceil(3.0 * blur)), pixels.shape[1]) if circle else 0
     padded = np.concatenate([pixels[:, pixels.shape[1] - seam :], pixels, pixels[:, :seam]], axis=1) if seam else pixels
@@ -107,9 +109,9 @@ def segments_of(pixels: Pixels, circle: bool, blur: float, gradient: float, shor
     steps = np.zeros_like(grey)
     steps[1:-1] = np.abs(grey[2:] - grey[:-2]) / 2.0
     lines, rows = np.empty(grey.size, np.int64), np.empty(grey.size)
-    found = _edges(steps, max(gradient * float(grey.std()), 1e-3), lines, rows)
+    found = _edges(steps, max(min_gradient * float(grey.std()), 1e-3), lines, rows)
     lines, rows = lines[:found], rows[:found]
-    kept = np.flatnonzero((lines[1:] == lines[:-1]) & (rows[1:] - rows[:-1] >= shortest))
+    kept = np.flatnonzero((lines[1:] == lines[:-1]) & (rows[1:] - rows[:-1] >= min_length))
     ends = np.stack([rows[kept], rows[kept + 1]], axis=-1)
     descriptors = np.empty((len(kept), 3 + SAMPLES - 1), np.float32)
     _describe(smooth, grey, lines[kept], ends, margin, profile_basis(), descriptors)
@@ -117,8 +119,8 @@ def segments_of(pixels: Pixels, circle: bool, blur: float, gradient: float, shor
 
 
 @numba.njit(cache=True, nogil=True)
-def _alike(
-    starts: Ints, ends: Array, scaled: Floats, reach: int, near: float, apart: float, circle: bool, crowd: Floats
+def _count_neighbours(
+    starts: Ints, ends: Array, scaled: Floats, reach: int, scale: float, distance: float, circle: bool, crowd: Floats
 ) -> None:
     columns = len(starts) - 1
     for column in range(columns):
@@ -128,7 +130,7 @@ def _alike(
                 if not circle or step >= columns:
                     break
                 other -= columns
-            across = (step * near) ** 2
+            across = (step * scale) ** 2
             for i in range(starts[column], starts[column + 1]):
                 for j in range(i if step == 0 else starts[other], starts[other + 1]):
                     if ends[i, 0] >= ends[j, 1] or ends[j, 0] >= ends[i, 1]:
@@ -136,8 +138,8 @@ def _alike(
                     d = across
                     for k in range(scaled.shape[1]):
                         d += (scaled[i, k] - scaled[j, k]) ** 2
-                    if d <= apart * apart:
-                        share = np.float32(1.0 - d / (apart * apart))
+                    if d <= distance * distance:
+                        share = np.float32(1.0 - d / (distance * distance))
                         crowd[i] += share
                         if i != j:
                             crowd[j] += share
@@ -151,8 +153,8 @@ def _prototypes(
     ends: Array,
     scaled: Floats,
     reach: int,
-    near: float,
-    apart: float,
+    scale: float,
+    distance: float,
     circle: bool,
     weights: Floats,
 ) -> None:
@@ -167,61 +169,71 @@ def _prototypes(
                 if not circle or 2 * reach >= columns:
                     continue
                 other = other % columns
-            across = (step * near) ** 2
+            across = (step * scale) ** 2
             for j in range(starts[other], starts[other + 1]):
                 if taken[j] or ends[i, 0] >= ends[j, 1] or ends[j, 0] >= ends[i, 1]:
                     continue
                 d = across
                 for k in range(scaled.shape[1]):
                     d += (scaled[i, k] - scaled[j, k]) ** 2
-                if d <= apart * apart:
+                if d <= distance * distance:
                     taken[j] = True
                     weights[i] += 1.0
 
 
-def prototypes(found: Segments, columns: int, spread: float, apart: float, circle: bool) -> tuple[Ints, Floats]:
-    """One segment for each group of neighbours that look alike: rows, heaviest first, and how many each stands for.
+def prototypes(
+    found: Segments, columns: int, azimuth_sigma: float, distance: float, circle: bool
+) -> tuple[Ints, Floats]:
+    """One segment for each group of similar neighbours: rows, heaviest first, and how many each stands for.
 
-    Two segments that overlap in height are `apart` at most by the Mahalanobis distance of their descriptors, extended
-    by the distance of their columns, in units of `spread` columns (section 3.3). Those with most alike around them are
-    taken first, and take all alike with them: the middle of a group, however the robot is turned.
+    Neighbours overlap in height and are at most `distance` apart by the Mahalanobis distance of their descriptors,
+    extended by the distance of their columns, in units of `azimuth_sigma` columns (section 3.3). Those with most
+    neighbours are taken first, and take all their neighbours with them: the middle of a group, however the robot is
+    turned.
     """
     weights = np.zeros(len(found.lines), np.float32)
     if not len(weights):
         return np.empty(0, np.int64), weights
     scaled = found.descriptors / spreads(found.descriptors)
     starts = np.searchsorted(found.lines, np.arange(columns + 1))
-    reach, near = int(apart * spread), 1.0 / spread
+    reach, scale = int(distance * azimuth_sigma), 1.0 / azimuth_sigma
     crowd = np.zeros(len(weights), np.float32)
-    _alike(starts, found.ends, scaled, reach, near, apart, circle, crowd)
+    _count_neighbours(starts, found.ends, scaled, reach, scale, distance, circle, crowd)
     order = np.argsort(-crowd, kind="stable")
-    _prototypes(order, found.lines, starts, found.ends, scaled, reach, near, apart, circle, weights)
+    _prototypes(order, found.lines, starts, found.ends, scaled, reach, scale, distance, circle, weights)
     kept = order[weights[order] > 0.0]
     kept = kept[np.argsort(-weights[kept], kind="stable")]
     return kept, weights[kept]
 
 
 class FindVerticalSegments(Stage):
-    """Upright lines between two edges, described by their colours and their profile.
+    """Vertical lines between two edges, described by their colours and their profile.
 
-    Goedeme et al. 2007, section 3.3: along every radius of a mirror image (`lines` of them), or every column of a
-    panorama, each two neighbouring gradient maxima bound a segment; its descriptor holds three colour correlations over
-    the segment widened by `margin` of its length at both ends, and seven cosine coefficients of its profile. The
-    paper's 8-point transform has the mean as its first: the profile's mean is taken out and its length made 1, as
-    "invariant to illumination" asks, and the other seven are kept. Neighbours that look alike become one
-    (`prototypes`, `cluster` and `spread_deg`); the `segments` heaviest are kept. Raises BadInput for an image without a
-    camera.
+    Goedemé et al. 2007, section 3.3: along every radius of a mirror image, or every column of a panorama, each two
+    neighbouring gradient maxima bound a segment; its descriptor holds three colour correlations over the widened
+    segment and seven cosine coefficients of its profile. The paper's 8-point transform has the mean as its first: the
+    profile's mean is taken out and its length made 1, as "invariant to illumination" asks, and the other seven are
+    kept. Similar neighbours become one (`prototypes`). Raises BadInput for an image without a camera.
     """
 
-    segments: Annotated[int, Bounds(ge=1)] = 200
+    max_segments: Annotated[int, Bounds(ge=1)] = 200
+    """The heaviest prototypes are kept."""
     lines: Annotated[int, Bounds(ge=8)] = 360
-    largest: Annotated[int, Bounds(ge=1024)] = 76800
-    blur: Annotated[float, Bounds(gt=0)] = 1.0
-    gradient: Annotated[float, Bounds(ge=0)] = 0.25
-    shortest: Annotated[float, Bounds(ge=2)] = 8.0
+    """Radii of a mirror image."""
+    max_pixels: Annotated[int, Bounds(ge=1024)] = 76800
+    """Larger images are made smaller; 320 x 240 is the paper's size."""
+    blur_px: Annotated[float, Bounds(gt=0)] = 1.0
+    """Standard deviation of the smoothing before edges are searched."""
+    min_gradient: Annotated[float, Bounds(ge=0)] = 0.25
+    """Of an edge, per pixel, in standard deviations of the image's intensity."""
+    min_length_px: Annotated[float, Bounds(ge=2)] = 8.0
+    """Of a segment."""
     margin: Annotated[float, Bounds(ge=0)] = 0.2
-    cluster: Annotated[float, Bounds(gt=0)] = 2.0
-    spread_deg: Annotated[float, Bounds(gt=0)] = 3.0
+    """Of its length, by which a segment is widened at both ends for its colours."""
+    cluster_distance: Annotated[float, Bounds(gt=0)] = 2.0
+    """Mahalanobis distance within which neighbours become one."""
+    azimuth_sigma_deg: Annotated[float, Bounds(gt=0)] = 3.0
+    """Azimuth that counts as one in that distance."""
 
     class Out(Outputs):
         """What was found, the heaviest first; it may be none."""
@@ -229,14 +241,14 @@ class FindVerticalSegments(Stage):
         vertical_segments: VerticalSegments
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
-        """Describe one picture."""
-        read = read_picture(image, camera, self.largest)
+        """Describe one image."""
+        read = prepared_image(image, camera, self.max_pixels)
         pixels, circle = self._upright(read)
-        settings = self.blur, self.gradient, self.shortest, self.margin
+        settings = self.blur_px, self.min_gradient, self.min_length_px, self.margin
         found = segments_of(pixels, circle, *settings)
         width = pixels.shape[1]
-        kept, weights = prototypes(found, width, self.spread_deg * width / 360.0, self.cluster, circle)
-        kept, weights = kept[: self.segments], weights[: self.segments]
+        kept, weights = prototypes(found, width, self.azimuth_sigma_deg * width / 360.0, self.cluster_distance, circle)
+        kept, weights = kept[: self.max_segments], weights[: self.max_segments]
         lines = np.broadcast_to(found.lines[kept, None], (len(kept), 2)).astype(np.float64)
         points = read.original(self._back(np.stack([lines, found.ends[kept]], axis=-1), read))
         bearings = read.bearings(points)
@@ -248,7 +260,7 @@ class FindVerticalSegments(Stage):
         )
 
     def _upright(self, read: PreparedImage) -> tuple[Pixels, bool]:
-        """The picture with its upright lines as columns, the outer end of a radius at the top."""
+        """The image with its upright lines as columns, the outer end of a radius at the top."""
         if read.ring is None:
             return read.pixels, read.circle
         lines, rows = np.meshgrid(np.arange(self.lines), np.arange(int(read.ring.outer - read.ring.inner) + 1))
@@ -257,7 +269,7 @@ class FindVerticalSegments(Stage):
         return cast(Pixels, upright), True
 
     def _back(self, points: Array, read: PreparedImage) -> Array:
-        """Points (..., 2) of the upright picture as points of the picture that was read."""
+        """Points (..., 2) of the upright image as points of the image that was read."""
         if read.ring is None:
             return points
         angle = 2.0 * math.pi * points[..., 0] / self.lines

@@ -12,16 +12,17 @@ from omninav.stages.values.topological_map import TopologicalMap
 
 
 class PlacePrior(Stage):
-    """A belief over places at the first picture of each log.
+    """A belief over places at the first image of each log.
 
-    Goedemé et al. 2007, section 5.1: `uniform`, a kidnapped robot. Or a place: the one whose medoid was taken closest
-    to the log's first true pose (`truth`), to the origin (`origin`), or to x, y (m) of a pose and its spread, of which
-    nothing else counts here. `anew_after`: so many pictures later it begins anew, again and again: many kidnapped
-    robots on one log; null: never. Raises BadInput where `truth` is asked for and there is none, or a map has no place.
+    Goedemé et al. 2007, section 5.1. Raises BadInput where `truth` is asked for and there is none, or where the map has
+    no place.
     """
 
     at: Literal["uniform", "truth", "origin"] | tuple[float, float, float, float, float] = "uniform"
-    anew_after: Annotated[int, Bounds(ge=1)] | None = None
+    """`uniform`: a kidnapped robot. Else the place whose medoid was taken closest to the log's first true pose, to the
+    origin, or to x, y (m) of a pose and its spread, of which nothing else counts."""
+    restart_after: Annotated[int, Bounds(ge=1)] | None = None
+    """Images after which the robot is kidnapped again, for many trials on one log; null: never."""
 
     class Out(Outputs):
         """The belief to begin with; absent where none begins."""
@@ -30,15 +31,15 @@ class PlacePrior(Stage):
 
     def step(self, ctx: Context, tick: Tick, map: TopologicalMap, truth: Pose | None = None) -> Out:
         """Give the first belief."""
-        if not (tick.first_of_log or (self.anew_after and tick.index % self.anew_after == 0)):
+        if not (tick.first_of_log or (self.restart_after and tick.index % self.restart_after == 0)):
             return self.Out()
         if not len(map):
-            raise BadInput("start: the map has no place; make it from a tour with pictures (tour=...)")
+            raise BadInput("start: the map has no place; make it from a tour with images (tour=...)")
         poses = map.poses[map.places]
         if self.at == "uniform":
             return self.Out(belief=PlaceBelief(np.full(len(map), 1.0 / len(map)), poses))
         if self.at == "truth" and truth is None:
-            raise BadInput("start: this log has no true pose at its first picture; use start=uniform")
+            raise BadInput("start: this log has no true pose at its first image; use start=uniform")
         if self.at == "truth" and truth is not None:
             x, y = truth.x, truth.y
         else:

@@ -18,13 +18,13 @@ class PlaceTransitions(Stage):
 
     Goedemé et al. 2007, section 5.2, equation 13: P(x_t | x_t-1) falls as exp(-dist^2 / sigma^2), dist the least number
     of links on the way, 0 where there is no way, normalised for each place that the robot comes from, since places have
-    more or fewer neighbours (erratum 32). `spread` is sigma in links; null: the standard deviation of dist over the
-    map, as in the paper. With a chance of `anywhere` it is at any place next, so that a robot that was carried is
-    found.
+    more or fewer neighbours (erratum 32).
     """
 
-    spread: Annotated[float, Bounds(gt=0)] | None = None
-    anywhere: Annotated[float, Bounds(ge=0, le=1)] = 0.01
+    sigma_links: Annotated[float, Bounds(gt=0)] | None = None
+    """sigma; null: the standard deviation of dist over the map, as in the paper."""
+    teleport_probability: Annotated[float, Bounds(ge=0, le=1)] = 0.01
+    """Of being at any place next, so that a robot that was carried is found."""
 
     class Out(Outputs):
         """What is believed before the present view is looked at."""
@@ -34,20 +34,22 @@ class PlaceTransitions(Stage):
     def setup(self, ctx: Context) -> None:
         """No map yet."""
         self._map: TopologicalMap | None = None
-        self._chances = np.zeros((0, 0))
+        self._probabilities = np.zeros((0, 0))
 
     def step(self, ctx: Context, belief: PlaceBelief, map: TopologicalMap) -> Out:
         """Spread a belief over the places that are near."""
         if self._map is not map:
             self._map = map
-            self._chances = transitions(links_between(map.links, len(map)), self.spread, self.anywhere)
-        return self.Out(belief=PlaceBelief(belief.probabilities @ self._chances, belief.poses))
+            self._probabilities = transitions(
+                links_between(map.links, len(map)), self.sigma_links, self.teleport_probability
+            )
+        return self.Out(belief=PlaceBelief(belief.probabilities @ self._probabilities, belief.poses))
 
 
-def transitions(apart: Array, spread: float | None, anywhere: float) -> Array:
-    """From each place (rows) to each (columns) the chance to go there, from the links between them: (P, P)."""
-    known = apart[np.isfinite(apart)]
-    sigma = (float(known.std()) if spread is None else spread) or 1.0
-    chances: Array = np.exp(-np.square(apart / sigma))
-    chances /= chances.sum(axis=1, keepdims=True)
-    return (1.0 - anywhere) * chances + anywhere / max(len(apart), 1)
+def transitions(links: Array, sigma_links: float | None, teleport_probability: float) -> Array:
+    """From each place (rows) to each (columns) the probability to go there, from the links between them: (P, P)."""
+    known = links[np.isfinite(links)]
+    sigma = (float(known.std()) if sigma_links is None else sigma_links) or 1.0
+    probabilities: Array = np.exp(-np.square(links / sigma))
+    probabilities /= probabilities.sum(axis=1, keepdims=True)
+    return (1.0 - teleport_probability) * probabilities + teleport_probability / max(len(links), 1)

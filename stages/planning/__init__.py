@@ -1,1 +1,1 @@
-"""From where the robot is believed to be to where it shall go."""
+"""Routes from where the robot is believed to be to its goal."""

@@ -1,4 +1,4 @@
-"""The shortest way over a topological map to a goal, as pictures to drive along."""
+"""The shortest route over a topological map to a goal, as images to drive along."""
 
 import shlex
 from dataclasses import field
@@ -8,7 +8,7 @@ import networkx
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick
 from omninav.pipeline.graph.problems import BadInput, nearest
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.homing import DrivingStatus, ImagePath, PathProgress
@@ -20,58 +20,61 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
-def _no_place() -> Ints:
-    return np.zeros(0, np.int64)
+class ShortestPathPlannerState(State):
+    """The route so far: its number and places, and how many of its views lead to each place.
 
-
-class Itinerary(State):
-    """The way so far: its number and places, how many views of it lead to each place, ways planned, ticks waited.
-
-    `failed` (F, 2): the links on which ways have failed, a place with itself for its own medoid, with which a way
-    begins; `times` (F,): how often. `why`: the last reason, `blocked`: the last one for which it was blocked; `ended`:
-    how it ended, "" if it has not.
+    `planned`: routes so far; `waiting_since` (ns): since when there has been reason to plan, None: there is none.
+    `failed_links` (F, 2): the links on which routes have failed, a place with itself for its own medoid, with which a
+    route begins; `failures` (F,): how often. `why`: the last reason to plan, `blocked`: the last reason why the way was
+    blocked; `ended`: how the route ended, "" if it has not.
     """
 
     number: int = -1
-    places: Ints = field(default_factory=_no_place)
-    views: Ints = field(default_factory=_no_place)
+    places: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    views: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     planned: int = 0
-    waited: int = 0
-    failed: Ints = field(default_factory=lambda: np.zeros((0, 2), np.int64))
-    times: Ints = field(default_factory=_no_place)
+    waiting_since: int | None = None
+    failed_links: Ints = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    failures: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     ended: str = ""
     why: str = ""
     blocked: str = ""
 
 
 class ShortestPathPlanner(Stage):
-    """From the most probable place to the goal over as few links as there are, as the pictures along that way.
+    """The shortest route from the most probable place to the goal, as the images along it.
 
     Goedemé et al. 2007, section 6 (Dijkstra's algorithm): the medoid of the place where the robot is believed to be,
-    the path images of each link, and the medoids between them; the goal's medoid is where it stops. `goal`: a place's
-    number or name (of several of that name the nearest), or a picture: the place with the least visual distance to
-    it, which may be `alike` at most. `cost`: a link counts one (`links`, the paper's) or as many as views have to be
-    driven to (`views`).
+    the path images of each link, and the medoids between them; the robot stops at the goal's medoid.
 
-    It plans once the robot is `sure` where it is, by the belief's share, for `calm` ticks, or has looked for `patience`
-    ticks; and again where the robot has lost its target, or found its way blocked. Ways without the link on which that
-    happened are then preferred, and one that has failed `again` times is closed. Where it is a place's own medoid
-    that the robot did not come to, it is half as likely to be there, and the next way from there begins behind it.
-    After `tries` ways, or where no way is left, it gives up: it says why, and gives an empty path, so that the robot
-    stands. Raises BadInput for a goal that the map does not have, and for a picture of no place in it.
+    It plans once the belief is sure enough or has had time enough, and again where the robot has lost its target or
+    finds its way blocked. Routes without the link on which that happened are then preferred, and a link that has failed
+    too often is closed. Where the robot did not come to a place's own medoid, it is half as likely to be at that place,
+    and the next route from there begins behind the medoid. After too many routes, or where no route is left, the
+    planner gives up with the reason and an empty path, so that the robot stands. Raises BadInput for a goal that the
+    map does not have, and for an image of no place in it.
     """
 
     goal: str | int | None = None
-    alike: Annotated[float, Bounds(gt=0)] = 0.5
+    """A place's number or name (of several of that name the nearest), or an image file: the place that looks most like
+    it."""
+    max_visual_distance: Annotated[float, Bounds(gt=0)] = 0.5
+    """Between a goal's image and its place: the paper's size of places."""
     cost: Literal["links", "views"] = "links"
-    sure: Annotated[float, Bounds(gt=0, le=1)] = 0.5
-    calm: Annotated[int, Bounds(ge=0)] = 5
-    patience: Annotated[int, Bounds(ge=1)] = 25
-    again: Annotated[int, Bounds(ge=1)] = 3
-    tries: Annotated[int, Bounds(ge=1)] = 20
+    """Of a link: one (the paper's), or as many as views have to be driven to."""
+    min_probability: Annotated[float, Bounds(gt=0, le=1)] = 0.5
+    """Of the most probable place, to plan from it."""
+    settle_s: Annotated[float, Bounds(ge=0)] = 1.0
+    """Time for which the robot looks before it plans, even if it is sure."""
+    locate_timeout_s: Annotated[float, Bounds(gt=0)] = 5.0
+    """Time after which it plans even if it is not sure."""
+    max_failures: Annotated[int, Bounds(ge=1)] = 3
+    """Of a link, after which it is closed."""
+    max_routes: Annotated[int, Bounds(ge=1)] = 20
+    """After which the planner gives up."""
 
     class Out(Outputs):
-        """`path`: the views, in the tick in which they are planned. `way`: through which places, at every tick."""
+        """`path`: the views, in the tick in which they are planned. `route`: through which places, at every tick."""
 
         path: ImagePath | None = None
         route: PlannedRoute
@@ -79,7 +82,8 @@ class ShortestPathPlanner(Stage):
     def step(
         self,
         ctx: Context,
-        itinerary: Itinerary,
+        state: ShortestPathPlannerState,
+        tick: Tick,
         belief: PlaceBelief,
         map: TopologicalMap,
         image: VisualDistances | None = None,
@@ -88,67 +92,74 @@ class ShortestPathPlanner(Stage):
     ) -> Out:
         """Plan where there is reason to; `status` and `progress` are those of the tick before.
 
-        `picture`: how far the goal's picture is from each place, where the goal is one.
+        `image`: how far the goal's image is from each place, where the goal is one.
         """
-        pictured = None if image is None else place_pictured(self.goal, image, self.alike, map)
+        pictured = None if image is None else place_in_image(self.goal, image, self.max_visual_distance, map)
         goals = places_called(self.goal, map) if pictured is None else pictured
-        if itinerary.ended or not self._must_plan(itinerary, belief, status, progress):
-            return self.Out(route=_way(itinerary))
-        if itinerary.number >= 0 and progress is not None and status is not None:
-            _remember(itinerary, progress.at)
-            itinerary.blocked = status.why if status.state == "blocked" else itinerary.blocked
-        path = self._plan(ctx, itinerary, belief.probabilities, goals, map)
-        return self.Out(path=path, route=_way(itinerary))
+        if state.ended or not self._must_plan(state, tick, belief, status, progress):
+            return self.Out(route=_route(state))
+        if state.number >= 0 and progress is not None and status is not None:
+            _remember(state, progress.at)
+            state.blocked = status.why if status.state == "blocked" else state.blocked
+        path = self._plan(ctx, state, belief.probabilities, goals, map)
+        return self.Out(path=path, route=_route(state))
 
     def _must_plan(
-        self, itinerary: Itinerary, belief: PlaceBelief, status: DrivingStatus | None, progress: PathProgress | None
+        self,
+        state: ShortestPathPlannerState,
+        tick: Tick,
+        belief: PlaceBelief,
+        status: DrivingStatus | None,
+        progress: PathProgress | None,
     ) -> bool:
-        if itinerary.number < 0:
-            itinerary.why = "it has no way yet"
-        elif progress is None or progress.path != itinerary.number:  # the way has not reached who drives it
+        if state.number < 0:
+            state.why = "it has no route yet"
+        elif progress is None or progress.path != state.number:  # the route has not reached whoever drives it
             return False
         elif progress.arrived:
-            itinerary.ended, itinerary.why = "arrived", ""
+            state.ended, state.why = "arrived", ""
             return False
         elif status is None or status.state not in ("lost", "blocked"):
-            itinerary.waited, itinerary.why = 0, ""
+            state.waiting_since, state.why = None, ""
             if progress.at > 0:  # it was right about where it is
-                _forget_medoids(itinerary)
+                _forget_medoids(state)
             return False
         else:
-            itinerary.why = f"{status.state}: {status.why}"
-        itinerary.waited += 1
-        sure = belief.probabilities.max() >= self.sure and itinerary.waited > self.calm
-        return bool(sure) or itinerary.waited > self.patience
+            state.why = f"{status.state}: {status.why}"
+        if state.waiting_since is None:
+            state.waiting_since = tick.stamp
+        waited_s = (tick.stamp - state.waiting_since) / 1e9
+        sure = belief.probabilities.max() >= self.min_probability and waited_s >= self.settle_s
+        return bool(sure) or waited_s >= self.locate_timeout_s
 
     def _plan(
-        self, ctx: Context, itinerary: Itinerary, probabilities: Array, goals: Ints, map: TopologicalMap
+        self, ctx: Context, state: ShortestPathPlannerState, probabilities: Array, goals: Ints, map: TopologicalMap
     ) -> ImagePath:
-        place, missed = _likeliest(probabilities, itinerary)
-        places = shortest_way(map, place, goals, self.cost, itinerary.failed, itinerary.times, self.again)
-        last = f"the last way ended because it was {itinerary.why}"
-        if itinerary.blocked and not itinerary.why.startswith("blocked"):
-            last = f"it was blocked: {itinerary.blocked}; {last}"
-        if itinerary.planned >= self.tries:
-            return _given_up(itinerary, f"{self.tries} ways were tried; {last}")
+        place, missed = _likeliest(probabilities, state)
+        places = shortest_route(map, place, goals, self.cost, state.failed_links, state.failures, self.max_failures)
+        last = f"the last route ended because it was {state.why}"
+        if state.blocked and not state.why.startswith("blocked"):
+            last = f"it was blocked: {state.blocked}; {last}"
+        if state.planned >= self.max_routes:
+            return _given_up(state, f"{self.max_routes} routes were tried; {last}")
         if not len(places):
-            closed = itinerary.failed[itinerary.times >= self.again].tolist()
+            closed = state.failed_links[state.failures >= self.max_failures].tolist()
             shut = ", ".join(f"{one} to {other}" for one, other in closed if one != other)
-            why = f" but what could not be driven {self.again} times, from place {shut}; {last}" if shut else ""
-            return _given_up(itinerary, f"no way leads from place {place} to {self.goal}{why}")
+            why = f" but what could not be driven {self.max_failures} times, from place {shut}; {last}" if shut else ""
+            return _given_up(state, f"no route leads from place {place} to {self.goal}{why}")
         views, ends = map.views_along(places)
         if missed % 2 and len(places) > 1:
             views, ends = views[1:], ends - 1
-        itinerary.number, itinerary.planned, itinerary.waited = itinerary.number + 1, itinerary.planned + 1, 0
-        itinerary.places, itinerary.views, itinerary.why = places, ends, ""
+        state.number, state.planned, state.waiting_since = state.number + 1, state.planned + 1, None
+        state.places, state.views, state.why = places, ends, ""
         names = tuple(_called(map, int(view)) for view in views)
-        return ImagePath(itinerary.number, tuple(map.views.features(int(view)) for view in views), names)
+        return ImagePath(state.number, tuple(map.views.features(int(view)) for view in views), names)
 
 
 def places_called(goal: str | int | None, map: TopologicalMap) -> Ints:
     """The places that a goal names. Raises BadInput where the map has none."""
     text = "" if goal is None else str(goal).strip()
-    found = map.named(text) if text else _no_place()
+    found = map.named(text) if text else np.zeros(0, np.int64)
     if not len(found) and text.isdecimal() and int(text) < len(map):
         found = np.array([int(text)], np.int64)
     if len(found):
@@ -160,89 +171,92 @@ def places_called(goal: str | int | None, map: TopologicalMap) -> Ints:
     raise BadInput(f"goal: {what}; type {example} or a number below {len(map)} ({known})")
 
 
-def place_pictured(goal: str | int | None, picture: VisualDistances, alike: float, map: TopologicalMap) -> Ints:
-    """The place that a picture is of, by its visual distances. Raises BadInput where the nearest is not `alike`."""
-    nearest = int(np.argmin(picture.distances))
-    apart = float(picture.distances[nearest])
-    if apart <= alike:
+def place_in_image(
+    goal: str | int | None, image: VisualDistances, max_visual_distance: float, map: TopologicalMap
+) -> Ints:
+    """The place that an image shows, by its visual distances. Raises BadInput where even the nearest is too far."""
+    nearest = int(np.argmin(image.distances))
+    distance = float(image.distances[nearest])
+    if distance <= max_visual_distance:
         return np.array([nearest], np.int64)
     name = f", {map.names[nearest]}" if map.names[nearest] else ""
-    so = f"the nearest is place {nearest}{name}, at a visual distance of {apart:.2f}, where {alike:g} is allowed"
-    if np.isinf(apart):
+    so = f"the nearest is place {nearest}{name}, at a visual distance of {distance:.2f}"
+    so += f", where {max_visual_distance:g} is allowed"
+    if np.isinf(distance):
         so = "it has too little in common with any"
-    raise BadInput(
-        f"goal: {goal} is of no place of the map: {so}; give a picture from closer to where the map was made"
-    )
+    raise BadInput(f"goal: {goal} is of no place of the map: {so}; give an image from closer to where the map was made")
 
 
-def shortest_way(
+def shortest_route(
     map: TopologicalMap,
     place: int,
     goals: Ints,
     cost: Literal["links", "views"],
-    failed: Ints,
-    times: Ints,
-    again: int,
+    failed_links: Ints,
+    failures: Ints,
+    max_failures: int,
 ) -> Ints:
-    """The places from `place` to the nearest of `goals` (G,), both included: (K,); none where no way is left.
+    """The places from `place` to the nearest of `goals` (G,), both included: (K,); none where no route is left.
 
-    `failed` (F, 2): pairs of places between which it has failed to go, `times` (F,) often: any way around them is
-    preferred, and those that failed `again` times are closed. Equally short ways: that of lower numbers.
+    `failed_links` (F, 2): pairs of places between which it has failed to drive, `failures` (F,) times: any route around
+    them is preferred, and those that failed `max_failures` times are closed. Equally short routes: that of lower
+    numbers.
     """
     graph = networkx.Graph()
     graph.add_nodes_from(range(len(map)))
-    failures = {frozenset(pair): number for pair, number in zip(failed.tolist(), times.tolist(), strict=True)}
+    failed = {frozenset(pair): number for pair, number in zip(failed_links.tolist(), failures.tolist(), strict=True)}
     for link, (one, other) in enumerate(map.links.tolist()):
-        missed = failures.get(frozenset((one, other)), 0)
-        if one != other and missed < again:
+        missed = failed.get(frozenset((one, other)), 0)
+        if one != other and missed < max_failures:
             price = (1 if cost == "links" else 1 + len(map.way(link))) + missed * len(map.views)
             known = graph.edges[one, other]["price"] if graph.has_edge(one, other) else price
             graph.add_edge(one, other, price=min(price, known))
-    lengths, ways = networkx.single_source_dijkstra(graph, place, weight="price")
+    lengths, routes = networkx.single_source_dijkstra(graph, place, weight="price")
     reached = [(lengths[goal], goal) for goal in goals.tolist() if goal in lengths]
-    return np.array(ways[min(reached)[1]] if reached else [], np.int64)
+    return np.array(routes[min(reached)[1]] if reached else [], np.int64)
 
 
-def _likeliest(probabilities: Array, itinerary: Itinerary) -> tuple[int, int]:
+def _likeliest(probabilities: Array, state: ShortestPathPlannerState) -> tuple[int, int]:
     """Where the robot most probably is, and how often it did not come to the medoid there."""
     missed = np.zeros(len(probabilities), np.int64)
-    own = itinerary.failed[:, 0] == itinerary.failed[:, 1]
-    missed[itinerary.failed[own, 0]] = itinerary.times[own]
+    own = state.failed_links[:, 0] == state.failed_links[:, 1]
+    missed[state.failed_links[own, 0]] = state.failures[own]
     place = int(np.argmax(probabilities * 0.5**missed))
     return place, int(missed[place])
 
 
-def _remember(itinerary: Itinerary, reached: int) -> None:
-    """That the way failed behind so many of its views: on which link."""
-    leg = int(np.searchsorted(itinerary.views, reached, side="right"))
-    pair = itinerary.places[[max(leg - 1, 0), min(leg, len(itinerary.places) - 1)]]
-    same = (np.sort(itinerary.failed, axis=1) == np.sort(pair)).all(axis=1)
+def _remember(state: ShortestPathPlannerState, reached: int) -> None:
+    """That the route failed behind so many of its views: on which link."""
+    leg = int(np.searchsorted(state.views, reached, side="right"))
+    pair = state.places[[max(leg - 1, 0), min(leg, len(state.places) - 1)]]
+    same = (np.sort(state.failed_links, axis=1) == np.sort(pair)).all(axis=1)
     if same.any():
-        itinerary.times = itinerary.times + same
+        state.failures = state.failures + same
     else:
-        itinerary.failed, itinerary.times = np.vstack([itinerary.failed, pair]), np.append(itinerary.times, 1)
+        state.failed_links = np.vstack([state.failed_links, pair])
+        state.failures = np.append(state.failures, 1)
 
 
-def _forget_medoids(itinerary: Itinerary) -> None:
-    links = itinerary.failed[:, 0] != itinerary.failed[:, 1]
-    itinerary.failed, itinerary.times = itinerary.failed[links], itinerary.times[links]
+def _forget_medoids(state: ShortestPathPlannerState) -> None:
+    links = state.failed_links[:, 0] != state.failed_links[:, 1]
+    state.failed_links, state.failures = state.failed_links[links], state.failures[links]
 
 
-def _given_up(itinerary: Itinerary, why: str) -> ImagePath:
-    itinerary.ended, itinerary.why = "gave up", why
-    return ImagePath(itinerary.number + 1, (), ())
+def _given_up(state: ShortestPathPlannerState, why: str) -> ImagePath:
+    state.ended, state.why = "gave up", why
+    return ImagePath(state.number + 1, (), ())
 
 
 def _called(map: TopologicalMap, view: int) -> str:
     place = int(map.owner[view])
     named = f"place {place}" + (f", {map.names[place]}" if map.names[place] else "")
-    return named if int(map.places[place]) == view else f"on the way, picture {int(map.frames[view])}"
+    return named if int(map.places[place]) == view else f"on the way, image {int(map.frames[view])}"
 
 
-def _way(itinerary: Itinerary) -> PlannedRoute:
-    state: Literal["locating", "under way", "arrived", "gave up"] = "under way"
-    if itinerary.ended:
-        state = "arrived" if itinerary.ended == "arrived" else "gave up"
-    elif itinerary.number < 0 or itinerary.waited > 0:
-        state = "locating"
-    return PlannedRoute(itinerary.places, state, itinerary.number, itinerary.why)
+def _route(state: ShortestPathPlannerState) -> PlannedRoute:
+    now: Literal["locating", "under way", "arrived", "gave up"] = "under way"
+    if state.ended:
+        now = "arrived" if state.ended == "arrived" else "gave up"
+    elif state.number < 0 or state.waiting_since is not None:
+        now = "locating"
+    return PlannedRoute(state.places, now, state.number, state.why)

@@ -16,19 +16,17 @@ Array = npt.NDArray[np.float64]
 class PlaceLikelihood(Stage):
     """A falling function of the visual distance between the present view and each place's.
 
-    Goedemé et al. 2007, section 5.3, equation 14, with `tail: gaussian`: P(z | x) falls as exp(-diss^2 / sigma^2).
-    `spread` is sigma; null: the standard deviation of visual distance that the map was measured to have within its
-    places. No place is less likely than `least` times one that looks the same: views are blocked, and one that shows
-    nothing known says nothing.
-
-    `tail: heavy` is 1 / (1 + diss^2 / sigma^2) instead. Beside the way of the tour, or where things have changed, every
-    distance is many sigma, and by a Gaussian all are as unlikely as what has nothing in common; yet the place with the
-    least of them is the right one.
+    Goedemé et al. 2007, section 5.3, equation 14: P(z | x) falls as exp(-diss^2 / sigma^2). Beside the way of the tour,
+    or where things have changed, every distance is many sigma, and by a Gaussian all are as unlikely as a place that
+    has nothing in common; yet the one with the smallest distance is the right one. Hence the heavy tail by default.
     """
 
-    spread: Annotated[float, Bounds(gt=0)] | None = None
-    least: Annotated[float, Bounds(gt=0, le=1)] = 0.001
+    sigma: Annotated[float, Bounds(gt=0)] | None = None
+    """Of visual distance; null: the spread that the map was measured to have within its places."""
+    min_likelihood: Annotated[float, Bounds(gt=0, le=1)] = 0.001
+    """Of a place, over that of one that looks the same: views are blocked."""
     tail: Literal["gaussian", "heavy"] = "heavy"
+    """`gaussian`: the paper's; `heavy`: 1 / (1 + diss^2 / sigma^2)."""
 
     class Out(Outputs):
         """One value per place."""
@@ -37,12 +35,14 @@ class PlaceLikelihood(Stage):
 
     def step(self, ctx: Context, distances: VisualDistances, map: TopologicalMap) -> Out:
         """Weigh all places."""
-        sigma = map.spread if self.spread is None else self.spread
-        values = place_likelihoods(distances.distances, sigma, self.least, self.tail)
+        sigma = map.spread if self.sigma is None else self.sigma
+        values = place_likelihoods(distances.distances, sigma, self.min_likelihood, self.tail)
         return self.Out(likelihood=Likelihood(values))
 
 
-def place_likelihoods(distances: Array, sigma: float, least: float, tail: Literal["gaussian", "heavy"]) -> Array:
-    """Of visual distances (P,), inf for nothing in common, lifted to [least, 1]: exp(-(d / sigma)^2), or as `tail`."""
+def place_likelihoods(
+    distances: Array, sigma: float, min_likelihood: float, tail: Literal["gaussian", "heavy"]
+) -> Array:
+    """Likelihoods in [min_likelihood, 1] of visual distances (P,), inf for nothing in common."""
     squares = np.square(distances / max(sigma, 1e-9))
-    return least + (1.0 - least) * (np.exp(-squares) if tail == "gaussian" else 1.0 / (1.0 + squares))
+    return min_likelihood + (1.0 - min_likelihood) * (np.exp(-squares) if tail == "gaussian" else 1.0 / (1.0 + squares))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omninav.stages.features.colour_moments import disc_colours, picture_colours
+from omninav.stages.features.colour_moments import disc_colours, image_colours
 
 RNG = np.random.default_rng(5)
 PIXELS = (RNG.integers(0, 60, (40, 50, 3)) + RNG.integers(0, 60, (40, 50, 1))).astype(np.uint8)
@@ -16,9 +16,9 @@ def by_numpy(pixels: np.ndarray) -> np.ndarray:
 
 
 def test_of_a_picture_they_are_the_correlations_of_its_channels() -> None:
-    assert picture_colours(PIXELS, ALL) == pytest.approx(by_numpy(PIXELS), abs=1e-6)
+    assert image_colours(PIXELS, ALL) == pytest.approx(by_numpy(PIXELS), abs=1e-6)
     seen = RNG.random((40, 50)) < 0.5
-    assert picture_colours(PIXELS, seen) == pytest.approx(by_numpy(PIXELS[seen]), abs=1e-6)
+    assert image_colours(PIXELS, seen) == pytest.approx(by_numpy(PIXELS[seen]), abs=1e-6)
 
 
 def test_of_a_disc_they_are_those_of_the_pixels_in_it() -> None:
@@ -29,11 +29,11 @@ def test_of_a_disc_they_are_those_of_the_pixels_in_it() -> None:
 
 def test_scale_and_offset_of_each_channel_do_not_change_them() -> None:
     lit = (PIXELS * (2.0, 1.0, 1.0) + (3, 40, 100)).astype(np.uint8)
-    assert picture_colours(lit, ALL) == pytest.approx(picture_colours(PIXELS, ALL), abs=1e-6)
+    assert image_colours(lit, ALL) == pytest.approx(image_colours(PIXELS, ALL), abs=1e-6)
 
 
 def test_a_channel_that_does_not_vary_goes_with_nothing() -> None:
     flat = PIXELS.copy()
     flat[..., 1] = 77
-    assert picture_colours(flat, ALL)[[0, 2]].tolist() == [0.0, 0.0]
+    assert image_colours(flat, ALL)[[0, 2]].tolist() == [0.0, 0.0]
     assert disc_colours(flat, ALL, np.empty((0, 2)), np.empty(0)).shape == (0, 3)

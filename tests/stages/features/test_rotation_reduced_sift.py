@@ -76,7 +76,7 @@ def test_beyond_the_mirrors_edge_there_is_nothing_to_see() -> None:
 def test_patches_across_a_panoramas_seam_are_found_once() -> None:
     panorama = look("panorama", 0.0)
     rolled = Panorama(np.roll(panorama.pixels, 100, axis=1), panorama.elevation_top, panorama.elevation_bottom)
-    one, other = found(panorama, largest=10**6), found(rolled, largest=10**6)
+    one, other = found(panorama, max_pixels=10**6), found(rolled, max_pixels=10**6)
     moved = np.column_stack([(one.points[:, 0] + 100) % 720, one.points[:, 1]])
     gaps = np.abs(moved[:, None] - other.points[None]).max(axis=-1)
     assert (gaps.min(axis=1) < 0.5).mean() > 0.9
@@ -85,10 +85,10 @@ def test_patches_across_a_panoramas_seam_are_found_once() -> None:
 
 
 def test_the_strongest_come_first_and_own_orientation_is_lowes() -> None:
-    few, many = found(look("mirror", 0.0), features=50), found(look("mirror", 0.0), features=200)
+    few, many = found(look("mirror", 0.0), max_features=50), found(look("mirror", 0.0), max_features=200)
     assert len(few) == 50
     assert (few.points == many.points[:50]).all()
-    own = found(look("mirror", 0.0), orientation="own", features=50)
+    own = found(look("mirror", 0.0), orientation="own", max_features=50)
     assert not (own.descriptors == few.descriptors).all()
 
 

@@ -75,7 +75,7 @@ def test_pictures_without_truth_do_not_count():
 
 
 def test_a_robot_may_be_kidnapped_again_and_again():
-    stage, begun = PlacePrior(anew_after=3), []
+    stage, begun = PlacePrior(restart_after=3), []
     for index in range(7):
         begun.append(stage.step(Context("start"), tick(index), ROW).belief is not None)
     assert begun == [True, False, False, True, False, False, True]
