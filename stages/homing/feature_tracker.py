@@ -17,6 +17,7 @@ from .working_image import WorkingImage, working_image
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
+Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 EDGE_PX = 2.0
 """Points closer to the image's edge are not tracked."""
@@ -34,7 +35,7 @@ class FeatureTrackerState(State):
     places: Array = field(default_factory=lambda: np.zeros((0, 3)))
     points: Array = field(default_factory=lambda: np.zeros((0, 2)))
     alive: Bools = field(default_factory=lambda: np.zeros(0, np.bool_))
-    histograms: npt.NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, HISTOGRAM_BINS), np.float32))
+    histograms: Floats = field(default_factory=lambda: np.zeros((0, HISTOGRAM_BINS), np.float32))
 
 
 class FeatureTracker(Stage):
@@ -123,7 +124,7 @@ class FeatureTracker(Stage):
         return lost[found]
 
     def _start(
-        self, state: FeatureTrackerState, before: WorkingImage, strength: Array, local_map: LocalMap, rows: Ints
+        self, state: FeatureTrackerState, before: WorkingImage, strength: Floats, local_map: LocalMap, rows: Ints
     ) -> None:
         """Track the best points near to where the features of these rows are."""
         expected = _expected(state, before, local_map, rows)

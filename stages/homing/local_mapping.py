@@ -197,7 +197,7 @@ class LocalMapping(Stage):
     ) -> tuple[LocalMap | None, str]:
         """A map of two views, or None with the reason."""
         good = np.isfinite(matches.first).all(axis=1) & np.isfinite(matches.second).all(axis=1)
-        first, points, second, rows = (each[good] for each in matches)
+        first, points, second = matches.first[good], matches.points[good], matches.second[good]
         threshold = math.radians(self.max_epipolar_error_deg)
         found = relative_pose(first, second, ctx.rng, self.solver, threshold)
         inliers = 0 if found is None else int(np.count_nonzero(found.inliers))
@@ -222,7 +222,7 @@ class LocalMapping(Stage):
             target=old.target,
             state="new",
             inliers=inliers,
-            rows=rows[chosen],
+            rows=matches.rows[good][chosen],
             places=places[chosen],
             kinds=np.full(np.count_nonzero(chosen), MATCHED),
             points=points[chosen],

@@ -76,8 +76,8 @@ class TopologicalMapping(Stage):
         ways = {} if known is None else known_ways(known, place)
         for pair, way in driven_ways(views.distances, place, views.tours, medoids).items():
             if pair not in ways and pair[::-1] not in ways:
-                images = place_clusters.path_images(matches, way, self.min_path_matches, self.max_path_step)
-                ways[pair] = images, DRIVEN
+                between = place_clusters.path_images(matches, way, self.min_path_matches, self.max_path_step)
+                ways[pair] = between, DRIVEN
         pairs = sorted(ways)
         images = [ways[pair][0] for pair in pairs]
         used = np.unique(np.concatenate([medoids, *images]))

@@ -32,7 +32,8 @@ def refined(
             damped = square.copy()
             damped.flat[:: len(slope) + 1] *= 1.0 + damping
             damped.flat[:: len(slope) + 1] += 1e-12
-            tried = moved(*pose, -np.linalg.solve(damped, slope))
+            step: Array = -np.linalg.solve(damped, slope)
+            tried = moved(*pose, step)
             new = cost(*tried)
             improved = new < least
             if not improved:
