@@ -23,7 +23,7 @@ RAYS_PER_WEDGE = 200
 class Rays:
     """The pixels of a camera that see something, in wedges of like azimuth.
 
-    `shape`: rows and columns of the picture. `pixels` (N,): their numbers, row by row from 0, wedge after wedge.
+    `shape`: rows and columns of the image. `pixels` (N,): their numbers, row by row from 0, wedge after wedge.
     `directions` (N, 3): unit rays in the robot's frame. `footprint` (N,): angle (rad) across a pixel. `gain` (N,):
     share that vignetting leaves. `wedge_start` (W + 1,): first ray of each wedge; `wedges` (W, 3): its lowest and
     highest azimuth (rad, counter-clockwise from forward) and steepest slope. `ray_of` (rows * columns,): ray of each
@@ -51,7 +51,7 @@ def camera_of(world: WorldConfig) -> Camera:
 
 
 def shutter_times(sensor: Sensor, at: float) -> F64:
-    """Moments (s) of the sub-exposures of a picture taken at a time: they lie evenly around it."""
+    """Moments (s) of the sub-exposures of a image taken at a time: they lie evenly around it."""
     if sensor.shutter == 0.0:
         return np.array([at])
     parts: F64 = at + sensor.shutter * ((np.arange(sensor.sub_exposures) + 0.5) / sensor.sub_exposures - 0.5)
@@ -67,7 +67,7 @@ LENS_BELOW_FOCUS_M = 0.073
 
 
 def camera_rays(camera: Camera, vignetting: float = 0.0, robot_radius: float = 0.0) -> Rays:
-    """The rays of a camera; `vignetting` is the share of light that is lost in the corners of the picture.
+    """The rays of a camera; `vignetting` is the share of light that is lost in the corners of the image.
 
     A robot of `robot_radius` (m) is seen in the image where the camera's height is known; there is none if that is 0.
     Raises BadInput for a donut whose ring is not known.

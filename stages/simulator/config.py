@@ -1,8 +1,8 @@
-"""What a world is made of, as typed configuration. `WorldConfig()` is an empty hall, `demo.DEMO` a small home store.
+"""Typed configuration of a simulated world. `WorldConfig()` is an empty hall, `demo.DEMO` a small home store.
 
-Bodies are listed one by one (shelves, blocks, wall_panels, lamps) or by the dozen (aisle blocks, rooms, a lamp grid);
-`layout.expand` turns these into such lists. Metres and radians in the map frame (x right and y up on the map, z up, the
-floor at 0) unless a field says otherwise.
+Bodies are listed one by one (shelves, blocks, wall panels, lamps) or in groups (aisle blocks, rooms, a lamp grid),
+which `layout.expand` turns into single bodies. Metres and radians in the map frame (z up, the floor at 0) unless a
+field says otherwise.
 """
 
 from dataclasses import dataclass, field
@@ -50,49 +50,55 @@ Material = Literal[
     "screen",
     "board",
 ]
-"""What a face may look like; `textures.MATERIALS` draws them."""
+"""Materials of faces; `textures` draws them."""
 
 
 @dataclass(frozen=True)
 class Shelf:
-    """A shelf with goods on its four faces: centre, length along its own x, depth along its own y, turned by `yaw`."""
+    """A shelf with goods on its four sides."""
 
     centre: Point
     length: Positive
+    """Along its own x."""
     depth: Positive
+    """Along its own y."""
     height: Positive = 1.8
     levels: Annotated[int, Bounds(ge=1)] = 4
+    """Rows of compartments."""
     yaw: float = 0.0
     stock: bool = True
-    """Cartons stand on top."""
+    """Whether cartons stand on top."""
     department: str = ""
-    """Whose goods stand here: shelves of one department choose among the same few."""
+    """Shelves of one department hold the same assortment of goods."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """A plain body: pillar, counter, inner wall, furniture, mat. `material` is its sides' look, `top` its top's."""
+    """A box: pillar, counter, inner wall, piece of furniture, mat."""
 
     centre: Point
     size: Point
     height: Positive
     material: Material = "concrete"
+    """Of its sides."""
     top: Material = "wood"
     bottom_z: float = 0.0
+    """Height of its underside above the floor."""
     yaw: float = 0.0
     bottom: Material | None = None
-    """Look of its underside; that of its top where null."""
+    """Of its underside; null: as its top."""
     look: str = ""
-    """Bodies of one material and one look are alike; every body has its own where it is empty."""
+    """Blocks of the same material and look share a texture; empty: a texture of its own."""
     kind: Literal["block", "wall", "door", "furniture", "plant", "roof"] = "block"
-    """What a floor plan shows it as."""
+    """How floor plans draw it."""
 
 
 @dataclass(frozen=True)
 class WallPanel:
-    """A poster, sign, window or door against a wall: its middle on the wall, the way it faces, and what is on it."""
+    """A poster, sign, window or door on a wall."""
 
     centre: Point
+    """Its middle on the wall."""
     facing: float
     """Heading of its outward normal."""
     width: Positive
@@ -103,20 +109,21 @@ class WallPanel:
 
 @dataclass(frozen=True)
 class Lamp:
-    """A ceiling lamp: where it hangs, its panel's size, and its light (blue, green, red; 1 is ordinary)."""
+    """A ceiling lamp."""
 
     centre: Point
     size: Point = (1.2, 0.3)
     light: tuple[float, float, float] = (0.96, 1.0, 1.0)
+    """Colour: blue, green, red; 1 is ordinary brightness."""
     z: float | None = None
-    """Height (m) that it hangs at; under the ceiling where null."""
+    """Height above the floor; null: under the ceiling."""
     name: str = ""
-    """What switches it: the name of its room, or its own."""
+    """Of its room, or its own; `lamps_off` switches lamps by it."""
 
 
 @dataclass(frozen=True)
 class LampGrid:
-    """Lamps all over the hall, the same distances apart in x and in y."""
+    """Lamps at equal distances over the whole hall."""
 
     spacing: Point = (3.0, 3.0)
     size: Point = (1.2, 0.3)
@@ -125,30 +132,29 @@ class LampGrid:
 
 @dataclass(frozen=True)
 class AisleBlock:
-    """Rows of shelves with aisles between them: they fill a rectangle, and aisles take what the shelves leave.
-
-    `cross_aisles` cut all rows, as wide as an aisle. Each stretch between two rows is an aisle; of the inner ones a
-    share `dead_ends` is closed by a shelf at one end, drawn by the seed.
-    """
+    """Rows of shelves that fill a rectangle, with aisles between them."""
 
     corner: Point
     """Lower left."""
     size: Point
     name: str = ""
     along: Literal["x", "y"] = "y"
-    """Which way the aisles run."""
+    """Direction of the aisles."""
     aisle: Positive = 2.0
-    """Least width of an aisle."""
+    """Minimum width of an aisle."""
     depth: Positive = 1.0
+    """Of the shelves, as the next three."""
     height: Positive = 2.0
     levels: Annotated[int, Bounds(ge=1)] = 4
     stock: bool = True
     cross_aisles: Annotated[int, Bounds(ge=0)] = 0
+    """Aisles that cut through all rows."""
     dead_ends: Share = 0.0
+    """Share of the inner aisles that a shelf closes at one end, drawn by the seed."""
     pillars: Spread = 0.0
-    """Distance of pillars that stand in every other row; none where 0."""
+    """Distance between pillars in every other row; 0: none."""
     department: str = ""
-    """Whose goods they hold; the block's own where empty."""
+    """Of the goods; empty: a department of its own."""
 
 
 Side = Literal["east", "north", "west", "south"]
@@ -159,97 +165,93 @@ Furniture = Literal[
 
 @dataclass(frozen=True)
 class Door:
-    """A way through a wall of a room and whatever wall lies behind: its middle is `at` m from the wall's low end."""
+    """A doorway through a wall of a room and any wall behind it."""
 
     side: Side
     at: float
+    """Distance of its middle from the end of the wall with the lower x or y."""
     width: Positive = 1.0
     leaf: bool = True
-    """A leaf opens and closes it; else it is a mere opening."""
+    """Whether a door leaf opens and closes it; false: always open."""
 
 
 @dataclass(frozen=True)
 class Room:
-    """A named rectangle: inner walls with doors and windows, its own floor, furniture along the walls, lamps.
-
-    Without walls it is a part of the hall or of the open: a corridor, a lawn.
-    """
+    """A named rectangle with walls, doors, windows, floor, furniture and lamps; without walls a corridor or a lawn."""
 
     name: str
     corner: Point
+    """Lower left."""
     size: Point
     doors: tuple[Door, ...] = ()
     windows: tuple[Side, ...] = ()
     """Sides with a row of windows; each has a curtain."""
     furniture: Furniture = "none"
     furniture_density: Share = 0.6
-    """Share of the places for furniture that are taken."""
+    """Share of the possible places for furniture that are taken."""
     walls: bool = True
     wall: Material = "plaster"
     facade: Material | None = None
-    """Look of the walls from outside, where the room stands in the open."""
+    """Of the walls outside, for a room in the open."""
     floor: Material | None = None
-    """The hall's where null."""
+    """null: the hall's."""
     height: float | None = None
-    """Of a ceiling of its own; the hall's where null."""
+    """Of its own ceiling; null: the hall's."""
     lamps: Spread = 2.5
-    """Distance between its lamps; none where 0."""
+    """Distance between its lamps; 0: none."""
 
 
 @dataclass(frozen=True)
 class Kidnapping:
-    """Somebody lifts the robot, `at` seconds into a drive; odometry does not see it.
-
-    It is put down where it was, or at `to` (x, y, heading: a kidnapping), turned by `turn` (rad).
-    """
+    """Somebody lifts the robot and puts it down again; odometry does not see it."""
 
     at: Positive
+    """Seconds from the start of the drive."""
     turn: float = 0.0
+    """Radians, counter-clockwise, by which it is turned."""
     to: tuple[float, float, float] | None = None
+    """Where it is put down: x, y, heading; null: where it was."""
 
 
 @dataclass(frozen=True)
 class Route:
-    """A way through a world; `route_planning.plan` makes it a line of points around whatever stands in between.
-
-    `waypoints` goes through the given points, `laps` round them. `aisles` goes through every aisle of the blocks named
-    in `through` (all where empty), `rooms` to every room named there that can be reached, `random` from one free
-    place to another. The robot starts at the first point, facing the second.
-    """
+    """A path through a world, led around obstacles. The robot starts at its first point, facing the second."""
 
     waypoints: tuple[Point, ...] = ()
-    """Of a tour that finds its own way, only the first is kept: where it starts."""
+    """Points to go through; `aisles`, `rooms` and `random` start at the first and end with the rest."""
     kind: Literal["waypoints", "aisles", "laps", "rooms", "random"] = "waypoints"
+    """`waypoints`: through the given points; `laps`: round them; `aisles`: through every aisle; `rooms`: into every
+    room that can be reached; `random`: between random free places or down random aisles."""
     through: tuple[str, ...] = ()
+    """Names of the aisle blocks or rooms to visit; empty: all."""
     laps: Annotated[int, Bounds(ge=1)] = 1
-    """Of `laps`: times around; of `aisles`: times through each, there and back by turns."""
+    """Of `laps`: times around; of `aisles`: times through each, in alternating directions."""
     lead_in: tuple[Point, ...] = ()
-    """Of `laps`: points that it goes through before."""
+    """Of `laps`: points to go through before the first lap."""
     length: Positive | None = None
-    """Metres after which it ends; all the way where null."""
+    """Metres after which it ends; null: the whole path."""
     seed: int = 0
+    """Of random routes."""
     kidnappings: tuple[Kidnapping, ...] = ()
-    """What is done to the robot on this route, each time that it is driven."""
+    """What happens on each drive along this route."""
     day_duration_s: Positive | None = None
-    """Seconds after which lamps, curtains and goods are the next day's, while the robot drives on; null: never."""
+    """Seconds after which lamps, curtains and goods become those of the next day during a drive; null: never."""
 
 
 @dataclass(frozen=True)
 class Day:
-    """What a day is like. Goods are rearranged against the seed's order, furniture is shifted by about `furniture` m.
-
-    Which goods, doors, curtains or lamps it hits follows from the world's seed and the day's number.
-    """
+    """The state of a world on one day. The world's seed and the day decide which goods, doors or lamps change."""
 
     people: Annotated[int, Bounds(ge=0)] = 0
     """Walkers in the whole world."""
     rearranged: Share = 0.0
-    """Share of the shelves' compartments that hold something else."""
+    """Share of the shelves' compartments that hold other goods."""
     furniture: Spread = 0.0
+    """Standard deviation (m) of the shift of furniture."""
     light: tuple[float, float, float] = (1.0, 1.0, 1.0)
     """Factors of all light: blue, green, red."""
     lamps_off: Share | tuple[str, ...] = 0.0
-    """Share of the lamps, or the names of lamps or rooms."""
+    """Share of the lamps that are off, or the names of lamps or rooms."""
     curtains: Share = 0.0
     """Share of the windows whose curtains are closed."""
     doors: Share = 1.0
@@ -258,46 +260,51 @@ class Day:
 
 @dataclass(frozen=True)
 class Robot:
-    """A differential drive and the hand on its joystick: limits (m/s, rad/s and per second), and its body."""
+    """A differential drive that is steered along a route."""
 
     radius: Positive = 0.25
     speed: Positive = 0.45
+    """Maximum, m/s."""
     turn_speed: Positive = 0.9
+    """Maximum, rad/s."""
     acceleration: Positive = 0.5
+    """m/s²."""
     turn_acceleration: Positive = 2.0
+    """rad/s²."""
     look_ahead: Positive = 0.45
-    """Distance (m) along the route of the point that is steered for."""
+    """Distance along the route to the point that is steered for (pure pursuit)."""
     path_jitter_m: Spread = 0.04
-    """Spread (m) of each day's line, drawn every 2.5 m: as a root mean square over the way it comes to 0.78 of it."""
+    """Standard deviation of each day's offset from the route, drawn every 2.5 m; its root mean square is 0.78 of it."""
     contact: Literal["slide", "hold"] = "slide"
-    """What a robot does that is steered into an obstacle: it slides along it, or is held where it is."""
+    """At an obstacle the robot slides along it, or stops."""
 
 
 @dataclass(frozen=True)
 class OdometryNoise:
-    """Noise of an odometry increment (rotation, translation, rotation), and the spread of a day's systematic errors.
+    """Noise of an odometry increment (rotation, translation, rotation), and systematic errors drawn once a day.
 
-    sigma_trans = `translation` sqrt(m); sigma_rot^2 = `rotation`^2 |rad| + `drift`^2 m. Biases are drawn once a day.
+    sigma_trans = `translation` sqrt(m); sigma_rot^2 = `rotation`^2 |rad| + `drift`^2 m.
     """
 
     translation: Spread = 0.02
+    """m per sqrt(m)."""
     rotation: Spread = 0.021
     """rad per sqrt(rad), 1.2 degrees."""
     drift: Spread = 0.0122
     """rad per sqrt(m), 0.7 degrees."""
     scale_bias: Spread = 0.02
-    """Share by which translation is misjudged."""
+    """Standard deviation of the relative error of translation."""
     rotation_bias: Spread = 0.015
-    """Share by which rotation is misjudged."""
+    """Standard deviation of the relative error of rotation."""
     turn_bias: Spread = 0.0044
-    """Rotation (rad) added per metre, 0.25 degrees."""
+    """Standard deviation of the rotation (rad) added per metre, 0.25 degrees."""
     added: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Noise on top, as in Wolf, Burgard & Burkhardt 2005: mm per sqrt(m), degrees per sqrt(360 degrees) and per
+    """Further noise as in Wolf, Burgard & Burkhardt 2005: mm per sqrt(m), degrees per sqrt(360 degrees), degrees per
     sqrt(m); `conf/odometry_noise` holds their nine levels."""
 
 
 def mirror(columns: int = 640) -> dict[str, Any]:
-    """The usual camera as in camera.yaml: a hyperbolic mirror over a camera of 4 : 3, of so many columns."""
+    """The default camera as in camera.yaml: a hyperbolic mirror above a camera with images of ratio 4 : 3."""
     scale = columns / 640
     focal, x, y = 497.0 * scale, 320.0 * scale - 0.5, 240.0 * scale - 0.5
     return {
@@ -313,67 +320,75 @@ def mirror(columns: int = 640) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Sensor:
-    """What the chip does: noise (grey levels), darker rim (share lost in the corner), slow exposure drift (share)."""
+    """The camera's image sensor."""
 
     noise: Spread = 2.0
+    """Standard deviation in grey levels."""
     vignetting: Share = 0.12
+    """Share of the light that is lost in the corners."""
     exposure: Positive = 1.0
+    """Factor of brightness."""
     exposure_drift: Share = 0.04
+    """Amplitude of a slow change of exposure."""
     exposure_period: Positive = 23.0
-    """Seconds."""
+    """Period (s) of that change."""
     shutter: Spread = 0.0
-    """Seconds that a picture takes: what moves meanwhile is blurred."""
+    """Exposure time (s): whatever moves meanwhile is blurred."""
     sub_exposures: Annotated[int, Bounds(ge=1)] = 6
-    """Moments within it that are rendered and averaged."""
+    """Instants within the exposure time that are rendered and averaged."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """Rates (Hz) of pictures and of odometry and truth."""
+    """Rates at which the robot records."""
 
     images: Positive = 2.0
+    """Hz."""
     odometry: Positive = 20.0
+    """Hz, of odometry and ground truth."""
 
 
 @dataclass(frozen=True)
 class Ranges:
-    """A ring of range readings like ultrasound: the nearest echo within each cone, from the robot's middle.
-
-    The first looks backwards, the others follow counter-clockwise at equal steps.
-    """
+    """A ring of ultrasound-like range sensors. The first looks backwards, the others follow counter-clockwise."""
 
     readings: Annotated[int, Bounds(ge=1)] = 16
+    """Sensors around the robot."""
     beam_width: Positive = 0.26
-    """Opening angle (rad) of a cone, 15 degrees."""
+    """Opening angle (rad) of a sensor's cone, 15 degrees; the nearest echo in it counts."""
     max_range: Positive = 4.0
-    """Metres; there is no echo from further away."""
+    """Metres from the robot's middle beyond which there is no echo."""
     noise: Spread = 0.01
-    """Standard deviation (m) of an echo."""
+    """Standard deviation (m) of a range."""
     dropout: Share = 0.02
-    """Share of readings without an echo though something is there."""
+    """Share of the readings that miss their echo."""
     rate: Positive = 5.0
-    """Readings (Hz) of the whole ring in a log."""
+    """Scans per second (Hz) in a log."""
 
 
 @dataclass(frozen=True)
 class Delivery:
-    """What happens to pictures on their way into the log: a share is lost, a share arrives `delay_s` seconds late."""
+    """What happens to images on their way into the log."""
 
     dropped: Share = 0.0
+    """Share that is lost."""
     late: Share = 0.0
+    """Share that arrives late."""
     delay_s: Spread = 0.7
+    """By how many seconds."""
 
 
 @dataclass(frozen=True)
 class WorldConfig:
-    """A world: one hall of `size` with what stands in it, the robot that drives there and what it perceives.
+    """A hall of `size`, what stands in it, the robot that drives there and its sensors.
 
-    `seed` decides goods, textures, the line of each day and all noise. Day k is like `days[k]`, and days after the last
-    are like the last. A ceiling of material `sky` is none: the world lies in the open, and rooms have roofs.
+    Day k is `days[k]`; later days are like the last one. With the ceiling material `sky` the world lies in the open and
+    rooms have roofs.
     """
 
     name: str = "empty"
     seed: int = 1
+    """Of goods, textures, the jitter of each day's path and all noise."""
     size: Point = (12.0, 9.0)
     height: Positive = 3.2
     wall: Material = "wall"
@@ -387,11 +402,11 @@ class WorldConfig:
     wall_panels: tuple[WallPanel, ...] = ()
     lamps: tuple[Lamp, ...] = ()
     ambient: Annotated[float, Bounds(ge=0, lt=1)] = 0.45
-    """Share of the light that comes from all around; lamps and windows give the rest."""
+    """Share of ambient light; lamps and windows give the rest."""
     goods: Annotated[int, Bounds(ge=1)] = 56
-    """Different goods in the whole world."""
+    """Number of different goods in the whole world."""
     assortment: Annotated[int, Bounds(ge=1)] = 56
-    """Different goods that one department has."""
+    """Number of different goods in one department."""
     days: tuple[Day, ...] = (Day(), Day(rearranged=0.1))
     routes: dict[str, Route] = field(default_factory=dict)
     robot: Robot = Robot()
@@ -409,5 +424,5 @@ class WorldConfig:
         return float(self.camera["height"])
 
     def day(self, number: int) -> Day:
-        """What day `number` (from 0) is like."""
+        """The state of the world on day `number` (from 0)."""
         return self.days[min(number, len(self.days) - 1)] if self.days else Day()

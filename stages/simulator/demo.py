@@ -1,4 +1,4 @@
-"""The world that comes embedded: a small home store, 12 x 9 m, the same as `conf/world/home_store_demo.yaml`."""
+"""The built-in world: a small home store, 12 x 9 m, the same as `conf/world/home_store_demo.yaml`."""
 
 from .config import Block, LampGrid, Route, Shelf, WallPanel, WorldConfig
 
@@ -74,4 +74,4 @@ DEMO = WorldConfig(
     lamp_grid=LampGrid(),
     routes=_routes(),
 )
-"""What is driven through where nothing else is named."""
+"""The world that is used when none is named."""

@@ -1,4 +1,4 @@
-"""How far away what features show is, asked of the simulated world."""
+"""Depths of image features in a simulated world."""
 
 from typing import Annotated
 
@@ -17,22 +17,22 @@ from .world import World
 
 
 class FeatureDepths(Stage):
-    """Distances from the camera to what its features show, in a simulated world as it stands on `day`.
-
-    A ray is cast along each bearing; people are not there. With a recorded `log` nothing is known of its place.
-    """
+    """Distances from the camera to the surfaces that features show, by a ray along each bearing, without people."""
 
     log: str | tuple[str, ...] | None = None
+    """A recorded log: then nothing is known of the place and the output is absent."""
     world: WorldConfig = DEMO
+    """The simulated world."""
     day: Annotated[int, Bounds(ge=0)] = 0
+    """Day of the simulated world."""
 
     class Out(Outputs):
-        """`depths`: absent where a log is driven through."""
+        """`depths`: absent with a recorded log."""
 
         depths: Depths | None = None
 
     def setup(self, ctx: Context) -> None:
-        """What stands where."""
+        """Build the world."""
         self._world = World(self.world, self.day) if self.log is None else None
 
     def step(
@@ -42,7 +42,7 @@ class FeatureDepths(Stage):
         features: LocalFeatures | None = None,
         vertical_segments: VerticalSegments | None = None,
     ) -> Out:
-        """Cast the rays of one picture."""
+        """Cast the rays of one image."""
         if self._world is None:
             return self.Out()
         patches = np.zeros((0, 3)) if features is None else features.bearings

@@ -1,4 +1,4 @@
-"""How far away a world's surfaces are along any rays, to score by: slower than the ring of ranges, and in space."""
+"""Distances of a world's surfaces along rays in space, for metrics; slower than the range sensors' rays."""
 
 import math
 from collections.abc import Sequence
@@ -44,7 +44,7 @@ def _hits(boxes: F64, ceiling: float, eye: F64, rays: F64) -> F64:
 
 @numba.njit(cache=True, error_model="numpy")
 def _slab(at: float, along: float, low: float, high: float, enter: float, leave: float) -> tuple[float, float]:
-    """What is left of the stretch from `enter` to `leave` of a ray between two planes."""
+    """Clip the interval from `enter` to `leave` of a ray to the slab between two planes."""
     if along == 0.0:
         return (enter, leave) if low <= at <= high else (math.inf, -math.inf)
     one, other = (low - at) / along, (high - at) / along

@@ -1,4 +1,4 @@
-"""What stands on the floor, as a value: of a simulated world, or of the place where a log was recorded."""
+"""Floor plans of a simulated world, or of the place where a log was recorded."""
 
 from typing import Annotated
 
@@ -15,21 +15,23 @@ from .world import World, outline
 
 
 class WorldPlan(Stage):
-    """The plan of a simulated world on a day, for pictures of where a robot drove."""
+    """The floor plan of a simulated world on a day, for plots."""
 
     world: WorldConfig = DEMO
+    """The simulated world."""
     day: Annotated[int, Bounds(ge=0)] = 1
+    """Day of the simulated world."""
 
     class Out(Outputs):
         plan: FloorPlan
 
     def step(self, ctx: Context) -> Out:
-        """Outlines of everything that a robot cannot drive over or under."""
+        """Outlines of all obstacles."""
         return self.Out(plan=plan_of(self.world, self.day))
 
 
 class DrivenPlan(Stage):
-    """The plan of where logs were recorded, for pictures: the occupancy grid beside the first log that has one.
+    """The floor plan of the place where logs were recorded, for plots: the grid beside the first log that has one.
 
     Beside `drive.mcap` that is `drive.grid/map.yaml`, as `omninav simulate` writes it, or else `map.yaml`, in the
     format of ROS map_server and in the frame of the true poses. Without a log it is the simulated world's plan on the
@@ -37,8 +39,11 @@ class DrivenPlan(Stage):
     """
 
     log: str | tuple[str, ...] | None = None
+    """The recorded logs."""
     world: WorldConfig = DEMO
+    """The simulated world, for runs without a log."""
     day: int | tuple[int, ...] = 1
+    """Its days."""
 
     class Out(Outputs):
         """`plan`: absent where no log has a grid beside it."""
@@ -46,7 +51,7 @@ class DrivenPlan(Stage):
         plan: FloorPlan | None = None
 
     def inputs_digest(self) -> str | None:
-        """Of the grid that is read, where there is one."""
+        """Hash of the grid file, if there is one."""
         grid = grid_beside(self.log)
         return None if grid is None else digest_file(grid)
 

@@ -1,4 +1,4 @@
-"""What stands where on a day: aisle blocks, rooms and lamp grids of a world, laid out into single bodies."""
+"""Lays out aisle blocks, rooms and lamp grids of a world on a day as single bodies."""
 
 import math
 from dataclasses import dataclass, replace

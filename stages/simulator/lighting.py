@@ -20,19 +20,19 @@ LIGHT_RANGE_M = 12.0
 LIGHT_SIZE_M2 = 0.25
 """Square (m) of the extent of a light: close by it is no point."""
 BOUNCE_SIGMA_M = 2.5
-"""How far (m, one sigma) light that is thrown back spreads."""
+"""Standard deviation (m) of the spread of reflected light."""
 CONTACT_SHADOW_M = 0.15
 """Distance (m) over which a body darkens the floor beside it."""
 DAYLIGHT = (1.1, 1.0, 0.92)
 """Colour of the sky: blue, green, red."""
 SKY_LIGHT_SPACING_M = 4.0
-"""Distance (m) of the lamps that an open sky is made of."""
+"""Distance (m) between the lamps that an open sky is made of."""
 CURTAIN_TRANSMISSION = 0.06
 """Share of the light that passes a closed curtain."""
 FACE_NORMALS = np.array([(0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)], dtype=np.float64)
-"""Ways that lit faces look: up, +x, -x, +y, -y."""
+"""Normals of lit faces: up, +x, -x, +y, -y."""
 FACE_HEIGHTS_M = np.array([0.0, 1.0, 1.0, 1.0, 1.0])
-"""Height (m) at which the light on each is taken."""
+"""Height (m) at which the light on each is sampled."""
 
 
 @dataclass(frozen=True)

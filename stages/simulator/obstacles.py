@@ -1,4 +1,4 @@
-"""What a robot can bump into, for quick questions: how far is the nearest obstacle, and what does a beam hit."""
+"""Obstacles with fast queries: distance to the nearest one, and range along a ray."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What the wheels say: the true motion with noise and a day's systematic errors."""
+"""Simulated odometry: the true motion with noise and systematic errors of a day."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from .config import OdometryNoise
 F64 = npt.NDArray[np.float64]
 
 DRAWS = 6
-"""Standard normal numbers that an increment takes."""
+"""Normal random numbers per increment."""
 
 
 @dataclass(frozen=True)

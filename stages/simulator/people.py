@@ -1,4 +1,4 @@
-"""People who walk about a world, stand before its goods and keep the robot company; and what they look like."""
+"""People who walk about a world or accompany the robot, and their appearance."""
 
 import math
 from bisect import bisect_right
@@ -18,28 +18,28 @@ F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 
 OUTFITS = 16
-"""Different people there are, by their clothes."""
+"""Number of different outfits."""
 RADIUS_M = 0.25
 WALKER_CLEARANCE_M = 0.32
-"""Clearance (m) of a walker's way from its middle line."""
+"""Clearance (m) of a walker's path from obstacles."""
 STRIDE_M = 0.7
 """Metres a step."""
 MIN_ROBOT_DISTANCE_M = 0.6
-"""Metres from the robot's middle that people keep."""
+"""Metres that people keep from the robot's middle."""
 MAX_COMPANIONS = 4
-"""People at most who take an interest in the robot at a time."""
+"""Maximum number of people who accompany the robot."""
 MAX_SPEED = 1.3
-"""Metres a second that nobody exceeds."""
+"""Maximum speed of a person, m/s."""
 MIN_PERSON_DISTANCE_M = 2.1 * RADIUS_M
-"""Metres between the middles of people who do not let one another pass."""
+"""Minimum distance (m) between two people near the robot."""
 GIVE_WAY_DISTANCE_M = 0.58
-"""Metres from the robot's middle where nobody stays who cannot get out of its way."""
+"""Distance (m) from the robot below which a person who cannot step aside disappears."""
 OUT_OF_SIGHT_M, GIVE_UP_DISTANCE_M = 5.0, 3.0
-"""Metres from the robot from which somebody may come or go unseen; metres from where somebody would like to be."""
+"""Metres from the robot beyond which a person may appear or disappear; metres from the desired place."""
 MIN_ABSENCE_S = 5.0
-"""Seconds that somebody is gone at least."""
+"""Minimum time (s) for which a person is gone."""
 STEP_S = 0.2
-"""Seconds of a step of those who walk near the robot."""
+"""Time step (s) of people near the robot."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ Clearance = Callable[[F64], F64]
 
 
 class Walker:
-    """Somebody strolling: from one stop to the next in straight free lines, forward rather than back, with halts."""
+    """A person who walks between random places in straight free lines, with halts."""
 
     def __init__(self, rng: np.random.Generator, start: tuple[float, float], clearance: Clearance) -> None:
         self._rng = rng
@@ -160,7 +160,7 @@ class Walker:
         return Person(position, heading, RADIUS_M, self.height, self.look, stride)
 
     def _next_leg(self) -> None:
-        """Another leg, or a halt: turned aside, as if to look at something."""
+        """Add a leg, or a halt facing aside."""
         time, x, y, _, way = self._legs[-1]
         rng = self._rng
         if rng.uniform() < 0.25:
@@ -192,7 +192,7 @@ class Track(NamedTuple):
 
 
 class Companion:
-    """Somebody who wants advice: comes up beside or behind the robot, stays within 0.6 to 1.5 m, falls back."""
+    """A person who accompanies the robot at 0.6 to 1.5 m, and falls back from time to time."""
 
     def __init__(self, rng: np.random.Generator, clearance: Clearance) -> None:
         self._clearance = clearance
@@ -227,7 +227,7 @@ class Companion:
         return next((place for place in places if self._has_room(place, x, y, others)), None)
 
     def _has_room(self, place: F64, x: float, y: float, others: F64) -> bool:
-        """Whether one can stand at a place: on nobody's feet, and if near the robot at (x, y) with nothing between."""
+        """Whether a place is free and, if near the robot at (x, y), has a free line to it."""
         if math.hypot(place[0] - x, place[1] - y) < MIN_ROBOT_DISTANCE_M:
             return False
         if len(others) and np.hypot(*(others - place).T).min() < 2.2 * RADIUS_M:
@@ -238,7 +238,7 @@ class Companion:
 
 
 def _back_along(poses: F64, gait: F64, distance: float) -> F64:
-    """The point of the robot's way that lies `distance` m back along it, or its start."""
+    """The point of the robot's path `distance` m back along it, or its start."""
     found = int(np.searchsorted(gait, distance))
     point: F64 = poses[max(0, len(poses) - 2 - found), :2]
     return point
@@ -272,7 +272,7 @@ class Crowd:
         self._known: tuple[Track, list[F64]] | None = None
 
     def at(self, seconds: float, track: Track | None = None) -> tuple[Person, ...]:
-        """Everybody at a time in seconds; who keeps the robot company only where its track is known."""
+        """All people at a time in seconds; companions only if the robot's track is known."""
         if track is None or not len(track.times):
             return tuple(walker.at(max(0.0, seconds)) for walker in self._walkers)
         known = self._known
@@ -298,14 +298,14 @@ class Crowd:
         return self.visible(state, seconds, strolls)
 
     def initial_state(self, track: Track) -> F64:
-        """Everybody when a drive begins (P, 5): walkers first."""
+        """State of all people at the start of a drive (P, 5), walkers first."""
         now = float(track.times[0])
         state = np.zeros((len(self._everybody), 5))
         state[:, GONE] = now - MIN_ABSENCE_S
         return self._advanced(state, now, 0.0, Track(track.times[:1], track.poses[:1]), begins=True)
 
     def advanced(self, state: F64, seconds: float, until: float, track: Track) -> F64:
-        """Everybody (P, 5) some time later, from where the robot was up to `seconds`: nobody knows what comes next."""
+        """State (P, 5) at time `until`, from the robot's track up to `seconds` alone."""
         steps = math.ceil((until - seconds) / STEP_S - 1e-9)
         last = max(1, int(np.searchsorted(track.times, seconds + 1e-9, side="right")))
         known = Track(track.times[:last], track.poses[:last])
@@ -316,7 +316,7 @@ class Crowd:
         return state
 
     def visible(self, state: F64, seconds: float, strolls: Sequence[bool] | None = None) -> tuple[Person, ...]:
-        """Who is there, and as what one sees them; `strolls`: which walkers nobody keeps from it."""
+        """The people who are present; `strolls`: walkers whom nothing keeps from their own path."""
         people = []
         for number, (row, who) in enumerate(zip(state, self._everybody, strict=True)):
             if row[GONE] < 0.0:
@@ -331,7 +331,7 @@ class Crowd:
         return tuple(people)
 
     def _advanced(self, before: F64, now: float, took: float, track: Track, begins: bool = False) -> F64:
-        """Everybody one step later: each in turn goes where it likes, as far as the others and the robot let it."""
+        """State one step later: each person in turn moves towards the desired place, avoiding others and the robot."""
         state = before.copy()
         robot = _expected(track, now)
         for number, who in enumerate(self._everybody):
@@ -361,7 +361,7 @@ class Crowd:
         return state
 
     def _reappear(self, row: F64, desired_place: F64 | None, now: float, robot: F64, others: F64, away: float) -> None:
-        """Somebody who was gone is there again, if far from the robot and on nobody's feet."""
+        """Let an absent person reappear, far from the robot and from others."""
         if (
             desired_place is None
             or now - row[GONE] < MIN_ABSENCE_S
@@ -373,7 +373,7 @@ class Crowd:
             row[HEADING] = math.atan2(robot[1] - desired_place[1], robot[0] - desired_place[0])
 
     def _walk(self, row: F64, goal: F64, now: float, took: float, robot: F64, others: F64) -> None:
-        """A step towards where somebody would like to be, or aside where others or the robot are in the way."""
+        """A step towards the desired place, or aside if others or the robot are in the way."""
         place = row[:2].copy()
         if _has_given_up(row, goal, robot):
             row[GONE] = now
@@ -405,7 +405,7 @@ class Crowd:
             row[HEADING] = math.atan2(step[1] - place[1], step[0] - place[0])
 
     def _passable(self, places: F64, start: F64, others: F64) -> npt.NDArray[np.bool_]:
-        """Whether one can go from `start` to each of some places (N, 2): not into things, nor closer to others."""
+        """Which of the places (N, 2) can be reached from `start` without touching obstacles or others."""
         room = min(0.8 * RADIUS_M, float(self._clearance(start[None])[0]))
         free: npt.NDArray[np.bool_] = self._clearance(places) >= room
         if len(others):
@@ -415,18 +415,18 @@ class Crowd:
 
 
 def _has_given_up(row: F64, goal: F64, robot: F64) -> bool:
-    """Whether somebody has given up, and nobody sees it."""
+    """Whether a person is too far from the desired place, out of the robot's sight."""
     return math.dist(goal, row[:2]) > GIVE_UP_DISTANCE_M and math.dist(row[:2], robot) > OUT_OF_SIGHT_M
 
 
 def _out_of_sight(way: F64, robot: F64) -> F64 | None:
-    """The last point of the robot's way (N, 2) that it has left far enough behind for somebody to turn up there."""
+    """The last point of the robot's path (N, 2) that is out of its sight."""
     far = np.flatnonzero(np.hypot(*(way - robot).T) >= OUT_OF_SIGHT_M)
     return way[far[-1]] if len(far) else None
 
 
 def _expected(track: Track, now: float) -> F64:
-    """Where (2,) the robot will be soon if it goes on as it does; where it is if that is not known."""
+    """Predicted position (2,) of the robot at constant velocity; its last one if the velocity is unknown."""
     at: F64 = track.poses[-1, :2]
     if len(track.times) < 2:
         return at
@@ -436,7 +436,7 @@ def _expected(track: Track, now: float) -> F64:
 
 
 def _ahead_on_track(way: F64, place: F64) -> F64:
-    """The point of the robot's way (N, 2) some 0.8 m on from where it comes nearest to a place."""
+    """The point of the robot's path (N, 2) some 0.8 m on from where it comes nearest to a place."""
     nearest = int(np.argmin(((way - place) ** 2).sum(axis=1)))
     gone = np.cumsum(np.hypot(*np.diff(way[nearest:], axis=0).T))
     point: F64 = way[min(nearest + 1 + int(np.searchsorted(gone, 0.8)), len(way) - 1)]

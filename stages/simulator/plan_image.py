@@ -1,4 +1,4 @@
-"""A floor plan of a world on its day, with the ways that were driven, as a picture."""
+"""Draws a floor plan of a world with driven paths."""
 
 from collections.abc import Mapping
 from io import BytesIO
@@ -26,10 +26,10 @@ COLOURS = {
     "door": "#c0392b",
     "hanging": "#3d7ab8",
 }
-"""Bodies from below to above; roofs are left off."""
+"""Bodies in drawing order; roofs are not drawn."""
 LAMP_ON, LAMP_OFF = "#ffe98a", "#cfcfcf"
 GROUNDS = {"grass": "#e4f0d8", "paving": "#efece6", "asphalt": "#e3e3e3", "carpet": "#f0eaf5", "parquet": "#f6ead9"}
-"""Floors of rooms, where they are not white."""
+"""Colours of floors other than white."""
 
 
 def draw_plan(world: World, path: Path, drives: Mapping[str, npt.ArrayLike] | None = None) -> None:
@@ -77,9 +77,9 @@ def draw_plan(world: World, path: Path, drives: Mapping[str, npt.ArrayLike] | No
     if drives:
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
     figure.tight_layout()
-    picture = BytesIO()
-    figure.savefig(picture, format="png", metadata={"Software": None})
-    write_whole(path, picture.getvalue())
+    png = BytesIO()
+    figure.savefig(png, format="png", metadata={"Software": None})
+    write_whole(path, png.getvalue())
 
 
 def _name(axes: "Axes", name: str, at: tuple[float, float], turn: float) -> None:

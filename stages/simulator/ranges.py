@@ -14,7 +14,7 @@ from .people import Person
 F64 = npt.NDArray[np.float64]
 
 RAYS_PER_CONE = 5
-"""Rays that stand for a cone."""
+"""Rays that sample a cone."""
 
 
 def azimuths(ring: Ranges) -> tuple[float, float]:

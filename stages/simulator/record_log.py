@@ -18,7 +18,7 @@ from .world import World
 
 
 def metres(drive: SimulatedRecording) -> float:
-    """How far the robot truly drove (m); being carried elsewhere is no driving."""
+    """Distance (m) that the robot drove, without being carried."""
     steps = np.hypot(*np.diff(drive.true_poses[:, :2], axis=0).T)
     return float(steps[np.diff(drive.true_times) > 1].sum())  # put down 1 ns after it was taken up
 
@@ -26,19 +26,23 @@ def metres(drive: SimulatedRecording) -> float:
 class RecordLog(Stage):
     """Writes a simulated drive, or one on each of several days: a log, camera.yaml, a floor plan, an occupancy grid.
 
-    `log`: the .mcap file to write; the others are named after it. Plan and grid are the first day's. The same world,
-    route, days and kidnappings give the same bytes. Raises `BadInput` where `log` is no .mcap name and
+    The same world, route, days and kidnappings give the same bytes. Raises `BadInput` if `log` is no .mcap name and
     `UnreadableRecording` for an unknown route.
     """
 
     world: WorldConfig = DEMO
+    """The simulated world."""
     route: str = "drive"
+    """Name of a route of the world."""
     day: int | tuple[int, ...] = 1
+    """Day, or several days, to drive on; floor plan and grid are those of the first."""
     log: str | None = None
+    """The .mcap file to write; the other files are named after it."""
     kidnappings: tuple[Kidnapping, ...] = ()
+    """Further ones besides those of the route."""
 
     class Out(Outputs):
-        """Files are all it gives."""
+        """Nothing: it writes files."""
 
     def step(self, ctx: Context) -> Out:
         """Render the whole drive and write it."""
@@ -48,26 +52,26 @@ class RecordLog(Stage):
         days = in_order(self.day)
         ctx.doing(f"building {self.world.name} and planning {self.route}")
         drives = [SimulatedRecording(self.world, self.route, day, self.kidnappings) for day in days]
-        ctx.doing("the first picture (for a minute, where the renderer was never compiled before)")
+        ctx.doing("rendering the first image (a minute if the renderer has to be compiled)")
         record(drives, path, progress=ctx.progress)
         path.with_suffix(".camera.yaml").write_text(write_camera(drives[0].camera))
         world = World(self.world, days[0])
         driven = {f"{self.route}, day {drive.day}": drive.truth for drive in drives}
         draw_plan(world, path.with_suffix(".plan.png"), driven)
         grid = write_grid(world, path.parent / f"{path.stem}.grid")
-        pictures = sum(len(drive.stamps) for drive in drives)
+        images = sum(len(drive.stamps) for drive in drives)
         collisions = sum(drive.collisions for drive in drives)
         people = [self.world.day(day).people for day in days]
         for name, value in (
             ("route", self.route),
             ("day", self.day),
             ("length_m", round(sum(metres(drive) for drive in drives), 1)),
-            ("frames", pictures),
+            ("frames", images),
             ("people", people[0] if len(people) == 1 else people),
             ("collisions", collisions),
         ):
             ctx.fact(name, value)
         if collisions:
-            print(f"{path}: on its way the robot came into contact with something {collisions} times")
-        print(f"{path}: {pictures} pictures; floor plan, camera.yaml and {grid} beside it")
+            print(f"{path}: the robot touched obstacles {collisions} times")
+        print(f"{path}: {images} images; floor plan, camera.yaml and {grid} beside it")
         return self.Out()

@@ -1,10 +1,10 @@
-"""The ray caster: boxes on a floor under a ceiling, seen along any set of rays.
+"""The renderer: a ray caster for boxes on a floor under a ceiling, for any set of rays.
 
 Every body is an upright box, turned by any angle, that stands on the floor or hangs (walls, shelves, posters, people).
 Rays come in wedges of like azimuth. For a wedge, the cells of a grid over the floor are walked outwards once, and the
 boxes in them are found_box, nearest first, until what was met hides the rest up to the ceiling; then each ray is tested
-against these few. So a picture costs what is seen, not what the world holds. Each pixel is computed by one thread
-from its own numbers alone, so that threads cannot change a picture.
+against these few. So a image costs what is seen, not what the world holds. Each pixel is computed by one thread
+from its own numbers alone, so that threads cannot change a image.
 """
 
 import math
@@ -28,11 +28,11 @@ U32 = npt.NDArray[np.uint32]
 FACES = 6
 """Faces of a box, in its own frame: -x, +x, -y, +y, bottom, top."""
 CHUNKS = 32
-"""Portions of a picture that threads take in turn; each has its own found of what a wedge may see."""
+"""Portions of a image that threads take in turn; each has its own list of candidates."""
 FAST_MATH = {"contract", "arcp", "reassoc", "nsz"}
-"""Liberties with rounding, an eighth of the time; the same picture on the same machine for any number of threads."""
+"""Floating-point optimisations; the image does not depend on the number of threads."""
 MAX_OCCLUDERS = 24
-"""Bodies at most that are remembered as about to hide what is behind them."""
+"""Maximum number of bodies that are kept as occluders."""
 
 
 class Bodies(NamedTuple):
@@ -91,7 +91,7 @@ def render(
     key: int = 0,
     people: Sequence[Person] = (),
 ) -> U8:
-    """The picture (rows, columns, 3), uint8 blue-green-red, from a robot's pose (x, y, heading).
+    """The image (rows, columns, 3), uint8 blue-green-red, from a robot's pose (x, y, heading).
 
     Several poses (N, 3) over the time the shutter is open give their mean: motion blur. `eye_height` (m): of the
     camera above the floor. `noise`: standard deviation (grey levels), drawn per pixel and colour from `key` alone.
@@ -105,10 +105,10 @@ def render(
     for x, y, heading in poses.tolist():
         _trace(scene, moving, rays.directions, rays.footprint, rays.wedge_start, rays.wedges, x, y, heading,
                float(eye_height), 1.0 / len(poses), lit)  # fmt: skip
-    picture = np.zeros((*rays.shape, 3), dtype=np.uint8)
+    image = np.zeros((*rays.shape, 3), dtype=np.uint8)
     _expose(lit, rays.ray_of, rays.gain, float(exposure), float(noise), np.uint64(key), QUANTILES,
-            picture.reshape(-1, 3))  # fmt: skip
-    return picture
+            image.reshape(-1, 3))  # fmt: skip
+    return image
 
 
 def _light_on_deck(scene: Scene, x: float, y: float) -> F32:
@@ -258,7 +258,7 @@ def _chunk(
                     u, v = found[which, 4] + lx, found[which, 5] - ly
                     slope = abs(dz)
 
-            # The texture, at the level its size in the picture asks for.
+            # The texture, at the level its size in the image asks for.
             per_width, per_height = size[surface, 0], size[surface, 1]
             u, v = u * per_width, v * per_height
             across = min(max(math.floor(u), 0), table[surface, 1] - 1)
@@ -683,12 +683,12 @@ QUANTILES = _gaussian_quantiles(4096)
 
 @numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH, parallel=True)
 def _expose(
-    lit: F32, ray_of: I32, gain: F32, exposure: float, noise: float, key: np.uint64, quantiles: F32, picture: U8
+    lit: F32, ray_of: I32, gain: F32, exposure: float, noise: float, key: np.uint64, quantiles: F32, image: U8
 ) -> None:
     """The chip: light times exposure and vignetting, plus noise that follows from key, pixel and colour alone."""
     start = _mixed(key)
     spread = np.float32(noise)
-    for p in numba.prange(len(picture)):
+    for p in numba.prange(len(image)):
         i = ray_of[p]
         blue = green = red = np.float32(0.5)
         if i >= 0:
@@ -701,6 +701,6 @@ def _expose(
             blue += spread * quantiles[drawn & np.uint64(0xFFF)]
             green += spread * quantiles[(drawn >> np.uint64(20)) & np.uint64(0xFFF)]
             red += spread * quantiles[(drawn >> np.uint64(40)) & np.uint64(0xFFF)]
-        picture[p, 0] = np.uint8(min(max(blue, np.float32(0.0)), np.float32(255.0)))
-        picture[p, 1] = np.uint8(min(max(green, np.float32(0.0)), np.float32(255.0)))
-        picture[p, 2] = np.uint8(min(max(red, np.float32(0.0)), np.float32(255.0)))
+        image[p, 0] = np.uint8(min(max(blue, np.float32(0.0)), np.float32(255.0)))
+        image[p, 1] = np.uint8(min(max(green, np.float32(0.0)), np.float32(255.0)))
+        image[p, 2] = np.uint8(min(max(red, np.float32(0.0)), np.float32(255.0)))

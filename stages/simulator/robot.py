@@ -1,4 +1,4 @@
-"""A differential drive: steered by commands, or along a route as a hand on a joystick would steer it."""
+"""A differential drive, steered by commands or along a route by pure pursuit."""
 
 import math
 from collections.abc import Sequence
@@ -20,14 +20,14 @@ STEP_S = 0.01
 ARRIVAL_M = 0.05
 """Metres from the last waypoint at which a drive ends."""
 CONTACT_RELEASE_M = 0.02
-"""Metres from an obstacle at which a contact has ended and another one counts anew."""
+"""Metres from an obstacle at which a contact has ended; the next one counts again."""
 REJOIN_TOLERANCE_M = 0.5
-"""Metres by which one stretch of a route may pass further from a place than another and still be taken for as near."""
+"""Metres within which two stretches of a route count as equally near to a place."""
 NO_PEOPLE: F64 = np.zeros((0, 3))
 """No people in the way."""
 
 X, Y, HEADING, SPEED, TURNING, IN_CONTACT, COLLISIONS, DISTANCE = range(8)
-"""What a robot's state (8,) holds: pose, m/s, rad/s, 1 in contact, contacts so far, metres driven so far."""
+"""Indices of a robot's state (8,): pose, m/s, rad/s, 1 in contact, contacts so far, metres driven so far."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +53,13 @@ def at_rest(pose: npt.ArrayLike) -> F64:
 
 
 def limits(robot: Robot) -> F64:
-    """What bounds a robot's motion, (6,): radius, speed, turning, both accelerations, and 1 where it slides."""
+    """Limits of a robot's motion, (6,): radius, speed, turning, both accelerations, and 1 if it slides."""
     slides = float(robot.contact == "slide")
     return np.array([robot.radius, robot.speed, robot.turn_speed, robot.acceleration, robot.turn_acceleration, slides])
 
 
 def reach(robot: Robot) -> float:
-    """How far (m) from an obstacle a robot needs to know of it."""
+    """Distance (m) up to which a robot needs to know obstacles."""
     return robot.radius + 2 * CONTACT_RELEASE_M
 
 
@@ -98,7 +98,7 @@ def _step(state: F64, speed: float, turning: float, robot: F64, room: Obstacles,
 
 @numba.njit(cache=True, error_model="numpy")
 def _kept_off(state: F64, dx: float, dy: float, robot: F64, room: Obstacles, people: F64) -> tuple[float, float]:
-    """A small motion, or what obstacles leave of it."""
+    """A small motion, reduced by contact with obstacles."""
     now, away_x, away_y = nearest(room, people, state[X], state[Y])
     then = nearest(room, people, state[X] + dx, state[Y] + dy)[0]
     if then >= robot[0] or then >= now:

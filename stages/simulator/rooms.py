@@ -14,7 +14,7 @@ INNER_WALL_M = 0.12
 """Thickness (m) of an inner wall."""
 DOOR_HEIGHT_M = 2.1
 DOOR_CLEARANCE_M = 0.7
-"""Metres on both sides of a door that furniture leaves free."""
+"""Metres that furniture keeps from both sides of a door."""
 
 
 class Opening(NamedTuple):

@@ -1,4 +1,4 @@
-"""Tours: a route of a world as a line of points that a robot can follow, around whatever stands in between."""
+"""Plans the path of a route through a world: a line of points around obstacles that a robot can follow."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -19,23 +19,23 @@ from .world import World
 F64 = npt.NDArray[np.float64]
 
 CLEARANCE_M = 0.1
-"""Metres that a tour keeps from obstacles beyond the robot's radius."""
+"""Minimum distance (m) of a path from obstacles beyond the robot's radius."""
 COMFORT_DISTANCE_M = 0.6
-"""Metres beyond the radius from which on a tour no longer minds an obstacle."""
+"""Distance (m) beyond the radius from which on obstacles cost nothing."""
 POINT_SPACING_M = 0.4
-"""Metres between the points of a tour."""
+"""Metres between the points of a path."""
 MAX_GOAL_SHIFT_M = 1.2
-"""Metres within which a point that has no room for the robot is replaced by one that has."""
+"""Metres by which a goal without room for the robot may be moved."""
 JITTER_PERIOD_M = 2.5
-"""Metres over which a hand on the joystick drifts to one side."""
+"""Metres of path between two draws of the jitter."""
 
 
 class UnreachableRoute(Exception):
-    """A route that cannot be driven on this day: one clear line why."""
+    """A route that cannot be driven on this day; the message says why."""
 
 
 def plan(world: World, route: Route) -> F64:
-    """The points (W, 2) of a route around what stands in the world on its day, rounded as a joystick is moved.
+    """The points (W, 2) of a route around what stands in the world on its day, rounded with smoothed corners.
 
     All points keep the robot's radius and 0.1 m from obstacles where there is as much room. Points behind closed doors
     are left out. Raises `UnreachableRoute` if another point cannot be reached, or no point is left.
@@ -85,11 +85,11 @@ def jittered(world: World, line: F64, spread: float, rng: np.random.Generator) -
     return jittered_line
 
 
-# Where a route leads
+# Goals of a route
 
 
 def _goals(world: World, space: "_FreeSpace", route: Route) -> Iterator[Point]:
-    """The points that a route visits, one after the other."""
+    """The points that a route visits, in order."""
     if route.kind == "waypoints":
         yield from route.waypoints
         return
@@ -112,7 +112,7 @@ def _goals(world: World, space: "_FreeSpace", route: Route) -> Iterator[Point]:
 
 
 def _through_aisles(world: World, route: Route, start: Point) -> Iterator[Point]:
-    """Down every aisle, always the nearest one next; on the next time around from the other end."""
+    """Through every aisle, the nearest first; in the next round from the other end."""
     aisles = [a for a in world.layout.aisles if not route.through or a.block in route.through]
     if not aisles:
         raise UnreachableRoute(f"world '{world.config.name}' has no aisles in {', '.join(route.through) or 'it'}")
@@ -134,7 +134,7 @@ def _through_aisles(world: World, route: Route, start: Point) -> Iterator[Point]
 
 
 def _along_aisle(aisle: Aisle, end: int) -> Iterator[Point]:
-    """Into an aisle at an end and out at the other; out of a closed one where one came in."""
+    """Into an aisle at one end and out at the other, or back out of a closed one."""
     (ax, ay), (bx, by) = aisle.ends[end], aisle.ends[1 - end]
     yield ax, ay
     if aisle.closed:
@@ -147,7 +147,7 @@ def _along_aisle(aisle: Aisle, end: int) -> Iterator[Point]:
 
 
 def _through_rooms(world: World, space: "_FreeSpace", route: Route, start: Point) -> Iterator[Point]:
-    """Into every room, the nearest by the path there first."""
+    """Into every room, the nearest by path first."""
     rooms = [room for room in world.config.rooms if not route.through or room.name in route.through]
     unknown = set(route.through) - {room.name for room in rooms}
     if unknown:
@@ -167,7 +167,7 @@ def _through_rooms(world: World, space: "_FreeSpace", route: Route, start: Point
 def _at_random(
     world: World, space: "_FreeSpace", route: Route, start: Point, rng: np.random.Generator
 ) -> Iterator[Point]:
-    """From one place to another, for as long as it is asked for: down aisles near by where there are any."""
+    """Random places, or aisles near by where there are any, up to the length that is asked for."""
     length = route.length or 100.0
     at, gone = start, 0.0
     seen: list[int] = []
@@ -192,7 +192,7 @@ def _at_random(
             yield point
 
 
-# Ways over the floor
+# Paths over the floor
 
 
 @lru_cache(maxsize=1)
@@ -311,7 +311,7 @@ class _FreeSpace:
         at = (points / self._step - 0.5).astype(np.float32)
         clear = self._clearance_map.astype(np.float32)
         looked_up: F64 = np.concatenate(
-            [  # a remapped picture has fewer than 32768 rows
+            [  # a remapped image has fewer than 32768 rows
                 cv2.remap(clear, part[:, 0], part[:, 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).ravel()
                 for part in np.array_split(at, len(at) // 16384 + 1)
             ]

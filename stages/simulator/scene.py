@@ -31,7 +31,7 @@ def build_scene(
     ceiling: Tiling,
     size: tuple[float, float],
     height: float,
-    pictures: Sequence[U8],
+    images: Sequence[U8],
     glow: Sequence[float],
     lights: Sequence[Light],
     ambient: float,
@@ -39,7 +39,7 @@ def build_scene(
 ) -> Scene:
     """The scene of boxes on a floor of `size` m under a ceiling at `height` m.
 
-    `pictures` and `glow` are the textures that tilings number, and how much of each shines by itself. `looks`: the
+    `images` and `glow` are the textures that tilings number, and how much of each shines by itself. `looks`: the
     coverings of the parts of people, look by look.
     """
     tilings = [floor, ceiling, *(face for box in boxes for face in box.faces)]
@@ -49,7 +49,7 @@ def build_scene(
     tilings += people
     starts = np.cumsum([0, *(tiling.tiles.size for tiling in tilings)])[:-1]
     table = [(start, t.tiles.shape[1], t.tiles.shape[0]) for start, t in zip(starts, tilings, strict=True)]
-    levels = textures.mip_levels(np.stack(pictures))
+    levels = textures.mip_levels(np.stack(images))
     bodies = box_array(boxes)
     grid = np.array([-MARGIN, -MARGIN, CELL])
     columns, rows = (math.ceil((extent + 2 * MARGIN) / CELL) for extent in size)

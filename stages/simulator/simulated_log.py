@@ -30,10 +30,10 @@ def record(
 ) -> None:
     """Write a simulated drive, or several one after the other, as an MCAP log; the same drives give the same bytes.
 
-    Topics as every recording has them: JPEG pictures, camera information, odometry, truth, ranges (`/scan`); what was
+    Topics as every recording has them: JPEG images, camera information, odometry, truth, ranges (`/scan`); what was
     done to the robot stands on `/ground_truth/event` as JSON; camera.yaml is attached. Odometry, truth and ranges come
     at their own rates. Log times run behind header stamps as a camera's, a wheel's and a ring's do. `progress` hears of
-    every picture: how many are written, of how many.
+    every image: how many are written, of how many.
     """
     drives = [recordings] if isinstance(recordings, SimulatedRecording) else recordings
     total = sum(len(drive.sent) for drive in drives)
@@ -44,7 +44,7 @@ def record(
             _write(log, drive, quality, lambda: progress(next(written), total))
 
 
-def _write(log: LogWriter, recording: SimulatedRecording, quality: int, wrote_picture: Callable[[], None]) -> None:
+def _write(log: LogWriter, recording: SimulatedRecording, quality: int, wrote_image: Callable[[], None]) -> None:
     for arrival, topic, number in sorted(_arrivals(recording)):
         if topic == "odometry":
             _write_odometry(log, recording, number, arrival)
@@ -59,7 +59,7 @@ def _write(log: LogWriter, recording: SimulatedRecording, quality: int, wrote_pi
             log.write("/ground_truth/event", "std_msgs/msg/String", arrival, {"data": said})
         else:
             _write_image(log, recording, number, arrival, quality)
-            wrote_picture()
+            wrote_image()
 
 
 def _arrivals(recording: SimulatedRecording) -> list[tuple[int, str, int]]:
@@ -101,9 +101,9 @@ def _write_image(log: LogWriter, recording: SimulatedRecording, number: int, arr
     size = {"width": camera.width, "height": camera.height_px}
     info = {"header": {"frame_id": "omni_camera"}, **size, **camera.camera_info()}  # camera.yaml says the rest
     _, packed = cv2.imencode(".jpg", recording.image_of_shot(shot), [cv2.IMWRITE_JPEG_QUALITY, quality])
-    picture = {"header": {"frame_id": "omni_camera"}, "format": "jpeg", "data": packed.ravel()}
+    image = {"header": {"frame_id": "omni_camera"}, "format": "jpeg", "data": packed.ravel()}
     log.write("/camera/camera_info", "sensor_msgs/msg/CameraInfo", stamp, info, arrival)
-    log.write("/camera/image/compressed", "sensor_msgs/msg/CompressedImage", stamp, picture, arrival)
+    log.write("/camera/image/compressed", "sensor_msgs/msg/CompressedImage", stamp, image, arrival)
 
 
 def _pose(pose: F64) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Drives through a simulated world as recordings: pictures are rendered when asked for."""
+"""Drives through a simulated world as recordings; images are rendered when asked for."""
 
 import dataclasses
 import json
@@ -36,9 +36,9 @@ I64 = npt.NDArray[np.int64]
 DAY_0_NS = 1_767_571_200 * 10**9
 """Midnight before day 0, 2026-01-05 UTC, in nanoseconds."""
 FIRST_IMAGE_S = 0.52
-"""Seconds from the start of a drive to its first picture: odometry reaches back before it."""
+"""Seconds from the start of a drive to its first image, so that odometry begins before it."""
 IMAGE_LATENCY_NS = 42_000_000
-"""Nanoseconds from a picture's stamp to its arrival."""
+"""Nanoseconds from an image's stamp to its arrival."""
 
 
 class SimulatedRecording:
@@ -92,9 +92,9 @@ class SimulatedRecording:
         self.rolled = odometry(driven.poses, world.odometry, bias, self._stream("odometry"), driven.rolled_to)
         self.times = self._stamps(driven.times)
         self.lifted = [(int(self.times[row]), kidnapping) for row, kidnapping in driven.kidnappings]
-        """When (ns) somebody put the robot down again, and what had been done to it."""
+        """Times (ns) at which the robot was put down again."""
         put = np.unique([row for row, _ in driven.kidnappings]).astype(np.int64)
-        # Up to that moment it was where its wheels had brought it: nobody flies from one place to the other
+        # Up to that moment it was where its wheels had rolled, so that interpolation does not bridge the jump.
         self._true_seconds = np.insert(driven.times, put, driven.times[put])
         self.true_poses = np.insert(driven.poses, put, driven.rolled_to[put], axis=0)
         self._true_columns = (*self.true_poses[:, :2].T.copy(), np.unwrap(self.true_poses[:, 2]))
@@ -112,12 +112,14 @@ class SimulatedRecording:
         self.sent: list[tuple[int, int, int]] = sorted(
             (int(arrivals[shot]), int(stamps[shot]), int(shot)) for shot in sent
         )
-        """What leaves the camera, in the order of arrival: time of arrival, stamp (ns), number of the picture."""
-        kept, _, overtaken = ascending([stamp for _, stamp, _ in self.sent])  # as whoever reads the log will find them
+        """Images in the order of arrival: time of arrival, stamp (ns), number of the shot."""
+        kept, _, overtaken = ascending(
+            [stamp for _, stamp, _ in self.sent]
+        )  # in the order in which a reader of the log finds them
         if overtaken:
             self.dropped["backward_stamp"] = len(overtaken)
             stamp = self.sent[overtaken[0]][1]
-            self.details["backward_stamp"] = f"{self.name}: a picture was overtaken, stamp {stamp} ns"
+            self.details["backward_stamp"] = f"{self.name}: an image was overtaken by a later one, stamp {stamp} ns"
         self._received: I64 = np.array([self.sent[number][2] for number in kept], dtype=np.int64)
         self.stamps: I64 = stamps[self._received]
         self.truth = self._true(self._shots[self._received])
@@ -127,7 +129,7 @@ class SimulatedRecording:
         rate = self.world.ranges.rate
         self._scan_seconds = np.arange(int(np.floor(self._seconds[-1] * rate + 1e-9)) + 1) / rate
         self.scan_times = self._stamps(self._scan_seconds)
-        """Stamps (ns) of all turns of the range ring."""
+        """Stamps (ns) of all range scans."""
         self._ring_key = int(self._stream("ranges").integers(2**62))
 
     def _stamps(self, seconds: F64) -> I64:
@@ -141,7 +143,7 @@ class SimulatedRecording:
 
     @property
     def name(self) -> str:
-        """World, route and day in words."""
+        """World, route and day."""
         return f"{self.world.name}, route {self.route}, day {self.day}"
 
     @cached_property
@@ -149,7 +151,7 @@ class SimulatedRecording:
         return World(self.world, self.day)
 
     def _scene(self, seconds: float) -> Scene:
-        """The world as it looks at a time: a long drive may see several days."""
+        """The world at a time; a long drive may see several days."""
         if self._day_duration_s is None or seconds < self._day_duration_s:
             return self._world.scene
         number = self.day + int(seconds // self._day_duration_s)
@@ -169,11 +171,11 @@ class SimulatedRecording:
         return stream(self.world.seed, purpose, self.route, self.day)
 
     def image(self, frame: int) -> Pixels:
-        """The picture of a frame, (height, width, 3) uint8 blue-green-red, rendered now."""
+        """The image of a frame, (height, width, 3) uint8 blue-green-red, rendered now."""
         return self.image_of_shot(int(self._received[frame]))
 
     def image_of_shot(self, shot: int) -> Pixels:
-        """A picture by its number among all that were taken, also those that nobody received."""
+        """An image by its number among all that were taken, lost ones included."""
         sensor, at = self.world.sensor, self._shots[shot]
         swing = np.sin(2 * np.pi * at / sensor.exposure_period)
         return render(
@@ -192,11 +194,11 @@ class SimulatedRecording:
         return camera_rays(self.camera, self.world.sensor.vignetting, self.world.robot.radius)
 
     def scan(self, frame: int) -> Scan | None:
-        """The last turn of the range ring before a frame."""
+        """The last range scan before a frame."""
         return self.scan_at(int(np.searchsorted(self.scan_times, self.stamps[frame], side="right")) - 1)
 
     def scan_at(self, turn: int) -> Scan:
-        """A turn of the range ring, by its number."""
+        """A range scan by its number."""
         at, ring = self._scan_seconds[turn], self.world.ranges
         people = round_bodies(self.people_at(float(at)))
         rng = np.random.default_rng([self._ring_key, turn])
@@ -204,7 +206,7 @@ class SimulatedRecording:
         return scan_value(self.world, metres.astype(np.float32).astype(np.float64))  # as a message holds them
 
     def people_at(self, seconds: float) -> tuple[Person, ...]:
-        """Who is about, some of them because of the robot."""
+        """The people at a time."""
         return self._world.people_at(seconds, Track(self._seconds, self.driven))
 
     def digest(self) -> str:
@@ -251,6 +253,6 @@ def simulation_digest(world: WorldConfig) -> str:
 
 
 def scan_value(world: WorldConfig, metres: F64) -> Scan:
-    """A turn of a world's range ring as the value that travels on wires."""
+    """A range scan as the value that travels on wires."""
     first, step = azimuths(world.ranges)
     return Scan(metres, first, step, nearest=0.0, farthest=world.ranges.max_range)

@@ -6,5 +6,5 @@ import numpy as np
 
 
 def stream(seed: int, *names: str | int) -> np.random.Generator:
-    """A generator of its own for each purpose: no draw for one thing can change another."""
+    """An independent generator for each purpose, so that draws for one cannot change another."""
     return np.random.default_rng([seed, *(zlib.crc32(str(name).encode()) for name in names)])

@@ -1,4 +1,4 @@
-"""Procedural textures: square pictures from a material's name and a random generator, and their mip levels.
+"""Procedural textures: square images from a material's name and a random generator, and their mip levels.
 
 Colours are blue-green-red. Each texture is drawn larger than it is kept and averaged down, so that no edge is jagged.
 """

@@ -23,11 +23,11 @@ I64 = npt.NDArray[np.int64]
 WALL_THICKNESS_M = 0.2
 """Thickness (m) of the outer walls."""
 MAX_DRIVABLE_HEIGHT_M = 0.03
-"""What is no higher (m) can be driven over."""
+"""Maximum height (m) of bodies that can be driven over."""
 VARIED_MATERIALS = ("floor", "ceiling", "grass", "asphalt", "paving", "parquet", "sky")
-"""Grounds whose pieces differ a little; others are of one piece."""
+"""Materials whose tiles differ a little; others repeat one tile."""
 HEADROOM_M = 1.4
-"""What hangs higher (m) can be driven under."""
+"""Minimum height (m) of bodies that can be driven under."""
 
 
 @lru_cache(maxsize=1024)
@@ -64,7 +64,7 @@ class World:
         self.floor = self._ground(config.floor, 6, config.rooms)
         self.ceiling = self._ground(config.ceiling, 6)
 
-    # What stands where
+    # Bodies
 
     def _texture(self, material: str, name: str) -> int:
         """Number of the texture of a material for a thing of that name; it is drawn for the scene."""
@@ -223,19 +223,19 @@ class World:
         """This world for the ray caster."""
         looks = [people.coverings(self._texture, look) for look in range(people.OUTFITS)]
         day = np.array(self.config.day(self.day).light)
-        pictures, glow = [], [textures.glow(material) for material, _ in self._named]
+        images, glow = [], [textures.glow(material) for material, _ in self._named]
         for number, (material, name) in enumerate(self._named):
-            picture = _drawn(self.config.seed, material, name)
+            image = _drawn(self.config.seed, material, name)
             if glow[number]:  # what shines has the light's colour
-                picture = np.clip(picture * (day * self._tints.get(number, (1.0, 1.0, 1.0))), 0, 255).astype(np.uint8)
-            pictures.append(picture)
+                image = np.clip(image * (day * self._tints.get(number, (1.0, 1.0, 1.0))), 0, 255).astype(np.uint8)
+            images.append(image)
         return build_scene(
             self.boxes,
             self.floor,
             self.ceiling,
             self.config.size,
             self.config.height,
-            pictures,
+            images,
             glow,
             lamps_and_windows(self.layout.lamps, self.layout.wall_panels, self.config, self.day),
             self.config.ambient,

@@ -1,4 +1,4 @@
-"""The names of a simulated world's rooms, as a value."""
+"""Names of a simulated world's rooms."""
 
 import numpy as np
 
@@ -10,16 +10,15 @@ from .demo import DEMO
 
 
 class WorldRooms(Stage):
-    """The rooms of a simulated world by their names, so that a robot can be told where to go.
-
-    With a recorded `log` nothing is known of its place.
-    """
+    """The named rooms of a simulated world, which can be goals of a robot."""
 
     log: str | tuple[str, ...] | None = None
+    """A recorded log: then nothing is known of the place and the output is absent."""
     world: WorldConfig = DEMO
+    """The simulated world."""
 
     class Out(Outputs):
-        """`rooms`: absent where the world has none, or a log is driven through."""
+        """`rooms`: absent if the world has none, and with a recorded log."""
 
         rooms: Rooms | None = None
 
