@@ -38,7 +38,7 @@ class Rounds(Source):
     class Out(Outputs):
         tick: Tick
         view: Coefficients
-        limit: NoveltyThreshold
+        threshold: NoveltyThreshold
         model: UncertainMotion | None = None
 
     def step(self, ctx: Context, at: At) -> Out | None:
@@ -51,7 +51,7 @@ class Rounds(Source):
         first = n % half == 0
         view = Coefficients(look(n), look(n)[None])
         tick = Tick(n, n * 10**9, n // half, n % half, first)
-        return self.Out(tick=tick, view=view, limit=NoveltyThreshold(1.0), model=None if first else model)
+        return self.Out(tick=tick, view=view, threshold=NoveltyThreshold(1.0), model=None if first else model)
 
 
 class Knows(Stage):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from background_runs import assert_same_bytes, finished, kill, start, wait_for_checkpoint
-from conftest import DATA, needs_data
+from conftest import DATA, DRIVE, TOUR, needs_data
 
 from omninav.pipeline.engine.artifact import read_artifact
 from omninav.pipeline.engine.call import StageFailed
@@ -21,15 +21,15 @@ NODES = {
     "source": {"_target_": "round_drive.Rounds"},
     "knows": {"_target_": "round_drive.Knows"},
     "empty": {"_target_": f"{STAGES}.mapping.initial_view_mixtures.InitialViewMixtures"},
-    "lessons": {"_target_": f"{STAGES}.mapping.unimodal_queue.UnimodalQueue", "length": 12},
+    "map_update": {"_target_": f"{STAGES}.mapping.unimodal_queue.UnimodalQueue", "length": 12},
     "mapping": {"_target_": f"{STAGES}.mapping.adaptive_views.AdaptiveViews", "max_views": 20},
 }
 WIRES = {
     "knows": {"view": "source.view"},
-    "lessons": {"view": "source.view", "state": "knows.belief", "model": "source.model"},
+    "map_update": {"view": "source.view", "state": "knows.belief", "model": "source.model"},
     "mapping": {
-        "lessons": "lessons.updates",
-        "limit": "source.limit",
+        "updates": "map_update.updates",
+        "threshold": "source.threshold",
         "map": {"from": "mapping.map", "delay": 1, "initial": "empty.map"},
     },
 }
@@ -45,23 +45,23 @@ def learned(place: Path, breaks_at: int = -1) -> bytes:
     ("at", "what"),
     [(5, "the queue fills"), (18, "it is full"), (28, "a way is open"), (35, "the way is worked out"), (45, "flushed")],
 )
-def test_a_run_stopped_while_lessons_wait_goes_on_to_the_same_map(tmp_path: Path, at: int, what: str):
+def test_a_run_stopped_while_updates_wait_goes_on_to_the_same_map(tmp_path: Path, at: int, what: str):
     unbroken = learned(tmp_path / "unbroken")
     with pytest.raises(StageFailed):
         learned(tmp_path / "broken", at)
     assert learned(tmp_path / "broken") == unbroken, what
 
 
-LEFT_OVER = {"ticks": {"from": "source.tick", "collect": True}, "waiting": "lessons.waiting"}
-LAST_MAP = {"lessons": "left_over.updates", "limit": "source.limit", "map": "mapping.map"}
+FLUSH_PENDING = {"ticks": {"from": "source.tick", "collect": True}, "waiting": "map_update.waiting"}
+LAST_MAP = {"updates": "flush_pending.updates", "threshold": "source.threshold", "map": "mapping.map"}
 
 
 def test_what_waits_as_the_last_log_ends_is_learned_after_it(tmp_path: Path):
-    left_over = {"_target_": f"{STAGES}.mapping.flush_pending.FlushPending"}
+    flush_pending = {"_target_": f"{STAGES}.mapping.flush_pending.FlushPending"}
     graph = build(
         {
-            "nodes": {**NODES, "left_over": left_over, "last_map": NODES["mapping"]},
-            "wires": {**WIRES, "left_over": LEFT_OVER, "last_map": LAST_MAP},
+            "nodes": {**NODES, "flush_pending": flush_pending, "last_map": NODES["mapping"]},
+            "wires": {**WIRES, "flush_pending": FLUSH_PENDING, "last_map": LAST_MAP},
         }
     )
     place = tmp_path / "after"
@@ -72,14 +72,8 @@ def test_what_waits_as_the_last_log_ends_is_learned_after_it(tmp_path: Path):
 
 
 HOUSE = DATA / "photoreal-house"
-WORDS = (
-    "variant=omniview_cml",
-    f"log=[{HOUSE / 'tour.mcap'},{HOUSE / 'drive.mcap'}]",
-    "nodes.source.stop=45",
-    "nodes.novelty_threshold.views=40",
-    "checkpoint_s=0.05",
-    "cache=null",
-)
+OPTIONS = ("nodes.source.stop=45", "nodes.novelty_threshold.views=40", "cache=null")
+WORDS = ("variant=omniview_cml", f"log=[{TOUR},{DRIVE}]", *OPTIONS, "checkpoint_s=0.05")
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +82,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @needs_data
-def test_two_logs_of_a_house_grow_one_map_and_the_second_finds_itself_in_it(whole: Path):
+def test_two_logs_of_a_house_grow_one_map_and_the_second_finds_itself_in_it(tmp_path: Path):
+    logs = f"log=[{HOUSE / 'tour.mcap'},{HOUSE / 'drive.mcap'}]"
+    whole = finished(tmp_path, "variant=omniview_cml", logs, *OPTIONS)
     metrics = json.loads((whole / "metrics.json").read_text())
     assert [log["frames"] for log in metrics["logs"]] == [45, 45]
     assert metrics["position_error_m"]["median"] < 1.0
@@ -97,7 +93,6 @@ def test_two_logs_of_a_house_grow_one_map_and_the_second_finds_itself_in_it(whol
     assert (whole / "trajectory.tum").read_bytes() == (whole / "trajectory_1.tum").read_bytes()
 
 
-@needs_data
 def test_a_killed_run_resumes_to_the_same_map_and_trajectory(whole: Path, tmp_path: Path):
     moments = random.Random(3)
     process, kills = start(tmp_path, *WORDS), 0
@@ -114,12 +109,12 @@ def test_a_killed_run_resumes_to_the_same_map_and_trajectory(whole: Path, tmp_pa
     assert_same_bytes(run, whole, "map.omap", "trajectory.tum", "trajectory_0.tum", "metrics.json")
 
 
-@needs_data
 def test_a_saved_map_is_read_only_or_grows_on_and_forgetting_is_a_word(whole: Path, tmp_path: Path):
     def drive(name: str, *words: str) -> Path:
-        log = f"log={HOUSE / 'drive.mcap'}"
         where = tmp_path / name
-        assert start(where, WORDS[0], log, *WORDS[2:], f"map={whole / 'map.omap'}", *words).wait(timeout=300) == 0
+        assert (
+            start(where, WORDS[0], f"log={DRIVE}", *OPTIONS, f"map={whole / 'map.omap'}", *words).wait(timeout=300) == 0
+        )
         return where / "runs" / "latest"
 
     def content(run: Path):
@@ -127,12 +122,12 @@ def test_a_saved_map_is_read_only_or_grows_on_and_forgetting_is_a_word(whole: Pa
 
     before = content(whole)
 
-    def limit(run: Path):
+    def threshold(run: Path):
         return json.loads((run / "manifest.json").read_text())["facts"]["novelty_threshold"]
 
     frozen = drive("frozen", "mapping=frozen")
     assert encode(content(frozen)) == encode(before)
-    assert limit(frozen) == limit(whole) == round(before.threshold.distance, 4)
+    assert threshold(frozen) == threshold(whole) == round(before.threshold.distance, 4)
     grown = content(drive("grown", "forgetting=passive"))
     assert grown.steps > before.steps
     assert np.isin(before.ids, grown.ids).mean() > 0.9

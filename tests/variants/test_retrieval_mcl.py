@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from conftest import DATA, needs_data
+from conftest import DATA, DRIVE, GRID, TOUR, needs_data
 from hydra import compose, initialize_config_module
 
 from omninav.pipeline.cli.composition import complete
@@ -54,21 +54,25 @@ def test_who_is_carried_on_its_drive_is_not_carried_on_its_tour():
         assert config["artifacts"][name]["graph"]["nodes"]["source"]["cuts"] == []
 
 
-@needs_data
 def test_without_a_grid_one_line_says_what_is_missing_and_how_to_get_one(omninav, tmp_path: Path):
-    ended = omninav("variant=retrieval_mcl", f"tour={HOUSE}/tour.mcap", f"log={HOUSE}/drive.mcap")
+    ended = omninav("variant=retrieval_mcl", f"tour={TOUR}", f"log={DRIVE}")
     assert ended.returncode == 2
     assert len(ended.stderr.strip().splitlines()) == 1
-    assert f"grid={HOUSE / 'map.yaml'}" in ended.stderr
+    assert f"grid={GRID}" in ended.stderr
     assert "grid=from_tour" in ended.stderr
     assert list(tmp_path.iterdir()) == []
 
 
-@needs_data
-@pytest.mark.parametrize("grid", [f"{HOUSE}/map.yaml", "from_tour"], ids=["its grid", "a stand-in"])
-def test_the_house_is_found_from_anywhere(omninav, tmp_path: Path, grid: str):
-    words = ("variant=retrieval_mcl", f"tour={HOUSE}/tour.mcap", f"log={HOUSE}/drive.mcap", f"grid={grid}")
-    omninav(*words, check=True)
+@pytest.mark.parametrize(
+    ("tour", "log", "grid"),
+    [
+        pytest.param(TOUR, DRIVE, GRID, id="a store and its grid"),
+        pytest.param(TOUR, DRIVE, "from_tour", id="a store and a stand-in"),
+        pytest.param(HOUSE / "tour.mcap", HOUSE / "drive.mcap", HOUSE / "map.yaml", id="a house", marks=needs_data),
+    ],
+)
+def test_a_robot_that_starts_anywhere_finds_itself(omninav, tmp_path: Path, tour: Path, log: Path, grid: Path | str):
+    omninav("variant=retrieval_mcl", f"tour={tour}", f"log={log}", f"grid={grid}", check=True)
     run = (tmp_path / "runs" / "latest").resolve()
     metrics = json.loads((run / "metrics.json").read_text())
     after = metrics["after_convergence"]

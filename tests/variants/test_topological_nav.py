@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from background_runs import assert_same_bytes, finished, killed_and_resumed
-from conftest import DATA, needs_data
+from conftest import DATA, DRIVE, TOUR, needs_data
 
 from omninav.pipeline.engine.artifact import read_artifact
 from omninav.pipeline.graph.ground_truth import truth_in_the_loop
@@ -97,11 +97,18 @@ def test_nothing_that_steers_the_robot_knows_the_truth():
     assert list(truth_in_the_loop(graph)) == []
 
 
-@needs_data
-def test_the_house_is_known_by_its_places(omninav, tmp_path: Path):
-    omninav("variant=topological_localisation", f"tour={HOUSE}/tour.mcap", f"log={HOUSE}/drive.mcap", check=True)
+@pytest.mark.parametrize(
+    ("tour", "log", "stride", "images"),
+    [
+        pytest.param(TOUR, DRIVE, 2, 26, id="a store"),
+        pytest.param(HOUSE / "tour.mcap", HOUSE / "drive.mcap", 1, 130, id="a house", marks=needs_data),
+    ],
+)
+def test_a_drive_is_known_by_its_places(omninav, tmp_path: Path, tour: Path, log: Path, stride: int, images: int):
+    words = ("variant=topological_localisation", f"tour={tour}", f"log={log}", f"nodes.source.stride={stride}")
+    omninav(*words, check=True)
     found = metrics_of(tmp_path)["localisation"]
-    assert found["pictures"] == 130
+    assert found["pictures"] == images
     assert found["adjacent_accuracy"] > 0.7
     assert found["place_distance_m"] < 1.0
     assert (tmp_path / "runs" / "latest" / "trajectory.tum").exists()

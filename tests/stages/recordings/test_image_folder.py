@@ -7,14 +7,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from conftest import DATA, needs_data
 
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.positions import track_directions
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.recordings.tables import Angle, Length, Time, read_table
-
-DATA = Path(__file__).parents[3].parent / "shared" / "data"
-needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"sample data is missing: {DATA}")
 
 DESCRIPTION = """
 frames:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import DATA, needs_data
 from made_logs import (
     CAMERA,
     FRAMES,
@@ -302,10 +303,6 @@ def test_ascending_keeps_the_longest_run_by_brute_force() -> None:
             if [stamps[n] for n in chosen] == sorted(stamps[n] for n in chosen)
         )
         assert len(kept) == best
-
-
-DATA = Path(__file__).parents[3].parent / "shared" / "data"
-needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"sample data is missing: {DATA}")
 
 
 @needs_data

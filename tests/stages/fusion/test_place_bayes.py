@@ -1,0 +1,42 @@
+"""Bayes' rule over places."""
+
+import math
+
+import numpy as np
+import pytest
+from made_places import made_map
+
+from omninav.pipeline import Context
+from omninav.stages.fusion.place_bayes import PlaceBayes
+from omninav.stages.values.belief import Likelihood, PlaceBelief
+from omninav.stages.values.visual_distance import VisualDistances
+
+MAP = made_map([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)], {})
+
+
+def fused(
+    predicted: list[float], likelihood: list[float], turn: float = 0.0, ctx: Context | None = None
+) -> PlaceBelief:
+    distances = VisualDistances(np.ones(3), np.full(3, turn), np.ones(3, np.int64))
+    prediction = PlaceBelief(np.array(predicted), MAP.poses[MAP.places])
+    return (
+        PlaceBayes().step(ctx or Context("fusion"), prediction, Likelihood(np.array(likelihood)), distances, MAP).belief
+    )
+
+
+def test_prediction_times_likelihood_is_normalised():
+    found = fused([0.5, 0.3, 0.2], [1.0, 2.0, 8.0])
+    np.testing.assert_allclose(found.probabilities, np.array([0.5, 0.6, 1.6]) / 2.7)
+    assert found.estimate().pose.x == 2.0
+
+
+def test_a_place_means_its_medoids_pose_turned_as_the_view_is():
+    pose = fused([1.0, 0.0, 0.0], [1.0, 1.0, 1.0], turn=3.5).estimate().pose
+    assert (pose.x, pose.y) == (0.0, 0.0)
+    assert pose.heading == pytest.approx(3.5 - 2 * math.pi)
+
+
+def test_a_view_that_no_place_explains_leaves_the_prediction_and_is_counted():
+    ctx = Context("fusion")
+    np.testing.assert_allclose(fused([0.5, 0.3, 0.2], [0.0, 0.0, 0.0], ctx=ctx).probabilities, [0.5, 0.3, 0.2])
+    assert ctx.counts["belief_without_support"] == 1

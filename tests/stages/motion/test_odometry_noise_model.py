@@ -1,0 +1,37 @@
+"""The noise that grows with distance and turn."""
+
+import math
+
+import pytest
+
+from omninav.stages.motion.odometry_noise import OdometryNoiseModel
+from omninav.stages.values.pose import Motion
+
+NO_FLOOR = OdometryNoiseModel(rotation_floor=0.0, translation_floor=0.0)
+
+
+@pytest.mark.parametrize("parts", [2, 10])
+def test_many_small_motions_are_as_uncertain_as_their_sum(parts: int):
+    whole, part = NO_FLOOR.sigmas((0.2, 3.0, 0.1)), NO_FLOOR.sigmas((0.2 / parts, 3.0 / parts, 0.1 / parts))
+    assert [math.sqrt(parts) * sigma for sigma in part] == pytest.approx(whole)
+
+
+def test_a_metre_and_a_turn_by_one_radian_are_as_uncertain_as_stated():
+    first, translation, second = NO_FLOOR.sigmas((0.0, 1.0, 0.0))
+    assert translation == pytest.approx(0.1)
+    assert math.hypot(first, second) == pytest.approx(0.05)  # both rotations together
+    first, translation, second = NO_FLOOR.sigmas((1.0, 0.0, 0.0))
+    assert translation == pytest.approx(0.01)
+    assert math.hypot(first, second) == pytest.approx(0.05)
+
+
+def test_a_robot_that_stands_still_keeps_the_floor_of_uncertainty():
+    model = OdometryNoiseModel(rotation_floor=0.02, translation_floor=0.03)
+    uncertain = model.model(Motion(0.0, 0.0, 0.0))
+    assert math.hypot(uncertain.sigmas[0], uncertain.sigmas[2]) == pytest.approx(0.02)
+    assert uncertain.sigmas[1] == pytest.approx(0.03)
+
+
+def test_wheel_jitter_sideways_is_no_turn():
+    sideways = NO_FLOOR.model(Motion(0.0, 1e-6, 0.0))
+    assert sideways.sigmas[0] < 1e-4
