@@ -34,7 +34,8 @@ def correlations(sums: Sums, out: Floats) -> None:
     """C_RG, C_RB, C_GB of a patch's ten sums into `out` (3,); 0 where a channel does not vary.
 
     C_PQ = int P'Q' / sqrt(int P'^2 int Q'^2), P' = P - mean, in [-1, 1], which neither offset nor scale of a channel
-    changes. Equation 1 as printed divides by the integrals of the centralised channels, which are 0 (erratum 25).
+    changes. Equation 1 as printed divides by the integrals of the centralised channels, which are 0 (erratum 25 in
+    docs/papers.md).
     """
     number = max(sums[0], 1.0)
     blue = sums[4] - sums[1] * sums[1] / number

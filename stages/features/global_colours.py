@@ -14,8 +14,8 @@ from .prepared_image import prepared_image
 class GlobalColours(Stage):
     """Colour correlations of a whole view, which light does not change: different views can be told apart quickly.
 
-    Goedemé et al. 2007, section 4.2.1: the moments of equation 1 (erratum 25) over all of a panorama, or over the ring
-    of a mirror image. Raises BadInput for an image without a camera.
+    Goedemé et al. 2007, section 4.2.1: the moments of equation 1 (erratum 25 in docs/papers.md) over all of a panorama,
+    or over the ring of a mirror image. Raises BadInput for an image without a camera.
     """
 
     max_pixels: Annotated[int, Bounds(ge=1024)] = 76800

@@ -104,11 +104,11 @@ class HaarIntegral(Stage):
     """Describes a view by histograms of Haar integrals, invariant to rotation and shift.
 
     Wolf, Burgard & Burkhardt 2005, section IV. A kernel (r1, r2) is f = M(0, r1) M(r2, at 90 degrees); it is averaged
-    over rotations around each pixel, per colour channel, with bilinear interpolation (equation 4, errata 40 and 42),
-    and the averages are counted. The histograms of several kernels follow one another with equal shares of the mass,
-    repeated for each scale. A panorama is described in equal segments, windows one by one. Metric `standard_error`: the
-    expected distance of a segment's histogram from that of full integration, in the last image. Raises BadInput where
-    an image is smaller than a kernel.
+    over rotations around each pixel, per colour channel, with bilinear interpolation (equation 4, errata 40 and 42 in
+    docs/papers.md), and the averages are counted. The histograms of several kernels follow one another with equal
+    shares of the mass, repeated for each scale. A panorama is described in equal segments, windows one by one. Metric
+    `standard_error`: the expected distance of a segment's histogram from that of full integration, in the last image.
+    Raises BadInput where an image is smaller than a kernel.
     """
 
     kernels: tuple[tuple[Radius, Radius], ...] = ((3.0, 4.0),)

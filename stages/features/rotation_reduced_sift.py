@@ -25,8 +25,8 @@ class RotationReducedSift(Stage):
 
     Goedemé et al. 2007, section 3.2 (after Ledwich & Williams): OpenCV's detector and descriptor, turned outwards along
     the radius in a mirror image and up the column in a panorama or strip. Features closer to a mirror's edges than
-    their own diameter are left out. Colours (equation 1, erratum 25) are those of a disc around each feature. Raises
-    BadInput for an image without a camera.
+    their own diameter are left out. Colours (equation 1, erratum 25 in docs/papers.md) are those of a disc around each
+    feature. Raises BadInput for an image without a camera.
     """
 
     orientation: Literal["reduced", "own"] = "reduced"

@@ -24,7 +24,8 @@ class Agreement(Stage):
     same unit.
 
     * Agreement above `agree_above`: all particles are resampled by pi_i p(y|x_i) and get weight 1/N. This is what the
-      paper describes. It is importance resampling (SIR), although the paper cites the auxiliary filter (erratum 15).
+      paper describes. It is importance resampling (SIR), although the paper cites the auxiliary filter (erratum 15 in
+      docs/papers.md).
     * Agreement below: a share `keep` of the particles, chosen at random and not by weight (erratum 17a), stays with
       total weight `keep`; the others are drawn from the hypothesis by lambda w and share the rest equally (erratum 17).
     * Without a hypothesis the belief stays as it is.

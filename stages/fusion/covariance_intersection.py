@@ -18,7 +18,8 @@ def alpha_by_ratio(cov_a: Array, cov_b: Array, weight_a: float = 1.0, weight_b: 
     """The weight alpha of b: w_b det(C_a) / (w_b det(C_a) + w_a det(C_b)).
 
     Gross, Koenig & Mueller 2005, equation 5; with equal weights the form of Porta & Kroese. A heuristic: it does not
-    minimise the result's determinant, and saturates (covariances 1 : 4 in three dimensions give 1 : 64; erratum 3).
+    minimise the result's determinant, and saturates (covariances 1 : 4 in three dimensions give 1 : 64; erratum 3 in
+    docs/papers.md).
     """
     return float(_ratio(np.linalg.slogdet(cov_a)[1], np.linalg.slogdet(cov_b)[1], weight_a, weight_b))
 

@@ -30,7 +30,7 @@ class ParticleClustering(Stage):
     min_weight: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
     """Weight below which a cluster is dropped."""
     min_sigma_m: Annotated[float, Bounds(gt=0)] = 0.01
-    """Smallest standard deviation of a Gaussian: equal particles have no spread (erratum 18)."""
+    """Smallest standard deviation of a Gaussian: equal particles have no spread (erratum 18 in docs/papers.md)."""
     min_sigma_deg: Annotated[float, Bounds(gt=0)] = 0.5
     """Smallest standard deviation of its heading."""
 

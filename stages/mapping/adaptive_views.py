@@ -42,9 +42,9 @@ class AdaptiveViews(Stage):
 
     1. A view at or above the novelty threshold (E_max) from all others is inserted as a new one, without components.
     2. Views with a similarity S of at least `min_similarity` get the state as a new component, its heading turned to
-       theirs (erratum 12), with weight 0 and count S over the sum of S of all views (equation 11, erratum 6).
-       Components closer than `merge_below` are merged (equations 12 to 14, divided by the counts' sum: erratum 7),
-       weights added and capped at 1 (erratum 8).
+       theirs (erratum 12 in docs/papers.md), with weight 0 and count S over the sum of S of all views (equation 11,
+       erratum 6). Components closer than `merge_below` are merged (equations 12 to 14, divided by the counts' sum:
+       erratum 7), weights added and capped at 1 (erratum 8).
     3. Weights of views within the threshold: w = beta S + (1 - beta S) w of components that fit the state, at squared
        distance <= `fits_below` (equation 16); w = (1 - beta S) w of the others (17), unless `forgetting` is `none`.
        With `forgetting: active`, components of all other views near the state: w = (1 - b) w with b = beta_forget

@@ -50,7 +50,7 @@ class FusedMixtures(Stage):
     """Squared Mahalanobis distance below which components are merged; 7.81: equal at 95 %."""
     spread: bool = True
     """Whether a merged covariance includes the spread of the means; the paper's does not and is over-confident
-    (erratum 16)."""
+    (erratum 16 in docs/papers.md)."""
     average: Average = "visits"
     """Shares of merged components. `halves`: their weights, as in the paper: the last state counts as much as all
     before, so that the map drifts (docs/experiments/cml_defaults.md). `visits`: the number of visits, weighted by

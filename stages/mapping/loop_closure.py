@@ -20,9 +20,9 @@ class LoopClosure(Stage):
 
     Goedemé et al. 2007, section 4.4. Views that are all close to each other make a cluster; its parts along the drive
     are subclusters, and each two subclusters of a cluster a hypothesis: they are one place. A hypothesis starts with
-    the similarity of the two views that stand for its subclusters (erratum 28), and neighbours along the drive add
-    evidence in one pass (erratum 31). It is accepted where its support is large enough and some neighbour has spoken:
-    nothing can be decided of an isolated one (section 4.4.3). Places of a known map stay together.
+    the similarity of the two views that stand for its subclusters (erratum 28 in docs/papers.md), and neighbours along
+    the drive add evidence in one pass (erratum 31). It is accepted where its support is large enough and some neighbour
+    has spoken: nothing can be decided of an isolated one (section 4.4.3). Places of a known map stay together.
     """
 
     place_size: Annotated[float, Bounds(gt=0)] = 0.5

@@ -34,8 +34,8 @@ class UnimodalQueue(Stage):
     wait for the next unimodal state and then get the most likely states along the odometry between the two
     (`geometry/plane/path_reconstruction.py`). They are dropped where odometry misses that state or a motion is missing.
 
-    The paper does not give the test for a unimodal state (erratum 12a). In a new place there is no evidence against a
-    wrong mode either, so that a high `min_share` would learn nothing there.
+    The paper does not give the test for a unimodal state (erratum 12a in docs/papers.md). In a new place there is no
+    evidence against a wrong mode either, so that a high `min_share` would learn nothing there.
     """
 
     length: Annotated[int, Bounds(ge=0)] = 20

@@ -44,10 +44,10 @@ class View(NamedTuple):
 class ViewComparison(Stage):
     """Visual distances between all views of a tour, and of a known map that is to grow by it.
 
-    Goedemé et al. 2007, section 4.2 (equations 3 and 4; erratum 27): local features are only compared where the
-    global colours leave it open. A known map takes part with the features that it keeps of its views. Poses are kept
-    for scoring and drawing only. Raises BadInput where no image shows anything, where `supervised: truth` finds no
-    true pose, or where known and new poses are not of one source.
+    Goedemé et al. 2007, section 4.2 (equations 3 and 4; erratum 27 in docs/papers.md): local features are only compared
+    where the global colours leave it open. A known map takes part with the features that it keeps of its views. Poses
+    are kept for scoring and drawing only. Raises BadInput where no image shows anything, where `supervised: truth`
+    finds no true pose, or where known and new poses are not of one source.
     """
 
     every_s: Annotated[float, Bounds(ge=0)] = 1.0

@@ -15,8 +15,8 @@ class ViewNeighbours(Stage):
     """Finds the views of the map within the novelty threshold of the current one, with their similarities.
 
     Similarity is 1 at distance 0 and falls to 0 at the threshold: lambda of Porta & Kröse 2004, equations 4 and 5; S of
-    Gross, Koenig & Müller 2005, section 2.2 (its shape is not given: erratum 12a). Without a threshold or a map there
-    are no neighbours. Raises BadInput where the map's views are of another kind.
+    Gross, Koenig & Müller 2005, section 2.2 (its shape is not given: erratum 12a in docs/papers.md). Without a
+    threshold or a map there are no neighbours. Raises BadInput where the map's views are of another kind.
     """
 
     shape: Shape = "linear"

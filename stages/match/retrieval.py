@@ -57,10 +57,10 @@ def normalised_intersections(
     """Similarity of a query at some turns to references: (chosen, turns) float32 in [0, 1].
 
     sum_k min(q_k, d_k) / sum_k q_k of a query's histogram q and a reference's d, in this order (Wolf, Burgard &
-    Burkhardt 2005, equation 5; erratum 43), on average over segments. `references` (R, segments, scales x bins),
-    `queries` (turns, segments, scales x bins): of several scales the best is taken, the query at its first scale
-    against each of the reference's, and the other way round. A segment whose query holds nothing counts as 0. `chosen`:
-    indices of the references to compare; None: all.
+    Burkhardt 2005, equation 5; erratum 43 in docs/papers.md), on average over segments. `references` (R, segments,
+    scales x bins), `queries` (turns, segments, scales x bins): of several scales the best is taken, the query at its
+    first scale against each of the reference's, and the other way round. A segment whose query holds nothing counts as
+    0. `chosen`: indices of the references to compare; None: all.
     """
     chosen = np.arange(len(references)) if chosen is None else chosen
     turns, segments, length = queries.shape

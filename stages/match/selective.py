@@ -16,9 +16,9 @@ from .candidates import NearBelief, check_same_kind
 class SelectiveMatch(NearBelief, Stage):
     """Similarity of the k best segments only, so that occluded ones do not count.
 
-    Gross & Koenig 2004, section 2: S = max_k (sum of the k largest s_j) sqrt(1 / (k n)) over all k (erratum 21); s_j is
-    the intersection of segment j's histograms. The paper gives s_j for histograms only; for colours it is
-    1 - |difference| / `colour_scale`, not below 0. Raises BadInput where the map has other features.
+    Gross & Koenig 2004, section 2: S = max_k (sum of the k largest s_j) sqrt(1 / (k n)) over all k (erratum 21 in
+    docs/papers.md); s_j is the intersection of segment j's histograms. The paper gives s_j for histograms only; for
+    colours it is 1 - |difference| / `colour_scale`, not below 0. Raises BadInput where the map has other features.
     """
 
     penalty: Literal["sqrt", "cube_root", "three_quarters", "none"] = "sqrt"

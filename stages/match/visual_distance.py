@@ -21,9 +21,9 @@ from omninav.stages.values.visual_distance import VisualDistances
 class MatchPlaces(Stage):
     """Visual distance to every place of a map: global colours first, local features where these leave it open.
 
-    Goedemé et al. 2007, section 4.2: equations 3 and 4 (erratum 27) against each place's medoid. The distance is inf
-    where the global colours differ too much or too few features match. Raises BadInput where the map's descriptors
-    are of another kind.
+    Goedemé et al. 2007, section 4.2: equations 3 and 4 (erratum 27 in docs/papers.md) against each place's medoid. The
+    distance is inf where the global colours differ too much or too few features match. Raises BadInput where the map's
+    descriptors are of another kind.
     """
 
     max_global_distance: Annotated[float, Bounds(gt=0)] = 0.5

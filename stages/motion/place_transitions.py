@@ -18,7 +18,7 @@ class PlaceTransitions(Stage):
 
     Goedemé et al. 2007, section 5.2, equation 13: P(x_t | x_t-1) falls as exp(-dist^2 / sigma^2), dist the least number
     of links on the way, 0 where there is no way, normalised for each place that the robot comes from, since places have
-    more or fewer neighbours (erratum 32).
+    more or fewer neighbours (erratum 32 in docs/papers.md).
     """
 
     sigma_links: Annotated[float, Bounds(gt=0)] | None = None

@@ -23,9 +23,9 @@ LEVELS: tuple[Triple, ...] = (
 class NoisyOdometry(Stage):
     """Adds noise to each increment of motion: rotation, translation, rotation.
 
-    Wolf, Burgard & Burkhardt 2005, section VI-D, figures 16 to 19. Erratum 46a: the paper gives no units; ours are
-    those of `add_odometry_noise`. A simulated world takes a triple as `world.odometry.added=[10,5,5]`. Raises
-    ValueError where `level` is not one of `levels`.
+    Wolf, Burgard & Burkhardt 2005, section VI-D, figures 16 to 19. Erratum 46a in docs/papers.md: the paper gives no
+    units; ours are those of `add_odometry_noise`. A simulated world takes a triple as `world.odometry.added=[10,5,5]`.
+    Raises ValueError where `level` is not one of `levels`.
     """
 
     level: Annotated[int, Bounds(ge=0)] = 4

@@ -60,7 +60,8 @@ def read_occupancy(file: Path) -> OccupancyGrid:
 def coarser(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:
     """A grid whose cells are as many whole ones of the given as come nearest to `resolution` metres; never a finer one.
 
-    A cell is occupied where any of its own is; else unknown where any is, as unknown ones block the view (erratum 46).
+    A cell is occupied where any of its own is; else unknown where any is, as unknown ones block the view (erratum 46 in
+    docs/papers.md).
     """
     factor = max(1, round(resolution / grid.resolution))
     if factor == 1:

@@ -53,7 +53,8 @@ def first_occupied(cells: Cells, starts: Array, directions: Array) -> Sight:
     """The closest occupied cell along rays through free cells.
 
     `starts` (N, 2): row and column in cells, as numbers whose whole part is the cell; `directions` (N,) rad. A ray that
-    begins in a cell that is not free, leaves the grid, or enters an unknown cell hits nothing (erratum 46).
+    begins in a cell that is not free, leaves the grid, or enters an unknown cell hits nothing (erratum 46 in
+    docs/papers.md).
     """
     found, faces = _cast(cells, np.ascontiguousarray(starts), np.ascontiguousarray(directions))
     return Sight(found, faces)

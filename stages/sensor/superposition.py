@@ -20,8 +20,8 @@ def superpose(
     """Superpose the mixtures of a map's views `rows` (J,), weighted by `shares` (J,), turned by `turns` (J,) rad.
 
     Returns means, covariances and weights of the components with positive weight, in the order of the map. The turn is
-    added to the headings and leaves the covariances as they are (erratum 12). `extents` (J,) m: standard deviations by
-    which each view's components are widened in x and y.
+    added to the headings and leaves the covariances as they are (erratum 12 in docs/papers.md). `extents` (J,) m:
+    standard deviations by which each view's components are widened in x and y.
     """
     place = np.full(len(map), -1, np.int64)
     place[rows] = np.arange(len(rows))

@@ -26,7 +26,7 @@ class Visibility(Stage):
 
     Wolf, Burgard & Burkhardt 2005, section V, equations 6 to 8. With a forward-looking camera the particle's heading
     must also deviate from the direction to the view's point lambda by at most `window_deg`. Where no view is left
-    (K = 0) the likelihood is the mean similarity to the whole database (erratum 44).
+    (K = 0) the likelihood is the mean similarity to the whole database (erratum 44 in docs/papers.md).
 
     A panoramic camera sees lambda with any heading: there a view is compared at the turn at which the robot sees
     lambda, which differs from the turn of its heading by the parallax of its motion.

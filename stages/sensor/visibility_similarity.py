@@ -77,11 +77,11 @@ def mean_seen(
     """Mean similarity of the views whose areas hold a pose, equations 7 and 8: (N, 3) -> (N,).
 
     `sums` and `number` as `sums_by_turn` gives them. With a `window` robots look ahead: psi is the angle between the
-    heading and the direction to a point, wrapped to [-pi, pi) (erratum 44); d(psi) is 1 up to `window` radians and 0
-    beyond (`step`, the paper's), falls to 0 there (`triangle`), or has it as standard deviation (`gaussian`). Without
-    one they see all around, and look up their turn relative to each point. p(M_j | l) of equation 6 falls with the
-    distance d to where a group was taken as exp(-d^2 / (2 distance_sigma^2)) and is 0 beyond three sigmas; with an
-    infinite sigma it is the paper's. `background_level`: the result where K = 0.
+    heading and the direction to a point, wrapped to [-pi, pi) (erratum 44 in docs/papers.md); d(psi) is 1 up to
+    `window` radians and 0 beyond (`step`, the paper's), falls to 0 there (`triangle`), or has it as standard deviation
+    (`gaussian`). Without one they see all around, and look up their turn relative to each point. p(M_j | l) of equation
+    6 falls with the distance d to where a group was taken as exp(-d^2 / (2 distance_sigma^2)) and is 0 beyond three
+    sigmas; with an infinite sigma it is the paper's. `background_level`: the result where K = 0.
     """
     farthest = math.pi if window is None else min(CUTOFF_SIGMAS * window if shape == "gaussian" else window, math.pi)
     turns = looks.bearing / (2 * math.pi)

@@ -21,7 +21,8 @@ class LocalFeatures(Value):
     `bearings` (N, 3): unit vectors in the robot's frame, from the camera's projection centre. `points` (N, 2): columns
     and rows (pixels, integers are centres) in the picture they were found in. `descriptors` (N, D) uint8, compared by
     Euclidean distance. `colours` (N, 3) float32: correlations of red with green, red with blue, green with blue over
-    the patch, in [-1, 1] (Goedeme et al. 2007, equation 1; erratum 25). `sizes` (N,): diameters (pixels).
+    the patch, in [-1, 1] (Goedeme et al. 2007, equation 1; erratum 25 in docs/papers.md). `sizes` (N,): diameters
+    (pixels).
     """
 
     bearings: Array

@@ -99,7 +99,8 @@ def spreads(*parts: Floats) -> Floats:
 def mahalanobis_matches(one: Floats, other: Floats, ratio: float) -> Pairs:
     """`mutual_nearest` of rows (N, D) and (M, D) in which each element counts by its spread over both.
 
-    d_ij = sqrt(sum_k (x_ik - x_jk)^2 / sigma_k^2) (Goedeme et al. 2007, equation 2 as erratum 26 reads it).
+    d_ij = sqrt(sum_k (x_ik - x_jk)^2 / sigma_k^2) (Goedeme et al. 2007, equation 2 as erratum 26 in docs/papers.md
+    reads it).
     """
     if not len(one) or not len(other):
         return NO_PAIRS

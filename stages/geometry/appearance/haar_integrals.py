@@ -1,7 +1,7 @@
 """Haar integrals over rotations: what a product of two neighbours is on average as the kernel turns around a pixel.
 
 Wolf, Burgard & Burkhardt 2005, section IV, equation 4 and algorithm 1, with +t instead of -t in equation 3: the value
-at a pixel is that of its own neighbourhood (erratum 40).
+at a pixel is that of its own neighbourhood (erratum 40 in docs/papers.md).
 """
 
 import math

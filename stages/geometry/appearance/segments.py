@@ -22,9 +22,10 @@ LARGEST_COLOUR_DISTANCE = float(np.sqrt(3.0) * 255.0)
 def turned_views(view: Floats, headings: int) -> Floats:
     """A view as it would look to robots turned back by each heading: (segments, bins) -> (headings, segments, bins).
 
-    Row h compares with the view of a robot whose heading is 2 pi h / headings (counter-clockwise) *less*: a turn to
-    the left moves the scene to higher segments, so row h takes segment j from j + h segments / headings. Fractions of
-    a segment are interpolated between the two neighbours (erratum 24), so that histograms still sum to 1.
+    Row h compares with the view of a robot whose heading is 2 pi h / headings (counter-clockwise) *less*: a turn to the
+    left moves the scene to higher segments, so row h takes segment j from j + h segments / headings. Fractions of a
+    segment are interpolated between the two neighbours (erratum 24 in docs/papers.md), so that histograms still sum to
+    1.
     """
     segments = len(view)
     shift = np.arange(headings) * segments / headings

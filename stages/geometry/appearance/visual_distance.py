@@ -96,12 +96,12 @@ def alignment(angles: Array) -> tuple[float, Array]:
 def local_distance(angles: Array, first: int, second: int, by: ComparisonOptions) -> tuple[float, float]:
     """Visual distance by matches, and the turn that aligns the views.
 
-    D = (n1 + n2) sum |theta_i| / (2 N^2) (Goedemé et al. 2007, equations 3 and 4; erratum 27): the mean number of
-    features over that of matches, times the mean angle between matches once both views are aligned by the circular
-    mean. The paper does not say its unit; here it is the full turn, in which 0.5 makes places of about the paper's size
-    (in radians they would be a metre wide). `angles` (N,): azimuth in the second view less that in the first. `first`,
-    `second`: n1 and n2. A single match would be a perfect one, so D is inf below `min_matches`, and the mean angle is
-    at least `min_angle`.
+    D = (n1 + n2) sum |theta_i| / (2 N^2) (Goedemé et al. 2007, equations 3 and 4; erratum 27 in docs/papers.md): the
+    mean number of features over that of matches, times the mean angle between matches once both views are aligned by
+    the circular mean. The paper does not say its unit; here it is the full turn, in which 0.5 makes places of about the
+    paper's size (in radians they would be a metre wide). `angles` (N,): azimuth in the second view less that in the
+    first. `first`, `second`: n1 and n2. A single match would be a perfect one, so D is inf below `min_matches`, and the
+    mean angle is at least `min_angle`.
     """
     number, features = len(angles), (first + second) / 2.0
     if number < max(1, by.min_matches):

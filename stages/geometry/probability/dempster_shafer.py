@@ -9,7 +9,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 SUREST = 0.99
-"""The most that evidence may weigh: two certain opposites could not be combined (erratum 29)."""
+"""The most that evidence may weigh: two certain opposites could not be combined (erratum 29 in docs/papers.md)."""
 
 
 def masses(similarity: npt.ArrayLike, confidence: npt.ArrayLike) -> Array:

@@ -45,7 +45,7 @@ def squared_distances(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array) 
     """Squared Mahalanobis distances d^T (C_a + C_b)^-1 d between means (A, 3) and (B, 3): (A, B).
 
     Gross, Koenig & Mueller 2005, equations 2, 12 and 15, with the transpose that equation 2 lost and the heading's
-    difference wrapped (erratum 1). For equal poses with three degrees of freedom 95 % lie below 7.81.
+    difference wrapped (erratum 1 in docs/papers.md). For equal poses with three degrees of freedom 95 % lie below 7.81.
     """
     return _squared_distances(*(np.ascontiguousarray(a, np.float64) for a in (mean_a, cov_a, mean_b, cov_b)))
 

@@ -2,7 +2,7 @@
 
 Convention as in `epipolar`: X = R Xc + t takes the camera's coordinates to those of the points' frame, so `rotation`
 (3, 3) and `translation` (3,) are the camera seen from there. Goedemé et al. 2007, section 7.2.3: three points in a
-sample (poselib's solver in place of Grunert's, erratum 38), the largest agreement, refined locally.
+sample (poselib's solver in place of Grunert's, erratum 38 in docs/papers.md), the largest agreement, refined locally.
 Bearings may look anywhere on the sphere.
 """
 

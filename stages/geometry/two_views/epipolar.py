@@ -3,7 +3,8 @@
 Convention, everywhere: `rotation` R (3, 3) and `translation` t (3,) are camera 2 seen from camera 1, X1 = R X2 + t. So
 t points from where view 1 was taken to where view 2 was, and R turns bearings of view 2 into the frame of view 1. The
 essential matrix is E = [t]x R, with b1' E b2 = 0. Its scale is lost: translations have length 1. In homing view 1 is
-what is seen now and view 2 the target: t is where to go, the yaw of R how far to turn there (erratum 39).
+what is seen now and view 2 the target: t is where to go, the yaw of R how far to turn there (erratum 39 in
+docs/papers.md).
 
 Goedemé et al. 2007, section 7.1.1, with errata 34 to 37. Bearings may look anywhere on the sphere; nothing here asks
 for a positive z.

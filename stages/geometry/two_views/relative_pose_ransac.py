@@ -1,7 +1,8 @@
 """Relative pose from bearings of which many are wrong: random samples, the largest agreement, refined locally.
 
 The paper's RANSAC (Goedemé et al. 2007, section 7.1.1), on the sphere: a pair agrees where its bearings, moved together
-by less than a threshold, meet in front of both cameras (errata 35 and 36). Conventions as in `epipolar`.
+by less than a threshold, meet in front of both cameras (errata 35 and 36 in docs/papers.md). Conventions as in
+`epipolar`.
 """
 
 import math

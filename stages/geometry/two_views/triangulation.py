@@ -15,7 +15,7 @@ def depths(first: npt.ArrayLike, second: npt.ArrayLike, rotation: Array, transla
 
     `first`, `second`: (N, 3) unit bearings of the same points. A negative depth lies behind, and the pair cannot be one
     point: this, and not a coordinate's sign, tells the right one of the poses that an essential matrix allows
-    (erratum 36). Infinite where the lines are parallel.
+    (erratum 36 in docs/papers.md). Infinite where the lines are parallel.
     """
     first, second = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64) @ rotation.T
     cos = np.einsum("ij,ij->i", first, second)
