@@ -32,7 +32,7 @@ def refined(
             damped = square.copy()
             damped.flat[:: len(slope) + 1] *= 1.0 + damping
             damped.flat[:: len(slope) + 1] += 1e-12
-            step: Array = -np.linalg.solve(damped, slope)
+            step = -np.asarray(np.linalg.solve(damped, slope), np.float64)
             tried = moved(*pose, step)
             new = cost(*tried)
             improved = new < least
