@@ -1,4 +1,4 @@
-"""The framework: stages, graphs, runs and experiments. It knows no robot; that is what `omninav.stages` adds."""
+"""The framework: stages, graphs, runs and experiments. What they are about is in `omninav.stages`."""
 
 from .graph.problems import BadInput, Problem, ProblemsFound
 from .graph.results import Figure, Metrics, Quantity, Table

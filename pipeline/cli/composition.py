@@ -35,7 +35,7 @@ Variants = Callable[[str], Any]
 
 
 def _unless(given: str, wanted: str, *, _root_: Any) -> Any:
-    """`${unless:log,world}`: the setting `world`, or, where `log` is given, the default of whoever reads it."""
+    """`${unless:a,b}`: the setting `b`, or, where `a` is given, the default of whoever reads it."""
     return UNSET if _root_[given] is not None else _root_[wanted]
 
 
@@ -151,7 +151,7 @@ def _graph_of(config: Any, name: str, spec: ArtifactSpecification, variants: Var
 
 
 def _linked(config: Any, name: str) -> dict[str, str]:
-    """Settings of an artifact's graph that are other settings of this run (`set: {log: ${tour}}`): name -> that one."""
+    """Settings of an artifact's graph that are other settings of this run (`set: {a: ${b}}`): name -> that one."""
     changed = config.artifacts[name].get("set")
     raw: Any = OmegaConf.to_container(changed, resolve=False) if changed is not None else {}
     links = {key: re.fullmatch(r"\$\{(\w+)\}", value) for key, value in raw.items() if isinstance(value, str)}

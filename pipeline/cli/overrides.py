@@ -66,7 +66,7 @@ def _parsed(words: Sequence[str]) -> tuple[list[Problem], list[Override]]:
         try:
             parsed += OverridesParser.create().parse_overrides([text])
         except HydraException:
-            hint = "write name=value, and quotes within quotes around odd characters: \"camera='my=rig.yaml'\""
+            hint = "write name=value, and quotes within quotes around odd characters: \"name='a=b.yaml'\""
             problems.append(Problem(text, "cannot be read", hint))
     return problems, parsed
 

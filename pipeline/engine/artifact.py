@@ -60,9 +60,7 @@ def read_header(path: Path) -> dict[str, Any]:
     with _opened(path) as archive:
         header: dict[str, Any] = json.loads(archive.read(_HEADER))
     if header.get("format") != FORMAT:
-        raise BadInput(
-            f"{path}: written in format {header.get('format')}, this version reads {FORMAT}; make the map again"
-        )
+        raise BadInput(f"{path}: written in format {header.get('format')}, this version reads {FORMAT}; make it again")
     return header
 
 
@@ -77,13 +75,13 @@ def read_artifact(path: Path) -> Value:
         for name, digest in header["arrays"].items():
             content = np.lib.format.read_array(io.BytesIO(archive.read(f"{name}.npy")), allow_pickle=False)
             if hashlib.sha256(content.tobytes()).hexdigest() != digest:
-                raise BadInput(f"{path}: the array '{name}' is damaged (sha256 differs); make the map again")
+                raise BadInput(f"{path}: the array '{name}' is damaged (sha256 differs); make it again")
             fields[name] = content
     try:
         fields |= decode(fields.pop("rest").tobytes())
         return cls(**fields)
     except (BadEncoding, TypeError) as error:
-        raise BadInput(f"{path}: does not fit {cls.__name__} of this version ({error}); make the map again") from None
+        raise BadInput(f"{path}: does not fit {cls.__name__} of this version ({error}); make it again") from None
 
 
 @contextmanager
@@ -94,8 +92,8 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
     size = len(_SUM) + 64
     whole, comment = content[:-size], content[-size:]
     if not comment.startswith(_SUM.encode()):
-        raise BadInput(f"{path}: not a map file, or cut off at its end; make the map again (tour=…)")
+        raise BadInput(f"{path}: not an artifact file, or cut off at its end; make it again")
     if comment[len(_SUM) :].decode("ascii", "replace") != hashlib.sha256(whole).hexdigest():
-        raise BadInput(f"{path}: damaged, its sha256 does not fit its content; make the map again (tour=…)")
+        raise BadInput(f"{path}: damaged, its sha256 does not fit its content; make it again")
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         yield archive

@@ -19,7 +19,7 @@ class Checkpoint:
     `ended`: the logs have ended, only "after" stages are left. `replayed`: the prefix came from the cache. `channels`:
     delayed values, oldest first. `held`: last present values. `states`: fields of the stages' States. `generators`: bit
     generators' states. `notes`: what contexts counted. `sequences`: length in bytes of every growing sequence. A value
-    that stands in several places (a map that is read delayed and kept for the end) is written once and is one object
+    that stands in several places (one that is read delayed and kept for the end) is written once and is one object
     again when loaded.
     """
 

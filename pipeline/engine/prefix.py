@@ -1,4 +1,4 @@
-"""The prefix of a graph: what follows from the logs alone (unwarped, featured images), kept for the next run.
+"""The prefix of a graph: what follows from the logs alone (prepared data), kept for the next run.
 
 A node is in the prefix when it is the source of a recorded log, or gets all its inputs from the prefix or from before
 the loop, without delays. What other nodes read of the prefix is its frontier; it is written tick by tick under the hash

@@ -122,7 +122,7 @@ class _Builder:
             self._problem(
                 "wires",
                 "expected a mapping: node -> port -> where it comes from",
-                "write wires: {match: {map: artifacts.map}}",
+                "write wires: {node: {port: other.output}}",
             )
             return
         for name, ports in wires.items():

@@ -10,7 +10,7 @@ from .stage import Stage
 Lifetime = Literal["before", "tick", "after"]
 LIFETIMES: tuple[Lifetime, ...] = ("before", "tick", "after")
 ARTIFACTS = "artifacts"
-"""The name under which static values from files or other graphs' runs are wired: `artifacts.map`."""
+"""The name under which static values from files or other graphs' runs are wired: `artifacts.name`."""
 
 
 @dataclass(frozen=True)

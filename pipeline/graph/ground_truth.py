@@ -1,4 +1,4 @@
-"""A closed loop is steered by what a robot would have: nothing that leads to a command knows the truth."""
+"""A closed loop is steered by what can be measured: nothing that leads to a command knows the truth."""
 
 from collections.abc import Iterator
 
@@ -14,17 +14,15 @@ def steering(graph: Graph) -> frozenset[str]:
 
 
 def truth_in_the_loop(graph: Graph) -> Iterator[tuple[str, str, str]]:
-    """Where, what and what to type for every wire that brings truth (see `Truth`) to a stage that steers the robot.
+    """Where, what and what to type for every wire that brings truth (see `Truth`) to a stage that steers the source.
 
-    Metrics and views, which no command depends on, may read it. A map is taken as it was made: from a tour, before.
+    Metrics and plots, which no command depends on, may read it. An artifact is taken as it was made before.
     """
     for name in sorted(steering(graph)):
         for wire in graph.inputs_of(name):
             for origin in _origins(wire):
                 if _is_truth(graph, origin):
-                    what = (
-                        f"{origin} is ground truth, and '{name}' steers the robot: no robot in the field would have it"
-                    )
+                    what = f"{origin} is ground truth, and '{name}' steers the source: it cannot be measured in the field"
                     yield wire.where, what, f"take the wire out: {wire.where}=null"
 
 

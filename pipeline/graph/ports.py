@@ -14,7 +14,7 @@ from .stage import Bounds
 
 
 def type_name(annotation: Any) -> str:
-    """A type as people write it: `Particles`, `int >= 1`, `'sqrt' | 'none'`, `list of Pose`."""
+    """A type as people write it: `Particles`, `int >= 1`, `'sqrt' | 'none'`, `list of Value`."""
     origin = get_origin(annotation)
     if annotation is type(None):
         return "null"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 class Problem:
     """One thing that is wrong.
 
-    `where`: the config path (`nodes.match.headings`) or file; `what`: what was found and what was expected;
+    `where`: the config path (`nodes.smoothing.gain`) or file; `what`: what was found and what was expected;
     `hint`: what to type or where to look, '' where there is nothing useful to say.
     """
 

@@ -32,7 +32,7 @@ class Metrics(Value):
 
         QUANTITIES = {
             "position_error_m": Quantity(better="lower"),
-            "success.at_end": Quantity(title="Final pose correct", better="higher"),
+            "success.at_end": Quantity(title="Correct at the end", better="higher"),
         }
         ...
         return self.Out(metrics=Metrics(values, QUANTITIES, headlines=("position_error_m.median", "success.at_end")))

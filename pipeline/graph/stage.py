@@ -39,7 +39,7 @@ class Bounds:
 
 
 class Truth:
-    """Marks an output that no robot in the field would have: `pose: Annotated[Pose, Truth]`.
+    """Marks an output that cannot be measured in the field: `state: Annotated[Reading, Truth]`.
 
     Metrics and views may read it, and so may a graph over a recorded log; in a closed loop nothing that leads to a
     command may. A source's output named `truth` is marked by its name, and so is every output whose value type says so.
@@ -110,7 +110,7 @@ class Context:
             self.details.setdefault(kind, detail)
 
     def fact(self, name: str, value: Any) -> None:
-        """Put a fact about the run into the manifest (`odometry: synthetic`)."""
+        """Put a fact about the run into the manifest (`noise: synthetic`)."""
         self.facts[name] = value
 
     def generator_state(self) -> dict[str, Any]:
@@ -148,7 +148,7 @@ class Context:
 class Stage:
     """Base of all stages. A subclass is a keyword-only dataclass of its parameters with a `step`.
 
-    * parameters: annotated fields with defaults (`headings: Annotated[int, Bounds(ge=1)] = 36`), each with a docstring
+    * parameters: annotated fields with defaults (`points: Annotated[int, Bounds(ge=1)] = 36`), each with a docstring
       directly below it that says what it means;
     * input ports: the arguments of `step` after `ctx`; `X | None` is optional; `Sequence[X]` takes a `collect` wire and
       gets every present value, `Sequence[X | None]` one entry per tick;
@@ -179,7 +179,7 @@ class Stage:
 class Source(Stage):
     """A stage that makes ticks. `Out` has a port `tick: Tick`; `step` returns None when there is no more.
 
-    Its position is its `State`. A source may have delayed inputs only (a simulator takes the last command).
+    Its position is its `State`. A source may have delayed inputs only (a simulation takes the last command).
     """
 
     def length(self) -> int | None:

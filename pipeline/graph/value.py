@@ -13,9 +13,9 @@ class Value:
     """Base of everything that travels on a wire. A subclass becomes a frozen dataclass by itself.
 
     Fields are arrays, numbers, strings, other values, and tuples, lists and string-keyed dicts of these: what
-    `codec.py` can write. `in_place` marks a large value that one stage updates in place (a map); it is then not
+    `codec.py` can write. `in_place` marks a large value that one stage updates in place; it is then not
     frozen, and the engine sees to it that nobody reads it too late. `bulky` marks what is too large to be kept over
-    a whole log (images): it is never cached. `is_truth` marks what no robot in the field has: a plan of the world.
+    a whole log: it is never cached. `is_truth` marks what cannot be measured in the field.
     """
 
     in_place: ClassVar[bool] = False
@@ -36,7 +36,7 @@ def value_name(cls: type) -> str:
 class Tick(Value):
     """One turn of the loop: its number, the time it stands for, and its log.
 
-    `stamp` is in nanoseconds (the header stamp of the tick's image); `log` counts the logs of the run from 0;
+    `stamp` is in nanoseconds (that of the tick's data); `log` counts the logs of the run from 0;
     `frame` is the record's number within its log; `first_of_log` is true where a new log begins.
     """
 

@@ -9,7 +9,8 @@ import pytest
 from hydra import compose, initialize_config_module
 from omegaconf import OmegaConf
 
-from omninav.pipeline.cli.main import COMMANDS, complete
+from omninav.pipeline.cli.composition import complete
+from omninav.pipeline.cli.main import COMMANDS
 from omninav.pipeline.cli.overrides import jobs_to_try, with_unlisted_parameters
 from omninav.pipeline.run.run import plan
 

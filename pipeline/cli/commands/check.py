@@ -20,7 +20,7 @@ def command(arguments: list[str]) -> int:
             return _check_experiment(planned_experiment(config, arguments, search(folders)))
         planned = plan(complete(config, configured_variants(search(folders))))
     refuse_missing(planned.config)
-    input_digests(planned)  # opens every log and map
+    input_digests(planned)  # opens every file that the run reads
     graph = planned.graph
     before, tick, after = (len(graph.of_lifetime(kind)) for kind in LIFETIMES)
     print(f"{planned.variant}: nothing wrong with it. {len(graph.nodes)} nodes, {len(graph.wires)} wires")

@@ -1,4 +1,4 @@
-"""`omninav simulate`: a drive through the built-in world, written as a log."""
+"""`omninav simulate`: what the variant `simulate` computes, written as a log."""
 
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.engine.engine import Engine, EngineOptions
@@ -7,8 +7,8 @@ from omninav.pipeline.run.plan import plan
 
 
 def command(arguments: list[str]) -> int:
-    """Run the variant `simulate`, which leaves a log and no run folder."""
-    with Progress(unit="pictures") as progress:
+    """Run the variant; it leaves no run folder."""
+    with Progress() as progress:
         progress.say("reading the configuration")
         with composed(["variant=simulate", *arguments]) as config:
             planned = plan(complete(config))  # of no artifacts

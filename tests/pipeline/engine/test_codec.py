@@ -117,5 +117,5 @@ def test_a_missing_or_foreign_file_is_refused_by_name(tmp_path: Path):
     with pytest.raises(BadInput, match="there is no such file"):
         read_artifact(tmp_path / "none.omap")
     (tmp_path / "text.omap").write_text("not a map at all, but long enough to hold a sum " * 9)
-    with pytest.raises(BadInput, match="not a map file"):
+    with pytest.raises(BadInput, match="not an artifact file"):
         read_artifact(tmp_path / "text.omap")

@@ -1,0 +1,71 @@
+"""The framework knows no robot, neither in names nor in prose."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+PIPELINE = Path(__file__).parents[2] / "pipeline"
+FILES = sorted(path for path in PIPELINE.rglob("*") if path.suffix in (".py", ".html", ".md", ".css"))
+WORDS = frozenset(
+    [
+        "camera",
+        "cameras",
+        "fisheye",
+        "heading",
+        "headings",
+        "image",
+        "images",
+        "kidnapped",
+        "kidnapping",
+        "landmark",
+        "lidar",
+        "localisation",
+        "localise",
+        "map",
+        "maps",
+        "mirror",
+        "odometry",
+        "omnidirectional",
+        "panorama",
+        "panoramas",
+        "",
+        "",
+        "pose",
+        "poses",
+        "robot",
+        "robots",
+        "room",
+        "route",
+        "routes",
+        "tour",
+        "tours",
+        "wheel",
+        "wheels",
+        "world",
+        "worlds",
+    ]
+)
+NOT_MEANT = r"\bmap\(|\bimage/|\*map\b"
+"""The built-in function, and media types."""
+
+
+def words(line: str) -> set[str]:
+    """The words of a line, those within names too: `max_pose_error`, `PoseError`."""
+    parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", re.sub(NOT_MEANT, "", line))
+    return {part.lower() for part in parts}
+
+
+def test_words_are_found_within_names():
+    assert {"pose", "camera", "map"} <= words("def max_pose(CameraModel, map=artifacts.map)")
+    assert not words("map(str, values), 'image/png'") & WORDS
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda path: str(path.relative_to(PIPELINE)))
+def test_a_file_of_the_framework_has_no_word_of_robots(file: Path):
+    found = [
+        f"{file.name}:{number}: {', '.join(sorted(words(line) & WORDS))}"
+        for number, line in enumerate(file.read_text().split("\n"), 1)
+        if words(line) & WORDS
+    ]
+    assert not found
