@@ -22,7 +22,7 @@ def truth_in_the_loop(graph: Graph) -> Iterator[tuple[str, str, str]]:
         for wire in graph.inputs_of(name):
             for origin in _origins(wire):
                 if _is_truth(graph, origin):
-                    what = f"{origin} is ground truth, and '{name}' steers the source: it cannot be measured in the field"
+                    what = f"{origin} is ground truth, and '{name}' steers the source: nothing measures it in the field"
                     yield wire.where, what, f"take the wire out: {wire.where}=null"
 
 

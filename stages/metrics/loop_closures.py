@@ -23,7 +23,7 @@ QUANTITIES = {
     "precision": Quantity(unit="%", better="higher"),
     "recall": Quantity(unit="%", better="higher"),
     "wrong": Quantity(title="Accepted wrongly", better="lower"),
-    "map.places": Quantity(title="Places in the map"),
+    "map.places": Quantity(title="Places in the map", context=True),
     "map.size_bytes": Quantity(title="Map size", better="lower"),
     "map.place_size_bytes": Quantity(title="Size of a place", better="lower"),
     "map.step_m": Quantity(title="Distance between path images"),

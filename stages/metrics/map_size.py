@@ -4,7 +4,7 @@ from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.values.maps import ReferenceGraph
 
 QUANTITIES = {
-    "map.references": Quantity(title="References in the map"),
+    "map.references": Quantity(title="References in the map", context=True),
     "map.size_bytes": Quantity(title="Map size", better="lower"),
     "map.reference_size_bytes": Quantity(title="Size of a reference", better="lower"),
 }

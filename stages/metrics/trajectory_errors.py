@@ -15,7 +15,8 @@ QUANTITIES = {
     "heading_error_deg": Quantity(better="lower"),
     "loss_rate": Quantity(better="lower"),
     "converged_after_frames": Quantity(title="Converged after", better="lower", absent="never"),
-    "frames": Quantity(),
+    "frames": Quantity(context=True),
+    "driven_m": Quantity(title="Distance driven", context=True),
     "odometry_alone.final_error_m": Quantity(title="Odometry drift at the end", better="lower"),
 }
 

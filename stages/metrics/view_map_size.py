@@ -14,7 +14,7 @@ Array = npt.NDArray[np.float64]
 
 
 QUANTITIES = {
-    "map.references": Quantity(title="References in the map"),
+    "map.references": Quantity(title="References in the map", context=True),
     "map.size_bytes": Quantity(title="Map size", better="lower"),
     "map.reference_size_bytes": Quantity(title="Size of a reference", better="lower"),
     "map.visited_area_m2": Quantity(title="Visited area", unit="m²"),

@@ -37,7 +37,7 @@ def test_metrics_behind_a_closed_loop_may_read_truth():
 def test_a_driver_that_reads_truth_is_refused_with_what_to_type():
     (problem,) = refused(NODES, WIRES | {"driving": {"number": "source.truth"}})
     assert problem.where == "wires.driving.number"
-    said = "source.truth is ground truth, and 'driving' steers the source: it cannot be measured in the field"
+    said = "source.truth is ground truth, and 'driving' steers the source: nothing measures it in the field"
     assert problem.what == said
     assert problem.hint == "take the wire out: wires.driving.number=null"
 
