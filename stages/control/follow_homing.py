@@ -32,7 +32,7 @@ class FollowHoming(Stage):
     Goedemé et al. 2007, section 7.2.4. Without a `scan` nothing is taken to be in the way. A lost target is approached
     for a while where its distance in metres is known. Then the robot stands and is `lost`, or drives by the `wander`
     command, if that is wired, until it sees where to go. It is `blocked` where no direction is free, or where `stalled`
-    says so. `status` gives the reason to whoever plans.
+    says so. `status` gives the reason.
     """
 
     max_speed: Annotated[float, Bounds(gt=0)] = 0.4
@@ -84,7 +84,7 @@ class FollowHoming(Stage):
         if vector.state == "lost" and (lost_s >= self.blocked_after_s or vector.metres is None):
             if wander is not None and lost_s >= self.wander_after_s:
                 ctx.count("wandered_lost")
-                return self.Out(command=wander, status=DrivingStatus("lost", f"it looks about: {vector.why}"))
+                return self.Out(command=wander, status=DrivingStatus("lost", f"it wanders: {vector.why}"))
             ctx.count("stood_lost")
             return self._stand("lost", vector.why)
         if progress is not None and progress.docking:

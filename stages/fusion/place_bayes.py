@@ -35,7 +35,7 @@ class PlaceBayes(Stage):
         weights = prediction.probabilities * likelihood.values
         total = float(weights.sum())
         if not (math.isfinite(total) and total > 0.0):
-            ctx.count("belief_without_support", detail="fusion: no place explains the picture; belief kept")
+            ctx.count("belief_without_support", detail="fusion: no place explains the image; belief kept")
             weights, total = prediction.probabilities, 1.0
         poses = map.poses[map.places].copy()
         poses[:, 2] = wrap(poses[:, 2] + distances.turns)

@@ -70,20 +70,20 @@ def track(
     seam = np.array([image.seam, 0])
     old = np.ascontiguousarray((points + seam)[:, None], np.float32)
     guess = np.ascontiguousarray((guesses + seam)[:, None], np.float32)
-    how: dict[str, Any] = {
+    options: dict[str, Any] = {
         "winSize": (window, window),
         "maxLevel": levels,
         "criteria": (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 0.02),
         "flags": cv2.OPTFLOW_USE_INITIAL_FLOW,
     }
-    new, forth, _ = cv2.calcOpticalFlowPyrLK(before, image.grey, old, guess.copy(), **how)
+    new, forward, _ = cv2.calcOpticalFlowPyrLK(before, image.grey, old, guess.copy(), **options)
     back_from = old + (new - guess)  # as far from the old place as the guess was from the new one
-    again, back, _ = cv2.calcOpticalFlowPyrLK(image.grey, before, new, back_from, **how)
+    again, backward, _ = cv2.calcOpticalFlowPyrLK(image.grey, before, new, back_from, **options)
     missed = np.linalg.norm((again - old)[:, 0], axis=1)
     found = new[:, 0].astype(np.float64) - seam
     if image.seam:
         found[:, 0] = np.mod(found[:, 0] + 0.5, image.columns) - 0.5
-    kept = (forth.ravel() > 0) & (back.ravel() > 0) & (missed <= max_error) & image.inside(found, 2.0)
+    kept = (forward.ravel() > 0) & (backward.ravel() > 0) & (missed <= max_error) & image.inside(found, 2.0)
     return found, np.asarray(kept)
 
 

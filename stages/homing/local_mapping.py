@@ -45,11 +45,11 @@ class LocalMapping(Stage):
     Goedemé et al. 2007, section 7.2. At a new target the bearings of the matched features give the relative pose of
     the two views, and the features' positions follow by triangulation. Only a pose on which more features agree than
     by chance is accepted. From then on three-point resection in samples gives the robot's pose from tracked features
-    and from those that are matched with the target view again, which also start their tracks anew.
+    and from those that are matched with the target view again, whose tracks start again.
 
-    With fewer than `min_inliers` the map is made anew from the matches of the same tick, its unit by the old map, or
-    the target is lost. It is also made anew where many more matches agree, since more is matched from closer by. A map
-    that says the target is reached, where the two views still differ, is discarded.
+    With fewer than `min_inliers` the map is rebuilt from the matches of the same tick, with the old map's scale, or the
+    target is lost. It is also rebuilt where many more matches agree, since more is matched from closer by. A map that
+    says the target is reached, where the two views still differ, is discarded.
 
     Without `tracks` only matches count; without `motion` (odometry) the robot's pose is not predicted, and the unit in
     metres is not known. Raises BadInput for correspondences of other features.
@@ -68,11 +68,11 @@ class LocalMapping(Stage):
     min_parallax_deg: Annotated[float, Bounds(ge=0)] = 1.0
     """Features with less are not triangulated."""
     rebuild_ratio: Annotated[float, Bounds(ge=1)] = 1.5
-    """The map is made anew where so many times as many matches agree as when it was made."""
+    """Matches over the first inliers from which the map is rebuilt, if as many agree."""
     min_rebuild_distance: Annotated[float, Bounds(ge=0)] = 0.1
-    """To the target, over the features' typical distance: closer the baseline is too short for a new map."""
+    """To the target, over the features' typical distance: closer, the baseline is too short for a new map."""
     arrival_distance: Annotated[float, Bounds(ge=0)] = 0.05
-    """To the target, over the features' typical distance: closer the two views must look alike."""
+    """To the target, over the features' typical distance: closer, the two views must look the same."""
     max_outlier_deg: Annotated[float, Bounds(gt=0)] = 10.0
     """By which most matched bearings may differ at the target, after the turn."""
 
@@ -189,8 +189,8 @@ class LocalMapping(Stage):
             return False
         turned = matches.second @ (local_map.rotation.T @ local_map.goal_rotation).T
         chord = 2.0 * math.sin(math.radians(self.max_outlier_deg) / 2.0)
-        alike = np.linalg.norm(turned - matches.first, axis=1) < chord
-        return bool(np.count_nonzero(alike) < len(matches.rows) / 2)
+        same = np.linalg.norm(turned - matches.first, axis=1) < chord
+        return bool(np.count_nonzero(same) < len(matches.rows) / 2)
 
     def _made(
         self, ctx: Context, state: LocalMappingState, old: LocalMap, matches: Matches, min_inliers: int

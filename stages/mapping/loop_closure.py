@@ -64,10 +64,12 @@ class LoopClosure(Stage):
         pairs, ends = found.pairs[open_], found.medoids[open_]
         if self.between == "nearest":
             ends = place_clusters.nearest_views(distances, subcluster, pairs)
-        apart = distances[ends[:, 0], ends[:, 1]]
+        visual_distances = distances[ends[:, 0], ends[:, 1]]
         enough = views.shares[ends[:, 0], ends[:, 1]] >= self.min_share
         spread = place_clusters.rms_within(distances, subcluster)
-        similarity = dempster_shafer.similarity_of(np.where(enough, apart, math.inf), spread, self.similarity)
+        similarity = dempster_shafer.similarity_of(
+            np.where(enough, visual_distances, math.inf), spread, self.similarity
+        )
         initial = dempster_shafer.masses(similarity, 1.0 - self.ignorance)
         gaps = place_clusters.between_hypotheses(ends, views.orders)
         masses = dempster_shafer.gather(initial, gaps, self.neighbour_distance)
@@ -87,7 +89,7 @@ class LoopClosure(Stage):
                 place=place_clusters.renumbered(place_of_part[subcluster]),
                 tour=views.tours,
                 pairs=ends,
-                apart=apart,
+                distances=visual_distances,
                 initial=initial,
                 masses=masses,
                 accepted=accepted,

@@ -64,7 +64,7 @@ class MatchPlaces(Stage):
         if len(features) and features.descriptors.shape[1] != map.views.descriptors.shape[1]:
             raise BadInput(
                 f"match: descriptors of {features.descriptors.shape[1]} numbers against a map of "
-                f"{map.views.descriptors.shape[1]}; use the features it was made with, or make it anew"
+                f"{map.views.descriptors.shape[1]}; use the features it was made with, or make a new map"
             )
         here = view_features(features, vertical_segments)
         options = ComparisonOptions(

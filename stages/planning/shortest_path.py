@@ -114,7 +114,7 @@ class ShortestPathPlanner(Stage):
     ) -> bool:
         if state.number < 0:
             state.why = "it has no route yet"
-        elif progress is None or progress.path != state.number:  # the route has not reached whoever drives it
+        elif progress is None or progress.path != state.number:  # the path has not reached path_following yet
             return False
         elif progress.arrived:
             state.ended, state.why = "arrived", ""

@@ -187,7 +187,7 @@ class LoopHypotheses(Value):
 
     `poses` (N, 3): of all pictures, from the map's `pose_source`. `cluster`, `subcluster` and `place` (N,): what each
     belongs to, subclusters numbered along the drive. `tour` (N,): which tour it is from. `pairs` (H, 2): the pictures
-    that stand for the two subclusters of each hypothesis. `apart` (H,): their visual distance. `initial` and `masses`
+    that stand for the two subclusters of each hypothesis. `distances` (H,): their visual ones. `initial` and `masses`
     (H, 3): for, against and unknown, before and after the evidence of neighbours. `accepted` (H,).
     """
 
@@ -197,7 +197,7 @@ class LoopHypotheses(Value):
     place: Ints
     tour: Ints
     pairs: Ints
-    apart: Array
+    distances: Array
     initial: Array
     masses: Array
     accepted: npt.NDArray[np.bool_]

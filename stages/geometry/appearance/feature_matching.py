@@ -67,7 +67,7 @@ def _mutual(squares: Floats, ratio: float, first: Ints, second: Ints, distance: 
 def mutual_nearest(squares: Floats, ratio: float) -> Pairs:
     """Pairs of which each is the other's nearest, and by `ratio` nearer than the second nearest of either.
 
-    `squares` (N, M) float32: squared distances. A row or column without a second nearest passes the ratio. (Goedeme et
+    `squares` (N, M) float32: squared distances. A row or column without a second nearest passes the ratio. (Goedemé et
     al. 2007, section 3.4.)
     """
     rows, columns = squares.shape
@@ -99,7 +99,7 @@ def spreads(*parts: Floats) -> Floats:
 def mahalanobis_matches(one: Floats, other: Floats, ratio: float) -> Pairs:
     """`mutual_nearest` of rows (N, D) and (M, D) in which each element counts by its spread over both.
 
-    d_ij = sqrt(sum_k (x_ik - x_jk)^2 / sigma_k^2) (Goedeme et al. 2007, equation 2 as erratum 26 in docs/papers.md
+    d_ij = sqrt(sum_k (x_ik - x_jk)^2 / sigma_k^2) (Goedemé et al. 2007, equation 2 as erratum 26 in docs/papers.md
     reads it).
     """
     if not len(one) or not len(other):

@@ -25,7 +25,7 @@ def renumbered(labels: npt.ArrayLike) -> Ints:
 
 
 def complete_linkage(distances: Array, size: float) -> Ints:
-    """Clusters (N,) in which no two views are further apart than `size` (Goedeme et al. 2007, section 4.4.1).
+    """Clusters (N,) in which no two views are further apart than `size` (Goedemé et al. 2007, section 4.4.1).
 
     `distances` (N, N) symmetric, inf where two views have nothing in common. Numbered in the order of the views.
     """
@@ -115,8 +115,8 @@ def between_hypotheses(medoids: Ints, frames: Ints) -> Array:
     `medoids` (H, 2): views; `frames` (N,): their numbers along the drive. Views are paired in the order that is nearer.
     """
     at = frames[medoids].astype(np.float64)
-    apart = np.abs(at[:, None, :, None] - at[None, :, None, :])  # (H, H, 2, 2)
-    either: Array = np.minimum(apart[..., 0, 0] + apart[..., 1, 1], apart[..., 0, 1] + apart[..., 1, 0])
+    gaps = np.abs(at[:, None, :, None] - at[None, :, None, :])  # (H, H, 2, 2)
+    either: Array = np.minimum(gaps[..., 0, 0] + gaps[..., 1, 1], gaps[..., 0, 1] + gaps[..., 1, 0])
     return either
 
 

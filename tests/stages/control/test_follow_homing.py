@@ -151,7 +151,7 @@ def test_who_is_lost_for_long_wanders_until_the_target_is_seen() -> None:
     said = [robot.drive(lost, progress(), scan((-20.0, 0.0, 0.6))) for _ in range(7)]
     assert [(out.command.speed, out.command.turning) for out in said[:5]] == [(0.0, 0.0)] * 5
     assert said[-1].command.turning > 0.0  # away from what stands ahead, a little to the right
-    assert (said[-1].status.state, said[-1].status.why) == ("lost", "it looks about: 2 of 9 matches agree")
+    assert (said[-1].status.state, said[-1].status.why) == ("lost", "it wanders: 2 of 9 matches agree")
     assert robot.drive(vector(), progress(), scan()).status.state == "driving"
 
 
