@@ -35,7 +35,7 @@ def parse_camera(text: str | bytes, where: str) -> Camera:
     """The camera that a text describes. Raises `UnreadableRecording` naming `where` and the key that is wrong."""
     try:
         content = yaml.safe_load(text)
-    except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
+    except (yaml.YAMLError, ValueError, AttributeError, TypeError, RecursionError) as error:  # what PyYAML raises
         raise UnreadableRecording(f"{where}: not readable as YAML ({' '.join(str(error).split())})") from None
     return camera_from(content, where)
 
@@ -116,8 +116,8 @@ def _model(content: dict[str, Any], where: str) -> type[Camera]:
     models, name = camera_models(), content.get("projection")
     if name is None:
         raise UnreadableRecording(f"{where}: {_missing(content, Key('', 'projection'), {'': {'projection'}})}")
-    if name not in models:
-        near = nearest(str(name), models)
+    if not isinstance(name, str) or name not in models:
+        near = nearest(name, models) if isinstance(name, str) else None
         hint = f"did you mean '{near}'?" if near else f"one of {', '.join(sorted(models))}"
         raise UnreadableRecording(f"{where}: 'projection' cannot be {_shown(name)}; {hint}")
     return models[name]

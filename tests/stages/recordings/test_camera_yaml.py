@@ -74,6 +74,24 @@ def test_a_wrong_key_is_named_with_what_to_write(old: str, new: str, said: str) 
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "projection: [hyperbolic]",
+        "width: !!timestamp nonsense",
+        "when: 2000-99-01",
+        f"width: {'9' * 5000}",
+        "a: &a [x, x]\nb: &b [*a, *a]\nprojection: hyperbolic\nK: *b\nimage: {width: 6, height: *b}",
+        "- projection",
+    ],
+)
+def test_a_hostile_file_is_refused_in_one_short_line(text: str) -> None:
+    with pytest.raises(UnreadableRecording, match=r"^camera\.yaml: ") as caught:
+        parse_camera(text, "camera.yaml")
+    assert len(str(caught.value).splitlines()) == 1
+    assert len(str(caught.value)) < 300
+
+
 def test_remarks_in_a_camera_file_do_no_harm() -> None:
     assert parse_camera(HOUSE + "serial_number: 7\n", "camera.yaml").width == 640
 
