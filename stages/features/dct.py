@@ -45,7 +45,7 @@ class CosineTransform(AveragedStrip, Stage):
     coefficients: Annotated[int, Bounds(ge=1)] = 128
     """Coefficients of each channel, from the lowest frequency on."""
     mean: bool = False
-    """Whether the first coefficient (DC), the brightness of the whole image, is among them (erratum 19)."""
+    """Whether the first coefficient (DC), the image's brightness, is among them (erratum 19 in docs/papers.md)."""
 
     def __post_init__(self) -> None:
         """Headings are whole columns apart, and there are as many coefficients as asked for."""

@@ -15,7 +15,7 @@ Array = npt.NDArray[np.float64]
 def auxiliary_filter(
     before: Particles, model: UncertainMotion, hypothesis: GaussianMixture, floor: float, rng: np.random.Generator
 ) -> Particles | None:
-    """Particles after a motion and a view, by the auxiliary filter of Pitt & Shephard 1999 (erratum 15).
+    """Particles after a motion and a view, by Pitt & Shephard's auxiliary filter (1999; erratum 15 in docs/papers.md).
 
     `before`: the belief before the motion. First stage: particle i is selected by pi_i p(y|mu_i), where mu_i is its
     pose after the motion without noise. The selected particles move with noise. Second stage: they get the weights
