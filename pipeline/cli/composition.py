@@ -107,17 +107,13 @@ def complete(config: Any, variants: Variants | None = None) -> dict[str, Any]:
             raise ProblemsFound(problems)
         for name, spec in specs.items():
             own = plain["artifacts"][name]
-            if spec.file is not None:
-                own["file"] = _past_links(spec.file)
-                continue
             maker = spec.together_with or name
             making = specs[maker]
-            if making.variant is None or making.file is not None:
-                continue
-            own["variant"] = making.variant
-            if missing := _missing(config, maker):
-                own["missing"] = missing
-            else:
+            if making.variant is not None:
+                own["variant"], own["made_from"] = making.variant, sorted(set(_linked(config, maker).values()))
+            if spec.file is not None:
+                own["file"] = _past_links(spec.file)
+            elif making.variant is not None and making.file is None and not _lacks(config, maker):
                 own["graph"] = _graph_of(config, maker, making, variants)
     except OmegaConfBaseException as error:
         where = getattr(error, "full_key", None) or "config"
@@ -167,9 +163,9 @@ def _given_twice(config: Any, name: str, spec: ArtifactSpecification) -> Iterato
             yield Problem(key, f"{setting} is given, but no {key}", f"type {key}=…")
 
 
-def _missing(config: Any, name: str) -> list[str]:
-    """Where this run is of something that was given, so must be what its artifact is made from."""
-    return [s for key, s in _linked(config, name).items() if config.get(key) is not None and config.get(s) is None]
+def _lacks(config: Any, name: str) -> bool:
+    """Whether this run is of something that was given, and what its artifact is made from was not."""
+    return any(config.get(key) is not None and config.get(s) is None for key, s in _linked(config, name).items())
 
 
 def _name_past_links(config: Any) -> None:

@@ -1,11 +1,12 @@
 """Static results as files: versioned, checksummed, never unpickled."""
 
 import hashlib
+import importlib
 import io
 import json
 import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from omninav.pipeline.graph.value import VALUE_TYPES, Value, value_name
 from .codec import BadEncoding, decode, encode, field_names
 
 FORMAT = 1
+OWN_PACKAGE = __name__.partition(".")[0]
 _HEADER, _REST, _SUM = "header.json", "rest.npy", "sha256:"
 
 
@@ -64,12 +66,22 @@ def read_header(path: Path) -> dict[str, Any]:
     return header
 
 
+def type_of(path: Path) -> type[Value]:
+    """The type of the value in an artifact file. Raises `BadInput` where this version knows no such type."""
+    name = str(read_header(path)["type"])
+    if name not in VALUE_TYPES and name.startswith(f"{OWN_PACKAGE}."):
+        with suppress(ImportError):
+            importlib.import_module(name.rpartition(".")[0])
+        if name not in VALUE_TYPES:
+            raise BadInput(f"{path}: made with an older omninav (its '{name}' is no longer known); make it again")
+    if name not in VALUE_TYPES:
+        raise BadInput(f"{path}: holds a '{name}', which is no value known here; load the stage that made it")
+    return VALUE_TYPES[name]
+
+
 def read_artifact(path: Path) -> Value:
     """The value in an artifact file. Raises `BadInput` naming the file where it is missing, cut or changed."""
-    header = read_header(path)
-    cls = VALUE_TYPES.get(header["type"])
-    if cls is None:
-        raise BadInput(f"{path}: holds a '{header['type']}', which is no value known here; load the stage that made it")
+    header, cls = read_header(path), type_of(path)
     fields: dict[str, Any] = {}
     with _opened(path) as archive:
         for name, digest in header["arrays"].items():

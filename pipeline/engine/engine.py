@@ -21,7 +21,7 @@ from . import checkpoint as checkpoints
 from .call import Call
 from .channel import Channel, channel_key, held_key
 from .checkpoint import Checkpoint
-from .codec import encode_state, restore_state
+from .codec import BadEncoding, encode_state, restore_state
 from .disk_sequence import DiskSequence, Present
 
 
@@ -244,7 +244,10 @@ class Engine:
 
     def _resume(self) -> None:
         path = self.options.memory / "checkpoint" if self.options.memory is not None else None
-        found = checkpoints.load(path) if path is not None and path.exists() else None
+        try:
+            found = checkpoints.load(path) if path is not None and path.exists() else None
+        except BadEncoding as error:
+            raise BadInput(str(error)) from None
         if found is None or (found.replayed and self.replay is None):  # or the cache it read from is gone: start anew
             for sequence in self.sequences.values():
                 sequence.cut(0)

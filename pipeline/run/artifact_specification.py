@@ -31,8 +31,8 @@ class ArtifactSpecification:
     """The artifact whose graph gives this one too, in the same run: it says how that graph is made."""
     required: bool = True
     """Whether nothing can run without it; else the wires from it are left out where it is neither given nor made."""
-    missing: tuple[str, ...] = ()
-    """Settings that have to be given before it can be made. Found by composing, not written."""
+    made_from: tuple[str, ...] = ()
+    """Settings that have to be given for it to be made. Found by composing, not written."""
     graph: dict[str, Any] | None = None
     """Nodes, wires and saves of the graph that makes it. Found by composing, not written."""
 

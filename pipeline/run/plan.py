@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.engine.artifact import read_header
+from omninav.pipeline.engine.artifact import read_header, type_of
 from omninav.pipeline.engine.code_version import graph_digest
 from omninav.pipeline.files import digest_file
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import UnknownStage, entries, resolve
-from omninav.pipeline.graph.value import VALUE_TYPES
 
 from .artifact_specification import ArtifactSpecification, read_specifications, without_absent
 
@@ -82,7 +81,7 @@ def plan(config: Mapping[str, Any]) -> Plan:
             port = made.graph.port(made.origin)
             types[name] = port.type if port else Any
         elif made.file is not None:
-            types[name] = VALUE_TYPES.get(read_header(made.file)["type"], Any)
+            types[name] = type_of(made.file)
     graph: Graph | None = None
     try:
         graph = build(config, types)
@@ -120,21 +119,25 @@ def _plan_artifact(name: str, spec: ArtifactSpecification) -> ArtifactPlan:
     if spec.file is not None:
         file = Path(spec.file)
         try:
-            read_header(file)
+            type_of(file)
         except BadInput as error:
-            raise ProblemsFound([Problem(name, str(error), f"give another one: {name}=FILE.omap")]) from None
+            raise ProblemsFound([Problem(name, str(error), _how_to_get(name, spec))]) from None
         return ArtifactPlan(name, file=file)
     if spec.graph is None:
-        give = " ".join(f"{setting}=…" for setting in spec.missing)
-        make = f"type {give} to make one with '{spec.variant}', or " if give else "type "
         what = f"this variant needs a {name}, and none is given"
-        raise ProblemsFound([Problem(name, what, f"{make}{name}=FILE.omap to load one")])
+        raise ProblemsFound([Problem(name, what, _how_to_get(name, spec))])
     where = f"artifacts.{name}"
     graph = build(spec.graph, prefix=f"{where}.", shared=spec.inherit)
     origin = spec.output or str((spec.graph.get("saves") or {}).get(name, ""))
     if graph.port(origin) is None:
         raise ProblemsFound([_no_output(f"{where}.output", origin, graph)])
     return ArtifactPlan(name, None, graph.leading_to([origin]), origin, str(spec.variant), graph)
+
+
+def _how_to_get(name: str, spec: ArtifactSpecification) -> str:
+    give = " ".join(f"{setting}=…" for setting in spec.made_from)
+    make = f"type {give} to make one with '{spec.variant}', or " if give else "type "
+    return f"{make}{name}=FILE.omap to load one"
 
 
 def stages_of(graph: Graph) -> dict[str, Any]:
@@ -158,6 +161,10 @@ def mismatches(name: str, made_by: Mapping[str, Any], graph: Graph, must_match: 
         if then is None or now is None:
             continue
         again = f"or leave {name}=FILE away, and it is made anew"
+        if not _is_known(then["_target_"]):
+            what = f"it was made with an older omninav ({then['_target_']} as '{node}')"
+            yield Problem(name, what, f"leave {name}=FILE away, and it is made anew")
+            continue
         before, after = (spec["_target_"].replace(":", ".").rpartition(".")[2] for spec in (then, now))
         if before != after:
             what = f"it was made with {before} as '{node}', and this run has {after}"
@@ -168,6 +175,14 @@ def mismatches(name: str, made_by: Mapping[str, Any], graph: Graph, must_match: 
         for key in [key for key in then if key in now and key != "_target_" and then[key] != now[key]]:
             what = f"it was made with nodes.{node}.{key}={then[key]}, and this run has {now[key]}"
             yield Problem(name, what, f"type nodes.{node}.{key}={then[key]}, {again}")
+
+
+def _is_known(target: str) -> bool:
+    try:
+        resolve(target)
+    except UnknownStage:
+        return False
+    return True
 
 
 def input_digests(planned: Plan) -> dict[str, str]:

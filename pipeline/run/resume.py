@@ -2,12 +2,13 @@
 
 import json
 import os
+import shlex
 import shutil
 from pathlib import Path
 
 import yaml
 
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.graph.results import Metrics
 
 from .artifacts import ProgressDisplay
@@ -30,7 +31,14 @@ def resume(folder: Path, display: ProgressDisplay | None = None) -> tuple[Run, M
         return run, read_metrics(folder)
     if Path(run.manifest["cwd"]).is_dir():
         os.chdir(run.manifest["cwd"])  # its paths are relative to where it was started
-    planned = plan(yaml.safe_load(config_file.read_text()))
+    try:
+        planned = plan(yaml.safe_load(config_file.read_text()))
+    except ProblemsFound as found:
+        if all(problem.where.startswith(("nodes.", "wires.", "artifacts.")) for problem in found.problems):
+            again = shlex.join(run.manifest["argv"])
+            message = f"{folder}: made with an older omninav, whose stages are no longer known; start it again: {again}"
+            raise BadInput(message) from None
+        raise
     inputs = input_digests(planned)
     changed = [name for name, digest in inputs.items() if run.manifest["inputs"].get(name) != digest]
     if changed:

@@ -132,7 +132,7 @@ def test_a_block_of_artifacts_that_is_no_mapping_is_a_problem() -> None:
 
 def test_an_artifact_that_is_neither_given_nor_made_says_what_to_give() -> None:
     config = configuration("other", None)
-    config["artifacts"] = {"map": {"variant": "toy", "missing": ["tour"]}}
+    config["artifacts"] = {"map": {"variant": "toy", "made_from": ["tour"]}}
     with pytest.raises(ProblemsFound) as found:
         plan(config)
     assert "this variant needs a map, and none is given" in str(found.value)

@@ -1,0 +1,70 @@
+"""Where a run's files lie: where Hydra's settings say, with what Hydra's users look for."""
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+VARIANT = """\
+# @package _global_
+variant: toy
+nodes:
+  source: null
+  count: {_target_: toys.Count}
+  sum: {_target_: toys.Add}
+  all: {_target_: toys.Collected}
+wires:
+  sum: {number: count.number}
+  all:
+    numbers: {from: sum.number, collect: true}
+"""
+
+
+@pytest.fixture
+def toy(omninav, tmp_path: Path):
+    """Runs a variant without robots, world or map."""
+    (tmp_path / "mine" / "variant").mkdir(parents=True)
+    (tmp_path / "mine" / "variant" / "toy.yaml").write_text(VARIANT)
+    path = f"{ROOT}:{ROOT / 'tests'}"
+    return lambda *words, **given: omninav(*words, "variant=toy", PYTHONPATH=path, **given)
+
+
+def test_a_run_lies_where_hydra_run_dir_says(toy, tmp_path: Path):
+    toy("--config-dir=mine", "hydra.run.dir=out/here", "seed=3", check=True)
+    folder = tmp_path / "out" / "here"
+    assert json.loads((folder / "manifest.json").read_text())["status"] == "complete"
+    assert yaml.safe_load((folder / ".hydra" / "overrides.yaml").read_text()) == ["seed=3", "variant=toy"]
+    assert yaml.safe_load((folder / ".hydra" / "config.yaml").read_text())["seed"] == 3
+    assert "run" in yaml.safe_load((folder / ".hydra" / "hydra.yaml").read_text())["hydra"]
+    assert not list(tmp_path.glob("runs/[!.]*"))
+    again = toy("--config-dir=mine", "hydra.run.dir=out/here")
+    assert again.returncode == 2
+    assert "there is a run in it" in again.stderr
+
+
+def test_a_run_that_is_refused_leaves_no_folder(toy, tmp_path: Path):
+    assert toy("--config-dir=mine", "hydra.run.dir=out", "nodes.sum._target_=toys.Nothing").returncode == 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_run_of_its_own_name_has_hydras_files_too_and_only_settings_that_are_read(toy, tmp_path: Path):
+    toy("--config-dir=mine", check=True)
+    folder = tmp_path / "runs" / "latest"
+    assert (folder / ".hydra" / "overrides.yaml").exists()
+    config = yaml.safe_load((folder / "config.yaml").read_text())
+    assert {"variant", "seed", "runs", "cache", "nodes", "wires"} <= set(config)
+    assert not {"world", "route", "topics", "tour"} & set(config)
+
+
+def test_the_jobs_of_a_sweep_lie_where_hydra_sweep_dir_and_subdir_say(toy, tmp_path: Path):
+    words = ("hydra.sweep.dir=swept", "hydra.sweep.subdir=seed_${seed}", "seed=0,1")
+    toy("--config-dir=mine", "-m", *words, check=True)
+    for seed in (0, 1):
+        manifest = json.loads((tmp_path / "swept" / f"seed_{seed}" / "manifest.json").read_text())
+        assert (manifest["status"], manifest["seed"]) == ("complete", seed)
+        assert (tmp_path / "swept" / f"seed_{seed}" / ".hydra" / "config.yaml").exists()
+    page = (tmp_path / "swept" / "sweep.html").read_text()
+    assert "2 jobs: 2 complete" in page
+    assert not list(tmp_path.glob("runs/[!.]*"))

@@ -1,0 +1,72 @@
+"""Going on with a run: what belongs to it, what has changed, what an older version made."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from omninav.pipeline.engine.artifact import write_artifact
+from omninav.pipeline.engine.codec import encode, seal
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound
+from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.resume import resume
+from omninav.pipeline.run.run_folder import Run, start, status
+from toys import Number
+
+
+def begun(place: Path, **changes: Any) -> Run:
+    """A run that has been started and has done nothing yet."""
+    config = {
+        "variant": "toy",
+        "runs": str(place),
+        "nodes": {"source": {"_target_": "toys.Count"}, "reader": {"_target_": "toys.Add"}},
+        "wires": {"reader": {"number": "source.number"}},
+    }
+    return start(plan(config | changes), ["omninav", "variant=toy"])
+
+
+def rewrite(run: Run, **nodes: str) -> None:
+    config = yaml.safe_load((run.folder / "config.yaml").read_text())
+    config["nodes"] |= {name: {"_target_": target} for name, target in nodes.items()}
+    (run.folder / "config.yaml").write_text(yaml.safe_dump(config))
+
+
+def test_a_run_that_was_stopped_ends_in_its_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    run = begun(tmp_path)
+    assert status(run.folder) == "running"
+    resumed, _ = resume(run.folder)
+    assert resumed.folder == run.folder.resolve()
+    assert status(run.folder) == "complete"
+
+
+def test_a_run_of_an_older_version_says_how_to_start_it_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    run = begun(tmp_path)
+    rewrite(run, reader="omninav.stages.matching.old.OldMatch")
+    with pytest.raises(BadInput, match=r"made with an older omninav.*start it again: omninav variant=toy"):
+        resume(run.folder)
+
+
+def test_a_checkpoint_of_an_older_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    run = begun(tmp_path)
+    run.memory.mkdir()
+    (run.memory / "checkpoint").write_bytes(seal(encode({"format": 1})))
+    with pytest.raises(BadInput, match="was written by another version of omninav; start the run again"):
+        resume(run.folder)
+
+
+def test_an_input_that_has_changed_or_gone_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "known.omap"
+    write_artifact(file, Number(3.0))
+    wires = {"reader": {"number": "source.number", "other": "artifacts.map"}}
+    run = begun(tmp_path / "runs", wires=wires, artifacts={"map": {"file": str(file)}})
+    write_artifact(file, Number(4.0))
+    with pytest.raises(BadInput, match="map changed since the run was started"):
+        resume(run.folder)
+    file.unlink()
+    with pytest.raises(ProblemsFound, match="there is no such file"):
+        resume(run.folder)
