@@ -7,7 +7,13 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.probability.gaussians import apart, intersect_into, inverse_into, merged, squared_distance
+from omninav.stages.geometry.probability.gaussians import (
+    farther_apart,
+    intersect_into,
+    inverse_into,
+    merged,
+    squared_distance,
+)
 from omninav.stages.values.belief import GaussianMixture
 
 Array = npt.NDArray[np.float64]
@@ -113,7 +119,7 @@ def _fuse(
     number = 0
     for i in range(size_a):
         for j in range(size_b):
-            if apart(mean_a[i], cov_a[i], mean_b[j], cov_b[j], gamma):
+            if farther_apart(mean_a[i], cov_a[i], mean_b[j], cov_b[j], gamma):
                 continue
             if squared_distance(mean_a[i], cov_a[i], mean_b[j], cov_b[j]) < gamma:
                 match[i, j] = True

@@ -10,7 +10,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.appearance.view_similarity import Shape, similarity
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.gaussians import (
-    apart,
+    farther_apart,
     floored,
     merged,
     moments,
@@ -264,7 +264,7 @@ def _update_weights(
             for k in range(len(shares)):
                 mode[:] = means[k]
                 mode[2] -= turns[row]
-                if apart(mode, covariances[k], places[c], spreads[c], fits_below):
+                if farther_apart(mode, covariances[k], places[c], spreads[c], fits_below):
                     continue
                 if squared_distance(mode, covariances[k], places[c], spreads[c]) <= fits_below:
                     fitting += shares[k]

@@ -54,7 +54,7 @@ class ImageDatabase(Stage):
         map: ReferenceGraph | None,
         last: ImageDatabaseState,
     ) -> Out:
-        """Take one picture into the map, or not; without a map, begin one."""
+        """Add one image where it is far enough from the last; without a map, begin one."""
         map = ReferenceGraph.empty() if map is None else map
         if ctx.tick.first_of_log:
             last.reference = -1

@@ -38,9 +38,9 @@ class ReferenceSnapshot(Stage):
     """JPEG quality."""
 
     class Out(Outputs):
-        """`pictures`: absent where the map did not grow."""
+        """`snapshots`: absent where the map did not grow."""
 
-        pictures: ReferenceThumbnails | None = None
+        snapshots: ReferenceThumbnails | None = None
 
     def step(self, ctx: Context, panorama: Panorama | Windows, map: ReferenceGraph, thumbnails: ThumbnailsState) -> Out:
         """One tick."""
@@ -50,7 +50,7 @@ class ReferenceSnapshot(Stage):
         new = len(map) - thumbnails.references
         thumbnails.references = len(map)
         jpegs = (thumbnail(pixels, None, self.columns).jpeg(self.quality) for pixels in seen[:new])
-        return self.Out(pictures=ReferenceThumbnails(tuple(jpegs)))
+        return self.Out(snapshots=ReferenceThumbnails(tuple(jpegs)))
 
 
 class CollectThumbnails(Stage):
@@ -61,9 +61,9 @@ class CollectThumbnails(Stage):
 
         thumbnails: Thumbnails
 
-    def step(self, ctx: Context, pictures: Sequence[ReferenceThumbnails]) -> Out:
+    def step(self, ctx: Context, snapshots: Sequence[ReferenceThumbnails]) -> Out:
         """The whole tour at once."""
-        return self.Out(thumbnails=joined([jpeg for some in pictures for jpeg in some.jpegs]))
+        return self.Out(thumbnails=joined([jpeg for some in snapshots for jpeg in some.jpegs]))
 
 
 class TourSnapshot(Stage):
@@ -80,12 +80,12 @@ class TourSnapshot(Stage):
     class Out(Outputs):
         """One thumbnail."""
 
-        pictures: ReferenceThumbnails
+        snapshots: ReferenceThumbnails
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
         """One tick."""
         jpeg = thumbnail(image.pixels, camera, self.columns).jpeg(self.quality)
-        return self.Out(pictures=ReferenceThumbnails((jpeg,)))
+        return self.Out(snapshots=ReferenceThumbnails((jpeg,)))
 
 
 class ViewThumbnails(Stage):
@@ -100,14 +100,14 @@ class ViewThumbnails(Stage):
         self,
         ctx: Context,
         ticks: Sequence[Tick],
-        pictures: Sequence[ReferenceThumbnails | None],
+        snapshots: Sequence[ReferenceThumbnails | None],
         map: TopologicalMap,
         known: TopologicalMap | None = None,
     ) -> Out:
         """The whole tour at once; `ticks` are counted on from the known map's frames."""
         first = 0 if known is None or not len(known.frames) else 1 + int(known.frames.max())
         rows = (map.frames - first).tolist()
-        found = [pictures[row] if row >= 0 else None for row in rows]
+        found = [snapshots[row] if row >= 0 else None for row in rows]
         return self.Out(thumbnails=joined([b"" if some is None else some.jpegs[0] for some in found]))
 
 

@@ -19,7 +19,7 @@ from omninav.stages.values.similarity import Similarities
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+GOLDEN_RATIO = (math.sqrt(5.0) - 1.0) / 2.0
 """Golden ratio: the fractional parts of its multiples fill an interval evenly."""
 
 CELLS_PER_RADIUS = 4
@@ -62,7 +62,7 @@ def near_belief(
     sampling_weight = near_any.astype(np.float64)
     if background:
         step = len(others) / background
-        first = (turn * GOLDEN % 1.0) * step
+        first = (turn * GOLDEN_RATIO % 1.0) * step
         taken = np.minimum((first + step * np.arange(background)).astype(np.int64), len(others) - 1)
         sampling_weight[others[taken]] = step
     chosen = np.flatnonzero(sampling_weight)

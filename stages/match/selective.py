@@ -3,7 +3,7 @@
 from typing import Annotated, Literal
 
 from omninav.pipeline import Bounds, Context, Stage
-from omninav.stages.geometry.appearance.segments import EXPONENTS, LARGEST_COLOUR_DISTANCE, similarities
+from omninav.stages.geometry.appearance.segments import EXPONENTS, MAX_COLOUR_DISTANCE, similarities
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures
 from omninav.stages.values.length_scale import LengthScale
@@ -24,7 +24,7 @@ class SelectiveMatch(NearBelief, Stage):
     penalty: Literal["sqrt", "cube_root", "three_quarters", "none"] = "sqrt"
     """Penalty on the number of segments: `sqrt` (the paper's), `cube_root` (k^-1/3 n^-2/3, wants more segments),
     `three_quarters` (k^-3/4 n^-1/4, wants fewer), or `none` (the mean of all)."""
-    colour_scale: Annotated[float, Bounds(gt=0)] = LARGEST_COLOUR_DISTANCE
+    colour_scale: Annotated[float, Bounds(gt=0)] = MAX_COLOUR_DISTANCE
     """Difference of mean colours (blue-green-red, 0..255) at which segments have similarity 0; by default the largest
     possible, sqrt(3) 255, which leaves no segment out (experiment omniview_mcl/colour_scale)."""
 

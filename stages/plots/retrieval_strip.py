@@ -105,7 +105,7 @@ def _draw(queries: Sequence[Query], map: ReferenceGraph, album: Thumbnails | Non
             for n, reference in enumerate(query.answers.references.tolist()):
                 left, high = cell * (n % across) + 0.02, below - cell * shape - (n // across) * row - 0.03
                 if pictures and album is not None:
-                    kept = album.picture(reference)
+                    kept = album.image(reference)
                     if not windows:  # turned as it is most similar
                         kept = np.roll(kept, round(query.answers.turns[n] / (2 * np.pi) * kept.shape[1]), axis=1)
                     _show(axes, kept, left, high, cell - 0.04, cell * shape - 0.04)

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.geometry.appearance.segments import LARGEST_COLOUR_DISTANCE, penalties, sorting_network
+from omninav.stages.geometry.appearance.segments import MAX_COLOUR_DISTANCE, penalties, sorting_network
 from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
@@ -110,7 +110,7 @@ def similarity_of_expected(
     fade_distance_m: float,
     background_level: float,
     exponent: float = 0.5,
-    colour_scale: float = LARGEST_COLOUR_DISTANCE,
+    colour_scale: float = MAX_COLOUR_DISTANCE,
 ) -> Array:
     """Selective similarity of a view (segments, bins) to the one expected at each pose: (N, 3) -> (N,).
 
@@ -164,7 +164,7 @@ class ExpectedObservation(NearReferences):
                 "views; use match=selective or match=histogram_intersection, or sensor=near_references"
             )
         self._view, self._exponent = features, similarities.exponent
-        self._colour_scale = similarities.colour_scale or LARGEST_COLOUR_DISTANCE
+        self._colour_scale = similarities.colour_scale or MAX_COLOUR_DISTANCE
         return super().step(ctx, similarities, particles, map, motion, length_scale)
 
     def _expected(

@@ -1,10 +1,10 @@
-"""What navigation asks of the wheels."""
+"""Commands to the wheels."""
 
 from omninav.pipeline import Value
 
 
 class Command(Value):
-    """A wish for a differential drive: `speed` forward (m/s) and `turning` (rad/s, counter-clockwise)."""
+    """A command to a differential drive: `speed` forward (m/s) and `turning` (rad/s, counter-clockwise)."""
 
     speed: float
     turning: float

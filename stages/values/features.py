@@ -18,13 +18,13 @@ class SegmentFeatures(Value):
 
 
 class SegmentHistograms(SegmentFeatures):
-    """Histograms per segment, of which none sums to more than 1, so that intersections lie in [0, 1].
+    """Histograms per segment, each with a sum of at most 1, so that intersections lie in [0, 1].
 
     Segments sum to 1 (erratum 20 in docs/papers.md) unless some of their pixels were left out: bins are shares of all
-    pixels of a segment. What is left out is nowhere in a match that divides by the query's own sum (erratum 43).
-    `directions` (segments,): the segments are separate pictures that look these ways (radians, counter-clockwise from
-    the robot's forward); None: they are equal parts of the circle. `scales`: the bins are so many histograms of equal
-    length one after the other, of one picture by the same kernels at growing size, each of which sums to at most 1.
+    pixels of a segment. Pixels left out do not count in a match that divides by the query's own sum (erratum 43).
+    `directions` (segments,): the segments are separate images with these directions (radians, counter-clockwise from
+    the robot's forward); None: they are equal parts of the circle. `scales`: the bins are that many histograms of equal
+    length one after the other, of one image by the same kernels at growing size, each of which sums to at most 1.
     """
 
     directions: npt.NDArray[np.float64] | None = None

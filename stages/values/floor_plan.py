@@ -7,7 +7,7 @@ from omninav.pipeline import Value
 
 
 class FloorPlan(Value):
-    """What stands on a simulated world's floor, for pictures: truth.
+    """The obstacles on a simulated world's floor, for plots: truth.
 
     `outlines`: (B, 4, 2) corners in metres, map frame. `width`, `depth`: of the floor, from 0, 0.
     """

@@ -1,4 +1,4 @@
-"""What stands where in the plane, cell by cell, and where a robot may be."""
+"""Occupancy grids and free space."""
 
 from typing import Literal
 
@@ -55,13 +55,14 @@ def cells_of(points: Array, origin: tuple[float, float], resolution: float) -> I
 
 
 class FreeSpace(Value):
-    """Where the robot may be. `centres`: (N, 2) x, y (m, map frame) of square cells; `cell`: their width (m)."""
+    """The positions where the robot may be. `centres`: (N, 2) x, y (m, map frame) of square cells; `cell`: their width
+    (m)."""
 
     centres: Array
     cell: float
 
     def draw(self, rng: np.random.Generator, number: int) -> Array:
-        """Poses drawn uniformly over the cells, all headings alike: (number, 3) m, m, rad."""
+        """Draw poses uniformly over the cells and headings: (number, 3) m, m, rad."""
         poses = np.empty((number, 3))
         chosen = rng.integers(len(self.centres), size=number)
         poses[:, :2] = self.centres[chosen] + self.cell * (rng.random((number, 2)) - 0.5)

@@ -1,4 +1,4 @@
-"""Going where a picture was taken: which picture, where that was, how far along a path of pictures the robot is."""
+"""Homing to where an image was taken: the target image, the homing vector, the progress along a path of images."""
 
 import math
 from dataclasses import field, replace

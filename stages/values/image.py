@@ -1,4 +1,4 @@
-"""Pictures: as the camera gave them, as panoramas in one common form, and as views that look one way each."""
+"""Images: as the camera gave them, as panoramas in one common form, and as perspective windows."""
 
 import math
 
@@ -11,14 +11,14 @@ Pixels = npt.NDArray[np.uint8]
 
 
 class Image(Value):
-    """A picture as the camera gave it. `pixels`: (height, width, 3) uint8, blue-green-red as in OpenCV."""
+    """An image as the camera gave it. `pixels`: (height, width, 3) uint8, blue-green-red as in OpenCV."""
 
     bulky = True
     pixels: Pixels
 
 
 class Panorama(Value):
-    """The full circle around the robot, seen by a person: columns run clockwise, forward is in the middle.
+    """The full circle around the robot, seen from inside: columns run clockwise, forward is in the middle.
 
     `pixels`: (rows, columns, 3) uint8, blue-green-red. The centre of column c looks along the azimuth
     `pi - 2 pi (c + 0.5) / columns` (radians, counter-clockwise from the robot's forward), so a robot that turns
@@ -33,12 +33,12 @@ class Panorama(Value):
 
 
 class Windows(Value):
-    """Perspective pictures taken at once, each of which looks one way, level or not.
+    """Perspective images taken at once, each in one direction, level or not.
 
     `pixels`: (W, rows, columns, 3) uint8, blue-green-red, the scene's left on the left. `headings` (W,): azimuths of
     their optical axes (radians, counter-clockwise from the robot's forward). `field`: horizontal field of view of each
-    (radians). `seen` (W, rows, columns): False where the camera that they were cut from sees nothing, which is black;
-    None: all is seen.
+    (radians). `seen` (W, rows, columns): False where the camera they were cut from sees nothing (black); None: all
+    is seen.
     """
 
     bulky = True

@@ -19,7 +19,7 @@ class LocalFeatures(Value):
     """Patches of a view with what they look like, the strongest first.
 
     `bearings` (N, 3): unit vectors in the robot's frame, from the camera's projection centre. `points` (N, 2): columns
-    and rows (pixels, integers are centres) in the picture they were found in. `descriptors` (N, D) uint8, compared by
+    and rows (pixels, integers are centres) in the image they were found in. `descriptors` (N, D) uint8, compared by
     Euclidean distance. `colours` (N, 3) float32: correlations of red with green, red with blue, green with blue over
     the patch, in [-1, 1] (Goedeme et al. 2007, equation 1; erratum 25 in docs/papers.md). `sizes` (N,): diameters
     (pixels).
@@ -51,7 +51,7 @@ class VerticalSegments(Value):
     `azimuths` (N,): radians, counter-clockwise from forward. `elevations` (N, 2): of the upper and the lower end
     (radians above the horizon). `descriptors` (N, 10) float32: three colour correlations, seven coefficients of the
     intensity profile from the upper end down. `weights` (N,): how many neighbouring segments each stands for.
-    `points` (N, 2, 2): columns and rows of both ends (pixels) in the picture they were found in.
+    `points` (N, 2, 2): columns and rows of both ends (pixels) in the image they were found in.
     """
 
     azimuths: Array

@@ -1,4 +1,4 @@
-"""A projection of pictures that was learned from pictures."""
+"""A projection learned from images."""
 
 import numpy as np
 import numpy.typing as npt
@@ -7,10 +7,10 @@ from omninav.pipeline import Value
 
 
 class Projection(Value):
-    """Rows that pictures are projected on: y = W z. `components`: (D, P) float32, orthonormal, strongest first.
+    """The rows of a projection of images: y = W z. `components`: (D, P) float32, orthonormal, strongest first.
 
-    A picture z is a strip of P numbers, column by column around the robot. `explained`: (D,) the share of the learning
-    pictures' variance along each row.
+    An image z is a strip of P numbers, column by column around the robot. `explained`: (D,) the share of the training
+    images' variance along each row.
     """
 
     components: npt.NDArray[np.float32]

@@ -1,4 +1,4 @@
-"""Pictures of a map's references, kept beside it."""
+"""Thumbnails of a map's references, kept beside it."""
 
 from typing import cast
 
@@ -12,10 +12,9 @@ from .image import Pixels
 
 
 class Thumbnails(Value):
-    """A small picture of each reference of a map, in the map's order, for people to look at.
+    """A small image of each reference of a map, in the map's order.
 
-    `jpegs`: their JPEG bytes one after the other; picture n lies from `ends[n]` to `ends[n + 1]`, nowhere where it is
-    not known.
+    `jpegs`: their JPEG bytes one after the other; image n lies from `ends[n]` to `ends[n + 1]`; empty: missing.
     """
 
     jpegs: npt.NDArray[np.uint8]
@@ -24,15 +23,15 @@ class Thumbnails(Value):
     def __len__(self) -> int:
         return len(self.ends) - 1
 
-    def picture(self, reference: int) -> Pixels:
-        """The picture of a reference: (rows, columns, 3), blue-green-red."""
+    def image(self, reference: int) -> Pixels:
+        """The thumbnail of a reference: (rows, columns, 3), blue-green-red."""
         return decoded(self.jpegs[self.ends[reference] : self.ends[reference + 1]])
 
 
 def decoded(jpeg: bytes | npt.NDArray[np.uint8]) -> Pixels:
-    """A picture of JPEG bytes that were made here: (rows, columns, 3), blue-green-red."""
+    """Decode an image from JPEG bytes that were encoded here: (rows, columns, 3), blue-green-red."""
     content = np.frombuffer(jpeg, np.uint8) if isinstance(jpeg, bytes) else jpeg
     pixels = cv2.imdecode(content, cv2.IMREAD_COLOR)
     if pixels is None:
-        raise ValueError("a picture that was encoded here cannot be decoded")
+        raise ValueError("an image that was encoded here cannot be decoded")
     return cast(Pixels, pixels.astype(np.uint8, copy=False))

@@ -136,7 +136,7 @@ def _means_at(
 
 
 def padded(pixels: npt.NDArray[np.uint8], by: int, wraps_rows: bool, wraps_columns: bool) -> Floats:
-    """A picture in [0, 1] with `by` more pixels on each side: from the other one where it wraps, else repeated."""
+    """An image in [0, 1] with `by` more pixels on each side: from the other one where it wraps, else repeated."""
     scaled = pixels.astype(np.float32) * np.float32(1.0 / 255.0)
     rows, columns = (cv2.BORDER_WRAP if wraps else cv2.BORDER_REPLICATE for wraps in (wraps_rows, wraps_columns))
     higher = cv2.copyMakeBorder(scaled, by, by, 0, 0, rows)
@@ -173,9 +173,9 @@ class Kernel(NamedTuple):
         )
 
     def means(self, padded: Floats) -> Floats:
-        """The integral at each pixel of a picture: (rows, columns, channels), of values in [0, 1] in [0, 1].
+        """The integral at each pixel of an image: (rows, columns, channels), of values in [0, 1] in [0, 1].
 
-        `padded` (rows + 2 m, columns + 2 m, channels) is the picture with m = `margin` + 1 more pixels on each side.
+        `padded` (rows + 2 m, columns + 2 m, channels) is the image with m = `margin` + 1 more pixels on each side.
         """
         m, (rows, columns, channels) = self.margin + 1, padded.shape
         stride = columns * channels
@@ -185,7 +185,7 @@ class Kernel(NamedTuple):
         return out.reshape(rows - 2 * m, columns - 2 * m, channels)
 
     def means_at(self, padded: Floats, rows: Ints, columns: Ints) -> Floats:
-        """The integral at some pixels (N,), (N,) of a picture that is padded as for `means`: (N, channels)."""
+        """The integral at some pixels (N,), (N,) of an image that is padded as for `means`: (N, channels)."""
         m, (_, wide, channels) = self.margin + 1, padded.shape
         stride = wide * channels
         out = np.empty((len(rows), channels), np.float32)

@@ -22,7 +22,7 @@ def turned_distances(turned: FloatArray, kept: FloatArray) -> Array:
 
     The best row is found in single precision, which does for ordering; the distance to it is exact, 0 for equals. With
     three rows or more it is that between rows, by the parabola through the three squared distances around the best: a
-    robot that stands turned by half a step is as near as one that does not.
+    robot turned by half a step is as near as one that is not.
     """
     squares = kept @ (-2.0 * turned.T)
     squares += np.einsum("rd,rd->r", kept, kept)[:, None]
@@ -40,7 +40,7 @@ def turned_distances(turned: FloatArray, kept: FloatArray) -> Array:
 
 
 def turns_of_nearest(turned: FloatArray, kept: FloatArray) -> Array:
-    """How far the robot stands turned, counter-clockwise, from its heading in each kept view (R, D): (R,) rad.
+    """The robot's turn, counter-clockwise, from its heading in each kept view (R, D): (R,) rad.
 
     Row h of `turned` (H, D) is what a robot turned by 2 pi h / H further would see: where it is the best fit, the robot
     stands turned by -2 pi h / H. Between two rows by the parabola through the three squared distances around the best.

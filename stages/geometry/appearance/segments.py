@@ -1,4 +1,4 @@
-"""Views described segment by segment around the robot: turning them, and how alike they are."""
+"""Views described by segments around the robot: turning and comparing them."""
 
 import functools
 
@@ -15,7 +15,7 @@ LANES = 8
 EXPONENTS = {"sqrt": 0.5, "cube_root": 1.0 / 3.0, "three_quarters": 0.75, "none": 0.0}
 """Penalties on the number k of segments by name: the exponent of 1 / k (the rest of 1 goes to 1 / n)."""
 
-LARGEST_COLOUR_DISTANCE = float(np.sqrt(3.0) * 255.0)
+MAX_COLOUR_DISTANCE = float(np.sqrt(3.0) * 255.0)
 """Distance of black and white in blue-green-red 0..255."""
 
 
@@ -123,7 +123,7 @@ def similarities(
     selective: bool,
     exponent: float = 0.5,
     chosen: Ints | None = None,
-    colour_scale: float = LARGEST_COLOUR_DISTANCE,
+    colour_scale: float = MAX_COLOUR_DISTANCE,
 ) -> Floats:
     """Similarity of a view to references at equally spaced headings: (chosen, headings) float32 in [0, 1].
 
@@ -199,7 +199,7 @@ def euclidean_similarities(
     flat = np.ascontiguousarray(some, np.float32).reshape(len(some), -1)
     # |a - b|^2 = a.a + b.b - 2 a.b
     squared = (flat * flat).sum(axis=1)[:, None] + (query * query).sum(axis=1) - 2 * (flat @ query.T)
-    largest = np.sqrt(2.0 * len(view)) if histograms else np.sqrt(len(view)) * LARGEST_COLOUR_DISTANCE
+    largest = np.sqrt(2.0 * len(view)) if histograms else np.sqrt(len(view)) * MAX_COLOUR_DISTANCE
     alike: Floats = (1.0 - np.sqrt(np.maximum(squared, 0.0)) / largest).astype(np.float32)
     return np.clip(alike, 0.0, 1.0)
 
@@ -229,7 +229,7 @@ def similarity_at(
         if histograms:
             alike = np.minimum(expected, view).sum(axis=1)
         else:
-            alike = 1.0 - np.sqrt(np.square(expected - view).sum(axis=1)) / LARGEST_COLOUR_DISTANCE
+            alike = 1.0 - np.sqrt(np.square(expected - view).sum(axis=1)) / MAX_COLOUR_DISTANCE
         best = np.cumsum(np.sort(alike)[::-1]) * penalties(segments, exponent)
         out[n] = best.max()
     return out

@@ -1,4 +1,4 @@
-"""Spectra of what stands around the robot: sizes that do not change when it turns, and the turn between two."""
+"""Spectra around the robot: magnitudes, which do not change when it turns, and the turn between two."""
 
 import math
 
@@ -24,10 +24,11 @@ def unpacked(vectors: FloatArray, channels: int) -> Complex:
 
 
 def spectral_distances(values: FloatArray, kept: FloatArray, channels: int, segments: int) -> Array:
-    """Euclidean distance between the sizes of two spectra's coefficients, (D,) and (R, D): (R,).
+    """Euclidean distance between the magnitudes of two spectra's coefficients, (D,) and (R, D): (R,).
 
     In the unit of the samples: the root of the summed squares over channels and segments of two signals that differ in
-    these sizes (Parseval; each frequency but the lowest and the half of an even number of segments stands for two).
+    these magnitudes (Parseval; each frequency but the lowest and the half of an even number of segments stands for
+    two).
     """
     half = values.shape[-1] // 2
     share = np.tile(_share(half // channels, segments), channels).astype(np.float32)
@@ -52,7 +53,7 @@ def _size_distances(values: FloatArray, kept: FloatArray, share: FloatArray) -> 
 
 
 def best_turns(values: FloatArray, kept: FloatArray, channels: int, segments: int, steps: int = 360) -> Array:
-    """How far the robot stands turned, counter-clockwise, from its heading in each kept view (R, D): (R,) rad.
+    """The robot's turn, counter-clockwise, from its heading in each kept view (R, D): (R,) rad.
 
     The greatest circular cross-correlation of the two signals, over all channels, at `steps` turns; between them by the
     parabola through the three values around the greatest. Samples run clockwise around the robot (as a panorama's

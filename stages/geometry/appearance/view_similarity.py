@@ -1,4 +1,4 @@
-"""How alike two views are, by how far apart they are."""
+"""Similarity of two views from their distance."""
 
 from typing import Literal
 
@@ -9,19 +9,19 @@ Array = npt.NDArray[np.float64]
 Shape = Literal["linear", "quadratic", "cosine", "step"]
 
 
-def similarity(distances: Array, limit: float, shape: Shape) -> Array:
-    """How alike views at these distances are: 1 at 0, falling to 0 at `limit` (`step`: 1 up to there).
+def similarity(distances: Array, threshold: float, shape: Shape) -> Array:
+    """Similarity of views at these distances: 1 at 0, falling to 0 at `threshold` (`step`: 1 up to there).
 
     S of Gross, Koenig & Mueller 2005, section 2.2, whose shape is not given (erratum 12a in docs/papers.md).
     """
-    share = np.clip(distances / limit, 0.0, 1.0) if limit > 0.0 else (distances > 0.0).astype(np.float64)
+    share = np.clip(distances / threshold, 0.0, 1.0) if threshold > 0.0 else (distances > 0.0).astype(np.float64)
     match shape:
         case "linear":
-            alike: Array = 1.0 - share
+            similarities: Array = 1.0 - share
         case "quadratic":
-            alike = 1.0 - share**2
+            similarities = 1.0 - share**2
         case "cosine":
-            alike = 0.5 + 0.5 * np.cos(np.pi * share)
+            similarities = 0.5 + 0.5 * np.cos(np.pi * share)
         case "step":
-            alike = (share < 1.0).astype(np.float64)
-    return alike
+            similarities = (share < 1.0).astype(np.float64)
+    return similarities

@@ -1,4 +1,4 @@
-"""Which of some fixed points lie nearest to a place, looked up in cells of the plane."""
+"""Looks up the nearest of some fixed points in cells of the plane."""
 
 from typing import Any, NamedTuple
 
@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 
 Array = npt.NDArray[np.float64]
 
-MOST_CELLS = 1 << 20
+MAX_CELLS = 1 << 20
 
 
 class NearestCells(NamedTuple):
@@ -32,7 +32,7 @@ def nearest_cells(points: Array, k: int, cell: float, radius: float) -> NearestC
         return NearestCells(np.zeros(2), 1.0, 0, 0, np.full((0, k), -1, np.int32))
     origin = xy.min(axis=0) - radius
     span = xy.max(axis=0) + radius - origin
-    cell = max(cell, float(np.sqrt(span[0] * span[1] / MOST_CELLS)))
+    cell = max(cell, float(np.sqrt(span[0] * span[1] / MAX_CELLS)))
     columns, rows = (int(n) for n in np.floor(span / cell) + 1)
     centres = np.stack(np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5, indexing="ij"), -1).reshape(-1, 2)
     tree: Any = KDTree(xy)  # type: ignore[no-untyped-call]

@@ -7,7 +7,7 @@ import numpy.typing as npt
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .particles import AROUND
+from .particles import NEIGHBOUR_STEPS
 
 Array = npt.NDArray[np.float64]
 
@@ -25,7 +25,7 @@ def clusters(poses: Array, metres: float, radians: float) -> npt.NDArray[np.int6
     width = int(row.max()) + 2
     cells, inverse = np.unique((column * width + row) * headings + turn, return_inverse=True)
     column, row, turn = cells // headings // width, cells // headings % width, cells % headings
-    a, b, c = AROUND
+    a, b, c = NEIGHBOUR_STEPS
     beside = ((column[:, None] + a) * width + row[:, None] + b) * headings + (turn[:, None] + c) % headings
     found = np.minimum(np.searchsorted(cells, beside), len(cells) - 1)
     one, other = np.nonzero(cells[found] == beside)

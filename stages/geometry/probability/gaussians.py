@@ -15,11 +15,11 @@ from omninav.stages.geometry.plane.se2 import wrap
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-FARTHEST = 81.0
-"""Squared Mahalanobis distance, nine sigma, beyond which a Gaussian's density counts as 0: below 3e-18 of its top."""
+MAX_SQUARED_DISTANCE = 81.0
+"""Nine sigma: beyond this a Gaussian's density counts as 0, less than 3e-18 of its peak."""
 
-TINY = 1e-300
-"""Stands for a variance of zero, so that equal places are at distance 0 and others far away."""
+MIN_VARIANCE = 1e-300
+"""Replaces a variance of zero, so that equal poses are at distance 0 and others far away."""
 
 
 def density(points: Array, means: Array, covariances: Array, weights: Array) -> Array:
@@ -33,7 +33,7 @@ def density(points: Array, means: Array, covariances: Array, weights: Array) -> 
         return np.zeros(len(points))
     factors = _triangular(covariances)
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-    reach = np.sqrt(FARTHEST * np.diagonal(covariances, axis1=1, axis2=2)[:, :2])
+    reach = np.sqrt(MAX_SQUARED_DISTANCE * np.diagonal(covariances, axis1=1, axis2=2)[:, :2])
     near = np.flatnonzero(((means[:, :2] + reach >= low) & (means[:, :2] - reach <= high)).all(axis=1))
     means, weights = means[near], weights[near]
     factors = np.asarray(np.linalg.inv(factors[near]), np.float64)
@@ -73,13 +73,13 @@ def merged(
     means: Array,
     covariances: Array,
     weights: Array,
-    limit: float,
+    merge_below: float,
     spread: bool = True,
     shares: Array | None = None,
 ) -> tuple[Array, ...]:
-    """Gaussians with the close ones merged: the closest pair first, until no pair is closer than `limit`.
+    """Gaussians with the close ones merged: the closest pair first, until no pair is closer than `merge_below`.
 
-    `limit` is a squared Mahalanobis distance (`squared_distances`); a pair becomes one Gaussian with its moments
+    `merge_below` is a squared Mahalanobis distance (`squared_distances`); a pair becomes one Gaussian with its moments
     (`moments`, with or without `spread`). `weights` say how much each counts in them and are added up; `shares` (K,)
     are added up only. Porta & Kroese 2004, section 3.2: the weights are w. Gross, Koenig & Mueller 2005, equations 12
     to 14 (erratum 7): the weights are eta and the shares w, which may come to more than 1 (erratum 8: cap them).
@@ -95,8 +95,8 @@ def merged(
     added = np.zeros(size) if shares is None else np.asarray(shares, np.float64)
     order = np.lexsort((*covariances.reshape(size, 9).T, added, *means.T[::-1], -np.asarray(weights)))
     rows = (means[order], covariances[order], np.asarray(weights, np.float64)[order], added[order])
-    if size > 1 and limit > 0.0:
-        kept = _merge(*rows, float(limit), spread)
+    if size > 1 and merge_below > 0.0:
+        kept = _merge(*rows, float(merge_below), spread)
         rows = (rows[0][kept], rows[1][kept], rows[2][kept], rows[3][kept])
     return rows if shares is not None else rows[:3]
 
@@ -178,7 +178,7 @@ def _density(points: Array, means: Array, factors: Array, scales: Array) -> Arra
             a, b, c = xx * dx, yx * dx + yy * dy, hx * dx + hy * dy + hh * turn
             squared[n] = a * a + b * b + c * c
         for n in range(number):
-            if squared[n] <= FARTHEST:
+            if squared[n] <= MAX_SQUARED_DISTANCE:
                 out[n] += scales[k] * np.exp(-0.5 * squared[n])
     return out
 
@@ -187,12 +187,12 @@ def _density(points: Array, means: Array, factors: Array, scales: Array) -> Arra
 def squared_distance(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array) -> float:
     """Squared Mahalanobis distance between two means with C_a + C_b, by its Cholesky factor."""
     dx, dy, turn = mean_b[0] - mean_a[0], mean_b[1] - mean_a[1], shorter_turn(mean_b[2] - mean_a[2])
-    first = max(cov_a[0, 0] + cov_b[0, 0], TINY)
+    first = max(cov_a[0, 0] + cov_b[0, 0], MIN_VARIANCE)
     low1 = (cov_a[1, 0] + cov_b[1, 0]) / first
     low2 = (cov_a[2, 0] + cov_b[2, 0]) / first
-    second = max(cov_a[1, 1] + cov_b[1, 1] - low1 * low1 * first, TINY)
+    second = max(cov_a[1, 1] + cov_b[1, 1] - low1 * low1 * first, MIN_VARIANCE)
     low3 = (cov_a[2, 1] + cov_b[2, 1] - low2 * low1 * first) / second
-    third = max(cov_a[2, 2] + cov_b[2, 2] - low2 * low2 * first - low3 * low3 * second, TINY)
+    third = max(cov_a[2, 2] + cov_b[2, 2] - low2 * low2 * first - low3 * low3 * second, MIN_VARIANCE)
     rest1 = dy - low1 * dx
     rest2 = turn - low2 * dx - low3 * rest1
     squared: float = dx * dx / first + rest1 * rest1 / second + rest2 * rest2 / third
@@ -209,8 +209,8 @@ def _squared_distances(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array)
 
 
 @numba.njit(cache=True, nogil=True)
-def apart(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array, limit: float) -> bool:
-    """Whether one of x, y, heading alone shows that the squared distance is `limit` or more: most pairs, cheaply."""
+def farther_apart(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array, limit: float) -> bool:
+    """Whether x, y or heading alone shows that the squared distance is `limit` or more: a cheap test for most pairs."""
     for i in range(3):
         gap = mean_b[i] - mean_a[i]
         if i == 2:
@@ -224,7 +224,7 @@ def apart(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array, limit: float
 def _nearest(i: int, means: Array, covariances: Array, alive: npt.NDArray[np.bool_], limit: float) -> tuple[int, float]:
     best, closest = -1, limit
     for j in range(i + 1, len(means)):
-        if alive[j] and not apart(means[i], covariances[i], means[j], covariances[j], closest):
+        if alive[j] and not farther_apart(means[i], covariances[i], means[j], covariances[j], closest):
             squared = squared_distance(means[i], covariances[i], means[j], covariances[j])
             if squared < closest:
                 best, closest = j, squared
@@ -262,7 +262,7 @@ def _merge(means: Array, covariances: Array, weights: Array, shares: Array, limi
                 continue
             if nearest[i] == a or nearest[i] == b:
                 stale[i] = True
-            if i < a and not apart(means[i], covariances[i], means[a], covariances[a], limit):
+            if i < a and not farther_apart(means[i], covariances[i], means[a], covariances[a], limit):
                 squared = squared_distance(means[i], covariances[i], means[a], covariances[a])
                 if squared < limit and (nearest[i] < 0 or squared < closest[i]):
                     nearest[i], closest[i], stale[i] = a, squared, False

@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 Array = npt.NDArray[np.float64]
 Members = npt.NDArray[np.bool_]
 
-AROUND = np.array(list(itertools.product((-1, 0, 1), repeat=3)), np.int64).T
+NEIGHBOUR_STEPS = np.array(list(itertools.product((-1, 0, 1), repeat=3)), np.int64).T
 """Steps to a cell itself and its 26 neighbours: (3, 27)."""
 
 
@@ -105,9 +105,11 @@ def _heaviest_cell(poses: Array, weights: Array, cell: float) -> Array:
     # A mode lighter than 64 others is not the heaviest.
     for candidate in np.argsort(-mass[:count], kind="mergesort")[:64]:
         number, around = cells[candidate], 0.0
-        for k in range(AROUND.shape[1]):
-            column, row = number // 12 // width + AROUND[0, k], number // 12 % width + AROUND[1, k]
-            beside = slots[_slot(slots, cells, (column * width + row) * 12 + (number % 12 + AROUND[2, k]) % 12)]
+        for k in range(NEIGHBOUR_STEPS.shape[1]):
+            column, row = number // 12 // width + NEIGHBOUR_STEPS[0, k], number // 12 % width + NEIGHBOUR_STEPS[1, k]
+            beside = slots[
+                _slot(slots, cells, (column * width + row) * 12 + (number % 12 + NEIGHBOUR_STEPS[2, k]) % 12)
+            ]
             around += mass[beside] if beside >= 0 else 0.0
         if around > most:
             best, most = number, around

@@ -10,7 +10,7 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
-from omninav.stages.mapping.thumbnails import TourSnapshot, ViewThumbnails, bound
+from omninav.stages.mapping.thumbnails import TourSnapshot, ViewThumbnails, joined
 from omninav.stages.plots.drive_video import DriveVideo
 from omninav.stages.plots.homing_snapshot import HomingSnapshot, HomingSnapshotState
 from omninav.stages.plots.homing_snapshots import HomingSnapshots
@@ -179,7 +179,7 @@ def test_an_album_holds_the_pictures_of_the_maps_views_and_nothing_of_a_known_ma
     pictures = []
     for shade in range(40):  # the map's views are every tenth picture of the tour
         pixels = np.full((48, 64, 3), 6 * shade, np.uint8)
-        pictures.append(TourSnapshot(columns=32).step(CTX, Image(pixels)).pictures)
+        pictures.append(TourSnapshot(columns=32).step(CTX, Image(pixels)).snapshots)
     ticks = [Tick(k, k) for k in range(40)]
     album = ViewThumbnails().step(CTX, ticks, pictures, MAP).thumbnails
     assert [round(picture_of(view, album).mean() / 60) for view in range(4)] == [0, 1, 2, 3]
@@ -191,11 +191,11 @@ def test_an_album_holds_the_pictures_of_the_maps_views_and_nothing_of_a_known_ma
     assert [picture_of(view, grown) is None for view in range(4)] == [True, True, False, False]
     assert picture_of(2, grown).mean() == pytest.approx(6 * (20 - 11), abs=2)
     assert picture_of(None, album) is None
-    assert picture_of(9, bound([])) is None
+    assert picture_of(9, joined([])) is None
 
 
 def test_the_first_picture_of_a_run_is_an_album():
     seen = glances(STRIP)
     album = FirstThumbnail().step(CTX, seen).thumbnails
-    assert (album.picture(0) == decoded(seen[0].jpeg)).all()
+    assert (album.image(0) == decoded(seen[0].jpeg)).all()
     assert FirstThumbnail().step(CTX, []).thumbnails is None

@@ -33,7 +33,7 @@ def an_album(map: ReferenceGraph) -> Thumbnails:
     for n in range(len(map)):
         pose = Pose(*map.poses[n].tolist())
         grown.insert(pose, map.features[n], map.kind)
-        shots.append(ReferenceSnapshot().step(CTX, Panorama(plain(5 * n, columns=160)[0]), grown, state).pictures)
+        shots.append(ReferenceSnapshot().step(CTX, Panorama(plain(5 * n, columns=160)[0]), grown, state).snapshots)
     return CollectThumbnails().step(CTX, [shot for shot in shots if shot is not None]).thumbnails
 
 
@@ -43,18 +43,18 @@ def test_an_album_holds_a_picture_of_each_reference_and_can_be_kept() -> None:
     assert len(album) == len(run.map)
     kept = decode(encode(album))
     for n in range(len(run.map)):
-        assert np.allclose(kept.picture(n), 5 * n, atol=2)
+        assert np.allclose(kept.image(n), 5 * n, atol=2)
 
 
 def test_of_windows_each_has_its_picture_and_pictures_not_taken_have_none() -> None:
     state, stage, map = ThumbnailsState(), ReferenceSnapshot(columns=20), ReferenceGraph.empty()
     for pose in ((0, 0, 0), (0, 0, 1), (0, 0, 2)):
         map.insert(Pose(*pose), np.zeros((1, 4), np.float32), "histograms")
-    first = stage.step(CTX, windows(10, 100, 200), map, state).pictures
+    first = stage.step(CTX, windows(10, 100, 200), map, state).snapshots
     assert first is not None
     assert [round(decoded(jpeg).mean()) for jpeg in first.jpegs] == pytest.approx([10, 100, 200], abs=2)
     assert decoded(first.jpegs[0]).shape == (15, 20, 3)
-    assert stage.step(CTX, windows(1, 2, 3), map, state).pictures is None
+    assert stage.step(CTX, windows(1, 2, 3), map, state).snapshots is None
 
 
 def test_windows_are_kept_side_by_side_from_the_left_to_the_right() -> None:
