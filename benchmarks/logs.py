@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from omninav.pipeline.mcap.log import LogWriter, read_messages
+from omninav.pipeline.mcap.reader import read_messages
+from omninav.pipeline.mcap.writer import LogWriter
 
 from .table import Row, medians
 

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 
-from omninav.pipeline.mcap.log import LogWriter, make_message, standard_types
+from omninav.pipeline.mcap.message_types import make_message, standard_types
+from omninav.pipeline.mcap.writer import LogWriter
 
 CAMERA = b"projection: cylindrical\nimage: {width: 48, height: 16}\ncolumn_of_forward: 24\n"
 START = 1_700_000_000_000_000_000

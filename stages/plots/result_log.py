@@ -6,7 +6,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.mcap.log import LogWriter, standard_types
+from omninav.pipeline.mcap.message_types import standard_types
+from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.command import Command
 from omninav.stages.values.drive import Array, Drive, known

@@ -7,7 +7,8 @@ from typing import Any
 
 import yaml
 
-from omninav.pipeline.mcap.log import Location, LogReader, Record
+from omninav.pipeline.mcap.message import Location, Record
+from omninav.pipeline.mcap.reader import LogReader
 
 from .recording import Format, OpenOptions
 from .topic_recording import TopicRecording

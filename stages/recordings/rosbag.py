@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
-from omninav.pipeline.mcap.log import BadMessage, Record, standard_types
+from omninav.pipeline.mcap.message import BadMessage, Record
+from omninav.pipeline.mcap.message_types import standard_types
 
 from .recording import Format, OpenOptions, UnreadableRecording
 from .topic_recording import TopicRecording

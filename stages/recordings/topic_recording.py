@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.files import digest_file
-from omninav.pipeline.mcap.log import BadMessage, Record
+from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.stages.camera.model import Camera
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan

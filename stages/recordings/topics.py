@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.graph.problems import nearest
-from omninav.pipeline.mcap.log import BadMessage, Record
+from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.stages.camera.model import Camera
 from omninav.stages.values.image import Pixels
 

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline.mcap.log import LogWriter
+from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.recordings.camera_yaml import write_camera
 
 from .simulated_recording import SimulatedRecording

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from background_runs import assert_same_bytes, finished, killed_and_resumed
 
-from omninav.pipeline.mcap.log import LogReader
+from omninav.pipeline.mcap.reader import LogReader
 
 WORDS = (
     "variant=homing",

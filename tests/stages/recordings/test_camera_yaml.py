@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 import yaml
 
-from omninav.pipeline.mcap.log import make_message
+from omninav.pipeline.mcap.message_types import make_message
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.camera.donut import Donut
 from omninav.stages.camera.equirectangular import Equirectangular

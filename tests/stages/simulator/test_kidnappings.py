@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.pipeline.mcap.log import LogReader
+from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Topics, UnreadableRecording

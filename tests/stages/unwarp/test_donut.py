@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import BadInput, Context, Tick
-from omninav.pipeline.mcap.log import LogReader
+from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.camera.donut import Donut
 from omninav.stages.unwarp.donut import DonutUnwarp, DonutUnwrapState, RingNotFound, find_ring

@@ -1,86 +1,28 @@
-"""Logs: MCAP files of ROS 2 messages, written whole and read as far as they are sound.
-
-What `LogWriter` writes opens with Foxglove, `mcap` and `ros2 bag play -s mcap FILE` as it is, and with rosbags as
-`AnyReader([Path("FILE.mcap")])` (0.11 and later): message definitions are inside, so no `metadata.yaml` is needed.
-
-Reading trusts nothing: every chunk's checksum is verified, a damaged chunk costs only itself, and a file that was cut
-gives every whole message before the cut. What was lost is counted by kind.
-"""
+"""Reading a log as far as it is sound: damage costs only itself, and what was lost is counted by kind."""
 
 import os
 import struct
 import zlib
 from collections import Counter, OrderedDict
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import ExitStack
-from dataclasses import dataclass
-from functools import cache
-from io import BytesIO
+from collections.abc import Collection, Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-import zstandard
-from lz4 import frame as lz4
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, ChunkIndex, Footer, Schema
-from mcap.writer import CompressionType, Writer
 
-from omninav.pipeline.files import whole_file
-from omninav.pipeline.graph.problems import BadInput, nearest
+from .chunks import MAGIC, RECORD_HEAD, parse, records_in, unpack
+from .message import BadMessage, Location, LogError, Message, Record
+from .message_types import standard_types, types_of
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
-MAGIC = b"\x89MCAP0\r\n"
-_RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _STAMP_LITTLE, _STAMP_BIG = struct.Struct("<iI").unpack_from, struct.Struct(">iI").unpack_from
-_FOOTER_SIZE = _RECORD.size + 20 + len(MAGIC)
-_DEFINITION_ENCODINGS = ("ros2msg", "ros2idl")
-_CHUNK_HEAD = struct.Struct("<QQQII")
-_LENGTH = struct.Struct("<Q")
+_FOOTER_SIZE = RECORD_HEAD.size + 20 + len(MAGIC)
 _BYTES_IN_MEMORY = 32_000_000
 """Of unpacked chunks, beside the last one used: logs up to that size are unpacked once."""
-
-
-class LogError(BadInput):
-    """A log that cannot be read or written at all. The message is one line: which file, what, and what to do."""
-
-
-class BadMessage(Exception):
-    """One message that cannot be decoded. The message is one line: which topic and what is wrong."""
-
-
-@dataclass(frozen=True)
-class Message:
-    """A decoded message. `stamp`: header stamp (ns), or the log time where its type has no header."""
-
-    topic: str
-    msgtype: str
-    stamp: int
-    log_time: int
-    content: Any
-
-
-class Location(NamedTuple):
-    """Where a message's bytes lie: number of its chunk (-1: directly in the file), first byte, length."""
-
-    chunk: int
-    start: int
-    length: int
-
-
-class Record(NamedTuple):
-    """One message as found by a scan: not decoded, with its times (ns) and where to find its bytes again."""
-
-    topic: str
-    stamp: int
-    log_time: int
-    data: bytes | memoryview
-    location: Any
 
 
 class _Chunk(NamedTuple):
@@ -171,7 +113,7 @@ class LogReader:
             chunk = self._chunks[location.chunk]
             with self.path.open("rb") as file:
                 packed = os.pread(file.fileno(), chunk.length, chunk.start)
-            data = _unpack(packed, chunk.whole, check=False)  # `scan` has checked it
+            data = unpack(packed, chunk.whole, check=False)  # `scan` has checked it
             self._unpacked[location.chunk] = data
             self._in_memory += len(data)
             while self._in_memory > _BYTES_IN_MEMORY and len(self._unpacked) > 1:
@@ -212,7 +154,7 @@ class LogReader:
         tail = file.read(_FOOTER_SIZE)
         if tail[-len(MAGIC) :] != MAGIC or tail[0] != Opcode.FOOTER:
             return []
-        footer = _parse(Footer, tail[_RECORD.size :])
+        footer = parse(Footer, tail[RECORD_HEAD.size :])
         if not 0 < footer.summary_start <= self._size - _FOOTER_SIZE:
             return []
         file.seek(footer.summary_start)
@@ -220,11 +162,11 @@ class LogReader:
         if footer.summary_crc and zlib.crc32(tail[: -len(MAGIC) - 4], zlib.crc32(summary)) != footer.summary_crc:
             return []
         chunks = []
-        for opcode, start, end in _records(summary):
+        for opcode, start, end in records_in(summary):
             if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                 self._learn(opcode, summary[start:end])
             elif opcode == Opcode.CHUNK_INDEX:
-                chunks.append(_parse(ChunkIndex, summary[start:end]))
+                chunks.append(parse(ChunkIndex, summary[start:end]))
         return sorted(chunks, key=lambda chunk: chunk.chunk_start_offset)
 
     def _complete(self) -> None:
@@ -236,10 +178,10 @@ class LogReader:
     def _learn(self, opcode: int, content: bytes) -> None:
         try:
             if opcode == Opcode.SCHEMA:
-                schema = _parse(Schema, content)
+                schema = parse(Schema, content)
                 self._schemas[schema.id] = schema
             else:
-                channel = _parse(Channel, content)
+                channel = parse(Channel, content)
                 self._channels[channel.id] = channel
         except Exception as error:
             self.drop("bad_chunk", f"{self.path}: a topic's description is damaged ({error})")
@@ -249,16 +191,16 @@ class LogReader:
         with self.path.open("rb") as file:
             for opcode, start, length, whole in self._walk(file):
                 if opcode == Opcode.CHUNK:
-                    seen.add(start - _RECORD.size)
+                    seen.add(start - RECORD_HEAD.size)
                     packed = os.pread(file.fileno(), length, start)  # past the file's buffer, which would copy it
                     self._chunks.append(_Chunk(start, length, whole))
                     try:
-                        data = _unpack(packed, whole)
+                        data = unpack(packed, whole)
                     except Exception as error:
                         if whole:
                             self.drop(
                                 "bad_chunk",
-                                f"{self.path}: chunk at byte {start - _RECORD.size}: {error}",
+                                f"{self.path}: chunk at byte {start - RECORD_HEAD.size}: {error}",
                             )
                         continue
                     number = len(self._chunks) - 1
@@ -297,14 +239,14 @@ class LogReader:
         starts = [chunk.chunk_start_offset for chunk in self._known_chunks]
         while True:
             file.seek(at)
-            head = file.read(_RECORD.size)
-            opcode, length = _RECORD.unpack(head) if len(head) == _RECORD.size else (0, 0)
+            head = file.read(RECORD_HEAD.size)
+            opcode, length = RECORD_HEAD.unpack(head) if len(head) == RECORD_HEAD.size else (0, 0)
             if opcode == Opcode.DATA_END:
                 return
-            start, end = at + _RECORD.size, at + _RECORD.size + length
+            start, end = at + RECORD_HEAD.size, at + RECORD_HEAD.size + length
             beyond = [known for known in starts if known > at]
             leaps = bool(beyond) and end > beyond[0]
-            if head and opcode > 0 and end <= self._size and not leaps and len(head) == _RECORD.size:
+            if head and opcode > 0 and end <= self._size and not leaps and len(head) == RECORD_HEAD.size:
                 yield opcode, start, length, True
                 at = end
             elif beyond:
@@ -322,7 +264,7 @@ class LogReader:
 
     def _in_chunk(self, data: bytes, chunk: int, topics: Collection[str] | None, whole: bool) -> Iterator[Record]:
         end = 0
-        for opcode, start, end in _records(data):
+        for opcode, start, end in records_in(data):
             if opcode == Opcode.MESSAGE and end - start >= _MESSAGE.size:
                 channel, _, log_time, _ = _MESSAGE.unpack_from(data, start)
                 start += _MESSAGE.size
@@ -363,7 +305,7 @@ class LogReader:
                 zlib.crc32(content[:-4]),
             ):
                 raise ValueError("checksum is wrong")
-            attachment = _parse(Attachment, content)
+            attachment = parse(Attachment, content)
             self._attachments[attachment.name] = attachment.data
         except Exception as error:
             self.drop("bad_attachment", f"{self.path}: attachment at byte {start}: {error}")
@@ -403,210 +345,5 @@ def read_messages(path: Path | str, topics: Collection[str] | None = None) -> It
     yield from LogReader(path).messages(topics)
 
 
-@cache
-def standard_types() -> "Typestore":
-    """The message types that come with ROS 2."""
-    from rosbags.typesys import Stores, get_typestore
-
-    return get_typestore(Stores.ROS2_HUMBLE)
-
-
-@cache
-def types_of(msgtype: str, encoding: str, definition: bytes) -> "Typestore":
-    """The message types in a definition; the standard ones where it is not whole or not readable."""
-    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
-
-    if encoding not in _DEFINITION_ENCODINGS:
-        return standard_types()
-    store = get_typestore(Stores.EMPTY)
-    try:
-        text = definition.decode()
-        store.register(get_types_from_msg(text, msgtype) if encoding == "ros2msg" else get_types_from_idl(text))
-        store.get_msgdef(msgtype)  # fails where a part of the definition is missing
-    except Exception:
-        return standard_types()
-    return store
-
-
-class LogWriter:
-    """Writes one MCAP file of ROS 2 messages; a context manager, the file appears when its block ends well.
-
-    The bytes follow from what is written alone: no clock, no machine, no library version. `chunk_bytes`: how much is
-    compressed and checksummed together, and so what a flipped bit costs at most.
-    """
-
-    def __init__(self, path: Path | str, chunk_bytes: int = 1 << 20) -> None:
-        self.path, self.chunk_bytes = Path(path), chunk_bytes
-        self._stack = ExitStack()
-        self._schemas: dict[str, int] = {}
-        self._channels: dict[str, tuple[int, str]] = {}
-        self._written: Counter[str] = Counter()
-
-    def __enter__(self) -> "LogWriter":
-        part = self._stack.enter_context(whole_file(self.path))
-        file = self._stack.enter_context(part.open("wb"))
-        self._writer = Writer(file, self.chunk_bytes, CompressionType.ZSTD, enable_crcs=True, enable_data_crcs=True)
-        self._writer.start(profile="ros2", library="omninav")
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if kind is None:
-            self._writer.finish()  # type: ignore[no-untyped-call]
-        self._stack.__exit__(kind, error, trace)
-
-    def write(
-        self,
-        topic: str,
-        msgtype: str,
-        stamp: int,
-        content: Any,
-        log_time: int | None = None,
-    ) -> None:
-        """Append a message. `stamp` (ns) goes into its header where the type has one, and is its log time by default.
-
-        `content`: a rosbags message object, or a mapping of fields; fields left out are zero or empty.
-        Raises `LogError` for an unknown type or field, and where a topic would change its type.
-        """
-        if isinstance(content, Mapping):
-            content = make_message(msgtype, content, stamp)
-        try:
-            data = bytes(standard_types().serialize_cdr(content, msgtype))
-        except Exception as error:
-            raise LogError(f"{self.path}: {topic}: not a valid {msgtype} ({error})") from None
-        channel, known = self._channels.get(topic, (0, msgtype))
-        if known != msgtype:
-            raise LogError(f"{self.path}: {topic} carries {known}, not {msgtype}; use another topic")
-        if not channel:
-            channel = self._open_channel(topic, msgtype)
-        time = stamp if log_time is None else log_time
-        self._writer.add_message(channel, time, data, time, self._written[topic])
-        self._written[topic] += 1
-
-    def attach(self, name: str, data: bytes, media_type: str = "application/octet-stream") -> None:
-        """Append an attachment."""
-        self._writer.add_attachment(0, 0, name, media_type, data)
-
-    def _open_channel(self, topic: str, msgtype: str) -> int:
-        store = standard_types()
-        if msgtype not in self._schemas:
-            definition, _ = store.generate_msgdef(msgtype, ros_version=2)
-            self._schemas[msgtype] = self._writer.register_schema(msgtype, "ros2msg", definition.encode())
-        channel = self._writer.register_channel(
-            topic,
-            "cdr",
-            self._schemas[msgtype],
-            {"offered_qos_profiles": "", "topic_type_hash": store.hash_rihs01(msgtype)},
-        )
-        self._channels[topic] = (channel, msgtype)
-        return channel
-
-
-def make_message(msgtype: str, fields: Mapping[str, Any], stamp: int | None = None) -> Any:
-    """A rosbags message from nested mappings; fields left out are zero or empty, `stamp` (ns) fills the header.
-
-    Raises `LogError` for an unknown type or field, with the nearest name.
-    """
-    store = standard_types()
-    if msgtype not in store.fielddefs:
-        raise LogError(f"{msgtype}: no such message type{_nearest(msgtype, store.fielddefs)}")
-    definitions = dict(store.fielddefs[msgtype][1])
-    for name in fields:
-        if name not in definitions:
-            raise LogError(f"{msgtype}: no field '{name}'{_nearest(name, definitions)}")
-    values = {name: _make_field(definition, fields.get(name)) for name, definition in definitions.items()}
-    if stamp is not None and "header" in definitions:
-        seconds, nanoseconds = divmod(stamp, 1_000_000_000)
-        values["header"].stamp.sec, values["header"].stamp.nanosec = (
-            seconds,
-            nanoseconds,
-        )
-    return store.types[msgtype](**values)
-
-
-def _make_field(definition: Any, value: Any) -> Any:
-    from rosbags.interfaces import Nodetype
-
-    kind, detail = definition
-    if kind == Nodetype.NAME:
-        return make_message(detail, value or {}) if value is None or isinstance(value, Mapping) else value
-    if kind == Nodetype.BASE:
-        name = detail[0]
-        empty: Any = "" if name in ("string", "wstring") else False if name == "bool" else 0
-        return empty if value is None else value
-    inner, count = detail
-    if inner[0] == Nodetype.BASE and inner[1][0] not in ("string", "wstring"):
-        dtype = np.dtype({"octet": "uint8", "byte": "uint8", "char": "uint8"}.get(inner[1][0], inner[1][0]))
-        if value is None:
-            return np.zeros(count if kind == Nodetype.ARRAY else 0, dtype)
-        return np.frombuffer(value, dtype) if isinstance(value, (bytes, memoryview)) else np.asarray(value, dtype)
-    length = count if kind == Nodetype.ARRAY else 0
-    return [_make_field(inner, item) for item in (value if value is not None else [None] * length)]
-
-
-def _nearest(name: str, names: Collection[str]) -> str:
-    near = nearest(name, names)
-    return f"; did you mean '{near}'?" if near else ""
-
-
 def _without_data(records: Iterator[Record]) -> Iterator[Record]:
     return (record._replace(data=b"") for record in records)
-
-
-def _records(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Records in a run of bytes: opcode, first byte of the content, end. Stops before one that is not whole."""
-    at = 0
-    while at + _RECORD.size <= len(data):
-        opcode, length = _RECORD.unpack_from(data, at)
-        start = at + _RECORD.size
-        at = start + length
-        if at > len(data):
-            return
-        yield opcode, start, at
-
-
-def _parse(kind: Any, content: bytes) -> Any:
-    return kind.read(ReadDataStream(BytesIO(content)))
-
-
-def _unpack(content: bytes, whole: bool, check: bool = True) -> bytes:
-    """The records in a chunk. A chunk that was cut off gives what its compression has let through so far.
-
-    Raises whatever a damaged chunk makes the decompressors raise, and ValueError for a wrong checksum (with `check`).
-    """
-    if not whole:
-        return _unpack_cut(content)
-    _, _, size, checksum, named = _CHUNK_HEAD.unpack_from(content)
-    at = _CHUNK_HEAD.size + named
-    compression = content[_CHUNK_HEAD.size : at].decode()
-    packed = memoryview(content)[at + _LENGTH.size :]
-    if len(packed) < _LENGTH.unpack_from(content, at)[0]:
-        raise ValueError("it is shorter than it says")
-    packed = packed[: _LENGTH.unpack_from(content, at)[0]]
-    if compression == "zstd":
-        data = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
-    elif compression == "lz4":
-        data = lz4.decompress(packed)  # type: ignore[attr-defined]
-    elif compression == "":
-        data = bytes(packed)
-    else:
-        raise ValueError(f"its compression '{compression}' is not known")
-    if check and checksum and zlib.crc32(data) != checksum:
-        raise ValueError("checksum is wrong")
-    return data
-
-
-def _unpack_cut(content: bytes) -> bytes:
-    stream = ReadDataStream(BytesIO(content))
-    stream.read(8 + 8 + 8 + 4)  # times, size and checksum of what is not all there
-    compression = stream.read_prefixed_string()
-    data = content[8 + 8 + 8 + 4 + 4 + len(compression) + 8 :]
-    if compression == "zstd":
-        return zstandard.ZstdDecompressor().decompressobj().decompress(data)
-    if compression == "lz4":
-        return bytes(lz4.LZ4FrameDecompressor().decompress(data))  # type: ignore[no-untyped-call]
-    return data if compression == "" else b""

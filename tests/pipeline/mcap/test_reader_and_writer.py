@@ -7,7 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from omninav.pipeline.mcap.log import MAGIC, BadMessage, LogError, LogReader, LogWriter, make_message, read_messages
+from omninav.pipeline.mcap.chunks import MAGIC
+from omninav.pipeline.mcap.message import BadMessage, LogError
+from omninav.pipeline.mcap.message_types import make_message
+from omninav.pipeline.mcap.reader import LogReader, read_messages
+from omninav.pipeline.mcap.writer import LogWriter
 
 POSE = "geometry_msgs/msg/PoseStamped"
 COUNT = 60
@@ -293,7 +297,7 @@ def test_every_compression_is_read_whole_and_cut_inside_a_chunk(tmp_path: Path, 
 
 
 def make_text(number: int) -> memoryview:
-    from omninav.pipeline.mcap.log import standard_types
+    from omninav.pipeline.mcap.message_types import standard_types
 
     noise = "".join(chr(letter) for letter in np.random.default_rng(number).integers(33, 127, 200))
     return standard_types().serialize_cdr(make_message("std_msgs/msg/String", {"data": noise}), "std_msgs/msg/String")

@@ -1,0 +1,43 @@
+"""Messages as they lie in a log and as they are decoded, and what is said of logs and messages that are unsound."""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from omninav.pipeline.graph.problems import BadInput
+
+
+class LogError(BadInput):
+    """A log that cannot be read or written at all. The message is one line: which file, what, and what to do."""
+
+
+class BadMessage(Exception):
+    """One message that cannot be decoded. The message is one line: which topic and what is wrong."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """A decoded message. `stamp`: header stamp (ns), or the log time where its type has no header."""
+
+    topic: str
+    msgtype: str
+    stamp: int
+    log_time: int
+    content: Any
+
+
+class Location(NamedTuple):
+    """Where a message's bytes lie: number of its chunk (-1: directly in the file), first byte, length."""
+
+    chunk: int
+    start: int
+    length: int
+
+
+class Record(NamedTuple):
+    """One message as found by a scan: not decoded, with its times (ns) and where to find its bytes again."""
+
+    topic: str
+    stamp: int
+    log_time: int
+    data: bytes | memoryview
+    location: Any

@@ -1,0 +1,97 @@
+"""Writing a log: an MCAP file of ROS 2 messages.
+
+It opens with Foxglove, `mcap` and `ros2 bag play -s mcap FILE` as it is, and with rosbags as
+`AnyReader([Path("FILE.mcap")])` (0.11 and later): message definitions are inside, so no `metadata.yaml` is needed.
+"""
+
+from collections import Counter
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from mcap.writer import CompressionType, Writer
+
+from omninav.pipeline.files import whole_file
+
+from .message import LogError
+from .message_types import make_message, standard_types
+
+
+class LogWriter:
+    """Writes one MCAP file of ROS 2 messages; a context manager, the file appears when its block ends well.
+
+    The bytes follow from what is written alone: no clock, no machine, no library version. `chunk_bytes`: how much is
+    compressed and checksummed together, and so what a flipped bit costs at most.
+    """
+
+    def __init__(self, path: Path | str, chunk_bytes: int = 1 << 20) -> None:
+        self.path, self.chunk_bytes = Path(path), chunk_bytes
+        self._stack = ExitStack()
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, tuple[int, str]] = {}
+        self._written: Counter[str] = Counter()
+
+    def __enter__(self) -> "LogWriter":
+        part = self._stack.enter_context(whole_file(self.path))
+        file = self._stack.enter_context(part.open("wb"))
+        self._writer = Writer(file, self.chunk_bytes, CompressionType.ZSTD, enable_crcs=True, enable_data_crcs=True)
+        self._writer.start(profile="ros2", library="omninav")
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if kind is None:
+            self._writer.finish()  # type: ignore[no-untyped-call]
+        self._stack.__exit__(kind, error, trace)
+
+    def write(
+        self,
+        topic: str,
+        msgtype: str,
+        stamp: int,
+        content: Any,
+        log_time: int | None = None,
+    ) -> None:
+        """Append a message. `stamp` (ns) goes into its header where the type has one, and is its log time by default.
+
+        `content`: a rosbags message object, or a mapping of fields; fields left out are zero or empty.
+        Raises `LogError` for an unknown type or field, and where a topic would change its type.
+        """
+        if isinstance(content, Mapping):
+            content = make_message(msgtype, content, stamp)
+        try:
+            data = bytes(standard_types().serialize_cdr(content, msgtype))
+        except Exception as error:
+            raise LogError(f"{self.path}: {topic}: not a valid {msgtype} ({error})") from None
+        channel, known = self._channels.get(topic, (0, msgtype))
+        if known != msgtype:
+            raise LogError(f"{self.path}: {topic} carries {known}, not {msgtype}; use another topic")
+        if not channel:
+            channel = self._open_channel(topic, msgtype)
+        time = stamp if log_time is None else log_time
+        self._writer.add_message(channel, time, data, time, self._written[topic])
+        self._written[topic] += 1
+
+    def attach(self, name: str, data: bytes, media_type: str = "application/octet-stream") -> None:
+        """Append an attachment."""
+        self._writer.add_attachment(0, 0, name, media_type, data)
+
+    def _open_channel(self, topic: str, msgtype: str) -> int:
+        store = standard_types()
+        if msgtype not in self._schemas:
+            definition, _ = store.generate_msgdef(msgtype, ros_version=2)
+            self._schemas[msgtype] = self._writer.register_schema(msgtype, "ros2msg", definition.encode())
+        channel = self._writer.register_channel(
+            topic,
+            "cdr",
+            self._schemas[msgtype],
+            {"offered_qos_profiles": "", "topic_type_hash": store.hash_rihs01(msgtype)},
+        )
+        self._channels[topic] = (channel, msgtype)
+        return channel
