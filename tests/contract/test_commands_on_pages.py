@@ -12,7 +12,7 @@ from omegaconf import OmegaConf
 from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.cli.main import COMMANDS
 from omninav.pipeline.cli.overrides import jobs_to_try, with_unlisted_parameters
-from omninav.pipeline.run.run import plan
+from omninav.pipeline.run.plan import plan
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md")])
