@@ -87,9 +87,9 @@ def stage_ms(variant: str, references: int) -> dict[str, np.ndarray]:
 
 def drawn(times: dict[str, dict[int, float]]) -> bytes:
     """Milliseconds a step over the references, one line a variant, with the limit."""
-    from omninav.pipeline.report.plot_style import picture
+    from omninav.pipeline.report.plot_style import plot
 
-    with picture(6.4, 3.6) as canvas:
+    with plot(6.4, 3.6) as canvas:
         axes = canvas.canvas.add_subplot()
         for variant, colour in zip(times, ("#0072B2", "#D55E00"), strict=False):
             axes.plot(list(times[variant]), list(times[variant].values()), "o-", color=colour, label=variant)

@@ -103,6 +103,6 @@ def mixture_run(run: SmallRun) -> tuple[ViewMixtures, list[GaussianMixture], lis
         weight, place = np.array([max(share, 1 - share)]), start[heaviest][None, :2]
         counts = len(map), len(map.weights)
         events.append(ViewEvent(*counts, inserted, inserted, removed, why, changed, weight, place, np.array([2])))
-        fields = ("views", "kind", "names", "born", "owner", "means", "covariances", "weights", "counts")
+        fields = ("views", "kind", "ids", "born", "owner", "means", "covariances", "weights", "counts")
         after.append(ViewMixtures(*(getattr(map, name) for name in fields), map.steps, map.next_id, map.pose_source))
     return map, beliefs, events, after

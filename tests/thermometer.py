@@ -23,7 +23,7 @@ from omninav.pipeline import (
     Value,
 )
 from omninav.pipeline.files import digest_file, digest_text
-from omninav.pipeline.report.plot_style import picture
+from omninav.pipeline.report.plot_style import plot
 
 
 class Temperature(Value):
@@ -124,7 +124,7 @@ class TemperatureErrors(Stage):
             "readings": len(errors),
             "course": {"reading": list(range(len(errors))), "error_k": errors.tolist()},
         }
-        with picture(4.0, 2.0) as drawn:
+        with plot(4.0, 2.0) as drawn:
             drawn.canvas.subplots().plot(errors)
         return self.Out(
             metrics=Metrics(values, QUANTITIES, headlines=("error_k.mean", "within_rate")),

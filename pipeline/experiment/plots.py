@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline.report.plot_style import PALETTE, picture
+from omninav.pipeline.report.plot_style import PALETTE, plot
 
 from .series import series_at
 from .specification import Condition, Curve, Experiment, Labels, space_of
@@ -60,7 +60,7 @@ def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
         name: PALETTE[n % len(PALETTE)] for n, name in enumerate(dict.fromkeys(_named(c, shown) for c in conditions))
     }
     levels: list[float] = []  # of each line: one that only begins near zero is no reason for powers of ten
-    with picture(4.6 * len(panel_labels) + 0.4, 3.8) as drawn:
+    with plot(4.6 * len(panel_labels) + 0.4, 3.8) as drawn:
         grid = drawn.canvas.subplots(1, len(panel_labels), squeeze=False, sharey=True)[0]
         for axes, panel in zip(grid, panel_labels, strict=True):
             here = [c for c in conditions if not curve.panels or c.labels[curve.panels] == panel]
@@ -125,7 +125,7 @@ def _lines(experiment: Experiment, results: Results, name: str, along: str, pane
     series = [factor for factor in experiment.sweep if factor not in (along, panels)]
     combinations = list(itertools.product(*(experiment.labels(factor) for factor in series)))
     heights: list[float] = []
-    with picture(4.6 * len(panel_labels) + 0.4, 3.8) as drawn:
+    with plot(4.6 * len(panel_labels) + 0.4, 3.8) as drawn:
         grid = drawn.canvas.subplots(1, len(panel_labels), squeeze=False, sharey=True)[0]
         for axes, panel in zip(grid, panel_labels, strict=True):
             for index, chosen in enumerate(combinations):
@@ -162,7 +162,7 @@ def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
     columns, rows = experiment.labels(experiment.page.columns), row_labels(experiment)
     width = 0.8 / len(rows)
     all_heights: list[float] = []
-    with picture(max(5.0, 1.1 + len(columns) * max(0.42 * (len(rows) + 1), 0.95)), 3.6) as drawn:
+    with plot(max(5.0, 1.1 + len(columns) * max(0.42 * (len(rows) + 1), 0.95)), 3.6) as drawn:
         axes = drawn.canvas.subplots()
         for index, labels in enumerate(rows):
             at = np.arange(len(columns)) + (index - (len(rows) - 1) / 2) * width

@@ -1,4 +1,4 @@
-"""How every picture is drawn: one look, units on axes, the same bytes every time, no state of pyplot's."""
+"""How every plot is drawn: one look, units on axes, the same bytes every time, no state of pyplot's."""
 
 import io
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#111111", "#8a8f98", "#E
 """Okabe & Ito's colours (2008), which colour-blind readers tell apart, dark enough on white."""
 
 RC: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",  # comes with matplotlib: the same picture on every machine
+    "font.family": "DejaVu Sans",  # comes with matplotlib: the same plot on every machine
     "font.size": 9,
     "axes.titlesize": 10,
     "axes.titlelocation": "left",
@@ -31,8 +31,8 @@ RC: dict[Any, Any] = {
 }
 
 
-class Picture:
-    """A figure being drawn; `content` holds its bytes once the `picture` block has ended."""
+class Plot:
+    """A figure being drawn; `content` holds its bytes once the `plot` block has ended."""
 
     def __init__(self, canvas: "Canvas") -> None:
         self.canvas = canvas
@@ -40,7 +40,7 @@ class Picture:
 
 
 @contextmanager
-def picture(width: float, height: float, dpi: int = 110, media_type: str = "image/png") -> Iterator[Picture]:
+def plot(width: float, height: float, dpi: int = 110, media_type: str = "image/png") -> Iterator[Plot]:
     """A blank figure of width x height inches in the house style, without pyplot's global state.
 
     Line drawings are PNG; what holds photographs is JPEG (`media_type` image/jpeg), or it would be far too large.
@@ -51,7 +51,7 @@ def picture(width: float, height: float, dpi: int = 110, media_type: str = "imag
     with matplotlib.rc_context():
         matplotlib.rcdefaults()  # a user's own matplotlibrc must not change the bytes
         matplotlib.rcParams.update(RC)
-        drawn = Picture(Canvas(figsize=(width, height), dpi=dpi, layout="constrained"))
+        drawn = Plot(Canvas(figsize=(width, height), dpi=dpi, layout="constrained"))
         yield drawn
         buffer = io.BytesIO()
         if media_type == "image/jpeg":

@@ -1,4 +1,4 @@
-"""How a belief came together: its particles, Gaussians or places at a few moments of a drive."""
+"""Plots the belief at a few frames of a drive."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -7,6 +7,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.geometry.probability.gaussians import moments
 from omninav.stages.geometry.probability.particles import weighted_moments
 from omninav.stages.values.belief import GaussianMixture, Particles, PlaceBelief
@@ -14,8 +15,7 @@ from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.map_places import AnyMap, map_poses
 
-from .snapshot_times import geometric_moments
-from .style import (
+from .drawing import (
     ESTIMATE,
     PARTICLE,
     TRUTH,
@@ -26,9 +26,9 @@ from .style import (
     extent_of,
     faded,
     fitting_height,
-    picture,
     plan_axes,
 )
+from .snapshot_times import geometric_steps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,17 +37,17 @@ Shown = Particles | GaussianMixture | PlaceBelief
 
 
 class BeliefSnapshots(Stage):
-    """The belief over the map at `moments` frames of the last log, dense at its beginning, with estimate and truth.
+    """Plots the belief over the map at a few frames of the last log, more often at its beginning.
 
     Particles are dots; a mixture's Gaussians are ellipses of two standard deviations, as opaque as they weigh; places
-    are discs, as large as they are probable.
-    With `grid` wired, all of it over what is occupied there.
+    are discs, as large as they are probable. With `grid` wired, all of it over what is occupied there.
     """
 
-    moments: Annotated[int, Bounds(ge=1, le=12)] = 6
+    frames: Annotated[int, Bounds(ge=1, le=12)] = 6
+    """Number of panels."""
 
     class Out(Outputs):
-        """`figure`: one panel per moment."""
+        """`figure`: one panel per frame."""
 
         figure: Figure | None = None
 
@@ -62,7 +62,7 @@ class BeliefSnapshots(Stage):
         """The whole run at once."""
         last = drive.last_log
         panels = []
-        for k in geometric_moments(len(last), self.moments):
+        for k in geometric_steps(len(last), self.frames):
             belief = beliefs[last.row[k]]
             if belief is not None:
                 panels.append((int(last.frames[k]), last.seconds[k], belief, last.estimate[k], last.truth[k]))
@@ -71,8 +71,8 @@ class BeliefSnapshots(Stage):
         return self.Out(
             figure=Figure(
                 name="belief_snapshots",
-                title="How the belief came together",
-                caption=f"{len(panels)} moments of the drive, dense at its beginning. Pink: {_named(panels[0][2])}; "
+                title="Convergence of the belief",
+                caption=f"{len(panels)} frames, more of them at the beginning. Pink: {_named(panels[0][2])}; "
                 "arrows: the estimate (blue) and the true pose (black). The spread is the standard deviation of the "
                 "distance from the belief's mean.",
                 content=_draw(panels, map, grid),
@@ -89,7 +89,7 @@ def _draw(
     everything = [map_poses(map)] if map is not None and len(map) else [_poses(panel[2]) for panel in panels]
     extent = extent_of(*everything, *(panel[3][None] for panel in panels), *(panel[4][None] for panel in panels))
     arrow = 0.09 * (extent[1] - extent[0] + extent[3] - extent[2]) / 2 if extent else 1.0
-    with picture(9.0, rows * fitting_height(extent, 9.0 / columns, 2.0, 4.5), dpi=100) as drawn:
+    with plot(9.0, rows * fitting_height(extent, 9.0 / columns, 2.0, 4.5), dpi=100) as drawn:
         for number, (frame, seconds, belief, estimate, truth) in enumerate(panels):
             axes = drawn.canvas.add_subplot(rows, columns, number + 1)
             draw_grid(axes, grid)
@@ -99,8 +99,8 @@ def _draw(
             draw_pose(axes, estimate, arrow, ESTIMATE, "estimate")
             plan_axes(axes, extent)
             error = float(np.hypot(*(estimate - truth)[:2]))
-            said = f", error {error:.2f} m" if np.isfinite(error) else ""
-            axes.set_title(f"frame {frame} · {seconds:.1f} s\nspread {_spread(belief):.2f} m{said}", fontsize=8.5)
+            suffix = f", error {error:.2f} m" if np.isfinite(error) else ""
+            axes.set_title(f"frame {frame} · {seconds:.1f} s\nspread {_spread(belief):.2f} m{suffix}", fontsize=8.5)
             if number % columns:
                 axes.set_ylabel("")
             if number < len(panels) - columns:

@@ -1,4 +1,4 @@
-"""The mixtures of the views that a tick changed: small enough to be kept, so that a reference's life can be told."""
+"""Keeps the mixtures of the views that a tick changed, so that a reference's history can be plotted."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""How what homing tells is drawn into pictures: features by what became of them, and the vector over the floor."""
+"""Draws tracked features by their state, and the homing vector over the floor, into images."""
 
 import cv2
 import numpy as np
@@ -7,7 +7,7 @@ import numpy.typing as npt
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.image import Pixels
 
-from .homing_snapshot import HomingGlance, Points
+from .homing_snapshot import EncodedHomingView, Points
 
 Colour = tuple[int, int, int]
 LOST, TRACKED, AGAIN, MATCHED = range(4)
@@ -34,26 +34,26 @@ def hexadecimal(colour: Colour) -> str:
 
 
 def is_known(vector: HomingVector) -> bool:
-    """Whether a homing vector says anything: of a target that was never found it does not."""
+    """Whether a homing vector is known: it is not where the target was never found."""
     return vector.state != "lost" or vector.metres is not None or vector.direction != 0.0
 
 
-def robots_view(pixels: Pixels, glance: HomingGlance) -> Pixels:
-    """The robot's picture with the features that it follows, and where it wants to go. As large as `pixels`."""
-    drawn, scale = pixels.copy(), pixels.shape[1] / glance.size[0]
-    _features(drawn, glance.points * scale, glance.kinds)
-    way = glance.way[np.isfinite(glance.way).all(axis=1)] * scale
-    if glance.vector is not None and len(way) > 1 and is_known(glance.vector):
-        lost = glance.vector.state == "lost"
+def draw_robot_view(pixels: Pixels, snapshot: EncodedHomingView) -> Pixels:
+    """The robot's image with its tracked features and the homing vector. As large as `pixels`."""
+    drawn, scale = pixels.copy(), pixels.shape[1] / snapshot.size[0]
+    _features(drawn, snapshot.points * scale, snapshot.kinds)
+    line = snapshot.floor_line[np.isfinite(snapshot.floor_line).all(axis=1)] * scale
+    if snapshot.vector is not None and len(line) > 1 and is_known(snapshot.vector):
+        lost = snapshot.vector.state == "lost"
         colour = BRIGHT[LOST] if lost else VECTOR
         for shade, thick in ((DARK, 6), (colour, 3)):
-            polyline(drawn, way, shade, thick)
-            arrow_head(drawn, way[-1], way[-1] - way[max(0, len(way) - 4)], shade, 11.0 if thick == 3 else 14.0)
+            polyline(drawn, line, shade, thick)
+            arrow_head(drawn, line[-1], line[-1] - line[max(0, len(line) - 4)], shade, 11.0 if thick == 3 else 14.0)
     return drawn
 
 
-def targets_view(pixels: Pixels | None, glance: HomingGlance, size: tuple[int, int]) -> Pixels:
-    """The view that it goes to, with the same features in the same colours; the others light. Without its picture grey.
+def draw_target_view(pixels: Pixels | None, snapshot: EncodedHomingView, size: tuple[int, int]) -> Pixels:
+    """The target view, with the same features in the same colours; the others light. Grey without its image.
 
     `size`: columns and rows.
     """
@@ -61,11 +61,11 @@ def targets_view(pixels: Pixels | None, glance: HomingGlance, size: tuple[int, i
     drawn = np.full((rows, columns, 3), 90, np.uint8)
     if pixels is not None:
         drawn = np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), np.uint8)
-    scale = columns / glance.size[0]
-    unused = glance.target_kinds < 0
-    for x, y in _finite(glance.target_points[unused]) * scale:
+    scale = columns / snapshot.size[0]
+    unused = snapshot.target_kinds < 0
+    for x, y in _finite(snapshot.target_points[unused]) * scale:
         disc(drawn, (x, y), 1.5, UNUSED)
-    _features(drawn, glance.target_points[~unused] * scale, glance.target_kinds[~unused])
+    _features(drawn, snapshot.target_points[~unused] * scale, snapshot.target_kinds[~unused])
     return drawn
 
 

@@ -1,4 +1,4 @@
-"""How far off the estimate was, frame by frame."""
+"""Plots the error of the estimate, frame by frame."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -7,10 +7,11 @@ import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive
 
-from .style import ESTIMATE, MARK, ODOMETRY, picture
+from .drawing import ESTIMATE, MARK, ODOMETRY
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class ErrorOverTime(Stage):
-    """Position (m) and heading error (degrees) over time, odometry alone beside them, convergence marked.
+    """Plots position (m) and heading error (degrees) over time, odometry alone beside them, convergence marked.
 
     Nothing is drawn for logs without ground truth.
     """
@@ -56,7 +57,7 @@ def _draw(logs: Sequence[Drive]) -> bytes:
     bands = -(-len(logs) // columns)
     kinds = (("position error (m)", position_errors, 1.0, None), ("heading error (°)", heading_errors_deg, 20.0, 250))
     floors = [_floor(np.concatenate([errors(log.estimate, log.truth) for log in logs])) for _, errors, _, _ in kinds]
-    with picture(8.0 if columns == 1 else 10.0, 4.2 * bands) as drawn:
+    with plot(8.0 if columns == 1 else 10.0, 4.2 * bands) as drawn:
         panels = drawn.canvas.subplots(2 * bands, columns, sharey="row", squeeze=False)
         for panel in panels[:, len(logs) - columns * (bands - 1) :][2 * (bands - 1) :].flat:
             panel.remove()

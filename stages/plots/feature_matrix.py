@@ -1,4 +1,4 @@
-"""What a kernel makes of the robot's picture: the picture, its feature matrix, and the histogram of that."""
+"""Plots an image, its feature matrix of Haar integrals, and the histogram of that."""
 
 from typing import Annotated
 
@@ -7,26 +7,29 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.geometry.appearance.haar_integrals import Kernel, padded
 from omninav.stages.values.image import Panorama, Pixels, Windows
-
-from .style import picture
 
 CHANNELS = (("red", 2, "#D55E00"), ("green", 1, "#009E73"), ("blue", 0, "#0072B2"))
 
 
 class FeatureMatrix(Stage):
-    """A picture of the drive, its Haar integral at each pixel, and how often which value occurs per colour.
+    """Plots an image of the drive, its Haar integral at each pixel, and how often each value occurs per colour.
 
-    Wolf, Burgard & Burkhardt 2005, figures 2 to 4; of windows the first. `frame`: which picture of the last log;
-    `kernel`, `angles` and `root` as in features.HaarIntegral; `bins` of the histogram that is drawn.
+    Wolf, Burgard & Burkhardt 2005, figures 2 to 4; of windows the first.
     """
 
     frame: Annotated[int, Bounds(ge=0)] = 0
+    """Frame of the log."""
     kernel: tuple[Annotated[float, Bounds(ge=0)], Annotated[float, Bounds(ge=0)]] = (3.0, 4.0)
+    """Distances (px) of the kernel's two neighbours, as in `HaarIntegral`."""
     angles: Annotated[int, Bounds(ge=1)] = 36
+    """Rotations over which the kernel is averaged."""
     root: bool = True
+    """Whether the root of the product is averaged."""
     bins: Annotated[int, Bounds(ge=1)] = 32
+    """Bins of the histogram that is drawn."""
 
     class Out(Outputs):
         """`figure`: absent at all other frames."""
@@ -46,8 +49,8 @@ class FeatureMatrix(Stage):
         return self.Out(
             figure=Figure(
                 name="feature_matrix",
-                title="What the kernel makes of a picture",
-                caption=f"The picture of frame {tick.frame}; the mean over {self.angles} rotations of "
+                title="Haar feature matrix",
+                caption=f"The image of frame {tick.frame}; the mean over {self.angles} rotations of "
                 f"{'the root of ' if self.root else ''}the product of the neighbours {one:g} and {other:g} pixels "
                 "away, at right angles; and how often which mean occurs. Only the last is kept, all colours together.",
                 content=_draw(pixels, means, self.bins),
@@ -60,9 +63,9 @@ class FeatureMatrix(Stage):
 def _draw(pixels: Pixels, means: npt.NDArray[np.float32], bins: int) -> bytes:
     rows, columns = pixels.shape[:2]
     beside = columns < 2 * rows
-    with picture(10.0, 3.0 if beside else 10.0 * 2 * rows / columns + 2.6, media_type="image/jpeg") as drawn:
+    with plot(10.0, 3.0 if beside else 10.0 * 2 * rows / columns + 2.6, media_type="image/jpeg") as drawn:
         axes = drawn.canvas.subplots(1, 3) if beside else drawn.canvas.subplots(3, 1, height_ratios=[1, 1, 1])
-        for panel, shown, title in ((axes[0], pixels / 255.0, "picture"), (axes[1], means, "feature matrix")):
+        for panel, shown, title in ((axes[0], pixels / 255.0, "image"), (axes[1], means, "feature matrix")):
             panel.imshow(np.clip(shown[:, :, ::-1], 0.0, 1.0), interpolation="antialiased")
             panel.set_title(title)
             panel.set_axis_off()

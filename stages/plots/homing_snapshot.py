@@ -1,4 +1,4 @@
-"""What a robot saw as it went towards a view, small, because pictures themselves are too large to be kept."""
+"""Keeps small images of a drive by homing, because images themselves are too large to be kept."""
 
 import math
 from typing import Annotated
@@ -16,17 +16,16 @@ from omninav.stages.values.image import Image, Panorama
 Array = npt.NDArray[np.float64]
 Points = npt.NDArray[np.float32]
 
-NEAREST, SHORTEST, FARTHEST, UNKNOWN = 0.35, 0.7, 6.0, 1.5
-"""Metres: where a homing vector begins on the floor before the robot, its least and greatest length, and one of unknown
-length."""
+NEAREST_M, MIN_LENGTH_M, MAX_LENGTH_M, UNKNOWN_LENGTH_M = 0.35, 0.7, 6.0, 1.5
+"""Where a homing vector begins on the floor, its least and greatest length, and its length where that is unknown."""
 
 
-class HomingGlance(Value):
-    """A picture as JPEG bytes, and what was told of it. Points are columns and rows of that picture of `size`.
+class EncodedHomingView(Value):
+    """An image as JPEG bytes, with the state of homing. Points are columns and rows of that image of `size`.
 
-    `points`, `kinds` (N,): as in `TrackedFeatures`. `way` (K, 2): the floor in the homing vector's direction, from the
-    robot on; it ends at the target where `metres` are known. `target_points` (M, 2): the target's features in a
-    picture of this size that was taken there; `target_kinds` (M,): their kinds, -1 for those that are not followed.
+    `points`, `kinds` (N,): as in `TrackedFeatures`. `floor_line` (K, 2): the floor along the homing vector, from
+    the robot on; it ends at the target where `metres` are known. `target_points` (M, 2): the target's features in a
+    image of this size that was taken there; `target_kinds` (M,): their kinds, -1 for those that are not followed.
     NaN where a point is not seen. `vector`: None where there is no target.
     """
 
@@ -34,7 +33,7 @@ class HomingGlance(Value):
     size: tuple[int, int]
     points: Points
     kinds: npt.NDArray[np.int8]
-    way: Points
+    floor_line: Points
     target_points: Points
     target_kinds: npt.NDArray[np.int8]
     target: str = ""
@@ -42,29 +41,31 @@ class HomingGlance(Value):
 
 
 class HomingSnapshotState(State):
-    """When it looked last (ns)."""
+    """When it state last (ns)."""
 
     stamp: int = 0
 
 
 class HomingSnapshot(Stage):
-    """Every `every_s` seconds the robot's picture, at most `columns` wide (JPEG, 80), with all that homing tells of it.
+    """Keeps, every few tenths of a second, a small JPEG of the robot's image (quality 80) with the state of homing.
 
-    Of a mirror's or a lens's picture the disc. Without a target the picture alone.
+    Of a mirror's or a fisheye's image the disc. Without a target the image alone.
     """
 
     every_s: Annotated[float, Bounds(ge=0)] = 0.4
+    """Seconds between snapshots."""
     columns: Annotated[int, Bounds(ge=32)] = 480
+    """Largest width of the image (px)."""
 
     class Out(Outputs):
-        """`glance`: absent in between."""
+        """`snapshot`: absent in between."""
 
-        snapshot: HomingGlance | None = None
+        snapshot: EncodedHomingView | None = None
 
     def step(
         self,
         ctx: Context,
-        looked: HomingSnapshotState,
+        state: HomingSnapshotState,
         tick: Tick,
         image: Image | Panorama,
         camera: Camera | None = None,
@@ -73,40 +74,40 @@ class HomingSnapshot(Stage):
         tracks: TrackedFeatures | None = None,
     ) -> Out:
         """One tick."""
-        if not tick.first_of_log and tick.stamp - looked.stamp < 0.99e9 * self.every_s:
+        if not tick.first_of_log and tick.stamp - state.stamp < 0.99e9 * self.every_s:
             return self.Out()
-        looked.stamp = tick.stamp
+        state.stamp = tick.stamp
         small = thumbnail(image.pixels, camera, self.columns)
-        points, way, there = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2))
+        points, floor_line, there = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2))
         kinds, of_target = np.zeros(0, np.int64), np.zeros(0, np.int8)
         if tracks is not None:
             points, kinds = tracks.points, tracks.kinds
         seen_by = camera_behind(image, camera)
         if vector is not None and seen_by is not None:
-            way = seen_at(seen_by, floor_ahead(vector, None if camera is None else camera.height))
+            floor_line = seen_at(seen_by, floor_ahead(vector, None if camera is None else camera.height))
         if target is not None:
             rays = target.features.bearings
             there = np.full((len(rays), 2), np.nan) if seen_by is None else seen_at(seen_by, rays)
             of_target = np.full(len(there), -1, np.int8)
             if tracks is not None:
                 of_target[tracks.rows] = tracks.kinds
-        glance = HomingGlance(
+        snapshot = EncodedHomingView(
             small.jpeg(80),
             (small.pixels.shape[1], small.pixels.shape[0]),
             small.points(points),
             kinds.astype(np.int8),
-            small.points(way),
+            small.points(floor_line),
             small.points(there),
             of_target,
             "" if target is None else target.name,
             vector,
         )
-        return self.Out(snapshot=glance)
+        return self.Out(snapshot=snapshot)
 
 
 def floor_ahead(vector: HomingVector, height: float | None) -> Array:
     """Points (K, 3) of the floor along a homing vector (m, robot frame, from the camera), `height` below it (1 m)."""
-    length = UNKNOWN if vector.metres is None else min(max(vector.metres, SHORTEST), FARTHEST)
-    metres = np.linspace(NEAREST, length, 24)
+    length = UNKNOWN_LENGTH_M if vector.metres is None else min(max(vector.metres, MIN_LENGTH_M), MAX_LENGTH_M)
+    metres = np.linspace(NEAREST_M, length, 24)
     below = np.full(len(metres), -(height or 1.0))
     return np.stack([metres * math.cos(vector.direction), metres * math.sin(vector.direction), below], axis=-1)

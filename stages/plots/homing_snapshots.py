@@ -1,4 +1,4 @@
-"""What homing followed and where it wanted to go, at a few moments of a drive."""
+"""Plots tracked features and homing vectors at a few frames of a drive."""
 
 import math
 from collections.abc import Sequence
@@ -8,6 +8,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing import HomingVector, PathProgress
@@ -16,10 +17,8 @@ from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.thumbnails import Thumbnails, decoded
 from omninav.stages.values.topological_map import TopologicalMap
 
-from .draw_homing import BRIGHT, LOST, NAMES, VECTOR, hexadecimal, is_known, robots_view, targets_view
-from .homing_snapshot import HomingGlance
-from .snapshot_times import spread_out
-from .style import (
+from .draw_homing import BRIGHT, LOST, NAMES, VECTOR, draw_robot_view, draw_target_view, hexadecimal, is_known
+from .drawing import (
     ESTIMATE,
     MARK,
     ODOMETRY,
@@ -27,24 +26,25 @@ from .style import (
     broken_at_jumps,
     draw_plan,
     draw_pose,
-    picture,
     plan_axes,
 )
+from .homing_snapshot import EncodedHomingView
+from .snapshot_times import spread_out
 from .target_images import target_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-REACH = 2.2
+AROUND_M = 2.2
 """Metres around the robot that the plan shows."""
 
 
-class Moment(NamedTuple):
-    """A moment of the drive: when, what was seen, the target's picture, where the robot and the target truly were."""
+class Row(NamedTuple):
+    """A row of the plot: when, what was seen, the target's image, where the robot and the target truly were."""
 
     frame: int
     seconds: float
-    glance: HomingGlance
+    snapshot: EncodedHomingView
     vector: HomingVector
     target: Pixels | None
     pose: Array
@@ -53,14 +53,15 @@ class Moment(NamedTuple):
 
 
 class HomingSnapshots(Stage):
-    """The robot's picture beside the target's at `moments` of a drive, with followed features and the homing vector.
+    """Plots the robot's image beside the target's at a few frames, with tracked features and the homing vector.
 
-    The last panel of each row is the floor around the robot (m): its way so far, the vector, and where the target view
-    was truly taken. `album` holds the pictures of the map's views, without `map` those of the path's own; without one
-    the target's features stand alone. Without `map` the target is where the run began.
+    The last panel of each row is the floor around the robot (m): its path so far, the vector, and where the target view
+    was truly taken. `thumbnails` holds the images of the map's views, without `map` those of the path's own; without
+    them the target's features stand alone. Without `map` the target is where the run began.
     """
 
-    moments: Annotated[int, Bounds(ge=1, le=8)] = 4
+    frames: Annotated[int, Bounds(ge=1, le=8)] = 4
+    """Number of rows."""
 
     class Out(Outputs):
         """`figure`: absent where there never was a target."""
@@ -71,7 +72,7 @@ class HomingSnapshots(Stage):
         self,
         ctx: Context,
         drive: Drive,
-        snapshots: Sequence[HomingGlance | None],
+        snapshots: Sequence[EncodedHomingView | None],
         progress: Sequence[PathProgress | None],
         routes: Sequence[PlannedRoute | None] | None = None,
         map: TopologicalMap | None = None,
@@ -80,20 +81,20 @@ class HomingSnapshots(Stage):
     ) -> Out:
         """The whole run at once."""
         path = drive.truth
-        told = [(row, g) for row, g in enumerate(snapshots) if g is not None and g.vector is not None]
-        if not told:
+        seen = [(row, g) for row, g in enumerate(snapshots) if g is not None and g.vector is not None]
+        if not seen:
             return self.Out()
         found = []
-        for row, glance in (told[n] for n in chosen([g for _, g in told], self.moments)):
-            assert glance.vector is not None
-            goal, shown = target_of(progress[row], None if routes is None else routes[row], map, path[0], thumbnails)
+        for row, snapshot in (seen[n] for n in chosen_rows([g for _, g in seen], self.frames)):
+            assert snapshot.vector is not None
+            goal, target = target_of(progress[row], None if routes is None else routes[row], map, path[0], thumbnails)
             found.append(
-                Moment(
+                Row(
                     int(drive.frames[row]),
                     drive.seconds[row],
-                    glance,
-                    glance.vector,
-                    shown,
+                    snapshot,
+                    snapshot.vector,
+                    target,
                     path[row],
                     goal,
                     path[: row + 1],
@@ -101,12 +102,12 @@ class HomingSnapshots(Stage):
             )
         return self.Out(
             figure=Figure(
-                name="homing_moments",
-                title="Features followed, and the way to the target view",
-                caption="Left: the robot's picture at a few moments, the features of the local map in it, and "
-                "the homing vector drawn over the floor. Middle: the view that it went to, the same features in the "
-                "same colours; light: those that it does not follow. Right: the floor around the robot, its true path "
-                "so far, the vector as homing told it (as long as odometry says, else dashed), and where the target "
+                name="homing_snapshots",
+                title="Tracked features and homing vectors",
+                caption="Left: the robot's image at a few frames, the features of the local map in it, and "
+                "the homing vector drawn over the floor. Middle: the target view, the same features in the "
+                "same colours; light: those that are not tracked. Right: the floor around the robot, its true path "
+                "so far, the homing vector (as long as odometry says, else dashed), and where the target "
                 "view was truly taken (green).",
                 content=_draw(found, plan),
                 media_type="image/jpeg",
@@ -115,33 +116,35 @@ class HomingSnapshots(Stage):
         )
 
 
-def chosen(glances: Sequence[HomingGlance], moments: int) -> list[int]:
+def chosen_rows(snapshots: Sequence[EncodedHomingView], frames: int) -> list[int]:
     """Spread over the drive; the last of them gives way to the first at which the target was lost."""
-    spread = spread_out(len(glances), moments)
-    lost = [n for n, glance in enumerate(glances) if glance.vector is not None and glance.vector.state == "lost"]
+    spread = spread_out(len(snapshots), frames)
+    lost = [
+        n for n, snapshot in enumerate(snapshots) if snapshot.vector is not None and snapshot.vector.state == "lost"
+    ]
     if lost and lost[0] not in spread and len(spread) > 2:
         nearest = min(spread[1:-1], key=lambda n: abs(n - lost[0]))
         spread = sorted({*spread, lost[0]} - {nearest})
     return spread
 
 
-def _draw(found: Sequence[Moment], plan: FloorPlan | None) -> bytes:
-    columns, rows = found[0].glance.size
+def _draw(found: Sequence[Row], plan: FloorPlan | None) -> bytes:
+    columns, rows = found[0].snapshot.size
     strip = columns > 2.5 * rows  # panoramas stand one above the other
     high = 10.5 / 3.15 * rows / columns
-    with picture(10.5, len(found) * (max(high, 2.6) + 0.4) + 0.4, dpi=100, media_type="image/jpeg") as drawn:
+    with plot(10.5, len(found) * (max(high, 2.6) + 0.4) + 0.4, dpi=100, media_type="image/jpeg") as drawn:
         grid = drawn.canvas.add_gridspec(2 * len(found) if strip else len(found), 3)
-        for number, moment in enumerate(found):
-            pixels = robots_view(decoded(moment.glance.jpeg), moment.glance)
-            target = targets_view(moment.target, moment.glance, moment.glance.size)
+        for number, row in enumerate(found):
+            pixels = draw_robot_view(decoded(row.snapshot.jpeg), row.snapshot)
+            target = draw_target_view(row.target, row.snapshot, row.snapshot.size)
             here, there = (
                 (grid[2 * number, :2], grid[2 * number + 1, :2]) if strip else (grid[number, 0], grid[number, 1])
             )
-            _show(drawn.canvas.add_subplot(here), pixels, f"frame {moment.frame} · {moment.seconds:.1f} s")
-            _show(drawn.canvas.add_subplot(there), target, f"going to: {moment.glance.target or 'a view'}")
+            _show(drawn.canvas.add_subplot(here), pixels, f"frame {row.frame} · {row.seconds:.1f} s")
+            _show(drawn.canvas.add_subplot(there), target, f"going to: {row.snapshot.target or 'a view'}")
             beside = grid[2 * number : 2 * number + 2, 2] if strip else grid[number, 2]
             axes = drawn.canvas.add_subplot(beside)
-            _draw_floor(axes, moment, plan)
+            _draw_floor(axes, row, plan)
             if number < len(found) - 1:
                 axes.set_xlabel("")
         drawn.canvas.legend(handles=_legend(), loc="outside lower center", ncols=6)
@@ -154,32 +157,32 @@ def _show(axes: "Axes", pixels: Pixels, title: str) -> None:
     axes.set_axis_off()
 
 
-def _draw_floor(axes: "Axes", moment: Moment, plan: FloorPlan | None) -> None:
+def _draw_floor(axes: "Axes", row: Row, plan: FloorPlan | None) -> None:
     draw_plan(axes, plan)
-    axes.plot(*broken_at_jumps(moment.path).T, color=ESTIMATE, linewidth=1.4, zorder=2)
-    axes.plot(*moment.goal[:2, None], "o", color=MARK, markersize=10, fillstyle="none", markeredgewidth=2, zorder=5)
-    draw_pose(axes, moment.goal, 0.35, MARK)
-    draw_pose(axes, moment.pose, 0.35, TRUTH)
-    vector = moment.vector
-    towards = moment.pose[2] + vector.direction
+    axes.plot(*broken_at_jumps(row.path).T, color=ESTIMATE, linewidth=1.4, zorder=2)
+    axes.plot(*row.goal[:2, None], "o", color=MARK, markersize=10, fillstyle="none", markeredgewidth=2, zorder=5)
+    draw_pose(axes, row.goal, 0.35, MARK)
+    draw_pose(axes, row.pose, 0.35, TRUTH)
+    vector = row.vector
+    towards = row.pose[2] + vector.direction
     length = 1.0 if vector.metres is None else max(vector.metres, 0.05)
-    tip = moment.pose[:2] + length * np.array([math.cos(towards), math.sin(towards)])
+    tip = row.pose[:2] + length * np.array([math.cos(towards), math.sin(towards)])
     if np.isfinite(tip).all() and is_known(vector):
         colour = ODOMETRY if vector.state == "lost" else hexadecimal(VECTOR)
         line = "--" if vector.metres is None or vector.state == "lost" else "-"
         arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0, "linestyle": line}
-        axes.annotate("", xy=tip.tolist(), xytext=moment.pose[:2].tolist(), arrowprops=arrow, zorder=7)
-    x, y = np.nan_to_num(moment.pose[:2])
-    plan_axes(axes, (x - REACH, x + REACH, y - REACH, y + REACH))
-    kinds = moment.glance.kinds
+        axes.annotate("", xy=tip.tolist(), xytext=row.pose[:2].tolist(), arrowprops=arrow, zorder=7)
+    x, y = np.nan_to_num(row.pose[:2])
+    plan_axes(axes, (x - AROUND_M, x + AROUND_M, y - AROUND_M, y + AROUND_M))
+    kinds = row.snapshot.kinds
     counted = f"{vector.inliers} agree, {int(np.count_nonzero(kinds == LOST))} of {len(kinds)} lost"
-    far = f"{vector.metres:.2f} m" if vector.metres is not None else f"{100 * vector.ratio:.0f} % of the way left"
-    said = (
+    far = f"{vector.metres:.2f} m" if vector.metres is not None else f"{100 * vector.ratio:.0f} % of the distance left"
+    text = (
         "the target is lost"
         if vector.state == "lost"
         else f"{far}, turn {round(math.degrees(vector.turn))}°\n{counted}"
     )
-    axes.set_title(said, fontsize=8.5)
+    axes.set_title(text, fontsize=8.5)
 
 
 def _legend() -> list[object]:

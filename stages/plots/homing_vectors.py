@@ -1,13 +1,14 @@
-"""Homing vectors over the floor, towards one target."""
+"""Plots homing vectors over the floor, towards one target."""
 
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing_field import HomingField
 
-from .style import (
+from .drawing import (
     EDGE,
     ODOMETRY,
     TRUTH,
@@ -15,13 +16,12 @@ from .style import (
     draw_pose,
     extent_of,
     fitting_height,
-    picture,
     plan_axes,
 )
 
 
 class ShowHomingVectors(Stage):
-    """An arrow where each view was taken, as the homing vector points from there, coloured by its error.
+    """Plots an arrow where each view was taken, along its homing vector, coloured by its error.
 
     As Figure 15 of Goedemé et al. 2007. With `plan` wired the world's floor plan lies under them.
     """
@@ -54,15 +54,15 @@ def _draw(field: HomingField, plan: FloorPlan | None) -> bytes:
     from matplotlib.patches import Circle
 
     extent = extent_of(field.poses, field.target[None], margin=0.06)
-    with picture(8.0, fitting_height(extent, 6.6, 3.0, 8.0)) as drawn:
+    with plot(8.0, fitting_height(extent, 6.6, 3.0, 8.0)) as drawn:
         axes = drawn.canvas.subplots()
         draw_plan(axes, plan)
         for metres in np.arange(2.0, float(field.metres.max()) + 1.0, 2.0):
             axes.add_patch(Circle(tuple(field.target[:2]), metres, fill=False, color=EDGE, linewidth=0.8))
         found = np.isfinite(field.directions)
         at, length = field.poses[found], _spacing(field.poses)
-        way = 0.85 * length * np.stack([np.cos(field.directions), np.sin(field.directions)], axis=-1)[found]
-        arrows = axes.quiver(*(at[:, :2] - way / 2).T, *way.T, np.clip(np.degrees(field.errors[found]), 0.0, 90.0),
+        arrow = 0.85 * length * np.stack([np.cos(field.directions), np.sin(field.directions)], axis=-1)[found]
+        arrows = axes.quiver(*(at[:, :2] - arrow / 2).T, *arrow.T, np.clip(np.degrees(field.errors[found]), 0.0, 90.0),
                              cmap="viridis", angles="xy", scale_units="xy", scale=1.0, width=0.004,
                              clim=(0.0, 90.0), zorder=3)  # fmt: skip
         drawn.canvas.colorbar(arrows, ax=axes, label="error of the direction (degrees)", shrink=0.7)

@@ -1,4 +1,4 @@
-"""A picture as the robot's camera took it, as a file: a goal to drive to, or something to look at."""
+"""Writes an image of the robot's camera as a file: a goal to drive to, or something to look at."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -11,9 +11,10 @@ from omninav.stages.values.image import Image
 
 
 class ImageAt(Stage):
-    """The picture of frame `frame` of each log."""
+    """Picks one image of each log."""
 
     frame: Annotated[int, Bounds(ge=0)] = 0
+    """Number of the frame."""
 
     class Out(Outputs):
         """`image`: absent at all other frames."""
@@ -26,7 +27,7 @@ class ImageAt(Stage):
 
 
 class ImageFile(Stage):
-    """Writes the first of the pictures that it is given as `picture.png` into the run's folder, pixel by pixel."""
+    """Writes the first image that it gets as `image.png` into the run's folder, pixel by pixel."""
 
     class Out(Outputs):
         pass
@@ -35,5 +36,5 @@ class ImageFile(Stage):
         """Write it, if there is one."""
         if images and ctx.folder is not None:
             _, encoded = cv2.imencode(".png", images[0].pixels)
-            write_whole(ctx.folder / "picture.png", encoded.tobytes())
+            write_whole(ctx.folder / "image.png", encoded.tobytes())
         return self.Out()

@@ -1,4 +1,4 @@
-"""Which places of a tour were thought to be one, and the map that was made of it."""
+"""Plots loop hypotheses of a tour, and the topological map made from it."""
 
 from typing import TYPE_CHECKING
 
@@ -7,10 +7,11 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.topological_map import LOOP, LoopHypotheses, TopologicalMap
 
-from .style import (
+from .drawing import (
     EDGE,
     ESTIMATE,
     MARK,
@@ -20,7 +21,6 @@ from .style import (
     draw_plan,
     extent_of,
     fitting_height,
-    picture,
     plan_axes,
 )
 
@@ -31,14 +31,14 @@ Array = npt.NDArray[np.float64]
 
 
 class ShowLoopHypotheses(Stage):
-    """Accepted and rejected loop hypotheses over the drive, and the map with its places, links and path images.
+    """Plots accepted and rejected loop hypotheses over the drive, and the map with its places, links and path images.
 
     As Figures 11 and 12 of Goedeme et al. 2007. Poses are those that the map keeps for drawing: truth, or odometry.
     With `plan` wired the world's floor plan lies under both.
     """
 
     class Out(Outputs):
-        """`figure`: absent where no picture has a pose."""
+        """`figure`: absent where no image has a pose."""
 
         figure: Figure | None = None
 
@@ -51,10 +51,10 @@ class ShowLoopHypotheses(Stage):
             figure=Figure(
                 name="loop_hypotheses",
                 title="Loop hypotheses and the topological map",
-                caption=f"Left: the {len(hypotheses.poses)} pictures of the tour that took part, where each was taken "
+                caption=f"Left: the {len(hypotheses.poses)} images of the tour that took part, where each was taken "
                 f"(from {hypotheses.pose_source}); {accepted} of {number} hypotheses that two views show one place "
                 f"were accepted, the others rejected. Right: {len(map)} places at their medoids, {len(map.links)} "
-                f"links, and the path images between them: {len(map.views)} views in all. It was made from pictures "
+                f"links, and the path images between them: {len(map.views)} views in all. It was made from images "
                 "alone.",
                 content=_draw(hypotheses, map, plan),
                 order=9,
@@ -64,7 +64,7 @@ class ShowLoopHypotheses(Stage):
 
 def _draw(found: LoopHypotheses, map: TopologicalMap, plan: FloorPlan | None) -> bytes:
     extent = extent_of(found.poses, margin=0.08)
-    with picture(11.0, fitting_height(extent, 4.9, 2.6, 8.5)) as drawn:
+    with plot(11.0, fitting_height(extent, 4.9, 2.6, 8.5)) as drawn:
         left, right = drawn.canvas.subplots(1, 2)
         for axes in (left, right):
             draw_plan(axes, plan)
@@ -91,19 +91,21 @@ def _draw(found: LoopHypotheses, map: TopologicalMap, plan: FloorPlan | None) ->
 def _draw_tours(axes: "Axes", found: LoopHypotheses) -> None:
     for number, tour in enumerate(np.unique(found.tour)):
         poses = found.poses[found.tour == tour]
-        label = f"pictures ({len(found.poses)})" if number == 0 else None
+        label = f"images ({len(found.poses)})" if number == 0 else None
         axes.plot(poses[:, 0], poses[:, 1], "." if tour == 0 else ".-", color=EDGE, linewidth=0.8, markersize=2.5,
                   zorder=1, label=label)  # fmt: skip
 
 
 def _draw_places(axes: "Axes", map: TopologicalMap) -> None:
     poses = map.poses[:, :2]
-    ways = [poses[[map.places[a], *map.way(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
+    paths = [poses[[map.places[a], *map.way(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
     loop = map.kinds == LOOP
-    driven = [way for way, of_loop in zip(ways, loop, strict=True) if not of_loop]
+    driven = [path for path, of_loop in zip(paths, loop, strict=True) if not of_loop]
     _lines(axes, driven, ESTIMATE, 1.1, f"driven ({len(driven)})")
     if loop.any():
-        _lines(axes, [way for way, of in zip(ways, loop, strict=True) if of], MARK, 1.4, f"loops ({int(loop.sum())})")
+        _lines(
+            axes, [path for path, of in zip(paths, loop, strict=True) if of], MARK, 1.4, f"loops ({int(loop.sum())})"
+        )
     between = np.setdiff1d(np.arange(len(poses)), map.places)
     axes.plot(*poses[between].T, ".", color=REFERENCE, markersize=4, zorder=4, label=f"path images ({len(between)})")
     axes.plot(*poses[map.places].T, "o", color=TRUTH, markersize=4.5, zorder=5, label=f"places ({len(map)})")

@@ -1,4 +1,4 @@
-"""A map of views: where each is seen from, how surely, and how much it counts."""
+"""Plots a map of views: where each is seen from, how surely, and its weight."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -7,11 +7,12 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.view_mixtures import ViewMixtures
 
-from .style import (
+from .drawing import (
     EDGE,
     ESTIMATE,
     TRUTH,
@@ -19,21 +20,21 @@ from .style import (
     draw_plan,
     extent_of,
     fitting_height,
-    picture,
     plan_axes,
 )
 
 
 class MapEllipses(Stage):
-    """The components of a map of views as ellipses, coloured by weight, over the true path and the floor plan.
+    """Plots the components of a map of views as ellipses, coloured by weight, over the true path and the floor plan.
 
-    Ellipses are `sigmas` standard deviations wide to either side; a short line from the middle points along the heading
-    at which the view is seen as it was kept, where there are at most `headings` components. Without truth the path is
-    that of the estimates, and no plan is drawn: the map has a frame of its own then.
+    A short line from the middle points along the heading at which the view is seen as it was kept. Without truth the
+    path is that of the estimates, and no plan is drawn: the map has a frame of its own then.
     """
 
     sigmas: Annotated[float, Bounds(gt=0)] = 1.0
+    """Half the width of an ellipse in standard deviations."""
     headings: Annotated[int, Bounds(ge=0)] = 600
+    """Largest number of components with which headings are drawn."""
 
     class Out(Outputs):
         """`figure`: absent where the map is empty."""
@@ -53,14 +54,14 @@ class MapEllipses(Stage):
         true = drive.has_truth
         paths = [log.truth if true else log.estimate for log in drive.by_log]
         per_view = len(map.weights) / max(len(map), 1)
-        said = (
+        size = (
             f"{len(map)} views seen from {len(map.weights)} places ({per_view:.2f} each), learned in {map.steps} steps."
         )
         return self.Out(
             figure=Figure(
                 name="map_ellipses",
                 title="The map",
-                caption=f"{said} Each place is an ellipse of {self.sigmas:g} sigma, yellow where it "
+                caption=f"{size} Each place is an ellipse of {self.sigmas:g} sigma, yellow where it "
                 f"weighs little and blue where it weighs much. The line is the {'true path' if true else 'estimate'}. "
                 f"The first pose came from {map.pose_source}.",
                 content=_draw(map, paths, plan if true else None, self.sigmas, self.headings, true),
@@ -78,7 +79,7 @@ def _draw(
     reach = sigmas * np.sqrt(np.diagonal(map.covariances, axis1=1, axis2=2)[:, :2])
     corners = map.means[:, None, :2] + np.stack([-reach, reach], axis=1)
     extent = extent_of(*paths, corners.reshape(-1, 2), margin=0.02)
-    with picture(8.0, fitting_height(extent, 8.0, 3.0, 9.0)) as drawn:
+    with plot(8.0, fitting_height(extent, 8.0, 3.0, 9.0)) as drawn:
         axes = drawn.canvas.add_subplot()
         draw_plan(axes, plan)
         for number, path in enumerate(paths):

@@ -1,4 +1,4 @@
-"""How a map of views grew and forgot."""
+"""Plots how a map of views grew and forgot."""
 
 from collections.abc import Sequence
 
@@ -7,16 +7,17 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import ViewEvent
 
-from .style import ESTIMATE, MARK, ODOMETRY, REFERENCE, picture
+from .drawing import ESTIMATE, MARK, ODOMETRY, REFERENCE
 
 BINS = 80
 
 
 class MapGrowth(Stage):
-    """References and components over the frames of all logs, and how many references came and went."""
+    """Plots references and components over the frames of all logs, and how many references came and went."""
 
     class Out(Outputs):
         """`figure`: absent where nothing was ever learned."""
@@ -34,14 +35,14 @@ class MapGrowth(Stage):
         went = np.array([len(event.removed) for event in found])
         starts = [int(log.row[0]) for log in drive.by_log]
         reasons = {why: sum(len(e.removed) for e in found if e.why == why) for why in ("forgotten", "merged", "full")}
-        told = ", ".join(f"{number} {why}" for why, number in reasons.items() if number)
+        counted = ", ".join(f"{number} {why}" for why, number in reasons.items() if number)
         return self.Out(
             figure=Figure(
                 name="map_growth",
-                title="The map over time",
-                caption=f"{came.sum()} references came, {went.sum()} went{f' ({told})' if told else ''}; "
+                title="Map size over time",
+                caption=f"{came.sum()} references came, {went.sum()} went{f' ({counted})' if counted else ''}; "
                 f"{found[-1].views} with {found[-1].components} components were left. Below, how many came and went "
-                f"per {_width(len(drive))} frames, by when it was learned, some way behind where it was seen. Dotted "
+                f"per {_width(len(drive))} frames, by when they were learned, which is later than seen. Dotted "
                 "lines: a new log begins.",
                 content=_draw(
                     len(drive),
@@ -72,7 +73,7 @@ def _draw(
 ) -> bytes:
     width = _width(frames)
     edges = np.arange(0, frames + width, width)
-    with picture(8.0, 4.4) as drawn:
+    with plot(8.0, 4.4) as drawn:
         upper, lower = drawn.canvas.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         upper.step(at, components, where="post", color=REFERENCE, linewidth=1.2, label="components")
         upper.step(at, views, where="post", color=ESTIMATE, linewidth=1.6, label="references")

@@ -1,17 +1,18 @@
-"""A map by itself: where its reference views were taken."""
+"""Plots a map: where its reference views were taken."""
 
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.maps import ReferenceGraph
 
-from .style import ESTIMATE, draw_map, extent_of, fitting_height, picture, plan_axes
+from .drawing import ESTIMATE, draw_map, extent_of, fitting_height, plan_axes
 
 
 class MapPlot(Stage):
-    """The map's references with their headings, and its edges. Map frame, metres."""
+    """Plots the map's references with their headings, and its edges. Map frame, metres."""
 
     class Out(Outputs):
         """`figure`: absent where the map is empty."""
@@ -36,7 +37,7 @@ class MapPlot(Stage):
 
 def _draw(map: ReferenceGraph) -> bytes:
     extent = extent_of(map.poses, margin=0.08)
-    with picture(8.0, fitting_height(extent, 8.0, 2.6, 8.5)) as drawn:
+    with plot(8.0, fitting_height(extent, 8.0, 2.6, 8.5)) as drawn:
         axes = drawn.canvas.add_subplot()
         draw_map(axes, map)
         heading = map.poses[:, 2]

@@ -1,4 +1,4 @@
-"""A few pictures as small encoded ones, because images themselves are too large to be kept."""
+"""Keeps a few panoramas as small JPEGs, because images themselves are too large to be kept."""
 
 import math
 
@@ -8,7 +8,7 @@ import numpy as np
 from omninav.pipeline import Context, Outputs, Stage, Tick, Value
 from omninav.stages.values.image import Panorama, Windows
 
-from .snapshot_times import is_moment
+from .snapshot_times import is_snapshot_frame
 
 
 class EncodedPanorama(Value):
@@ -32,7 +32,7 @@ class PanoramaSnapshot(Stage):
 
     def step(self, ctx: Context, tick: Tick, panorama: Panorama | Windows) -> Out:
         """One frame."""
-        if not is_moment(tick.frame):
+        if not is_snapshot_frame(tick.frame):
             return self.Out()
         headings: tuple[float, ...] = ()
         pixels: cv2.typing.MatLike = panorama.pixels

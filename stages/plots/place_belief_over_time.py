@@ -1,4 +1,4 @@
-"""What was believed of every place of a topological map, all through a drive."""
+"""Plots the belief in every place of a topological map over time."""
 
 from collections.abc import Sequence
 
@@ -7,22 +7,23 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.drive import known as poses_known
 from omninav.stages.values.topological_map import TopologicalMap
 
-from .style import ESTIMATE, MARK, ODOMETRY, PARTICLE, TRUTH, picture
+from .drawing import ESTIMATE, MARK, ODOMETRY, PARTICLE, TRUTH
 
 COLUMNS = 900
-"""Ticks that are told apart in the picture; of longer drives the most that was believed in each."""
+"""Ticks that are told apart in the plot; of longer drives the largest belief in each."""
 
 
 class PlaceBeliefOverTime(Stage):
-    """The belief in every place over time, as dark as it is probable, with the place that was truly nearest beside it.
+    """Plots the belief in every place over time, as dark as it is probable, with the place that was truly nearest.
 
-    Of the last log. Below it how sure it was: the belief's share of its maximum, of the truly nearest place, and of
+    Of the last log. Below it: the belief's share of its maximum, of the truly nearest place, and of
     that together with its neighbours.
     """
 
@@ -55,11 +56,11 @@ class PlaceBeliefOverTime(Stage):
         both = known & np.isfinite(shares).all(axis=1)
         if both.any():
             rate = float((np.argmax(shares[both], axis=1) == nearest[both]).mean())
-            right = f" In {100 * rate:.0f} % of the pictures the most probable place is that one."
+            right = f" In {100 * rate:.0f} % of the images the most probable place is that one."
         return self.Out(
             figure=Figure(
                 name="place_belief",
-                title="The belief in every place, over time",
+                title="Belief over places",
                 caption=f"Above: {len(map)} places, numbered as the map has them, as dark as they were believed.{truly}"
                 f"{right} Below: how probable the most probable place was, and how probable the truly nearest, alone "
                 "and with the places linked to it.",
@@ -90,7 +91,7 @@ def _draw(seconds: Array, shares: Array, nearest: npt.NDArray[np.int64], map: To
 
     step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 1.0
     height = float(np.clip(0.09 * len(map) + 0.8, 2.2, 5.0))
-    with picture(9.5, height + 2.0) as drawn:
+    with plot(9.5, height + 2.0) as drawn:
         upper, lower = drawn.canvas.subplots(2, 1, sharex=True, height_ratios=[height, 1.5])
         shades = LinearSegmentedColormap.from_list("belief", ["#ffffff", PARTICLE, "#4a1536"])
         dark = shades.with_extremes(bad="#eceef1")

@@ -1,4 +1,4 @@
-"""One reference's life: where it was thought to be seen from, and how much each of these places counted."""
+"""Plots the history of one reference: where it was thought to be seen from, and the weight of each place."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -8,18 +8,18 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 
-from .style import (
+from .drawing import (
     EDGE,
     REFERENCE,
     TRUTH,
     draw_plan,
     extent_of,
     fitting_height,
-    picture,
     plan_axes,
 )
 
@@ -28,16 +28,17 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 
 class ReferenceLife(Stage):
-    """The components of one reference over the frames: their weights, and their places over the plan.
+    """Plots the components of one reference over the frames: their weights, and their places over the plan.
 
-    `name`: which one; None: the one whose heaviest component's place moved furthest in sum, which is where wrong
-    associations show. Components of two moments are the same place where they are nearest to each other and within
-    `same_m` metres. True positions are those of the frames at which the reference changed; where lessons come late
-    its view was seen before.
+    Components of two frames are the same place where they are nearest to each other. True positions are those of the
+    frames at which the reference changed; where map updates come late its view was seen before.
     """
 
     name: Annotated[int, Bounds(ge=0)] | None = None
+    """Number of the reference. None: the one whose heaviest component moved furthest in sum, which is where wrong
+    associations show."""
     same_m: Annotated[float, Bounds(gt=0)] = 1.0
+    """Largest distance (m) between components of two frames that are the same place."""
 
     class Out(Outputs):
         """`figure`: absent where that reference never was, or no reference ever changed."""
@@ -56,24 +57,24 @@ class ReferenceLife(Stage):
         name = most_moved(events) if self.name is None else self.name
         if name is None:
             return self.Out()
-        moments: list[Moment] = []
+        snapshots: list[Snapshot] = []
         seen = []
         path = drive.truth[:, :2]
         for row, now in enumerate(mixtures):
             if now is not None and (mine := now.ids == name).any():
-                moments.append((row, now.means[mine, :2].astype(np.float64), now.weights[mine].astype(np.float64)))
+                snapshots.append((row, now.means[mine, :2].astype(np.float64), now.weights[mine].astype(np.float64)))
                 seen.append(row)
-        if not moments:
+        if not snapshots:
             return self.Out()
         gone = next((row for row, event in enumerate(events) if event is not None and name in event.removed), None)
-        lives = lives_of(moments, self.same_m)
+        lives = lives_of(snapshots, self.same_m)
         ended = f"it was removed in frame {gone}" if gone is not None else "it was in the map to the end"
         return self.Out(
             figure=Figure(
                 name="reference_life",
-                title="A reference's life",
-                caption=f"Reference {name} came in frame {moments[0][0]} and changed in {len(moments)} frames; "
-                f"{ended}. {len(lives)} place(s) were held for it, each with its colour in both pictures"
+                title="History of a reference",
+                caption=f"Reference {name} came in frame {snapshots[0][0]} and changed in {len(snapshots)} frames; "
+                f"{ended}. {len(lives)} place(s) were held for it, each with its colour in both plots"
                 f"{'; grey: those beyond the heaviest six' if len(lives) > len(COLOURS) else ''}. "
                 "Right: larger dots weigh more, circles are last places, crosses the true positions at these frames "
                 "(a map that learns with delay changes a little after the view was seen).",
@@ -83,7 +84,7 @@ class ReferenceLife(Stage):
         )
 
 
-Moment = tuple[int, Array, Array]
+Snapshot = tuple[int, Array, Array]
 """A frame, and the places (K, 2) and weights (K,) of a reference's components after it."""
 
 
@@ -96,20 +97,20 @@ def most_moved(events: Sequence[ViewEvent | None]) -> int | None:
             continue
         for name, place, parts in zip(event.changed.tolist(), event.places, event.parts.tolist(), strict=True):
             if parts:
-                way, times = moved.get(name, (0.0, 0))
-                moved[name] = (way + float(np.hypot(*(place - last.get(name, place)))), times + 1)
+                distance, times = moved.get(name, (0.0, 0))
+                moved[name] = (distance + float(np.hypot(*(place - last.get(name, place)))), times + 1)
                 last[name] = place
     return max(moved, key=lambda name: (*moved[name], -name)) if moved else None
 
 
-def lives_of(moments: Sequence[Moment], same_m: float) -> list[Array]:
-    """What became of each place over the moments: (n, 4) frame, x, y, weight; the one that weighed most comes first.
+def lives_of(snapshots: Sequence[Snapshot], same_m: float) -> list[Array]:
+    """What became of each place over the snapshots: (n, 4) frame, x, y, weight; the one that weighed most comes first.
 
-    From moment to moment the closest pair is taken for one place first, none that is further apart than `same_m`.
+    From snapshot to snapshot the closest pair is taken for one place first, none that is further apart than `same_m`.
     """
     done: list[list[tuple[float, ...]]] = []
     alive: list[list[tuple[float, ...]]] = []
-    for frame, places, weights in moments:
+    for frame, places, weights in snapshots:
         rows = [(float(frame), float(x), float(y), float(w)) for (x, y), w in zip(places, weights, strict=True)]
         before = np.array([life[-1][1:3] for life in alive]).reshape(-1, 2)
         gaps = np.linalg.norm(before[:, None] - places[None], axis=2)
@@ -132,7 +133,7 @@ def _draw(
     gone: int | None,
 ) -> bytes:
     extent = extent_of(path, *(life[:, 1:3] for life in lives), margin=0.08)
-    with picture(9.0, fitting_height(extent, 4.6, 3.0, 6.0)) as drawn:
+    with plot(9.0, fitting_height(extent, 4.6, 3.0, 6.0)) as drawn:
         left, right = drawn.canvas.subplots(1, 2)
         draw_plan(right, plan)
         right.plot(*path.T, color=EDGE, linewidth=0.8, zorder=1)

@@ -23,24 +23,25 @@ FRAME = "map"
 
 
 class ResultLog(Stage):
-    """Writes `result.mcap`: what the run thought, beside what was true.
+    """Writes `result.mcap`: estimates and beliefs beside the truth.
 
     | topic | message | holds |
     |---|---|---|
     | `/estimate/pose` | PoseWithCovarianceStamped | the estimate per frame; 6 x 6 covariance, plane entries only |
     | `/estimate/path` | Path | all of a log's estimates, at its end |
-    | `/belief` | PoseArray | the belief in at most `particles` poses per frame; of a mixture, its Gaussians' means |
+    | `/belief` | PoseArray | the belief in few poses per frame; of a mixture, its Gaussians' means |
     | `/belief/gaussians` | MarkerArray | a mixture's Gaussians: the axes of their ellipses, one sigma each way |
     | `/odom` | Odometry | odometry alone, from the log's first frame, in the frame `odom` |
     | `/ground_truth/pose` | PoseStamped | where the log has it |
     | `/map` | MarkerArray | a graph's references and edges, once per log; what mixtures were learned, at the end |
-    | `/command` | TwistStamped | what a driver asked for, in a closed loop |
+    | `/command` | TwistStamped | what was commanded, in a closed loop |
     | `/tf` | TFMessage | `map` to `odom`, once per log: odometry laid where `odometry alone` starts |
 
     Stamps are the images' header stamps.
     """
 
     particles: Annotated[int, Bounds(ge=1)] = 200
+    """Largest number of poses in a message of the belief."""
 
     class Out(Outputs):
         """Nothing: the file is the result."""

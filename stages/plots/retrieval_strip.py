@@ -1,4 +1,4 @@
-"""What the image database answers: the picture asked for, and the most similar ones it holds."""
+"""Plots retrieved references: a query image, and the most similar ones of the map."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -7,6 +7,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.image import Pixels
@@ -14,9 +15,9 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Answers
 from omninav.stages.values.thumbnails import Thumbnails, decoded
 
+from .drawing import EDGE, MARK, ODOMETRY, TRUTH
 from .panorama_snapshot import EncodedPanorama
 from .snapshot_times import spread_out
-from .style import EDGE, MARK, ODOMETRY, TRUTH, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +30,7 @@ WIDTH, LINE = 10.0, 0.17
 
 
 class Query(NamedTuple):
-    """A moment of the drive: its frame, what the robot saw, what the database answered, where the robot truly was."""
+    """A query: its frame, what the robot saw, what the database answered, where the robot truly was."""
 
     frame: int
     seen: EncodedPanorama
@@ -38,16 +39,16 @@ class Query(NamedTuple):
 
 
 class RetrievalStrip(Stage):
-    """Queries of a few moments of the last log, and under each the most similar references with their similarities.
+    """Plots queries of a few frames of the last log, and under each the most similar references.
 
-    Wolf, Burgard & Burkhardt 2005, figures 2 and 5. Without an `album` there are no pictures of references: their poses
-    stand in their places.
+    Wolf, Burgard & Burkhardt 2005, figures 2 and 5. Without `thumbnails` the references' poses stand in their places.
     """
 
     frames: Annotated[int, Bounds(ge=1, le=8)] = 3
+    """Number of queries."""
 
     class Out(Outputs):
-        """`figure`: a query per moment."""
+        """`figure`: a query per frame."""
 
         figure: Figure | None = None
 
@@ -69,32 +70,33 @@ class RetrievalStrip(Stage):
         ]
         if not queries:
             return self.Out()
-        pictures = thumbnails is not None and len(thumbnails) == len(map)
+        chosen = [queries[n] for n in spread_out(len(queries), self.frames)]
+        illustrated = thumbnails is not None and len(thumbnails) == len(map)
         return self.Out(
             figure=Figure(
                 name="retrieval_strip",
-                title="What the image database answers",
-                caption="The robot's picture at a few moments, and below it the most similar references, the best "
+                title="Retrieved references",
+                caption="Query images of the drive, and below each the most similar references, the best "
                 "first: the similarity, and where it is known how far the robot truly was from where it would be if "
                 f"the reference were right (green: within {NEAR_M:g} m and {NEAR_DEG:g}°)."
-                + ("" if pictures else " There is no album of the references' pictures: their poses stand instead."),
-                content=_draw([queries[n] for n in spread_out(len(queries), self.frames)], map, thumbnails, pictures),
+                + ("" if illustrated else " Without thumbnails of the references their poses are shown."),
+                content=_draw(chosen, map, thumbnails, illustrated),
                 media_type="image/jpeg",
                 order=42,
             )
         )
 
 
-def _draw(queries: Sequence[Query], map: ReferenceGraph, album: Thumbnails | None, pictures: bool) -> bytes:
+def _draw(queries: Sequence[Query], map: ReferenceGraph, thumbnails: Thumbnails | None, illustrated: bool) -> bytes:
     asked = [decoded(query.seen.jpeg) for query in queries]
     windows = len(queries[0].seen.headings)
     shape = asked[0].shape[0] / asked[0].shape[1] * max(windows, 1)
     across = 3 if shape < 0.4 else 9
     cell = WIDTH / across  # inches
     lines = -(-max(len(query.answers.references) for query in queries) // across)
-    row = cell * (shape if pictures else 0.0) + (2.3 if pictures else 3.4) * LINE
+    row = cell * (shape if illustrated else 0.0) + (2.3 if illustrated else 3.4) * LINE
     block = cell * shape + 1.5 * LINE + lines * row + 1.5 * LINE
-    with picture(WIDTH, block * len(queries), media_type="image/jpeg") as drawn:
+    with plot(WIDTH, block * len(queries), media_type="image/jpeg") as drawn:
         axes = drawn.canvas.add_subplot(1, 1, 1)
         for number, (query, pixels) in enumerate(zip(queries, asked, strict=True)):
             top = -number * block
@@ -104,13 +106,13 @@ def _draw(queries: Sequence[Query], map: ReferenceGraph, album: Thumbnails | Non
             _show(axes, pixels, 0.02, below, wide - 0.04, cell * shape - 0.02)
             for n, reference in enumerate(query.answers.references.tolist()):
                 left, high = cell * (n % across) + 0.02, below - cell * shape - (n // across) * row - 0.03
-                if pictures and album is not None:
-                    kept = album.image(reference)
+                if illustrated and thumbnails is not None:
+                    kept = thumbnails.image(reference)
                     if not windows:  # turned as it is most similar
                         kept = np.roll(kept, round(query.answers.turns[n] / (2 * np.pi) * kept.shape[1]), axis=1)
                     _show(axes, kept, left, high, cell - 0.04, cell * shape - 0.04)
                     high -= cell * shape - 0.03
-                _label(axes, query, map, n, left, high, pictures)
+                _label(axes, query, map, n, left, high, illustrated)
         axes.set_xlim(0.0, WIDTH)
         axes.set_ylim(-block * len(queries), 0.0)
         axes.set_axis_off()
@@ -126,16 +128,16 @@ def _title(axes: "Axes", text: str, left: float, top: float) -> None:
     axes.text(left, top, text, fontsize=9, va="bottom", color=TRUTH, fontweight="bold")
 
 
-def _label(axes: "Axes", query: Query, map: ReferenceGraph, n: int, left: float, top: float, pictures: bool) -> None:
+def _label(axes: "Axes", query: Query, map: ReferenceGraph, n: int, left: float, top: float, illustrated: bool) -> None:
     x, y, heading = map.poses[query.answers.references[n]]
     words, colour = [f"{100 * query.answers.similarities[n]:.1f} %"], TRUTH
-    if not pictures:
+    if not illustrated:
         words.append(f"({x:.1f}, {y:.1f}) m {np.degrees(wrap(heading)):.0f}°")
     if np.isfinite(query.truth).all():
         apart = float(np.hypot(*(map.poses[query.answers.references[n]] - query.truth)[:2]))
         turned = abs(np.degrees(float(wrap(heading + query.answers.turns[n] - query.truth[2]))))
         words.append(f"{apart:.1f} m, {turned:.0f}°")
         colour = MARK if apart <= NEAR_M and turned <= NEAR_DEG else ODOMETRY
-    if not pictures:
+    if not illustrated:
         axes.plot([left, left], [top - len(words) * LINE, top], color=EDGE, linewidth=1)
     axes.text(left + 0.02, top, "\n".join(words), fontsize=7.5, va="top", color=colour, linespacing=1.1)

@@ -1,4 +1,4 @@
-"""Which places look like what the robot sees."""
+"""Plots which references look like the present image."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -7,28 +7,29 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.maps import ReferenceGraph
 
-from .similarity_peaks import Peaks
-from .snapshot_times import spread_out
-from .style import (
+from .drawing import (
     ESTIMATE,
     REFERENCE,
     TRUTH,
     draw_pose,
     extent_of,
     fitting_height,
-    picture,
     plan_axes,
 )
+from .similarity_peaks import Peaks
+from .snapshot_times import spread_out
 
 
 class SimilarityHeatMap(Stage):
-    """Each reference's best similarity as a coloured dot over the map, and the heading profile of the best one."""
+    """Plots each reference's best similarity over the map, and the heading profile of the best one."""
 
     frames: Annotated[int, Bounds(ge=1, le=8)] = 4
+    """Number of columns."""
 
     class Out(Outputs):
         """`figure`: a column per frame."""
@@ -72,7 +73,7 @@ def _draw(panels: Sequence[tuple[int, Peaks, Array]], map: ReferenceGraph) -> by
     columns = len(panels)
     arrow = 0.1 * (extent[1] - extent[0] + extent[3] - extent[2]) / 2 if extent else 1.0
     above = fitting_height(extent, 10.0 / columns, 1.8, 5.0)
-    with picture(10.0, above + 1.9, dpi=100) as drawn:
+    with plot(10.0, above + 1.9, dpi=100) as drawn:
         axes = drawn.canvas.subplots(2, columns, squeeze=False, height_ratios=[above, 1.6])
         low = min(float(peak.best.min()) for _, peak, _ in panels)
         high = max(float(peak.best.max()) for _, peak, _ in panels)

@@ -1,4 +1,4 @@
-"""What is kept of the similarities for a picture: the best one of each reference, at a few frames."""
+"""Keeps what a plot needs of the similarities: the best one of each reference, at a few frames."""
 
 import numpy as np
 import numpy.typing as npt
@@ -6,7 +6,7 @@ import numpy.typing as npt
 from omninav.pipeline import Context, Outputs, Stage, Tick, Value
 from omninav.stages.values.similarity import Similarities
 
-from .snapshot_times import is_moment
+from .snapshot_times import is_snapshot_frame
 
 
 class Peaks(Value):
@@ -33,7 +33,7 @@ class SimilarityPeaks(Stage):
     def step(self, ctx: Context, tick: Tick, similarities: Similarities) -> Out:
         """One frame."""
         values = similarities.values
-        if not is_moment(tick.frame) or not len(values):
+        if not is_snapshot_frame(tick.frame) or not len(values):
             return self.Out()
         best = values.max(axis=1)
         winner = int(np.argmax(best))

@@ -1,4 +1,4 @@
-"""Which picture of an album a robot was going to, tick by tick."""
+"""The image of the view that a robot was going to, tick by tick."""
 
 from collections.abc import Sequence
 
@@ -12,18 +12,18 @@ from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.thumbnails import Thumbnails, decoded
 from omninav.stages.values.topological_map import TopologicalMap
 
-from .homing_snapshot import HomingGlance
+from .homing_snapshot import EncodedHomingView
 
 
 class FirstThumbnail(Stage):
-    """An album of one: the first picture of a run, to which a robot that was carried away goes back."""
+    """Keeps the first image of a run, to which a kidnapped robot goes back, as the only thumbnail."""
 
     class Out(Outputs):
-        """`album`: absent where nothing was seen."""
+        """`thumbnails`: absent where nothing was seen."""
 
         thumbnails: Thumbnails | None = None
 
-    def step(self, ctx: Context, snapshots: Sequence[HomingGlance]) -> Out:
+    def step(self, ctx: Context, snapshots: Sequence[EncodedHomingView]) -> Out:
         """The whole run at once."""
         first = next(iter(snapshots), None)
         if first is None:
@@ -33,38 +33,39 @@ class FirstThumbnail(Stage):
         )
 
 
-def target_view(progress: PathProgress | None, way: PlannedRoute | None, map: TopologicalMap | None) -> int | None:
-    """The number of the view that the robot goes to: on a way over a map the map's, else the path's own; None: none."""
+def target_view(progress: PathProgress | None, route: PlannedRoute | None, map: TopologicalMap | None) -> int | None:
+    """The number of the view that the robot goes to: the map's on a route over a map, else the path's; or None."""
     if progress is None:
         return None
     at = min(progress.at, progress.of - 1)
     if map is None:
         return at
-    if way is None or way.number != progress.path:
+    if route is None or route.number != progress.path:
         return None
-    views, _ = map.views_along(way.places)
+    views, _ = map.views_along(route.places)
     return int(views[at]) if at < len(views) else None
 
 
 def target_of(
     progress: PathProgress | None,
-    way: PlannedRoute | None,
+    route: PlannedRoute | None,
     map: TopologicalMap | None,
     start: Array,
-    album: Thumbnails | None,
+    thumbnails: Thumbnails | None,
 ) -> tuple[Array, Pixels | None]:
-    """Where the view that the robot goes to was taken (3,), NaN where it is not known, and its picture.
+    """Where the view that the robot goes to was taken (3,), NaN where it is not known, and its image.
 
     Without a map that is where the run began, `start` (3,).
     """
-    view = target_view(progress, way, map)
+    view = target_view(progress, route, map)
     if view is None:
         return np.full(3, np.nan), None
-    return start if map is None else map.poses[view], picture_of(view, album)
+    return start if map is None else map.poses[view], image_of(view, thumbnails)
 
 
-def picture_of(view: int | None, album: Thumbnails | None) -> Pixels | None:
-    """A view's picture, where the album has it."""
-    if view is None or album is None or view >= len(album) or album.ends[view] == album.ends[view + 1]:
+def image_of(view: int | None, thumbnails: Thumbnails | None) -> Pixels | None:
+    """A view's image, where there is a thumbnail of it."""
+    if view is None or thumbnails is None or view >= len(thumbnails):
         return None
-    return decoded(album.jpegs[album.ends[view] : album.ends[view + 1]])
+    start, end = thumbnails.ends[view : view + 2]
+    return decoded(thumbnails.jpegs[start:end]) if end > start else None

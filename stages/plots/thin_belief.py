@@ -12,12 +12,13 @@ Array = npt.NDArray[np.float64]
 
 
 class ThinBelief(Stage):
-    """At most `particles` equally weighted particles that stand for a belief, chosen without chance.
+    """Thins a belief to few equally weighted particles that stand for it, without chance.
 
-    Of a mixture, as many of its heaviest Gaussians. Other beliefs are shown by the one pose that they stand for.
+    Of a mixture, as many of its heaviest Gaussians. Other beliefs become the one pose of their estimate.
     """
 
     particles: Annotated[int, Bounds(ge=1)] = 300
+    """Largest number of particles or Gaussians."""
 
     class Out(Outputs):
         """`belief`: particles or Gaussians, map frame."""

@@ -1,4 +1,4 @@
-"""Where the robot was thought to be, over the map."""
+"""Plots estimated trajectories over the map."""
 
 from collections.abc import Sequence
 
@@ -6,12 +6,13 @@ import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.map_places import AnyMap, map_poses
 from omninav.stages.values.topological_map import TopologicalMap
 
-from .style import (
+from .drawing import (
     ESTIMATE,
     MARK,
     ODOMETRY,
@@ -20,19 +21,18 @@ from .style import (
     draw_map,
     extent_of,
     fitting_height,
-    picture,
     plan_axes,
 )
 
 
 class TrajectoryOverMap(Stage):
-    """Estimate, truth and odometry alone over the map's references and edges, one panel per log (map frame, m).
+    """Plots estimate, truth and odometry alone over the map's references and edges, a panel per log (map frame, m).
 
     With `grid` wired, all of it over what is occupied there.
     """
 
     class Out(Outputs):
-        """`figure`: the last log; `earlier`: where there are several, the ones before it in one picture."""
+        """`figure`: the last log; `earlier`: where there are several, the ones before it in one plot."""
 
         figure: Figure | None = None
         earlier: Figure | None = None
@@ -75,7 +75,7 @@ def _caption(drive: Drive, map: AnyMap | None) -> str:
         words.append(f"Odometry alone {anchor}.")
     if isinstance(map, TopologicalMap) and len(map):
         words.append(
-            f"Grey: {len(map)} places at their medoids, joined along the pictures between them, all poses taken from "
+            f"Grey: {len(map)} places at their medoids, joined along the images between them, all poses taken from "
             f"{map.pose_source}: the estimate is the most probable place's, turned as the view is."
         )
     elif map is not None and len(map):
@@ -88,7 +88,7 @@ def _draw(logs: Sequence[Drive], map: AnyMap | None, grid: OccupancyGrid | None)
     rows = -(-len(logs) // columns)
     extent = _shown(logs, map)
     width = 8.0 / columns
-    with picture(8.0, rows * fitting_height(extent, width, 2.6, 8.5 if columns == 1 else 5.0)) as drawn:
+    with plot(8.0, rows * fitting_height(extent, width, 2.6, 8.5 if columns == 1 else 5.0)) as drawn:
         for number, drive in enumerate(logs):
             axes = drawn.canvas.add_subplot(rows, columns, number + 1)
             draw_grid(axes, grid)
@@ -122,7 +122,7 @@ def _draw(logs: Sequence[Drive], map: AnyMap | None, grid: OccupancyGrid | None)
 
 
 def _shown(logs: Sequence[Drive], map: AnyMap | None) -> tuple[float, float, float, float] | None:
-    """Truth and map, or estimate and map: what strays (odometry, a lost filter) leaves the picture, not shrinks it."""
+    """The extent of truth and map, or of estimate and map: odometry and a lost filter may leave the plot."""
     kept = [drive.truth if drive.has_truth else drive.estimate for drive in logs]
     return extent_of(*kept, map_poses(map), margin=0.08)
 

@@ -7,12 +7,13 @@ import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.topological_map import TopologicalMap
 
-from .style import (
+from .drawing import (
     ESTIMATE,
     MARK,
     ODOMETRY,
@@ -22,7 +23,6 @@ from .style import (
     extent_of,
     faded,
     fitting_height,
-    picture,
     plan_axes,
 )
 
@@ -30,7 +30,7 @@ RIGHT, BESIDE, WRONG = range(3)
 
 
 class TrueAndEstimatedPlace(Stage):
-    """The topological map over the true path, each picture joined with the place that was believed most (map frame, m).
+    """Plots the true path over the topological map, each image joined with its most probable place (map frame, m).
 
     As opaque as it was probable; green where that place's medoid is the truly nearest, blue where it is linked with the
     nearest, orange elsewhere. Of the last log.
@@ -66,12 +66,12 @@ class TrueAndEstimatedPlace(Stage):
         return self.Out(
             figure=Figure(
                 name="believed_places",
-                title="Where it was, and where it thought to be",
+                title="True and estimated place",
                 caption=f"Black: the true path. Grey: {len(map)} places where their medoids were taken, joined along "
-                "the pictures between them. From each picture a line to the place that was believed most, as dark as "
-                f"it was probable: the truly nearest (green, {counted[RIGHT]:.0f} % of the pictures), one that is "
+                "the images between them. From each image a line to the place that was believed most, as dark as "
+                f"it was probable: the truly nearest (green, {counted[RIGHT]:.0f} % of the images), one that is "
                 f"linked with it (blue, {counted[BESIDE]:.0f} %), another (orange, {counted[WRONG]:.0f} %). Where the "
-                "drive leaves the tour's way no place is near.",
+                "drive leaves the tour's path no place is near.",
                 content=_draw(path, believed, np.array(shares), kinds, map),
                 order=9,
             )
@@ -79,7 +79,7 @@ class TrueAndEstimatedPlace(Stage):
 
 
 def judged(path: Array, believed: npt.NDArray[np.int64], map: TopologicalMap) -> npt.NDArray[np.int64]:
-    """Of each picture, taken at (N, 2): whether the believed place (N,) is the nearest, one beside it, or another."""
+    """Of each image, taken at (N, 2): whether the believed place (N,) is the nearest, one beside it, or another."""
     nearest, apart = map.nearest_places(path), links_between(map.links, len(map))
     return np.where(believed == nearest, RIGHT, np.where(apart[believed, nearest] <= 1, BESIDE, WRONG))
 
@@ -91,7 +91,7 @@ def _draw(
 
     medoids = map.poses[map.places][:, :2]
     extent = extent_of(map.poses, path, margin=0.05)
-    with picture(8.5, fitting_height(extent, 8.5, 2.6, 8.5)) as drawn:
+    with plot(8.5, fitting_height(extent, 8.5, 2.6, 8.5)) as drawn:
         axes = drawn.canvas.add_subplot()
         draw_map(axes, map)
         axes.plot(*broken_at_jumps(path, 2.5).T, color=TRUTH, linewidth=1.4, zorder=2, label="true path")

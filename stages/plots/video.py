@@ -1,4 +1,4 @@
-"""Pictures as a film that browsers play: MP4 with VP9 where OpenCV can write it, else an animated GIF."""
+"""Encodes frames as a video that browsers play: MP4 with VP9 where OpenCV can write it, else an animated GIF."""
 
 import io
 import tempfile
@@ -14,7 +14,7 @@ from .snapshot_times import spread_out
 
 
 class Video(NamedTuple):
-    """A film's bytes and what they are: `video/mp4` or `image/gif`."""
+    """A video's bytes and what they are: `video/mp4` or `image/gif`."""
 
     content: bytes
     media_type: str
@@ -26,7 +26,7 @@ class Video(NamedTuple):
 
 
 def encoded(frames: Sequence[Pixels], per_second: float) -> Video:
-    """Frames (rows, columns, 3), blue-green-red, all of one even size, as a film: the same bytes every time.
+    """Frames (rows, columns, 3), blue-green-red, all of one even size, as a video: the same bytes every time.
 
     Every frame is drawn once for an MP4 and once for a GIF: `frames` may draw them when asked.
     """
@@ -36,9 +36,9 @@ def encoded(frames: Sequence[Pixels], per_second: float) -> Video:
 def mp4(frames: Sequence[Pixels], per_second: float) -> Video | None:
     """VP9 in MP4, which all browsers play, from libvpx as OpenCV's wheels have it; None where this OpenCV has not."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "film.mp4"
-        told = cv2.utils.logging.getLogLevel()
-        cv2.utils.logging.setLogLevel(0)  # it would be told on the terminal that there is no such codec
+        path = Path(folder) / "video.mp4"
+        level = cv2.utils.logging.getLogLevel()
+        cv2.utils.logging.setLogLevel(0)  # else OpenCV prints that there is no such codec
         try:
             rows, columns = frames[0].shape[:2]
             writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"vp09"), per_second, (columns, rows))
@@ -46,21 +46,21 @@ def mp4(frames: Sequence[Pixels], per_second: float) -> Video | None:
                 writer.write(frame)
             writer.release()
         finally:
-            cv2.utils.logging.setLogLevel(told)
+            cv2.utils.logging.setLogLevel(level)
         return Video(path.read_bytes(), "video/mp4") if path.exists() and path.stat().st_size else None
 
 
 def gif(frames: Sequence[Pixels], per_second: float) -> Video:
     """An animated GIF in 128 colours, those of a few of its frames."""
-    from PIL import Image as Picture  # comes with matplotlib
+    from PIL import Image as PillowImage  # comes with matplotlib
 
-    pictures = [Picture.fromarray(frame[:, :, ::-1]) for frame in frames]
-    few = [pictures[n] for n in spread_out(len(pictures), 6)]
-    all_of_them = Picture.new("RGB", (few[0].width, len(few) * few[0].height))
-    for number, picture in enumerate(few):
-        all_of_them.paste(picture, (0, number * picture.height))
+    images = [PillowImage.fromarray(frame[:, :, ::-1]) for frame in frames]
+    few = [images[n] for n in spread_out(len(images), 6)]
+    all_of_them = PillowImage.new("RGB", (few[0].width, len(few) * few[0].height))
+    for number, image in enumerate(few):
+        all_of_them.paste(image, (0, number * image.height))
     palette = all_of_them.quantize(128)
-    small = [picture.quantize(palette=palette, dither=Picture.Dither.NONE) for picture in pictures]
+    small = [image.quantize(palette=palette, dither=PillowImage.Dither.NONE) for image in images]
     buffer = io.BytesIO()
     rest = {"save_all": True, "append_images": small[1:], "duration": round(1000 / per_second), "loop": 0}
     small[0].save(buffer, format="GIF", optimize=False, **rest)

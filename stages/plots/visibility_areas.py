@@ -1,4 +1,4 @@
-"""From where the views of a map can be seen."""
+"""Plots from where the views of a map can be seen."""
 
 from typing import TYPE_CHECKING, Annotated
 
@@ -7,12 +7,13 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.results import Figure
+from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.grid import FREE, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visibility import VisibilityAreas
 
-from .style import (
+from .drawing import (
     ESTIMATE,
     MARK,
     ODOMETRY,
@@ -23,7 +24,6 @@ from .style import (
     faded,
     fitting_height,
     grid_extent,
-    picture,
     plan_axes,
 )
 
@@ -37,14 +37,15 @@ HUES = (ESTIMATE, MARK, ODOMETRY, "#CC79A7")
 
 
 class ShowVisibilityAreas(Stage):
-    """Visibility areas of some references over the grid, and how many views each free cell lies in the areas of.
+    """Plots visibility areas of some references over the grid, and how many views' areas each free cell lies in.
 
-    As Figure 6 of Wolf, Burgard & Burkhardt 2005: a circle where the picture was taken, its axis, the point lambda and
-    the area from which that is visible; of a view all around, of every sector. `examples` references are taken at equal
+    As Figure 6 of Wolf, Burgard & Burkhardt 2005: a circle where the image was taken, its axis, the point lambda and
+    the area from which that is visible; of a panorama, of every sector. The references are taken at equal
     steps along the map. With `drive` wired its true path is drawn over the last panel.
     """
 
     examples: Annotated[int, Bounds(ge=1, le=11)] = 5
+    """Number of references that have a panel."""
 
     class Out(Outputs):
         """`figure`: a panel for each example, and one for all."""
@@ -72,7 +73,7 @@ class ShowVisibilityAreas(Stage):
             figure=Figure(
                 name="visibility_areas",
                 title="Visibility areas",
-                caption=f"{len(chosen)} of {len(map)} references: a circle where the picture was taken, a cross at "
+                caption=f"{len(chosen)} of {len(map)} references: a circle where the image was taken, a cross at "
                 f"{ways}, coloured the free cells from which it is visible. Last: of how many views' points each "
                 f"free cell sees; {100 * share:.0f} % of them see one at least.{made}",
                 content=_draw(map, areas, grid, chosen, counts, driven),
@@ -104,7 +105,7 @@ def _draw(
     extent = extent_of(grid.centres(rows, columns), margin=0.02)
     across = 2 if extent and extent[1] - extent[0] > 1.6 * (extent[3] - extent[2]) else 3
     down = -(-(len(chosen) + 1) // across)
-    with picture(9.0, down * fitting_height(extent, 0.8 * 9.0 / across, 1.4, 4.0), dpi=100) as drawn:
+    with plot(9.0, down * fitting_height(extent, 0.8 * 9.0 / across, 1.4, 4.0), dpi=100) as drawn:
         for number, reference in enumerate(chosen):
             axes = drawn.canvas.add_subplot(down, across, number + 1)
             _draw_view(axes, map.poses[reference], areas, areas.target[reference], grid)

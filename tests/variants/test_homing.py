@@ -39,11 +39,11 @@ def test_a_robot_that_was_carried_away_comes_back_and_stands_as_before(whole: Pa
     assert 0.3 < max(commands) <= 0.4
 
 
-def test_the_report_shows_what_it_followed_and_the_drive_as_a_film(whole: Path):
+def test_the_report_shows_what_it_followed_and_the_drive_as_a_video(whole: Path):
     page = (whole / "report.html").read_text()
-    assert 'id="homing_moments"' in page
-    film = base64.b64encode((whole / "drive.mp4").read_bytes()).decode()
-    assert f'src="data:video/mp4;base64,{film}"' in page
+    assert 'id="homing_snapshots"' in page
+    video = base64.b64encode((whole / "drive.mp4").read_bytes()).decode()
+    assert f'src="data:video/mp4;base64,{video}"' in page
     assert 'data-per-second="8.0"' in page
 
 

@@ -27,8 +27,8 @@ def test_a_robot_wanders_without_a_contact_and_every_command_is_in_the_result(wh
     assert max(commands) == pytest.approx(0.4)
     assert log.topics["/command"] == "geometry_msgs/msg/TwistStamped"
     report = (whole / "report.html").read_text()
-    assert "Where it drove" in report
-    assert "What the robot saw" in report
+    assert "Path driven" in report
+    assert "Images along the drive" in report
 
 
 def test_a_killed_closed_loop_resumes_to_the_same_bytes(whole: Path, tmp_path: Path):

@@ -27,7 +27,7 @@ def windows(*levels: int) -> Windows:
     return Windows(plain(*levels), 2 * np.pi * np.arange(len(levels)) / len(levels), 1.0)
 
 
-def an_album(map: ReferenceGraph) -> Thumbnails:
+def made_thumbnails(map: ReferenceGraph) -> Thumbnails:
     shots, state = [], ThumbnailsState()
     grown = ReferenceGraph.empty()
     for n in range(len(map)):
@@ -37,11 +37,11 @@ def an_album(map: ReferenceGraph) -> Thumbnails:
     return CollectThumbnails().step(CTX, [shot for shot in shots if shot is not None]).thumbnails
 
 
-def test_an_album_holds_a_picture_of_each_reference_and_can_be_kept() -> None:
+def test_thumbnails_hold_an_image_of_each_reference_and_can_be_kept() -> None:
     run = small_run()
-    album = an_album(run.map)
-    assert len(album) == len(run.map)
-    kept = decode(encode(album))
+    thumbnails = made_thumbnails(run.map)
+    assert len(thumbnails) == len(run.map)
+    kept = decode(encode(thumbnails))
     for n in range(len(run.map)):
         assert np.allclose(kept.image(n), 5 * n, atol=2)
 
@@ -69,21 +69,21 @@ def test_windows_are_kept_side_by_side_from_the_left_to_the_right() -> None:
     assert "Windows" in figure.caption
 
 
-@pytest.mark.parametrize("with_album", [True, False])
+@pytest.mark.parametrize("with_thumbnails", [True, False])
 @pytest.mark.parametrize("kind", ["panorama", "windows"])
-def test_queries_and_their_answers_are_drawn(kind: str, with_album: bool) -> None:
+def test_queries_and_their_answers_are_drawn(kind: str, with_thumbnails: bool) -> None:
     run = small_run()
     answers = Answers(np.arange(9), np.linspace(0.9, 0.5, 9).astype(np.float32), np.zeros(9))
     seen = Panorama(plain(120, columns=160)[0]) if kind == "panorama" else windows(120, 40)
     shots = [PanoramaSnapshot().step(CTX, tick, seen).snapshot for tick in run.ticks]
-    album = an_album(run.map) if with_album else None
+    thumbnails = made_thumbnails(run.map) if with_thumbnails else None
     drawn = [
-        RetrievalStrip().step(CTX, run.drive, shots, [answers] * len(run.ticks), run.map, album).figure
+        RetrievalStrip().step(CTX, run.drive, shots, [answers] * len(run.ticks), run.map, thumbnails).figure
         for _ in range(2)
     ]
     assert drawn[0] is not None
     assert drawn[0].content == drawn[1].content
-    assert ("no album" in drawn[0].caption) is not with_album
+    assert ("Without thumbnails" in drawn[0].caption) is not with_thumbnails
     pixels = cv2.imdecode(np.frombuffer(drawn[0].content, np.uint8), cv2.IMREAD_COLOR)
     assert pixels.shape[1] == 1100
     assert pixels.std() > 5
@@ -112,6 +112,6 @@ def test_pictures_that_look_one_way_stand_side_by_side() -> None:
     shots = [PanoramaSnapshot().step(CTX, Tick(0, 0), windows(level)).snapshot for level in (40, 200)]
     figure = PanoramaStrip().step(CTX, collected([Tick(0, 0), Tick(1, 1, frame=1)], [None, None]), shots).figure
     assert figure is not None
-    assert "camera's picture" in figure.caption
+    assert "camera's image" in figure.caption
     drawn = cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR)
     assert drawn.shape[1] > 2 * drawn.shape[0]

@@ -20,7 +20,7 @@ PIXELS = np.random.default_rng(0).integers(0, 255, (12, 16, 3)).astype(np.uint8)
 
 def test_an_image_that_was_written_is_read_again_pixel_by_pixel_with_the_robots_camera(tmp_path):
     ImageFile().step(Context("picture_file", folder=tmp_path), [Image(PIXELS), Image(255 - PIXELS)])
-    stage = GoalImage(goal=str(tmp_path / "picture.png"), world=WORLD)
+    stage = GoalImage(goal=str(tmp_path / "image.png"), world=WORLD)
     found = stage.step(Context("goal_picture"))
     assert found.image is not None
     assert found.image.pixels.tolist() == PIXELS.tolist()

@@ -7,9 +7,9 @@ from made_places import made_map
 from small_run import collected
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.plots.drive_over_plan import DriveOverPlan, planned_ways
+from omninav.stages.plots.drawing import broken_at_jumps
+from omninav.stages.plots.drive_over_plan import DriveOverPlan, planned_routes
 from omninav.stages.plots.place_belief_over_time import PlaceBeliefOverTime, binned, with_neighbours
-from omninav.stages.plots.style import broken_at_jumps
 from omninav.stages.plots.true_and_estimated_place import BESIDE, RIGHT, WRONG, TrueAndEstimatedPlace, judged
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.drive_tally import DriveTally
@@ -45,10 +45,10 @@ def test_the_way_planned_is_drawn_over_the_plan_with_its_goal():
     assert green(planned) > 4 * green(plain) > 0  # the start
     assert "map" not in plain.caption
     assert "4 places" in mapped.caption
-    assert "It planned no way" in mapped.caption
+    assert "It planned no route" in mapped.caption
     assert "thin: the 1 before it" in planned.caption
     assert planned.content == drawn(map=MAP, routes=ways).content
-    first, last = planned_ways(ways, MAP)
+    first, last = planned_routes(ways, MAP)
     assert first.tolist() == [[1.0, 1.0], [1.0, 1.0], [4.0, 1.0], [4.0, 4.0]]  # path images lie at their owner's
     assert len(last) == 5
 
@@ -71,7 +71,7 @@ def test_the_belief_in_every_place_is_drawn_with_the_truth_beside_it():
     blind = stage.step(CTX, BLIND, believed(), MAP).figure
     assert figure.content == stage.step(CTX, DRIVE, believed(), MAP).figure.content
     assert green(figure) > 200 > green(blind)
-    assert "In 100 % of the pictures" in figure.caption  # the nearest place and the belief change at the same time
+    assert "In 100 % of the images" in figure.caption  # the nearest place and the belief change at the same time
     assert "truly nearest." not in blind.caption
     assert stage.step(CTX, DRIVE, [None] * 20, MAP).figure is None
 
@@ -105,5 +105,5 @@ def test_pictures_are_joined_with_the_places_believed():
     wrong = stage.step(CTX, collected(TICKS, TRUTH[::-1]), believed(), MAP).figure
     assert figure.content == stage.step(CTX, DRIVE, believed(), MAP).figure.content
     assert green(figure) > 2 * green(wrong)
-    assert "green, 100 % of the pictures" in figure.caption
+    assert "green, 100 % of the images" in figure.caption
     assert stage.step(CTX, BLIND, believed(), MAP).figure is None

@@ -59,6 +59,6 @@ def test_a_grid_lies_under_paths_and_beliefs_where_it_is_wired():
     paths = [TrajectoryOverMap().step(CTX, run.drive, run.map, grid).figure for grid in (None, ROOM)]
     assert paths[0].content != paths[1].content
     beliefs = [
-        BeliefSnapshots(moments=2).step(CTX, run.drive, run.beliefs, run.map, grid).figure for grid in (None, ROOM)
+        BeliefSnapshots(frames=2).step(CTX, run.drive, run.beliefs, run.map, grid).figure for grid in (None, ROOM)
     ]
     assert beliefs[0].content != beliefs[1].content

@@ -1,11 +1,10 @@
-"""One look for all pictures: colours that colour-blind readers tell apart, units on axes, the same bytes every time."""
+"""Draws maps, grids, plans, poses and Gaussians on the axes of a plan view."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline.report.plot_style import Picture, picture
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from omninav.stages.values.map_places import AnyMap
@@ -14,23 +13,6 @@ from omninav.stages.values.view_mixtures import ViewMixtures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-__all__ = [
-    "Picture",
-    "broken_at_jumps",
-    "draw_gaussians",
-    "draw_grid",
-    "draw_map",
-    "draw_plan",
-    "draw_pose",
-    "draw_ways",
-    "extent_of",
-    "faded",
-    "fitting_height",
-    "grid_extent",
-    "picture",
-    "plan_axes",
-]
 
 Array = npt.NDArray[np.float64]
 
@@ -51,7 +33,7 @@ def plan_axes(axes: "Axes", extent: tuple[float, float, float, float] | None = N
 
 def draw_map(axes: "Axes", map: AnyMap | None, label: bool = True) -> None:
     """Reference views as grey dots, joined by their edges; of mixtures every component's mean, as dark as it weighs; of
-    a topological map its places, joined along the pictures between them."""
+    a topological map its places, joined along the images between them."""
     if map is None or not len(map):
         return
     from matplotlib.collections import LineCollection
@@ -67,7 +49,7 @@ def draw_map(axes: "Axes", map: AnyMap | None, label: bool = True) -> None:
     topological = isinstance(map, TopologicalMap)
     poses, edges = (map.poses[map.places], map.links[:0]) if isinstance(map, TopologicalMap) else (map.poses, map.edges)
     if isinstance(map, TopologicalMap):
-        draw_ways(axes, map)
+        draw_links(axes, map)
     if len(edges):
         axes.add_collection(LineCollection(list(poses[edges][:, :, :2]), colors=EDGE, linewidths=0.7, zorder=1))
     size = float(np.clip(3000 / len(map), 1.5, 25 if topological else 9))
@@ -75,13 +57,13 @@ def draw_map(axes: "Axes", map: AnyMap | None, label: bool = True) -> None:
     axes.scatter(poses[:, 0], poses[:, 1], s=size, color=REFERENCE, linewidths=0, zorder=1.5, label=name)
 
 
-def draw_ways(axes: "Axes", map: TopologicalMap) -> None:
-    """The links of a topological map, each along the pictures between its two places."""
+def draw_links(axes: "Axes", map: TopologicalMap) -> None:
+    """The links of a topological map, each along the images between its two places."""
     from matplotlib.collections import LineCollection
 
     poses = map.poses[:, :2]
-    ways = [poses[[map.places[a], *map.way(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
-    axes.add_collection(LineCollection(ways, colors=REFERENCE, linewidths=0.7, zorder=1))
+    paths = [poses[[map.places[a], *map.way(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
+    axes.add_collection(LineCollection(paths, colors=REFERENCE, linewidths=0.7, zorder=1))
 
 
 def draw_gaussians(

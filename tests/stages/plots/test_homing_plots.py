@@ -1,4 +1,4 @@
-"""What homing follows, as pictures and as a film."""
+"""What homing follows, as images and as a video."""
 
 import cv2
 import numpy as np
@@ -14,7 +14,7 @@ from omninav.stages.mapping.thumbnails import TourSnapshot, ViewThumbnails, join
 from omninav.stages.plots.drive_video import DriveVideo
 from omninav.stages.plots.homing_snapshot import HomingSnapshot, HomingSnapshotState
 from omninav.stages.plots.homing_snapshots import HomingSnapshots
-from omninav.stages.plots.target_images import FirstThumbnail, picture_of, target_view
+from omninav.stages.plots.target_images import FirstThumbnail, image_of, target_view
 from omninav.stages.plots.video import gif, mp4
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.floor_plan import FloorPlan
@@ -51,7 +51,7 @@ def vector(tick: int, lost: bool) -> HomingVector:
     return HomingVector(0, 0.4, 0.1, 0.5, 0.5, 0.2, metres, 0 if lost else 5, "lost" if lost else "tracking")
 
 
-def glances(camera: HyperbolicMirror | Equirectangular, every_s: float = 0.0) -> list:
+def snapshots(camera: HyperbolicMirror | Equirectangular, every_s: float = 0.0) -> list:
     """A drive of two seconds; at tick 0 there is no target yet, at tick 7 it is lost."""
     rng = np.random.default_rng(0)
     looks = [rng.integers(0, 255, (camera.height_px // 30, camera.width // 30, 3)).astype(np.uint8) for _ in range(2)]
@@ -61,6 +61,7 @@ def glances(camera: HyperbolicMirror | Equirectangular, every_s: float = 0.0) ->
         kinds = np.array([1, 1, 2, 3, 0, 1])
         points = np.column_stack([np.linspace(0.3, 0.7, 6) * camera.width, np.full(6, 0.3 * camera.height_px)])
         known = k > 0
+        nowhere = np.zeros((6, 3))
         found.append(
             stage.step(
                 CTX,
@@ -70,7 +71,7 @@ def glances(camera: HyperbolicMirror | Equirectangular, every_s: float = 0.0) ->
                 camera,
                 target(1) if known else None,
                 vector(k, k == 7) if known else None,
-                TrackedFeatures(points, kinds, np.arange(6)) if known and k != 7 else None,
+                TrackedFeatures(1, np.arange(6), kinds, points, nowhere, nowhere) if known and k != 7 else None,
             ).snapshot
         )
     return found
@@ -84,7 +85,7 @@ def drive(camera: HyperbolicMirror | Equirectangular = MIRROR) -> dict:
             [Tick(k, k * 200_000_000, 0, k, k == 0) for k in range(TICKS)],
             [Pose(1.0 + 0.2 * k, 1.1, 0.1 * k) for k in range(TICKS)],
         ),
-        "snapshots": glances(camera),
+        "snapshots": snapshots(camera),
         "progress": [None if k == 0 else PathProgress(0, 1, 4, 1, False, False, False) for k in range(TICKS)],
         "routes": [way] * 10 + [over] * 2,
         "map": MAP,
@@ -92,21 +93,21 @@ def drive(camera: HyperbolicMirror | Equirectangular = MIRROR) -> dict:
     }
 
 
-def film_of(ctx: Context = CTX) -> DriveVideo.Out:
+def video_of(ctx: Context = CTX) -> DriveVideo.Out:
     beliefs = [PlaceBelief(np.array([0.7, 0.2, 0.1]), np.zeros((3, 3)))] * TICKS
     return DriveVideo(after_s=0.1).step(ctx, statuses=[DrivingStatus("driving")] * TICKS, beliefs=beliefs, **drive())
 
 
 def frames_in(content: bytes, path) -> list:
     path.write_bytes(content)
-    film, found = cv2.VideoCapture(str(path)), []
-    while (read := film.read())[0]:
+    video, found = cv2.VideoCapture(str(path)), []
+    while (read := video.read())[0]:
         found.append(read[1])
     return found
 
 
 @pytest.mark.parametrize("camera", [MIRROR, STRIP], ids=["mirror", "strip"])
-def test_moments_are_drawn_the_same_every_time_for_every_camera(camera):
+def test_rows_are_drawn_the_same_every_time_for_every_camera(camera):
     one, other = (HomingSnapshots().step(CTX, **drive(camera)).figure for _ in range(2))
     assert one.content == other.content
     pixels = cv2.imdecode(np.frombuffer(one.content, np.uint8), cv2.IMREAD_COLOR)
@@ -114,27 +115,27 @@ def test_moments_are_drawn_the_same_every_time_for_every_camera(camera):
     assert len(one.content) < 600_000
 
 
-def test_a_glance_is_of_the_mirrors_disc_and_its_points_move_with_it():
-    glance = glances(MIRROR)[1]
-    assert glance.size == (240, 240)  # of 640 x 480
-    assert decoded(glance.jpeg).shape == (240, 240, 3)
+def test_a_snapshot_is_of_the_mirrors_disc_and_its_points_move_with_it():
+    snapshot = snapshots(MIRROR)[1]
+    assert snapshot.size == (240, 240)  # of 640 x 480
+    assert decoded(snapshot.jpeg).shape == (240, 240, 3)
     middle = (np.array([319.5, 239.5]) - (81, 1) + 0.5) * 240 / 478 - 0.5  # the disc begins at column 81, row 1
     assert middle == pytest.approx((119.5, 119.5), abs=0.5)
-    way = glance.way[np.isfinite(glance.way).all(axis=1)]
+    way = snapshot.floor_line[np.isfinite(snapshot.floor_line).all(axis=1)]
     towards = np.arctan2(*(way[-1] - middle)[::-1])  # in the picture an azimuth turns by the camera's yaw
     assert towards == pytest.approx(0.4 - 0.3, abs=0.02)
-    assert glance.target_kinds.tolist() == [1, 1, 2, 3, 0, 1, -1, -1, -1]
-    assert encode(decode(encode(glance))) == encode(glance)
+    assert snapshot.target_kinds.tolist() == [1, 1, 2, 3, 0, 1, -1, -1, -1]
+    assert encode(decode(encode(snapshot))) == encode(snapshot)
 
 
-def test_between_glances_nothing_is_kept():
-    given = [glance is not None for glance in glances(STRIP, every_s=0.5)]
+def test_between_snapshots_nothing_is_kept():
+    given = [snapshot is not None for snapshot in snapshots(STRIP, every_s=0.5)]
     assert given == [k % 3 == 0 for k in range(TICKS)]  # ticks are 0.2 s apart: 0.6 s is the next
 
 
-def test_a_film_is_written_whole_the_same_every_time_and_ends_with_the_drive(tmp_path):
-    ctx = Context("film", folder=tmp_path)
-    one, other = film_of(ctx=ctx).figure, film_of().figure
+def test_a_video_is_written_whole_the_same_every_time_and_ends_with_the_drive(tmp_path):
+    ctx = Context("video", folder=tmp_path)
+    one, other = video_of(ctx=ctx).figure, video_of().figure
     assert one.content == other.content == (tmp_path / "drive.mp4").read_bytes()
     assert [path.name for path in tmp_path.iterdir()] == ["drive.mp4"]
     assert one.media_type == "video/mp4"
@@ -145,22 +146,22 @@ def test_a_film_is_written_whole_the_same_every_time_and_ends_with_the_drive(tmp
     assert "11 frames" in one.caption
 
 
-def test_a_film_has_no_more_frames_than_it_may(tmp_path):
+def test_a_video_has_no_more_frames_than_it_may(tmp_path):
     given = drive() | {"statuses": [None] * TICKS}
-    film = DriveVideo(frames=4).step(CTX, **given).figure
-    assert len(frames_in(film.content, tmp_path / "few.mp4")) == 4
+    video = DriveVideo(frames=4).step(CTX, **given).figure
+    assert len(frames_in(video.content, tmp_path / "few.mp4")) == 4
 
 
-def test_without_an_encoder_a_film_is_an_animated_picture(tmp_path, monkeypatch):
+def test_without_an_encoder_a_video_is_an_animated_image(tmp_path, monkeypatch):
     monkeypatch.setattr("omninav.stages.plots.video.mp4", lambda frames, per_second: None)
-    ctx = Context("film", folder=tmp_path)
-    figure = film_of(ctx=ctx).figure
+    ctx = Context("video", folder=tmp_path)
+    figure = video_of(ctx=ctx).figure
     assert figure.media_type == "image/gif"
-    assert (tmp_path / "drive.gif").read_bytes() == figure.content == film_of().figure.content
+    assert (tmp_path / "drive.gif").read_bytes() == figure.content == video_of().figure.content
     assert figure.content.startswith(b"GIF89a")
 
 
-def test_both_kinds_of_film_hold_the_frames_in_their_order(tmp_path):
+def test_both_kinds_of_video_hold_the_frames_in_their_order(tmp_path):
     frames = [np.full((64, 96, 3), shade, np.uint8) for shade in (20, 120, 220)]
     for made, name in ((mp4(frames, 5.0), "a.mp4"), (gif(frames, 5.0), "a.gif")):
         shades = [frame.mean() for frame in frames_in(made.content, tmp_path / name)]
@@ -175,27 +176,25 @@ def test_the_target_is_the_view_that_the_way_has_come_to():
     assert target_view(PathProgress(2, 0, 1, 0, True, False, False), None, None) == 0
 
 
-def test_an_album_holds_the_pictures_of_the_maps_views_and_nothing_of_a_known_maps():
-    pictures = []
+def test_thumbnails_are_of_the_maps_views_and_not_of_a_known_maps():
+    images = []
     for shade in range(40):  # the map's views are every tenth picture of the tour
         pixels = np.full((48, 64, 3), 6 * shade, np.uint8)
-        pictures.append(TourSnapshot(columns=32).step(CTX, Image(pixels)).snapshots)
+        images.append(TourSnapshot(columns=32).step(CTX, Image(pixels)).snapshots)
     ticks = [Tick(k, k) for k in range(40)]
-    album = ViewThumbnails().step(CTX, ticks, pictures, MAP).thumbnails
-    assert [round(picture_of(view, album).mean() / 60) for view in range(4)] == [0, 1, 2, 3]
+    thumbnails = ViewThumbnails().step(CTX, ticks, images, MAP).thumbnails
+    assert [round(image_of(view, thumbnails).mean() / 60) for view in range(4)] == [0, 1, 2, 3]
     grown = (
-        ViewThumbnails()
-        .step(CTX, ticks, pictures, MAP, known=made_map([(0.0, 0.0), (1.0, 0.0)], {(0, 1): 0}))
-        .thumbnails
+        ViewThumbnails().step(CTX, ticks, images, MAP, known=made_map([(0.0, 0.0), (1.0, 0.0)], {(0, 1): 0})).thumbnails
     )
-    assert [picture_of(view, grown) is None for view in range(4)] == [True, True, False, False]
-    assert picture_of(2, grown).mean() == pytest.approx(6 * (20 - 11), abs=2)
-    assert picture_of(None, album) is None
-    assert picture_of(9, joined([])) is None
+    assert [image_of(view, grown) is None for view in range(4)] == [True, True, False, False]
+    assert image_of(2, grown).mean() == pytest.approx(6 * (20 - 11), abs=2)
+    assert image_of(None, thumbnails) is None
+    assert image_of(9, joined([])) is None
 
 
-def test_the_first_picture_of_a_run_is_an_album():
-    seen = glances(STRIP)
-    album = FirstThumbnail().step(CTX, seen).thumbnails
-    assert (album.image(0) == decoded(seen[0].jpeg)).all()
+def test_the_first_image_of_a_run_is_the_only_thumbnail():
+    seen = snapshots(STRIP)
+    thumbnails = FirstThumbnail().step(CTX, seen).thumbnails
+    assert (thumbnails.image(0) == decoded(seen[0].jpeg)).all()
     assert FirstThumbnail().step(CTX, []).thumbnails is None

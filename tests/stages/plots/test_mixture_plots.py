@@ -83,23 +83,23 @@ def test_the_life_that_is_told_is_that_of_the_reference_whose_place_moved_most()
 def test_a_references_place_goes_on_where_a_component_is_near_and_ends_where_none_is():
     far = np.array([[9.0, 0.0]])
     here, there = np.array([[0.0, 0.0]]), np.array([[0.4, 0.0]])
-    moments = [
+    snapshots = [
         (0, here, np.array([1.0])),
         (4, np.concatenate([far, there]), np.array([0.3, 0.7])),
         (9, far, np.array([1.0])),
     ]
-    lives = lives_of(moments, same_m=1.0)
+    lives = lives_of(snapshots, same_m=1.0)
     assert [life[:, 0].tolist() for life in lives] == [[0.0, 4.0], [4.0, 9.0]]  # 1.7 of weight in all, and 1.3
     np.testing.assert_allclose(lives[0][:, 1:], [[0, 0, 1.0], [0.4, 0, 0.7]])
     np.testing.assert_allclose(lives[1][:, 3], [0.3, 1.0])
 
 
 def test_of_two_components_near_the_same_place_the_closer_one_is_its_future():
-    moments = [
+    snapshots = [
         (0, np.array([[0.0, 0.0]]), np.ones(1)),
         (1, np.array([[0.5, 0.0], [0.2, 0.0]]), np.array([0.6, 0.4])),
     ]
-    lives = sorted(lives_of(moments, same_m=1.0), key=len)
+    lives = sorted(lives_of(snapshots, same_m=1.0), key=len)
     assert [len(life) for life in lives] == [1, 2]
     assert lives[1][1, 1] == 0.2
 

@@ -11,7 +11,7 @@ from omninav.stages.plots.panorama_snapshot import PanoramaSnapshot
 from omninav.stages.plots.panorama_strip import PanoramaStrip
 from omninav.stages.plots.similarity_heat_map import SimilarityHeatMap
 from omninav.stages.plots.similarity_peaks import SimilarityPeaks
-from omninav.stages.plots.snapshot_times import geometric_moments, is_moment, spread_out
+from omninav.stages.plots.snapshot_times import geometric_steps, is_snapshot_frame, spread_out
 from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.similarity import Similarities
@@ -113,14 +113,14 @@ def test_only_a_few_frames_are_kept_and_their_best_headings():
     assert peaks.profile.tolist() == pytest.approx([0, 0, 0, 0.9])
 
 
-def test_moments_follow_one_two_five():
-    assert [frame for frame in range(1001) if is_moment(frame)] == [0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000]
+def test_snapshot_frames_follow_one_two_five():
+    assert [frame for frame in range(1001) if is_snapshot_frame(frame)] == [0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000]
 
 
-def test_geometric_moments_hold_the_first_and_the_last_frame():
-    assert geometric_moments(244, 6) == [0, 2, 8, 26, 80, 243]  # 3^0 .. 3^5, less one
-    assert geometric_moments(1, 6) == [0]
-    assert geometric_moments(0, 6) == []
+def test_geometric_steps_hold_the_first_and_the_last_frame():
+    assert geometric_steps(244, 6) == [0, 2, 8, 26, 80, 243]  # 3^0 .. 3^5, less one
+    assert geometric_steps(1, 6) == [0]
+    assert geometric_steps(0, 6) == []
 
 
 def test_things_spread_out_hold_both_ends():
