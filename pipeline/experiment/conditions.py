@@ -59,7 +59,7 @@ class ConditionRun:
 
 
 def condition_runs(experiment: Experiment, folder: Path, overrides: Sequence[str]) -> list[ConditionRun]:
-    """A run for each condition in each scenario. `overrides`: what was typed beside the experiment's name."""
+    """A run for each condition in each scenario. `overrides`: what was typed after the experiment's name."""
     seeds = tuple(range(experiment.repetitions))
     return [
         _run(

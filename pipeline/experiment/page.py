@@ -1,4 +1,4 @@
-"""An experiment as one page: verdicts, the paper's table or figure beside ours, failures, and how to run it again."""
+"""An experiment as one page: verdicts, the paper's figures next to ours, failures, and how to reproduce it."""
 
 import base64
 import json
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from omninav.pipeline.files import write_whole
+from omninav.pipeline.report.quantities import title, unit
 from omninav.pipeline.report.rendering import render
 
 from .conditions import ConditionRun
@@ -195,8 +196,7 @@ def _facts(facts: Mapping[str, Any]) -> str:
 
 
 def _in_words(name: str, value: Any) -> str:
-    words = name.removesuffix("_m").replace("_", " ")
-    return f"{words} {value} m" if name.endswith("_m") else f"{words} {value}"
+    return f"{title(name).lower()} {value} {unit(name)}".rstrip()
 
 
 def _tiles(content: PageContent, verdicts: Sequence[Verdict]) -> list[dict[str, str]]:

@@ -145,7 +145,7 @@ class Experiment:
     """Each condition is run with the seeds 0 to `repetitions` - 1."""
     scenarios: Mapping[str, str] = field(default_factory=dict)
     """Label -> overrides. Each condition is run in each of them with every seed, and all count as its repetitions, so
-    that intervals speak of more than the seeds."""
+    that intervals cover more than the seeds."""
     without: tuple[Mapping[str, Any], ...] = ()
     """Labels of conditions that are not run."""
     published: Mapping[str, Any] = field(default_factory=dict)
@@ -318,7 +318,7 @@ def figure_of(measure: Measure, result: Mapping[str, Any]) -> float | None:
 
 
 def space_of(result: Mapping[str, Any]) -> dict[str, Any]:
-    """Where paths lead through a repetition's result: its metrics, and `timing` and `facts` beside them."""
+    """Where paths lead through a repetition's result: its metrics, `timing` and `facts`."""
     return {**result["metrics"], "timing": result["timing"], "facts": result["facts"]}
 
 

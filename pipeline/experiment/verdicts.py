@@ -91,8 +91,8 @@ def samples(experiment: Experiment, results: Results, measure: str, labels: Labe
 
 def pooled(experiment: Experiment, results: Results, measure: str, labels: Labels) -> float | None:
     """The standard deviation over all frames of all repetitions of a condition, of a measure that is `pooled`."""
-    asked = experiment.measures[measure]
-    for path in asked.path:
+    described = experiment.measures[measure]
+    for path in described.path:
         place = path.rpartition(".")[0]
         frames = f"{place}.frames" if place else "frames"
         groups = [
@@ -103,7 +103,7 @@ def pooled(experiment: Experiment, results: Results, measure: str, labels: Label
         whole = [group for group in known if len(group) == 3]
         if whole:
             means, deviations, counts = zip(*whole, strict=True)
-            return asked.scale * pooled_deviation(means, deviations, counts)
+            return described.scale * pooled_deviation(means, deviations, counts)
     return None
 
 
@@ -236,9 +236,9 @@ def _lowest(experiment: Experiment, claim: Claim, labels: Labels, results: Resul
     """Not above any condition that differs from this one only in the claim's factors; the closest call is shown."""
     varied = claim.among or tuple(factor for factor in experiment.sweep if factor in claim.of)
     where, ours = _where(experiment, labels), samples(experiment, results, claim.measure, labels)
-    alike = {factor: label for factor, label in labels.items() if factor not in varied}
+    same = {factor: label for factor, label in labels.items() if factor not in varied}
     cases = []
-    for facing in (condition.labels for condition in experiment.conditions() if condition.fits(alike)):
+    for facing in (condition.labels for condition in experiment.conditions() if condition.fits(same)):
         if facing != labels:
             against = ", ".join(facing[factor] for factor in varied)
             theirs = samples(experiment, results, claim.measure, facing)

@@ -90,13 +90,13 @@ class Progress:
             line = live_line(self._name, self._done, self._total, rate, left, self._unit, self._note)
             self._stream.write("\r\x1b[K" + line)
         else:
-            said = {"graph": self._name, self._unit: self._done, "of": self._total}
-            said |= {
+            state = {"graph": self._name, self._unit: self._done, "of": self._total}
+            state |= {
                 f"{self._unit}_per_second": None if rate is None else _rounded(rate),
                 "seconds_left": None if left is None else round(left, 1),
             }
-            said |= {"note": self._note} if self._note else {}
-            self._stream.write(json.dumps(said) + "\n")
+            state |= {"note": self._note} if self._note else {}
+            self._stream.write(json.dumps(state) + "\n")
         self._stream.flush()
 
 

@@ -60,7 +60,7 @@ class Entry:
 
     @property
     def where(self) -> str:
-        """Its groups in words; nothing where the title says it all."""
+        """Its groups in words; nothing where its title is complete."""
         return "" if self.by_path and self.quantity.title else ", ".join(words(part) for part in self.groups)
 
     def text(self, value: Any) -> str:
@@ -104,7 +104,7 @@ class Number:
 
     @property
     def is_context(self) -> bool:
-        """Whether it says what a run was of."""
+        """Whether it is about how large the run was."""
         return self.entry.by_path and self.entry.quantity.context
 
 
