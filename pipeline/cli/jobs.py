@@ -107,7 +107,7 @@ def _hydra_files(config: Any) -> dict[str, str]:
 
 
 def _folder() -> Path | None:
-    """Where Hydra wants the job's files; None where nobody has said so."""
+    """Where Hydra puts the job's files; None where nobody has set it."""
     settings = HydraConfig.get()
     chosen = any(str(word).startswith("hydra.run.dir=") for word in settings.overrides.hydra)
     if settings.mode == RunMode.MULTIRUN or chosen or settings.run.dir != NO_FOLDER:

@@ -30,14 +30,14 @@ def invalid_overrides(words: Sequence[str], folders: Sequence[str], message: str
     problems, parsed = _parsed(words)
     groups = {name: _options(name, folders) for name in _groups(folders)}
     swaps = [word for word in parsed if word.key_or_group in groups]
-    unknown = [problem for word in swaps for problem in _unknown_option(word, groups[word.key_or_group])]
+    options = [problem for word in swaps for problem in _unknown_option(word, groups[word.key_or_group])]
     known = [word for word in swaps if not any(_unknown_option(word, groups[word.key_or_group]))]
     plain = _plain(known, folders)
     for word in parsed if plain else ():
         # Which nodes there are, and what can be set of them, depends on the options: unknown ones come first.
-        if word not in swaps and not (unknown and word.key_or_group.startswith(WITHIN_GRAPH)):
-            unknown += _unknown_setting(word, plain, list(groups))
-    problems += unknown
+        if word not in swaps and not (options and word.key_or_group.startswith(WITHIN_GRAPH)):
+            problems += _unknown_setting(word, plain, list(groups))
+    problems += options
     return problems or [Problem("command line", " ".join(message.partition("Config search path")[0].split()))]
 
 

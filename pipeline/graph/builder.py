@@ -235,12 +235,12 @@ class _Builder:
                 f"{node.name}.{p.name}" for p in node.signature.outputs.values() if compatible(p.type, wanted.type)
             ]
         kind = type_name(wanted.type)
-        return f"what gives {kind} here: {', '.join(sorted(found))}" if found else f"nothing in this graph gives {kind}"
+        return f"outputs of type {kind}: {', '.join(sorted(found))}" if found else f"no output here is of type {kind}"
 
     def _check_types(self, where: str, origin: str, given: Port, node: Node, port: Port) -> None:
         if not compatible(given.type, port.type):
             taker = f"{node.name}.{port.name} ({type(node.stage).__name__})"
-            what = f"{origin} gives {type_name(given.type)}, {taker} takes {type_name(port.type)}"
+            what = f"{origin} is of type {type_name(given.type)}, {taker} expects {type_name(port.type)}"
             self._problem(where, what, self._producers(port))
 
     def _check_missing(self) -> None:

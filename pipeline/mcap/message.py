@@ -1,4 +1,4 @@
-"""Messages as they lie in a log and as they are decoded, and what is said of logs and messages that are unsound."""
+"""Messages as they lie in a log and as they are decoded, and the errors of those that are unsound."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple

@@ -170,7 +170,7 @@ class LogReader:
         return sorted(chunks, key=lambda chunk: chunk.chunk_start_offset)
 
     def _complete(self) -> None:
-        """Go through the file once if that has not happened: attachments, and what the summary would have said."""
+        """Go through the file once if that has not happened: attachments, and what the summary would have held."""
         if not self._scanned:
             for _ in self.scan(()):
                 pass

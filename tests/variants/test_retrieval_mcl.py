@@ -34,7 +34,7 @@ def test_each_stage_of_one_variant_serves_the_other(variant: str, features: str,
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("features=hsv_histogram", "unwarp=window"), "gives Windows"),
+        (("features=hsv_histogram", "unwarp=window"), "is of type Windows"),
         (("features=fourier",), "has no output 'features'"),
         (("fusion=agreement",), "hypothesis"),
     ],

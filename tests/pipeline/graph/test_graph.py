@@ -105,13 +105,13 @@ def test_wrong_types_on_a_wire_show_both_sides_and_what_would_fit():
         {"spell": {"number": "c.number"}, "s": {"number": "spell.word"}},
     )
     assert problem.where == "wires.s.number"
-    assert problem.what == "spell.word gives Word, s.number (Scale) takes Number"
-    assert problem.hint == "what gives Number here: c.number, s.number"
+    assert problem.what == "spell.word is of type Word, s.number (Scale) expects Number"
+    assert problem.hint == "outputs of type Number: c.number, s.number"
 
 
 def test_a_missing_input_names_what_would_fit():
     problem = only({"c": "Constant", "s": "Scale"})
-    assert (problem.where, problem.hint) == ("wires.s.number", "what gives Number here: c.number, s.number")
+    assert (problem.where, problem.hint) == ("wires.s.number", "outputs of type Number: c.number, s.number")
 
 
 def test_an_unknown_node_on_a_wire_names_the_nearest_one():
@@ -122,7 +122,7 @@ def test_an_unknown_node_on_a_wire_names_the_nearest_one():
 def test_a_missing_artifact_is_a_problem_and_a_fitting_one_is_none():
     assert "there is no artifact 'map'" in only({"s": "Scale"}, {"s": {"number": "artifacts.map"}}).what
     build(config({"s": "Scale"}, {"s": {"number": "artifacts.map"}}), {"map": toys.Whole})
-    assert "gives Word" in only({"s": "Scale"}, {"s": {"number": "artifacts.map"}}, {"map": toys.Word}).what
+    assert "is of type Word" in only({"s": "Scale"}, {"s": {"number": "artifacts.map"}}, {"map": toys.Word}).what
 
 
 def test_a_delay_without_a_first_value_is_a_problem():
@@ -141,7 +141,7 @@ def test_a_first_value_of_null_is_for_optional_ports():
         "wires.sum.number.initial",
         "Add needs 'number' at every tick, and the first value is null",
     )
-    assert problem.hint == "what gives Number here: scale.number, source.number, sum.number"
+    assert problem.hint == "outputs of type Number: scale.number, source.number, sum.number"
 
 
 def test_a_loop_without_a_delay_shows_the_way_round():

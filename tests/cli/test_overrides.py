@@ -1,0 +1,42 @@
+"""Words that do not fit a configuration: which ones, and what to type instead."""
+
+from collections.abc import Iterator
+
+import pytest
+from hydra import initialize_config_module
+
+from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
+
+
+@pytest.fixture(autouse=True)
+def _configured() -> Iterator[None]:
+    with initialize_config_module("omninav.conf", version_base="1.3"):
+        yield
+
+
+def test_each_word_that_does_not_fit_is_a_problem_and_the_others_are_none():
+    found = invalid_overrides(["sead=3", "match=l2", "nodes.match.headngs=18", "mach=l2"], (), "not used")
+    assert [problem.where for problem in found] == ["sead", "nodes.match.headngs", "mach"], [str(problem) for problem in found]
+    assert "did you mean 'seed=3'?" in found[0].hint
+    assert "did you mean 'nodes.match.headings=18'?" in found[1].hint
+    assert "did you mean 'match=l2'?" in found[2].hint
+
+
+def test_where_no_word_is_to_blame_hydras_own_message_is_given_in_one_line():
+    (problem,) = invalid_overrides(["seed=3"], (), "In 'config': something\n  else\nConfig search path:\n  here")
+    assert (problem.where, problem.what) == ("command line", "In 'config': something else")
+
+
+def test_an_unknown_option_comes_before_what_depends_on_it():
+    found = invalid_overrides(["match=l3", "nodes.match.nothing=1"], (), "")
+    assert [problem.where for problem in found] == ["match"]
+
+
+def test_a_sweep_is_tried_by_its_first_choices_and_each_other_option_of_a_group():
+    jobs = list(jobs_to_try(["match=selective,l2", "seed=0,1", "day=2"], ()))
+    assert jobs == [["match=selective", "seed=0", "day=2"], ["match=l2", "seed=0", "day=2"]]
+
+
+def test_a_parameter_that_the_configuration_does_not_list_is_added_and_a_misspelled_one_is_not():
+    words = ["nodes.match.headings=18", "nodes.match.headngs=18", "seed=3"]
+    assert with_unlisted_parameters(words, ()) == ["++nodes.match.headings=18", "nodes.match.headngs=18", "seed=3"]
