@@ -213,12 +213,14 @@ def test_graph_draws_the_graph_and_that_of_its_map(omninav, tmp_path: Path):
 def test_the_embedded_default_leaves_everything_a_run_should(demo: Path):
     names = {path.name for path in demo.iterdir()}
     assert names == {
+        ".hydra",
         "config.yaml",
         "graph.mmd",
         "graph.svg",
         "manifest.json",
         "map.omap",
         "metrics.json",
+        "quantities.json",
         "report.html",
         "result.mcap",
         "run.log",

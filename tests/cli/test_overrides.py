@@ -16,7 +16,9 @@ def _configured() -> Iterator[None]:
 
 def test_each_word_that_does_not_fit_is_a_problem_and_the_others_are_none():
     found = invalid_overrides(["sead=3", "match=l2", "nodes.match.headngs=18", "mach=l2"], (), "not used")
-    assert [problem.where for problem in found] == ["sead", "nodes.match.headngs", "mach"], [str(problem) for problem in found]
+    assert [problem.where for problem in found] == ["sead", "nodes.match.headngs", "mach"], [
+        str(problem) for problem in found
+    ]
     assert "did you mean 'seed=3'?" in found[0].hint
     assert "did you mean 'nodes.match.headings=18'?" in found[1].hint
     assert "did you mean 'match=l2'?" in found[2].hint
