@@ -89,7 +89,7 @@ def test_results_stand_with_units_and_the_estimate_beside_odometry_alone(tmp_pat
     assert "Map: size 168 kB" in said
 
 
-def test_what_was_dropped_what_is_worth_knowing_and_how_to_run_it_again_are_said(tmp_path):
+def test_a_page_has_skipped_data_notes_and_the_command(tmp_path):
     said = text_of(report(tmp_path))
     assert "source.duplicate frame 7 frame 12 <twice>" in said
     assert "odometry synthetic" in said
@@ -100,7 +100,7 @@ def test_what_was_dropped_what_is_worth_knowing_and_how_to_run_it_again_are_said
     assert "name: <x>" in said
 
 
-def test_pictures_are_inside_the_page_in_their_order(tmp_path):
+def test_plots_are_inside_the_page_in_their_order(tmp_path):
     later = Figure("aaa", "Later", "Second.", b"<svg/>", media_type="image/svg+xml", order=2)
     page = report(tmp_path, figures=(later, PICTURE))
     assert f'src="data:image/png;base64,{base64.b64encode(PICTURE.content).decode()}"' in page
@@ -127,7 +127,7 @@ def test_tables_of_stages_are_shown(tmp_path):
     assert "&lt;b&gt;" in page
 
 
-def test_a_filter_that_never_converged_is_said_to_have_never_done_so(tmp_path):
+def test_a_run_that_never_converged_says_never(tmp_path):
     metrics = measured(converged_after_frames=None, after_convergence=None)
     assert "Converged after never" in text_of(report(tmp_path, metrics=metrics))
 

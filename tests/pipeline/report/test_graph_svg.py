@@ -75,7 +75,7 @@ def test_what_runs_after_the_loop_stands_below_it():
 
 
 @pytest.mark.parametrize("views", [0, 1, 9, 19])
-def test_boxes_never_overlap_and_lie_inside_the_picture(views):
+def test_boxes_never_overlap_and_lie_inside_the_drawing(views):
     made = loop()
     for number in range(views):
         read = Signature({}, {"figure": Port("figure", int)}, {}, None, "", False)
@@ -93,7 +93,7 @@ def test_boxes_never_overlap_and_lie_inside_the_picture(views):
             assert x + w <= ox or ox + ow <= x or y + h <= oy or oy + oh <= y
 
 
-def test_a_delayed_wire_is_dashed_and_says_how_much_later():
+def test_a_delayed_wire_is_dashed_and_labelled_with_its_delay():
     text = svg(loop())
     assert "one tick later" in text
     dashed = [line for line in text.splitlines() if 'stroke-dasharray="6 4"' in line and "<title>" in line]
@@ -101,7 +101,7 @@ def test_a_delayed_wire_is_dashed_and_says_how_much_later():
     assert "fuse.belief → move.belief, one tick later, first value: start.belief" in dashed[0]
 
 
-def test_whoever_reads_ground_truth_is_red():
+def test_readers_of_ground_truth_are_red():
     text = svg(loop())
     red = re.findall(r'<text[^>]*fill="#b3261e"[^>]*>([^<]*)</text>', text)
     assert "truth" in red
@@ -109,12 +109,12 @@ def test_whoever_reads_ground_truth_is_red():
     assert "class n_score,n_start truth" in mermaid(loop())
 
 
-def test_hovering_tells_class_summary_and_parameters_escaped():
+def test_hovering_shows_class_summary_and_parameters_escaped():
     text = svg(loop())
     assert "see: robot.stages.See\nMakes &lt;see&gt; &amp; more.\ngain = 2.5" in text
 
 
-def test_the_same_graph_gives_the_same_picture_and_nothing_is_fetched():
+def test_a_graph_is_always_drawn_alike_and_fetches_nothing():
     assert svg(loop()) == svg(loop())
     assert re.findall(r"https?://[^\"\s<]+", svg(loop())) == ["http://www.w3.org/2000/svg"]
 
@@ -129,7 +129,7 @@ def test_chains_of_boxes_are_drawn_without_crossings():
     assert placed["f"][1] < placed["e"][1]
 
 
-def test_an_empty_graph_is_a_picture_too():
+def test_an_empty_graph_can_be_drawn():
     ET.fromstring(svg(Graph({}, [])))
     assert mermaid(Graph({}, [])) == "flowchart LR\n"
 
