@@ -26,6 +26,14 @@ def test_links_and_paths_of_a_page_exist(page: Path) -> None:
     assert not missing
 
 
+def test_the_readme_names_every_folder() -> None:
+    tree = (ROOT / "README.md").read_text().partition("## Where things are")[2]
+    folders = [each for each in ROOT.glob("*/*/") if each.parent.name in ("pipeline", "stages")]
+    named = [each.name for each in folders if not each.name.startswith("_")]
+    assert len(named) > 15
+    assert not [name for name in named if f"{name}/" not in tree]
+
+
 def test_every_class_and_function_beside_a_file_is_defined_in_it() -> None:
     rows = re.findall(r"`((?:stages|pipeline)/[\w/]+\.py)`((?:,? `\w+`)+)", PAPERS.read_text())
     assert len(rows) > 40
