@@ -1,4 +1,4 @@
-"""How many matches of two views are right before the first wrong one."""
+"""Counts matches of two views that are right before the first wrong one."""
 
 import math
 from collections.abc import Sequence
@@ -7,8 +7,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline import BadInput, Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, one_way_matches
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
@@ -24,7 +23,7 @@ Each = TypeVar("Each")
 
 
 class Seen(NamedTuple):
-    """What is known of a picture: where it was taken, and what was found in it, how far away."""
+    """What is known of an image: its pose, its features, and their depths."""
 
     pose: Array
     patches: LocalFeatures | None
@@ -96,7 +95,7 @@ class FirstMatches(Stage):
         """The whole log at once."""
         there = [row for row, pose in enumerate(truth) if pose is not None]
         if not there:
-            raise BadInput("matches: no picture of the log has a true pose; use a log with /ground_truth/pose")
+            raise BadInput("matches: no image of the log has a true pose; use a log with /ground_truth/pose")
         lens = next((each for each in camera if each is not None), None)
         views = []
         for row in there:
@@ -105,10 +104,10 @@ class FirstMatches(Stage):
             at = np.array([pose.x, pose.y, pose.heading])
             views.append(Seen(at, _at(features, row), _at(vertical_segments, row), _at(depths, row)))
         chosen = [pairs_apart(np.array([view.pose for view in views]), far, self.pairs) for far in self.apart_m]
-        told = [[self._judged(views[one], views[other], lens) for one, other in pairs] for pairs in chosen]
+        judged = [[self._judged(views[one], views[other], lens) for one, other in pairs] for pairs in chosen]
         found: dict[str, Any] = {"depths_known": int(any(view.depths is not None for view in views))}
-        found["apart"] = [{"m": far, **summary(pairs)} for far, pairs in zip(self.apart_m, told, strict=True)]
-        found["all"] = summary([pair for pairs in told for pair in pairs])
+        found["apart"] = [{"m": far, **summary(pairs)} for far, pairs in zip(self.apart_m, judged, strict=True)]
+        found["all"] = summary([pair for pairs in judged for pair in pairs])
         return self.Out(metrics=Metrics({"matches": found}, QUANTITIES, ("matches.all.right_share",)))
 
     def _judged(self, one: Seen, other: Seen, lens: Camera | None) -> tuple[Bools, float]:
@@ -175,7 +174,7 @@ def _at(values: Sequence[Each | None], row: int) -> Each | None:
 
 
 def pairs_apart(poses: Array, metres: float, number: int) -> list[tuple[int, int]]:
-    """Up to `number` pairs of pictures: the first evenly along the log, the second the next taken `metres` from it."""
+    """Up to `number` pairs of images: the first evenly along the log, the second the next taken `metres` from it."""
     found = []
     for row in range(len(poses)):
         after = np.flatnonzero(np.hypot(*(poses[row:, :2] - poses[row, :2]).T) >= metres)
@@ -192,7 +191,7 @@ def shifted(pairs: Pairs) -> Pairs:
 
 
 def half_widths(features: LocalFeatures, camera: Camera) -> Array:
-    """Half of each patch's diameter as an angle (N,), rad: the less of across and down the picture."""
+    """Half of each patch's diameter as an angle (N,), rad: the less of across and down the image."""
     reach = features.sizes[:, None].astype(np.float64) / 2.0
     widths = [
         angles_between(features.bearings, camera.unproject(features.points + reach * np.array(step))[0])
@@ -209,7 +208,7 @@ def run_of_right(right: Bools) -> int:
 
 
 def summary(pairs: Sequence[tuple[Bools, float]]) -> dict[str, float | int | None]:
-    """What is told of some pairs; None where there is none."""
+    """What is judged of some pairs; None where there is none."""
     if not pairs:
         return {"pairs": 0, "first_right": None, "right": None, "right_share": None, "by_chance": None}
     chances = np.array([chance for _, chance in pairs])

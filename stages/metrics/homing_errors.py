@@ -51,22 +51,22 @@ class HomingErrors(Stage):
         poses = drive.truth
         if not len(poses) or not known(poses).all():
             return self.Out()
-        ways = between(poses, poses[0])
-        away = int(np.argmax(np.hypot(ways[:, 0], ways[:, 1])))  # where it was carried to, or drove to
+        targets = between(poses, poses[0])
+        away = int(np.argmax(np.hypot(targets[:, 0], targets[:, 1])))  # where it was carried to, or drove to
         after = {k: vector for k, vector in enumerate(vectors) if k >= away and vector is not None}
         if not after:
             return self.Out()
         found = {k: vector for k, vector in after.items() if vector.state != "lost"}
-        off = {k: _off(vector, ways[k]) for k, vector in found.items()}
-        far = [off[k][0] for k in off if math.hypot(*ways[k, :2]) > self.from_m]
+        off = {k: _errors_deg(vector, targets[k]) for k, vector in found.items()}
+        far = [off[k][0] for k in off if math.hypot(*targets[k, :2]) > self.from_m]
         arrived = next((k for k, at in enumerate(progress) if at is not None and at.arrived and k > away), None)
         first = min(after)
         values = {
-            "start_m": float(math.hypot(*ways[away, :2])),
+            "start_m": float(math.hypot(*targets[away, :2])),
             "arrived": int(arrived is not None),
-            "end_error_m": float(math.hypot(*ways[-1, :2])),
-            "end": {"error_m": {"mean": float(math.hypot(*ways[-1, :2])), "std": 0.0}, "frames": 1},
-            "end_turn_deg": abs(math.degrees(ways[-1, 2])),
+            "end_error_m": float(math.hypot(*targets[-1, :2])),
+            "end": {"error_m": {"mean": float(math.hypot(*targets[-1, :2])), "std": 0.0}, "frames": 1},
+            "end_turn_deg": abs(math.degrees(targets[-1, 2])),
             "time_s": None if arrived is None else float(drive.seconds[arrived] - drive.seconds[away]),
             "lost_rate": 1.0 - len(found) / len(after),
             "direction_error_deg": {
@@ -85,6 +85,6 @@ class HomingErrors(Stage):
         return self.Out(metrics=Metrics({"homing": values}, QUANTITIES, headlines, details=("homing.end",)))
 
 
-def _off(vector: HomingVector, way: np.ndarray) -> tuple[float, float]:
-    direction = float(wrap(vector.direction - math.atan2(way[1], way[0])))
-    return abs(math.degrees(direction)), abs(math.degrees(float(wrap(vector.turn - way[2]))))
+def _errors_deg(vector: HomingVector, target: np.ndarray) -> tuple[float, float]:
+    direction = float(wrap(vector.direction - math.atan2(target[1], target[0])))
+    return abs(math.degrees(direction)), abs(math.degrees(float(wrap(vector.turn - target[2]))))

@@ -42,7 +42,7 @@ class HomingFieldErrors(Stage):
     """Number of rings around the target."""
 
     class Out(Outputs):
-        """`field`: for the picture. Both absent without a view beside the target's."""
+        """`field`: for the plot. Both absent without a view beside the target's."""
 
         metrics: Metrics | None = None
         field: HomingField | None = None
@@ -60,21 +60,26 @@ class HomingFieldErrors(Stage):
         rings = [(metres >= low) & (metres < high) for low, high in pairwise(edges)]
         values: dict[str, Any] = summary(found.errors, turns)
         for name, parts in (("by_distance", rings), ("within", [metres < high for high in edges[1:]])):
-            told = [summary(found.errors[part], turns[part]) for part in parts]
-            values[name] = {"to_m": edges[1:].tolist(), **{key: [each[key] for each in told] for key in told[0]}}
+            summaries = [summary(found.errors[part], turns[part]) for part in parts]
+            values[name] = {
+                "to_m": edges[1:].tolist(),
+                **{key: [each[key] for each in summaries] for key in summaries[0]},
+            }
         headlines = ("homing_field.median_deg", "homing_field.found_rate")
         return self.Out(metrics=Metrics({"homing_field": values}, QUANTITIES, headlines), field=found)
 
 
 def field_of(poses: Array, rows: Sequence[int], vectors: Sequence[HomingVector | None]) -> HomingField:
     """The field over poses (N, 3) of `rows`, towards the first of all."""
-    told = np.array([math.nan if vector is None or vector.state == "lost" else vector.direction for vector in vectors])
-    ways = between(poses[list(rows)], poses[0])
+    directions = np.array(
+        [math.nan if vector is None or vector.state == "lost" else vector.direction for vector in vectors]
+    )
+    targets = between(poses[list(rows)], poses[0])
     return HomingField(
         poses[0],
         poses[list(rows)],
-        np.asarray(wrap(told + poses[list(rows), 2])),
-        np.abs(wrap(told - np.arctan2(ways[:, 1], ways[:, 0]))),
+        np.asarray(wrap(directions + poses[list(rows), 2])),
+        np.abs(wrap(directions - np.arctan2(targets[:, 1], targets[:, 0]))),
         np.array([0 if vector is None else vector.inliers for vector in vectors], np.int64),
     )
 

@@ -73,15 +73,15 @@ class LoopClosures(Stage):
         gaps = hypothesis_gaps(hypotheses) if hypotheses.pose_source == "truth" else None
         far = np.abs(np.diff(hypotheses.pairs, axis=1))[:, 0] >= self.min_images_between
         one, other = hypotheses.place[hypotheses.pairs].T
-        told, near = support(hypotheses.masses), None if gaps is None else gaps[far]
+        supports, near = support(hypotheses.masses), None if gaps is None else gaps[far]
         loops = {
             **counted(hypotheses.accepted, gaps, self.near_m),
             "loop_closures": {
                 **counted(hypotheses.accepted[far], near, self.near_m),
-                "average_precision": None if near is None else average_precision(told[far], near <= self.near_m),
+                "average_precision": None if near is None else average_precision(supports[far], near <= self.near_m),
             },
             "merged": counted((one == other)[far], near, self.near_m),
-            "at_supports": at_supports(told[far], near, self.near_m),
+            "at_supports": at_supports(supports[far], near, self.near_m),
         }
         return self.Out(metrics=Metrics({"map": held, "loops": loops}, QUANTITIES, HEADLINES))
 
@@ -137,7 +137,7 @@ def at_supports(support: Array, gaps: Array | None, near: float) -> dict[str, li
 
 
 def hypothesis_gaps(found: LoopHypotheses) -> Array:
-    """How far apart the two subclusters of each hypothesis came: (H,) metres, between their nearest pictures."""
+    """How far apart the two subclusters of each hypothesis came: (H,) metres, between their nearest images."""
     at = found.poses[:, :2]
     members = [at[found.subcluster == number] for number in range(int(found.subcluster.max(initial=-1)) + 1)]
     gaps = np.empty(len(found.pairs))
@@ -148,9 +148,9 @@ def hypothesis_gaps(found: LoopHypotheses) -> Array:
 
 
 def path_steps(map: TopologicalMap) -> Array:
-    """How far apart neighbouring views on all ways between places were taken: metres, by the map's poses."""
+    """How far apart neighbouring views on all paths between places were taken: metres, by the map's poses."""
     steps = [np.empty(0)]
     for link, (one, other) in enumerate(map.links):
-        way = map.poses[[map.places[one], *map.way(link), map.places[other]], :2]
-        steps.append(np.hypot(*np.diff(way, axis=0).T))
+        path = map.poses[[map.places[one], *map.way(link), map.places[other]], :2]
+        steps.append(np.hypot(*np.diff(path, axis=0).T))
     return np.concatenate(steps)

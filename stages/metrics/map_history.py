@@ -92,17 +92,17 @@ def counted(events: Sequence[ViewEvent | None], after_last: ViewEvent | None = N
 
     What a known map held is taken from the first event. `after_last`: what was learned after the last tick.
     """
-    told = [(row, event) for row, event in enumerate(events) if event is not None]
+    known_events = [(row, event) for row, event in enumerate(events) if event is not None]
     if after_last is not None and events:
-        told.append((len(events) - 1, after_last))
-    if not told:
+        known_events.append((len(events) - 1, after_last))
+    if not known_events:
         return np.zeros((len(events), 4), np.int64)
-    rows = np.array([row for row, _ in told])
-    first = told[0][1]
+    rows = np.array([row for row, _ in known_events])
+    first = known_events[0][1]
     known = first.views - len(first.inserted) + len(first.removed)
-    held = np.array([(known, first.components if known else 0), *((e.views, e.components) for _, e in told)])
-    came = np.bincount(np.concatenate([event.seen for _, event in told]), minlength=len(events))
-    went = np.bincount(rows, [len(event.removed) for _, event in told], len(events))
+    held = np.array([(known, first.components if known else 0), *((e.views, e.components) for _, e in known_events)])
+    came = np.bincount(np.concatenate([event.seen for _, event in known_events]), minlength=len(events))
+    went = np.bincount(rows, [len(event.removed) for _, event in known_events], len(events))
     latest = np.searchsorted(rows, np.arange(len(events)), side="right")
     return np.column_stack([held[latest], came.cumsum(), went.cumsum()]).astype(np.int64)
 

@@ -1,4 +1,4 @@
-"""Whether a robot came to where it was told to go, and what that took."""
+"""Measures whether a robot reached its goal, and at what cost."""
 
 import math
 from collections.abc import Sequence
@@ -57,12 +57,12 @@ class Navigation(Stage):
         map: TopologicalMap,
     ) -> Out:
         """The whole drive at once."""
-        said = [way for way in routes if way is not None]
+        planned = [route for route in routes if route is not None]
         spots = drive.truth[known(drive.truth)][:, :2]
-        if not said or not len(spots):
+        if not planned or not len(spots):
             return self.Out()
-        last = said[-1]
-        ends = (k for k, way in enumerate(routes) if way is not None and way.state in ("arrived", "gave up"))
+        last = planned[-1]
+        ends = (k for k, route in enumerate(routes) if route is not None and route.state in ("arrived", "gave up"))
         ended = next(ends, len(drive) - 1)
         tallied = np.flatnonzero(np.isfinite(drive.distance))
         collisions = int(drive.collisions[-1]) if len(tallied) else None
@@ -99,9 +99,9 @@ class Navigation(Stage):
 
 
 def shortest_metres(map: TopologicalMap, start: npt.ArrayLike, goal: int) -> float | None:
-    """Metres from a point (x, y) to a place, by the straight way to the closest view and from there along the map's.
+    """Metres from a point (x, y) to a place, straight to the closest view and from there along the map's.
 
-    None where no way leads there.
+    None where no path leads there.
     """
     spots = map.poses[:, :2]
     graph = networkx.Graph()

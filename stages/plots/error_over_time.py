@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from omninav.pipeline import Context, Outputs, Stage
-from omninav.pipeline.graph.results import Figure
+from omninav.pipeline import Context, Figure, Outputs, Stage
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive

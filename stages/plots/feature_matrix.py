@@ -5,8 +5,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
-from omninav.pipeline.graph.results import Figure
+from omninav.pipeline import Bounds, Context, Figure, Outputs, Stage, Tick
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.geometry.appearance.haar_integrals import Kernel, padded
 from omninav.stages.values.image import Panorama, Pixels, Windows

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Outputs, Stage
-from omninav.pipeline.graph.results import Figure
+from omninav.pipeline import Context, Figure, Outputs, Stage
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing_field import HomingField

@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Outputs, Stage
-from omninav.pipeline.graph.results import Figure
+from omninav.pipeline import Context, Figure, Outputs, Stage
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.topological_map import LOOP, LoopHypotheses, TopologicalMap

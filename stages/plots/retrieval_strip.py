@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.graph.results import Figure
+from omninav.pipeline import Bounds, Context, Figure, Outputs, Stage
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.drive import Array, Drive

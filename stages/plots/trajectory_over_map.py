@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Outputs, Stage
-from omninav.pipeline.graph.results import Figure
+from omninav.pipeline import Context, Figure, Outputs, Stage
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.grid import OccupancyGrid
