@@ -264,11 +264,11 @@ def _place(layers: list[list[Item]], links: list[Link]) -> None:
                 pulls = [link.start_y - (link.end_y - item.y) for link in links if link.end is item]
                 pulls += [link.end_y - (link.start_y - item.y) for link in links if link.start is item]
                 wishes.append(sum(pulls) / len(pulls) if pulls else item.y)
-            for item, y in zip(layer, _apart(wishes, [item.height + GAP for item in layer]), strict=True):
+            for item, y in zip(layer, _spaced(wishes, [item.height + GAP for item in layer]), strict=True):
                 item.y = y
 
 
-def _apart(wishes: Sequence[float], sizes: Sequence[float]) -> list[float]:
+def _spaced(wishes: Sequence[float], sizes: Sequence[float]) -> list[float]:
     """Positions nearest to the wishes (least squares) at which things of these sizes follow without overlap."""
     offsets = [sum(sizes[:number]) for number in range(len(sizes))]
     blocks: list[tuple[float, int]] = []  # mean of wish minus offset, and how many share it

@@ -76,7 +76,7 @@ class TopologicalMapping(Stage):
         ways = {} if known is None else known_ways(known, place)
         for pair, way in driven_ways(views.distances, place, views.tours, medoids).items():
             if pair not in ways and pair[::-1] not in ways:
-                between = place_clusters.path_images(matches, way, self.min_path_matches, self.max_path_step)
+                between = place_clusters.waypoint_views(matches, way, self.min_path_matches, self.max_path_step)
                 ways[pair] = between, DRIVEN
         pairs = sorted(ways)
         images = [ways[pair][0] for pair in pairs]
@@ -181,7 +181,7 @@ def known_ways(known: TopologicalMap, place: Ints) -> dict[tuple[int, int], tupl
     for link, (one, other) in enumerate(known.links):
         pair = int(place[known.places[one]]), int(place[known.places[other]])
         if pair[0] != pair[1] and pair not in ways and pair[::-1] not in ways:
-            ways[pair] = known.way(link), int(known.kinds[link])
+            ways[pair] = known.path_of(link), int(known.kinds[link])
     return ways
 
 

@@ -151,6 +151,6 @@ def path_steps(map: TopologicalMap) -> Array:
     """How far apart neighbouring views on all paths between places were taken: metres, by the map's poses."""
     steps = [np.empty(0)]
     for link, (one, other) in enumerate(map.links):
-        path = map.poses[[map.places[one], *map.way(link), map.places[other]], :2]
+        path = map.poses[[map.places[one], *map.path_of(link), map.places[other]], :2]
         steps.append(np.hypot(*np.diff(path, axis=0).T))
     return np.concatenate(steps)

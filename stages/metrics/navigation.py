@@ -107,7 +107,7 @@ def shortest_metres(map: TopologicalMap, start: npt.ArrayLike, goal: int) -> flo
     graph = networkx.Graph()
     graph.add_nodes_from(range(len(spots)))
     for link, (one, other) in enumerate(map.links.tolist()):
-        row = [int(map.places[one]), *map.way(link).tolist(), int(map.places[other])]
+        row = [int(map.places[one]), *map.path_of(link).tolist(), int(map.places[other])]
         graph.add_edges_from((a, b, {"metres": math.dist(spots[a], spots[b])}) for a, b in pairwise(row))
     lengths = networkx.single_source_dijkstra_path_length(graph, int(map.places[goal]), weight="metres")
     ahead = np.hypot(*(spots - np.asarray(start, np.float64)).T)

@@ -208,7 +208,7 @@ def shortest_route(
     for link, (one, other) in enumerate(map.links.tolist()):
         missed = failed.get(frozenset((one, other)), 0)
         if one != other and missed < max_failures:
-            price = (1 if cost == "links" else 1 + len(map.way(link))) + missed * len(map.views)
+            price = (1 if cost == "links" else 1 + len(map.path_of(link))) + missed * len(map.views)
             known = graph.edges[one, other]["price"] if graph.has_edge(one, other) else price
             graph.add_edge(one, other, price=min(price, known))
     lengths, routes = networkx.single_source_dijkstra(graph, place, weight="price")

@@ -62,7 +62,7 @@ def draw_links(axes: "Axes", map: TopologicalMap) -> None:
     from matplotlib.collections import LineCollection
 
     poses = map.poses[:, :2]
-    paths = [poses[[map.places[a], *map.way(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
+    paths = [poses[[map.places[a], *map.path_of(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
     axes.add_collection(LineCollection(paths, colors=REFERENCE, linewidths=0.7, zorder=1))
 
 

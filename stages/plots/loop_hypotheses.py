@@ -97,7 +97,7 @@ def _draw_tours(axes: "Axes", found: LoopHypotheses) -> None:
 
 def _draw_places(axes: "Axes", map: TopologicalMap) -> None:
     poses = map.poses[:, :2]
-    paths = [poses[[map.places[a], *map.way(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
+    paths = [poses[[map.places[a], *map.path_of(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
     loop = map.kinds == LOOP
     driven = [path for path, of_loop in zip(paths, loop, strict=True) if not of_loop]
     _lines(axes, driven, ESTIMATE, 1.1, f"driven ({len(driven)})")

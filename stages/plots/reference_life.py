@@ -53,7 +53,7 @@ class ReferenceLife(Stage):
         plan: FloorPlan | None = None,
     ) -> Out:
         """The whole run at once."""
-        name = most_moved(events) if self.name is None else self.name
+        name = farthest_moved(events) if self.name is None else self.name
         if name is None:
             return self.Out()
         snapshots: list[Snapshot] = []
@@ -87,7 +87,7 @@ Snapshot = tuple[int, Array, Array]
 """A frame, and the places (K, 2) and weights (K,) of a reference's components after it."""
 
 
-def most_moved(events: Sequence[ViewEvent | None]) -> int | None:
+def farthest_moved(events: Sequence[ViewEvent | None]) -> int | None:
     """The reference whose heaviest component moved furthest in sum; of equals the one that changed more often."""
     last: dict[int, Array] = {}
     moved: dict[int, tuple[float, int]] = {}

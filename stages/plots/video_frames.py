@@ -194,7 +194,7 @@ class VideoFrames(Sequence[Pixels]):
         if self.map is None:
             return
         for link, (one, other) in enumerate(self.map.links):
-            views = [int(self.map.places[one]), *self.map.way(link).tolist(), int(self.map.places[other])]
+            views = [int(self.map.places[one]), *self.map.path_of(link).tolist(), int(self.map.places[other])]
             polyline(frame, window(self.map.poses[views]), LINK, thickness)
         if thickness > 1:
             for spot in window(self.map.poses):

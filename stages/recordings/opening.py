@@ -25,7 +25,7 @@ def open_recording(
     if path.is_dir():
         hints = "; ".join(filter(None, (one.hint(log, options) for one in formats)))
         raise UnreadableRecording(f"{log}: no recording is in this folder ({kinds}); {hints}")
-    what = "not a recording" if path.exists() else f"no such file{_beside(path)}"
+    what = "not a recording" if path.exists() else f"no such file{_candidates(path)}"
     raise UnreadableRecording(f"{log}: {what}; name {kinds}")
 
 
@@ -36,6 +36,6 @@ def log_formats() -> list[Format]:
     return [kind() for kind in sorted(FORMATS, key=lambda kind: kind.__module__)]
 
 
-def _beside(path: Path) -> str:
+def _candidates(path: Path) -> str:
     near = sorted(other.name for other in path.parent.glob(f"*{path.suffix}")) if path.parent.is_dir() else []
     return f" (in that folder: {', '.join(near[:5])})" if near and path.suffix else ""

@@ -419,10 +419,10 @@ def _has_given_up(row: F64, goal: F64, robot: F64) -> bool:
     return math.dist(goal, row[:2]) > GIVE_UP_DISTANCE_M and math.dist(row[:2], robot) > OUT_OF_SIGHT_M
 
 
-def _out_of_sight(way: F64, robot: F64) -> F64 | None:
+def _out_of_sight(path: F64, robot: F64) -> F64 | None:
     """The last point of the robot's path (N, 2) that is out of its sight."""
-    far = np.flatnonzero(np.hypot(*(way - robot).T) >= OUT_OF_SIGHT_M)
-    return way[far[-1]] if len(far) else None
+    far = np.flatnonzero(np.hypot(*(path - robot).T) >= OUT_OF_SIGHT_M)
+    return path[far[-1]] if len(far) else None
 
 
 def _expected(track: Track, now: float) -> F64:
@@ -435,9 +435,9 @@ def _expected(track: Track, now: float) -> F64:
     return at if float(np.hypot(*speed)) > MAX_SPEED else at + speed * (now - float(track.times[-1]))
 
 
-def _ahead_on_track(way: F64, place: F64) -> F64:
+def _ahead_on_track(path: F64, place: F64) -> F64:
     """The point of the robot's path (N, 2) some 0.8 m on from where it comes nearest to a place."""
-    nearest = int(np.argmin(((way - place) ** 2).sum(axis=1)))
-    gone = np.cumsum(np.hypot(*np.diff(way[nearest:], axis=0).T))
-    point: F64 = way[min(nearest + 1 + int(np.searchsorted(gone, 0.8)), len(way) - 1)]
+    nearest = int(np.argmin(((path - place) ** 2).sum(axis=1)))
+    gone = np.cumsum(np.hypot(*np.diff(path[nearest:], axis=0).T))
+    point: F64 = path[min(nearest + 1 + int(np.searchsorted(gone, 0.8)), len(path) - 1)]
     return point

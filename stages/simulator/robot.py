@@ -165,7 +165,7 @@ def drive(
             break
         rolled_to.setdefault(done - 1, poses[done - 1].copy())
         kidnapped.append((done - 1, kidnapping))
-        put_down(state, kidnapping)
+        teleport(state, kidnapping)
         poses[done - 1] = state[:3]
         if kidnapping.to is not None:
             along = _nearest_along(points, ends, state[:2], along)
@@ -185,7 +185,7 @@ def around(state: F64, seconds: npt.ArrayLike) -> F64:
     return np.stack([x, y, state[HEADING] + state[TURNING] * offset], axis=-1)
 
 
-def put_down(state: F64, kidnapping: Kidnapping) -> None:
+def teleport(state: F64, kidnapping: Kidnapping) -> None:
     """Somebody lifts a robot and puts it down: its `state` (8,) is at rest then, and nothing is counted as driven."""
     state[:3] = compose(state[:3] if kidnapping.to is None else kidnapping.to, (0.0, 0.0, kidnapping.turn))
     state[SPEED] = state[TURNING] = state[IN_CONTACT] = 0.0

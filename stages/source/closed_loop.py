@@ -19,7 +19,7 @@ from omninav.stages.simulator.odometry import draw_bias, measured
 from omninav.stages.simulator.people import Person, Track
 from omninav.stages.simulator.ranges import measure, round_bodies
 from omninav.stages.simulator.renderer import render
-from omninav.stages.simulator.robot import COLLISIONS, DISTANCE, around, at_rest, limits, put_down, reach, steer
+from omninav.stages.simulator.robot import COLLISIONS, DISTANCE, around, at_rest, limits, reach, steer, teleport
 from omninav.stages.simulator.simulated_recording import DAY_0_NS, refuse_no_room, scan_value, simulation_digest
 from omninav.stages.simulator.streams import stream
 from omninav.stages.simulator.world import World
@@ -146,7 +146,7 @@ class ClosedLoop(Source):
         simulation.odometry = compose(simulation.odometry, rolled)
         for kidnapping in self.kidnappings:
             if now - 1.0 / self.rate_hz < kidnapping.at <= now:
-                put_down(robot, kidnapping)
+                teleport(robot, kidnapping)
         return Motion(*(float(value) for value in rolled))
 
     def _perceive(self, ctx: Context, simulation: ClosedLoopState, motion: Motion | None) -> Out:

@@ -82,7 +82,7 @@ class PerspectiveWindow(Stage):
     def step(self, ctx: Context, image: Image, camera: Camera) -> Out:
         """Cut the windows of one image."""
         if isinstance(camera, Perspective):
-            return self.Out(panorama=self._ordinary(image, camera))
+            return self.Out(panorama=self._of_perspective(image, camera))
         headings = wrap(2.0 * math.pi * np.arange(self.directions) / self.directions)
         if self._table is None or camera is not self._camera:
             self._table, self._camera = self._built(ctx, camera, headings), camera
@@ -106,7 +106,7 @@ class PerspectiveWindow(Stage):
             )
         return WindowTable(table, None if dark == 0.0 else seen.reshape(len(headings), self.rows, self.columns))
 
-    def _ordinary(self, image: Image, camera: Perspective) -> Windows:
+    def _of_perspective(self, image: Image, camera: Perspective) -> Windows:
         if self.directions > 1:
             raise BadInput(
                 f"unwarp: an ordinary camera looks one way, not {self.directions}; write nodes.unwarp.directions=1"

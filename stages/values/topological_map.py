@@ -152,7 +152,7 @@ class TopologicalMap(Value):
         gaps = spots[:, None, :2] - self.poses[self.places][None, :, :2]
         return np.asarray(np.hypot(gaps[..., 0], gaps[..., 1]).argmin(axis=1), np.int64)
 
-    def way(self, link: int) -> Ints:
+    def path_of(self, link: int) -> Ints:
         """The path images of a link, from its first place to its second: views."""
         return self.ways[self.way_starts[link] : self.way_starts[link + 1]]
 
@@ -171,7 +171,7 @@ class TopologicalMap(Value):
         for one, other in pairwise(places.tolist()):
             link = self.link(one, other)
             assert link is not None, f"places {one} and {other} are not linked"
-            between: list[int] = self.way(link).tolist()
+            between: list[int] = self.path_of(link).tolist()
             views += between if int(self.links[link, 0]) == one else between[::-1]
             views.append(int(self.places[other]))
             ends.append(len(views))

@@ -120,14 +120,14 @@ def between_hypotheses(medoids: Ints, frames: Ints) -> Array:
     return either
 
 
-def path_images(matches: Callable[[int, int], int], way: Ints, min_matches: int, max_step: int) -> Ints:
-    """The fewest views of a way along it, each with `min_matches` with the one before, where that is possible.
+def waypoint_views(matches: Callable[[int, int], int], path: Ints, min_matches: int, max_step: int) -> Ints:
+    """The fewest views of a path along it, each with `min_matches` with the one before, where that is possible.
 
-    `matches`: of one view with another one further along. `way`: views in the order of the drive; the first and the
+    `matches`: of one view with another one further along. `path`: views in the order of the drive; the first and the
     last are given and are not part of the answer. No two are more than `max_step` views apart, however similar: along
     a wall that repeats itself similarity says nothing.
     """
-    views = way.tolist()
+    views = path.tolist()
     chosen: list[int] = []
     at = 0
     while at < len(views) - 1:

@@ -17,8 +17,8 @@ from omninav.stages.geometry.appearance.place_clusters import (
     complete_linkage,
     hypotheses,
     medoid,
-    path_images,
     subclusters,
+    waypoint_views,
 )
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
 from omninav.stages.geometry.probability.dempster_shafer import support
@@ -97,10 +97,10 @@ def test_path_images_are_few_and_each_sees_enough_of_the_one_before() -> None:
     def matches(one: int, other: int) -> int:
         return 100 - 20 * abs(one - other)
 
-    assert path_images(matches, at, 40, 9).tolist() == [3, 6]
-    assert path_images(matches, at, 1000, 9).tolist() == list(range(1, 9))
-    assert path_images(matches, at, -100, 9).tolist() == []
-    assert path_images(matches, at, -100, 4).tolist() == [4, 8]
+    assert waypoint_views(matches, at, 40, 9).tolist() == [3, 6]
+    assert waypoint_views(matches, at, 1000, 9).tolist() == list(range(1, 9))
+    assert waypoint_views(matches, at, -100, 9).tolist() == []
+    assert waypoint_views(matches, at, -100, 4).tolist() == [4, 8]
 
 
 def test_a_ring_driven_once_is_a_ring_of_places(once: tuple[TopologicalMap, LoopHypotheses]) -> None:
@@ -112,7 +112,7 @@ def test_a_ring_driven_once_is_a_ring_of_places(once: tuple[TopologicalMap, Loop
     steps = np.hypot(*np.diff(made.poses[made.places[made.links]][:, :, :2], axis=1)[:, 0].T)
     assert steps.max() < 10.0  # a robot sees 7 m far
     for link, (one, other) in enumerate(made.links):
-        way = [int(view) for view in (made.places[one], *made.way(link), made.places[other])]
+        way = [int(view) for view in (made.places[one], *made.path_of(link), made.places[other])]
         for here, there in itertools.pairwise(way):
             seen = [WORLD.seen(Pose(*(float(number) for number in made.poses[view]))) for view in (here, there)]
             found = len(match_patches(*(view.patches() for view in seen), ComparisonOptions()).first)
@@ -204,7 +204,7 @@ def test_accepted_places_can_stay_two_with_a_link(twice: tuple[TopologicalMap, L
     assert len(linked) > len(twice[0])
     assert (linked.kinds == LOOP).sum() > 5
     loop = int(np.flatnonzero(linked.kinds == LOOP)[0])
-    assert len(linked.way(loop)) == 0
+    assert len(linked.path_of(loop)) == 0
     assert linked.link(*linked.links[loop][::-1]) == loop
 
 

@@ -68,7 +68,7 @@ def test_a_map_is_as_large_as_its_file_and_its_steps_are_those_of_its_ways(
     assert merged["hypotheses"] == values["loops"]["loop_closures"]["hypotheses"]
     assert merged["accepted"] >= values["loops"]["loop_closures"]["accepted"] > 0
     one, other = made.map.links[0]
-    way = made.map.poses[[made.map.places[one], *made.map.way(0), made.map.places[other]], :2]
+    way = made.map.poses[[made.map.places[one], *made.map.path_of(0), made.map.places[other]], :2]
     assert path_steps(made.map)[: len(way) - 1] == pytest.approx(np.hypot(*np.diff(way, axis=0).T))
 
 

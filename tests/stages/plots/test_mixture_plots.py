@@ -11,7 +11,7 @@ from omninav.stages.plots.belief_snapshots import BeliefSnapshots
 from omninav.stages.plots.changed_mixtures import ChangedMixtures
 from omninav.stages.plots.map_ellipses import MapEllipses
 from omninav.stages.plots.map_growth import MapGrowth
-from omninav.stages.plots.reference_life import ReferenceLife, lives_of, most_moved
+from omninav.stages.plots.reference_life import ReferenceLife, farthest_moved, lives_of
 from omninav.stages.plots.result_log import ResultLog
 from omninav.stages.plots.thin_belief import ThinBelief, heaviest
 from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap
@@ -75,9 +75,9 @@ def test_the_life_that_is_told_is_that_of_the_reference_whose_place_moved_most()
         return ViewEvent(1, 1, none, none, none, "", one, np.ones(1), np.array([[x, 0.0]]), np.ones(1, np.int64))
 
     moves = [event(3, 0.0), None, event(5, 0.0), event(5, 1.0), event(3, 1.5), event(5, 0.5)]
-    assert most_moved(moves) == 5  # 1.0 m and half of it back, as far as 3 in one go, but in more frames
-    assert most_moved([*moves, event(3, 1.6)]) == 3
-    assert most_moved([None]) is None
+    assert farthest_moved(moves) == 5  # 1.0 m and half of it back, as far as 3 in one go, but in more frames
+    assert farthest_moved([*moves, event(3, 1.6)]) == 3
+    assert farthest_moved([None]) is None
 
 
 def test_a_references_place_goes_on_where_a_component_is_near_and_ends_where_none_is():
