@@ -108,7 +108,7 @@ def test_a_drive_is_known_by_its_places(omninav, tmp_path: Path, tour: Path, log
     words = ("variant=topological_localisation", f"tour={tour}", f"log={log}", f"nodes.source.stride={stride}")
     omninav(*words, check=True)
     found = metrics_of(tmp_path)["localisation"]
-    assert found["pictures"] == images
+    assert found["images"] == images
     assert found["adjacent_accuracy"] > 0.7
     assert found["place_distance_m"] < 1.0
     assert (tmp_path / "runs" / "latest" / "trajectory.tum").exists()
