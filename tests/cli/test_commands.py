@@ -111,7 +111,7 @@ def test_a_log_of_ones_own_without_a_map_says_what_to_type(omninav, tmp_path: Pa
         ),
         (("variant=topological_nav",), "goal: variant=topological_nav needs it: where to go"),
         (("+artifacts.map.set={rout: tour}",), "did you mean 'route'?"),
-        (("+artifacts.map.inheritd=[unwarp]",), "ArtifactSpecification has no parameter 'shared'"),
+        (("+artifacts.map.inheritd=[unwarp]",), "ArtifactSpecification has no parameter 'inheritd'"),
     ],
 )
 def test_what_a_newcomer_gets_wrong_is_answered_with_what_to_type(omninav, tmp_path: Path, words, said: str):

@@ -13,6 +13,7 @@ from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import complete, settings_read
 from omninav.pipeline.cli.config_groups import settings_left_open
+from omninav.pipeline.cli.overrides import with_unlisted_parameters
 from omninav.pipeline.experiment.specification import read_experiment
 from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.registry import resolve
@@ -64,7 +65,8 @@ def test_the_command_in_its_head_composes(path: Path):
     if group(path) != "graph":  # its files are included by variants
         assert f"{'+' if group(path) == 'experiment' else ''}{group(path)}={option}" in command, command
     with initialize_config_module("omninav.conf", version_base="1.3"):
-        compose("config", overrides=[word for word in command if not word.startswith("-")])
+        words = [word for word in command if not word.startswith("-")]
+        compose("config", overrides=with_unlisted_parameters(words, []))
 
 
 def graphs_of(path: Path) -> set[str]:

@@ -22,6 +22,7 @@ from omninav.pipeline.graph.problems import ProblemsFound
 def command(arguments: list[str]) -> int:
     """Run one job, or all of a sweep. Hydra composes the configurations."""
     words, folders = read_words(arguments)
+    offer_plugins()  # which parameters there are depends on the stages that are offered
     if any(word.startswith("nodes.") for word in words):
         with initialize_config_module(CONF, version_base="1.3"):
             listed = with_unlisted_parameters(words, folders)
@@ -31,7 +32,6 @@ def command(arguments: list[str]) -> int:
     def job(config: Any) -> None:
         run_job(config, arguments, run_experiment)
 
-    offer_plugins()
     if {"-m", "--multirun"} & set(arguments):
         _refuse_misspelled_sweep(words, folders)
     of_conditions = condition_words(words)
