@@ -11,6 +11,8 @@ help:  ## list these targets
 demo: $(VENV)/.installed  ## simulate a small world, map it, localise a drive, write a report
 	$(BIN)/omninav
 
+# Small matrix products are many times slower with several threads on busy cores.
+test: export OPENBLAS_NUM_THREADS = 1
 test: lint  ## lint, then run every test
 	$(BIN)/pytest -n 2 --dist loadfile
 
