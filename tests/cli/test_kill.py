@@ -45,7 +45,7 @@ def written(checkpoint: Path) -> int:
 
 @needs_data
 def test_a_run_killed_while_views_wait_to_be_learned_or_may_be_taken_back_resumes_to_the_same_bytes(tmp_path: Path):
-    """Each view waits for 4 m, some 18 pictures, and what it taught is put right later: at any moment some wait."""
+    """Each view waits for 4 m, some 18 images, and is corrected later: at any moment some views wait."""
     logs = f"log=[{DATA / 'photoreal-house' / 'tour.mcap'},{DATA / 'photoreal-house' / 'drive.mcap'}]"
     words = ("variant=particle_cml", logs, "nodes.source.stop=90", "cache=null")
     whole, killed = finished(tmp_path / "whole", *words), tmp_path / "killed" / "runs" / "latest"
