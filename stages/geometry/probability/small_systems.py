@@ -1,4 +1,4 @@
-"""Vectors and rotations of three dimensions inside compiled loops."""
+"""Small systems of equations, vectors and rotations of three dimensions, inside compiled loops."""
 
 import math
 
@@ -7,6 +7,34 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+
+
+@numba.njit(cache=True, nogil=True)
+def solve(matrix: Array, right: Array) -> Array:
+    """x of A x = b for a symmetric, positive definite A (n, n) and b (n,), by A = L L'; zeros where A is not definite.
+
+    LAPACK's solver, as numba calls it, would keep the calling functions out of numba's cache.
+    """
+    size, lower, x = len(right), np.zeros_like(matrix), right.copy()
+    for i in range(size):
+        for j in range(i + 1):
+            rest = matrix[i, j]
+            for k in range(j):
+                rest -= lower[i, k] * lower[j, k]
+            if i != j:
+                lower[i, j] = rest / lower[j, j]
+            elif rest > 0.0:
+                lower[i, i] = math.sqrt(rest)
+            else:
+                return np.zeros(size)
+        for k in range(i):
+            x[i] -= lower[i, k] * x[k]
+        x[i] /= lower[i, i]
+    for i in range(size - 1, -1, -1):
+        for k in range(i + 1, size):
+            x[i] -= lower[k, i] * x[k]
+        x[i] /= lower[i, i]
+    return x
 
 
 @numba.njit(cache=True, nogil=True)

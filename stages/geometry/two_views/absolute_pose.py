@@ -16,7 +16,7 @@ import poselib
 from omninav.stages.geometry.probability.small_systems import rotated_by
 
 from .ransac import BATCH, AgreedPose, samples_needed, samples_of
-from .refinement import refined
+from .refinement import refinement
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -138,22 +138,15 @@ def refined_camera(
     `planar`: only x, y and the turn about the vertical move.
     """
     bearings, points = np.ascontiguousarray(bearings, np.float64), np.ascontiguousarray(points, np.float64)
-    limit = 1.0 - math.cos(threshold)
-
-    def cost(R: Array, t: Array) -> float:
-        return float(_tukey(R, t, bearings, points, limit))
-
-    def normal_equations(R: Array, t: Array) -> tuple[Array, Array]:
-        square, slope = _normal_equations(R, t, bearings, points, limit)
-        return (square[:3, :3], slope[:3]) if planar else (square, slope)
-
-    return refined((np.ascontiguousarray(rotation), translation), cost, normal_equations, _moved, steps)
+    limit, freedoms = 1.0 - math.cos(threshold), 3 if planar else 6
+    return _refined(np.ascontiguousarray(rotation), translation, bearings, points, limit, freedoms, steps)
 
 
+@numba.njit(cache=True, nogil=True)
 def _moved(R: Array, t: Array, step: Array) -> tuple[Array, Array]:
     # Freedoms: x, y, turn about the vertical; then, unless planar, z and both other turns.
-    x, y, yaw = step[:3]
-    z, roll, pitch = step[3:] if len(step) == 6 else (0.0, 0.0, 0.0)
+    x, y, yaw = step[0], step[1], step[2]
+    z, roll, pitch = (step[3], step[4], step[5]) if len(step) == 6 else (0.0, 0.0, 0.0)
     return rotated_by(R, roll, pitch, yaw), t + np.array([x, y, z])
 
 
@@ -167,7 +160,9 @@ def _tukey(R: Array, t: Array, bearings: Array, points: Array, limit: float) -> 
 
 
 @numba.njit(cache=True, nogil=True)
-def _normal_equations(R: Array, t: Array, bearings: Array, points: Array, limit: float) -> tuple[Array, Array]:
+def _normal_equations(
+    R: Array, t: Array, bearings: Array, points: Array, limit: float, freedoms: int
+) -> tuple[Array, Array]:
     # Residual: the ray to the point less the bearing, in the points' frame; the ray moves with t, the bearing with R.
     square, slope, row = np.zeros((6, 6)), np.zeros(6), np.zeros((3, 6))
     seen, ray = np.empty(3), np.empty(3)
@@ -194,4 +189,14 @@ def _normal_equations(R: Array, t: Array, bearings: Array, points: Array, limit:
                 slope[k] += weight * row[i, k] * (ray[i] - seen[i])
                 for j in range(6):
                     square[k, j] += weight * row[i, k] * row[i, j]
-    return square, slope
+    return np.ascontiguousarray(square[:freedoms, :freedoms]), slope[:freedoms]
+
+
+_refinement = refinement(_tukey, _normal_equations, _moved)
+
+
+@numba.njit(cache=True, nogil=True)
+def _refined(
+    R: Array, t: Array, bearings: Array, points: Array, limit: float, freedoms: int, steps: int
+) -> tuple[Array, Array]:
+    return _refinement(R, t, bearings, points, limit, freedoms, steps)

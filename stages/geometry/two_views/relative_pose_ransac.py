@@ -17,7 +17,7 @@ from omninav.stages.geometry.probability.small_systems import cross, rotated_by,
 
 from .epipolar import decompose, eight_points, five_points, planar_candidates
 from .ransac import BATCH, AgreedPose, samples_needed, samples_of
-from .refinement import refined
+from .refinement import refinement
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -199,15 +199,7 @@ def refined_pose(
     """
     first, second = np.ascontiguousarray(first, np.float64), np.ascontiguousarray(second, np.float64)
     limit, freedoms = math.sin(threshold) ** 2, 2 if planar else 5
-
-    def cost(R: Array, t: Array) -> float:
-        return float(_tukey(R, t, first, second, limit))
-
-    def normal_equations(R: Array, t: Array) -> tuple[Array, Array]:
-        found: tuple[Array, Array] = _normal_equations(R, t, first, second, limit, freedoms)
-        return found
-
-    return refined((np.ascontiguousarray(rotation), translation), cost, normal_equations, _moved, steps)
+    return _refined(np.ascontiguousarray(rotation), translation, first, second, limit, freedoms, steps)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -254,3 +246,13 @@ def _normal_equations(
             for j in range(freedoms):
                 square[k, j] += weight * row[k] * row[j]
     return square, slope
+
+
+_refinement = refinement(_tukey, _normal_equations, _moved)
+
+
+@numba.njit(cache=True, nogil=True)
+def _refined(
+    R: Array, t: Array, first: Array, second: Array, limit: float, freedoms: int, steps: int
+) -> tuple[Array, Array]:
+    return _refinement(R, t, first, second, limit, freedoms, steps)

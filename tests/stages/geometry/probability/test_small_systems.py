@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from omninav.stages.geometry.probability.small_systems import cross, rotated_by, unit
+from omninav.stages.geometry.probability.small_systems import cross, rotated_by, solve, unit
 
 VECTORS = st.lists(st.floats(-5, 5), min_size=3, max_size=3).map(np.array)
 Array = npt.NDArray[np.float64]
@@ -35,3 +35,16 @@ def test_no_rotation_gives_a_copy_of_its_own():
     same = rotated_by(start, 0.0, 0.0, 0.0)
     same[0, 0] = 5.0
     assert start[0, 0] == 1.0
+
+
+@given(st.integers(1, 6), st.integers(0, 1000))
+def test_a_definite_system_is_solved_as_numpy_does(size: int, seed: int):
+    rng = np.random.default_rng(seed)
+    half, right = rng.normal(size=(size, size)), rng.normal(size=size)
+    matrix = half @ half.T + 0.1 * np.eye(size)
+    np.testing.assert_allclose(solve(matrix, right), np.linalg.solve(matrix, right), rtol=1e-8, atol=1e-8)
+
+
+def test_a_system_that_is_not_definite_gives_no_step():
+    np.testing.assert_array_equal(solve(np.zeros((3, 3)), np.ones(3)), np.zeros(3))
+    np.testing.assert_array_equal(solve(np.diag([1.0, -1.0]), np.ones(2)), np.zeros(2))
