@@ -22,7 +22,7 @@ def test_a_killed_run_resumes_to_the_same_bytes(tmp_path: Path, demo: Path, shar
     wait_for_checkpoint(process, tmp_path)
     kills = 0
     while process.poll() is None and kills < 3:
-        time.sleep(moments.uniform(0.0, 4.0))
+        time.sleep(moments.uniform(0.0, 0.5 if cached else 4.0))
         if process.poll() is None:
             kill(process)
             kills += 1
