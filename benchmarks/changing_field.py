@@ -148,6 +148,7 @@ def graph_on_field(variant: str, source: dict[str, Any], limit: float | None = N
         "particle_clustering",
         "map_update",
         "mapping",
+        "past_states",
     }
     kept = {name for name in kept | {"initial_map", "estimate"} if nodes.get(name)}
     config["nodes"] = {name: nodes[name] for name in nodes if name in kept}
@@ -157,4 +158,6 @@ def graph_on_field(variant: str, source: dict[str, Any], limit: float | None = N
         if name in kept
     }
     config["saves"] = {}  # the map that is saved is made after the last tick, by nodes that are not kept
+    for artifact in config["artifacts"].values():
+        artifact["must_match"] = []  # the views come from the field, not from the nodes that a map is compared by
     return plan(config).graph

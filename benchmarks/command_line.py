@@ -11,7 +11,7 @@ from .table import Row
 def rows() -> list[Row]:
     """`omninav --help` in a fresh process, beside a Python process that does nothing."""
     empty = _median([sys.executable, "-c", "pass"])
-    helped = _median([sys.executable, "-m", "omninav.pipeline", "--help"])
+    helped = _median([sys.executable, "-m", "omninav", "--help"])
     return [Row("omninav --help", helped, "s", "python -c pass", empty, limit=0.5)]
 
 

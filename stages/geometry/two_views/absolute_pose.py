@@ -72,11 +72,10 @@ def three_point_pose(
 def _candidates(bearings: Array, points: Array, planar: bool) -> tuple[Array, Array]:
     # All poses of samples (S, 3, 3). Poselib's pose takes the world to the camera, ours the camera to the world.
     solved = [pose for sample in zip(bearings, points, strict=True) for pose in poselib.p3p(*sample)]
-    rotations = np.array([pose.R.T for pose in solved]).reshape(-1, 3, 3)
-    translations = np.array([pose.t for pose in solved]).reshape(-1, 3)
-    translations = -np.einsum("kij,kj->ki", rotations, translations)
-    usable = np.isfinite(rotations).all(axis=(1, 2)) & np.isfinite(translations).all(axis=1)
-    rotations, translations = rotations[usable], translations[usable]
+    poses = np.array([pose.Rt for pose in solved]).reshape(-1, 3, 4)
+    poses = poses[np.isfinite(poses).all(axis=(1, 2))]
+    rotations = poses[:, :, :3].transpose(0, 2, 1)
+    translations = -np.einsum("kij,kj->ki", rotations, poses[:, :, 3])
     if planar:  # the turn about the vertical that is closest, at the height of the points' frame
         yaws = np.arctan2(rotations[:, 1, 0] - rotations[:, 0, 1], rotations[:, 0, 0] + rotations[:, 1, 1])
         rotations, translations[:, 2] = np.zeros_like(rotations), 0.0
