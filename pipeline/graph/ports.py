@@ -2,13 +2,14 @@
 
 import dataclasses
 import inspect
+import sys
 import types
 import typing
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from .problems import Problem, suggest
+from .problems import Problem, cut, suggest
 from .signature import read_parameters, split_optional
 from .stage import Bounds
 
@@ -69,8 +70,8 @@ def convert(value: Any, expected: Any, where: str) -> tuple[Any, list[Problem]]:
 
 
 def _unfit(value: Any, expected: Any, where: str, hint: str = "") -> _Unfit:
-    shown = repr(value) if not isinstance(value, Mapping) else "a mapping"
-    return _Unfit([Problem(where, f"{shown} ({type(value).__name__}), expected {type_name(expected)}", hint)])
+    given = "a mapping" if isinstance(value, Mapping) else cut(value)
+    return _Unfit([Problem(where, f"{given} ({type(value).__name__}), expected {type_name(expected)}", hint)])
 
 
 def _convert(value: Any, expected: Any, where: str) -> Any:
@@ -87,7 +88,7 @@ def _convert(value: Any, expected: Any, where: str) -> Any:
         for bounds in (extra for extra in arguments[1:] if isinstance(extra, Bounds)):
             broken = bounds.violated_by(converted) if isinstance(converted, int | float) else None
             if broken:
-                raise _Unfit([Problem(where, f"{converted!r} is out of bounds, expected {type_name(expected)}")])
+                raise _Unfit([Problem(where, f"{cut(converted)} is out of bounds, expected {type_name(expected)}")])
         return converted
     if origin is Literal:
         if value in arguments and not isinstance(value, bool):
@@ -112,7 +113,10 @@ def _convert(value: Any, expected: Any, where: str) -> Any:
         arguments_found, problems = convert_fields(value, expected, where)
         if problems:
             raise _Unfit(problems)
-        return expected(**arguments_found)
+        try:
+            return expected(**arguments_found)
+        except ValueError as error:  # what __post_init__ says of them
+            raise _Unfit([Problem(where, str(error))]) from None
     return _convert_plain(value, expected, where)
 
 
@@ -128,6 +132,8 @@ def _convert_plain(value: Any, expected: Any, where: str) -> Any:
             return value
     elif expected is float:
         if isinstance(value, int | float) and not isinstance(value, bool):
+            if not -sys.float_info.max <= value <= sys.float_info.max:
+                raise _unfit(value, expected, where, "write a finite number")
             return float(value)
     elif expected is str:
         if isinstance(value, str):

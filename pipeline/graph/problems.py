@@ -2,8 +2,9 @@
 
 import difflib
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,7 @@ class Problem:
     hint: str = ""
 
     def __str__(self) -> str:
-        return f"{self.where}: {self.what}" + (f"\n    {self.hint}" if self.hint else "")
+        return one_line(f"{self.where}: {self.what}") + (f"\n    {one_line(self.hint)}" if self.hint else "")
 
 
 class ProblemsFound(Exception):
@@ -32,6 +33,34 @@ class ProblemsFound(Exception):
 
 class BadInput(Exception):
     """Input that cannot be used. The message is one line: where (file, topic, record), what, and what to do."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
+
+
+MAX_WORD, MAX_LINE = 300, 4000
+"""Characters of a word and of a line in a message."""
+
+
+def one_line(text: str) -> str:
+    """A text on one line, without what a terminal does not show; what is very long is cut short."""
+    words = (word if len(word) <= MAX_WORD else f"{word[:MAX_WORD]}…" for word in text.split())
+    line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(words))
+    return line if len(line) <= MAX_LINE else f"{line[:MAX_LINE]}…"
+
+
+def shown(value: Any) -> str:
+    """A value as messages name it: its kind where it is a mapping or a list, and the beginning where it is long."""
+    return f"a {type(value).__name__}" if isinstance(value, Mapping | list | tuple | set) else cut(value)
+
+
+def cut(value: Any) -> str:
+    """A value as it would be written, cut short where it is long."""
+    try:
+        text = repr(value)
+    except ValueError:  # a whole number of more digits than Python prints
+        return f"a {type(value).__name__} of very many digits"
+    return text if len(text) <= 60 else f"{text[:57]}…"
 
 
 def unreadable_yaml(error: BaseException) -> BadInput | None:

@@ -33,13 +33,17 @@ class Key(NamedTuple):
     name: str | int
 
 
-FocalX = Annotated[float, Key("K", 0), Bounds(gt=0)]
-FocalY = Annotated[float, Key("K", 4), Bounds(gt=0)]
-CentreX = Annotated[float, Key("K", 2)]
-CentreY = Annotated[float, Key("K", 5)]
-Skew = Annotated[float, Key("K", 1)]
-InnerRadius = Annotated[float, Key("mask", "inner_radius_px"), Bounds(ge=0)]
-OuterRadius = Annotated[float, Key("mask", "outer_radius_px"), Bounds(gt=0)]
+MAX_SIDE, MAX_PIXELS = 32_768, 100_000_000
+"""Columns or rows of an image, and its pixels: several arrays of this size are made of a camera."""
+FAR_PX = 1e6
+"""No place of a camera's image, and no radius in it, is further from its corner than this."""
+FocalX = Annotated[float, Key("K", 0), Bounds(gt=0, le=FAR_PX)]
+FocalY = Annotated[float, Key("K", 4), Bounds(gt=0, le=FAR_PX)]
+CentreX = Annotated[float, Key("K", 2), Bounds(ge=-FAR_PX, le=FAR_PX)]
+CentreY = Annotated[float, Key("K", 5), Bounds(ge=-FAR_PX, le=FAR_PX)]
+Skew = Annotated[float, Key("K", 1), Bounds(ge=-FAR_PX, le=FAR_PX)]
+InnerRadius = Annotated[float, Key("mask", "inner_radius_px"), Bounds(ge=0, le=FAR_PX)]
+OuterRadius = Annotated[float, Key("mask", "outer_radius_px"), Bounds(gt=0, le=FAR_PX)]
 
 
 class Ring(NamedTuple):
@@ -75,9 +79,9 @@ class Camera(Value, ABC):
     sees_itself: ClassVar[bool] = False
     """The camera's housing is seen in the middle of its own image, as under a mirror."""
 
-    width: Annotated[int, Key("image", "width"), Bounds(gt=0)]
+    width: Annotated[int, Key("image", "width"), Bounds(gt=0, le=MAX_SIDE)]
     """Columns of an image."""
-    height_px: Annotated[int, Key("image", "height"), Bounds(gt=0)]
+    height_px: Annotated[int, Key("image", "height"), Bounds(gt=0, le=MAX_SIDE)]
     """Rows of an image."""
     _: KW_ONLY
     height: float | None = None
@@ -92,6 +96,8 @@ class Camera(Value, ABC):
             MODELS[projection] = cls
 
     def __post_init__(self) -> None:
+        if self.width * self.height_px > MAX_PIXELS:
+            raise ValueError(f"'image' is {self.width} x {self.height_px}, expected at most {MAX_PIXELS:,} pixels")
         ring = self.ring
         if ring is not None and ring.inner >= ring.outer:
             raise ValueError("'mask.inner_radius_px' must be below 'mask.outer_radius_px'")

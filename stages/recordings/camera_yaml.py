@@ -6,15 +6,16 @@ K: [[fx, skew, cx], [0, fy, cy], [0, 0, 1]].
 """
 
 import dataclasses
-import math
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
+import numpy as np
 import yaml
 
 from omninav.pipeline.graph.ports import convert
-from omninav.pipeline.graph.problems import nearest
+from omninav.pipeline.graph.problems import nearest, shown
 from omninav.pipeline.graph.signature import Parameter, read_parameters
+from omninav.pipeline.graph.small_files import parse_yaml, read_yaml
 from omninav.stages.camera.model import Camera, Key, camera_models
 
 from .recording import UnreadableRecording
@@ -24,20 +25,13 @@ MATRIX = "must be [[fx, skew, cx], [0, fy, cy], [0, 0, 1]], with focal lengths a
 
 
 def read_camera(path: Path) -> Camera:
-    """The camera that a file describes. Raises `UnreadableRecording` naming the file, and the key that is wrong."""
-    try:
-        return parse_camera(path.read_bytes(), str(path))
-    except OSError as error:
-        raise UnreadableRecording(f"{path}: {error.strerror or error}; give camera=PATH/camera.yaml") from None
+    """The camera that a file describes. Raises `BadInput` naming the file, and the line or key that is wrong."""
+    return camera_from(read_yaml(path), str(path))
 
 
 def parse_camera(text: str | bytes, where: str) -> Camera:
-    """The camera that a text describes. Raises `UnreadableRecording` naming `where` and the key that is wrong."""
-    try:
-        content = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, AttributeError, TypeError, RecursionError) as error:  # what PyYAML raises
-        raise UnreadableRecording(f"{where}: not readable as YAML ({' '.join(str(error).split())})") from None
-    return camera_from(content, where)
+    """The camera that a text describes. Raises `BadInput` naming `where`, and the line or key that is wrong."""
+    return camera_from(parse_yaml(text, where), where)
 
 
 def camera_from(content: Any, where: str, size: tuple[int, int] | None = None) -> Camera:
@@ -84,14 +78,14 @@ def camera_from_info(info: Any, where: str) -> Camera:
     """
     k = [float(number) for number in (info.k if hasattr(info, "k") else info.K)]
     d = [float(number) for number in (info.d if hasattr(info, "d") else info.D)]
-    if k[0] <= 0 or k[4] <= 0:
+    if not np.isfinite([*k, *d]).all() or len(k) != 9 or k[0] <= 0 or k[4] <= 0:
         raise UnreadableRecording(
             f"{where}: its focal length is {k[0]:g}: not calibrated; give camera=PATH/camera.yaml"
         )
     for model in camera_models().values():
         camera = model.from_camera_info(info.distortion_model, (int(info.width), int(info.height)), k, d)
         if camera is not None:
-            return camera
+            return camera_from(camera_section(camera), where)  # within the limits of a camera.yaml
     raise UnreadableRecording(
         f"{where}: distortion model '{info.distortion_model}' does not describe an omnidirectional camera; "
         "give camera=PATH/camera.yaml"
@@ -119,7 +113,7 @@ def _model(content: dict[str, Any], where: str) -> type[Camera]:
     if not isinstance(name, str) or name not in models:
         near = nearest(name, models) if isinstance(name, str) else None
         hint = f"did you mean '{near}'?" if near else f"one of {', '.join(sorted(models))}"
-        raise UnreadableRecording(f"{where}: 'projection' cannot be {_shown(name)}; {hint}")
+        raise UnreadableRecording(f"{where}: 'projection' cannot be {shown(name)}; {hint}")
     return models[name]
 
 
@@ -140,8 +134,8 @@ def _value(content: dict[str, Any], parameter: Parameter, known: Keys, where: st
         if value is None:
             continue
         parts = value if isinstance(value, list) else [value]
-        if any(isinstance(part, dict | list) or part in (math.inf, -math.inf) or part != part for part in parts):
-            raise UnreadableRecording(f"{where}: '{path}' must be a number or a word, not {_shown(value)}")
+        if any(isinstance(part, dict | list) for part in parts):
+            raise UnreadableRecording(f"{where}: '{path}' must be a number or a word, not {shown(value)}")
         converted, problems = convert(value, parameter.type, path)
         if problems:
             what = MATRIX if isinstance(key.name, int) else f"is {problems[0].what}"
@@ -192,7 +186,3 @@ def _refuse_misspelt(content: dict[str, Any], known: Keys, where: str) -> None:
             if near:
                 path = f"{section}.{name}".strip(".")
                 raise UnreadableRecording(f"{where}: key '{path}' is not known; did you mean '{near}'?")
-
-
-def _shown(value: Any) -> str:
-    return f"a {type(value).__name__}" if isinstance(value, dict | list) else repr(value)[:60]

@@ -7,14 +7,26 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import yaml
-
 from omninav.pipeline import Bounds
 from omninav.pipeline.graph.ports import convert
-from omninav.pipeline.graph.problems import nearest
+from omninav.pipeline.graph.problems import nearest, shown
+from omninav.pipeline.graph.small_files import read_yaml
 
 from .recording import UnreadableRecording
-from .tables import Length, Time
+from .tables import Delimiter, Length, Time
+
+MAX_PATTERN, MAX_REPEATS, MAX_ALTERNATIVES = 200, 2, 4
+"""Of a regular expression: with few repeats, none of them of a group, no name takes it long."""
+MAX_NAME = 255
+"""Characters of a file's name, as file systems have it."""
+FAR = 1e9
+"""Metres or seconds that an offset does not exceed."""
+Offset = Annotated[float, Bounds(ge=-FAR, le=FAR)]
+_SINGLE = re.compile(r"\\.|\[\^?\]?(?:\\.|[^\]\\])*\]")
+"""In a regular expression: an escaped character or a set of characters."""
+_REPEAT = re.compile(r"[*+?][+?]?|\{\d*,\d*\}[+?]?")
+_REPEATED_GROUP = re.compile(r"\)\s*[*+?{]")
+_MANY_TIMES = re.compile(r"\{\d{3,}|,\d{3,}\}")
 
 
 @dataclass(frozen=True)
@@ -25,8 +37,33 @@ class Rename:
     by: str
     regex: bool = False
 
+    def __post_init__(self) -> None:
+        if not 0 < len(self.replace) <= MAX_PATTERN or len(self.by) > MAX_PATTERN:
+            raise ValueError(f"'replace' has 1 to {MAX_PATTERN} characters, and 'by' at most as many")
+        if self.regex:
+            _check_pattern(self.replace, self.by)
+
     def __call__(self, name: str) -> str:
+        """The name changed. Raises ValueError where it is too long to be a file's."""
+        if len(Path(name).name) > MAX_NAME or len(name) > 2 * MAX_NAME:
+            raise ValueError(f"{shown(name)} has {len(name)} characters, which no file's name has")
         return re.sub(self.replace, self.by, name) if self.regex else name.replace(self.replace, self.by)
+
+
+def _check_pattern(pattern: str, by: str) -> None:
+    """Raise ValueError for a regular expression that is none, or that might take for ever on some name."""
+    bare = _SINGLE.sub("c", pattern).replace("(?:", "(")
+    if "(?" in bare or _REPEATED_GROUP.search(bare) or _MANY_TIMES.search(bare):
+        raise ValueError(f"the regular expression {shown(pattern)} repeats a group; repeat characters or [sets] only")
+    if len(_REPEAT.findall(bare)) > MAX_REPEATS or bare.count("|") > MAX_ALTERNATIVES:
+        limits = f"at most {MAX_REPEATS} repeats and {MAX_ALTERNATIVES} alternatives"
+        raise ValueError(f"the regular expression {shown(pattern)} is too complicated; {limits}, or several renames")
+    try:
+        nothing = re.match(f"(?:{pattern})|", "")
+        assert nothing is not None
+        nothing.expand(by)
+    except (re.error, IndexError, OverflowError, RecursionError) as error:
+        raise ValueError(f"{shown(pattern)} or its replacement {shown(by)} is not understood ({error})") from None
 
 
 @dataclass(frozen=True)
@@ -41,12 +78,12 @@ class Frames:
 
     csv: str | None = None
     header: bool = True
-    delimiter: str = ","
+    delimiter: Delimiter = ","
     file: str | int | None = None
     images: str = ""
     rename: tuple[Rename, ...] = ()
     time: Time | None = None
-    period: Annotated[float, Bounds(gt=0)] | None = None
+    period: Annotated[float, Bounds(ge=1e-6, le=3600)] | None = None
 
 
 @dataclass(frozen=True)
@@ -62,12 +99,12 @@ class Positions:
     y: Length
     csv: str | None = None
     header: bool = True
-    delimiter: str = ","
+    delimiter: Delimiter = ","
     time: Time | None = None
-    clock_offset: float = 0.0
-    max_gap: Annotated[float, Bounds(gt=0)] = 1.0
-    offset_x: float = 0.0
-    offset_y: float = 0.0
+    clock_offset: Offset = 0.0
+    max_gap: Annotated[float, Bounds(gt=0, le=FAR)] = 1.0
+    offset_x: Offset = 0.0
+    offset_y: Offset = 0.0
 
 
 @dataclass(frozen=True)
@@ -78,7 +115,7 @@ class Heading:
     unit: Literal["deg", "rad"]
     zero: Literal["x", "y"] = "x"
     sense: Literal["clockwise", "counter_clockwise"] = "counter_clockwise"
-    offset: float = 0.0
+    offset: Offset = 0.0
 
 
 @dataclass(frozen=True)
@@ -91,9 +128,9 @@ class Tangent:
     before the robot does.
     """
 
-    window: Annotated[float, Bounds(gt=0)] = 1.0
+    window: Annotated[float, Bounds(ge=1e-6, le=FAR)] = 1.0
     unit: Literal["s", "m"] = "s"
-    lag: float = 0.0
+    lag: Offset = 0.0
 
 
 @dataclass(frozen=True)
@@ -121,7 +158,7 @@ def known_layouts(layouts: Sequence[str] = ()) -> dict[str, Path]:
 def read_description(path: Path, layouts: Sequence[str] = ()) -> Description:
     """A description from a file. Its key `like` names another one, which it changes key by key.
 
-    Raises `UnreadableRecording` naming the file and every key that is wrong.
+    Raises `BadInput` naming the file and the line or every key that is wrong.
     """
     content = _read(path, layouts, ())
     description, problems = convert(content, Description, "")
@@ -150,12 +187,7 @@ def find_layout(name: str, layouts: Sequence[str] = ()) -> Path:
 def _read(path: Path, layouts: Sequence[str], seen: tuple[Path, ...]) -> dict[str, Any]:
     if path in seen:
         raise UnreadableRecording(f"{path}: 'like' leads back to itself")
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UnreadableRecording(f"{path}: {error.strerror or error}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise UnreadableRecording(f"{path}: not readable as YAML ({' '.join(str(error).split())})") from None
+    content = read_yaml(path)
     if not isinstance(content, dict):
         raise UnreadableRecording(f"{path}: must hold keys (frames, positions, …)")
     like = content.pop("like", None)

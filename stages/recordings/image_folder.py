@@ -11,19 +11,22 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.files import digest_file
+from omninav.pipeline.graph.problems import shown
 from omninav.stages.camera.model import Camera
 from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from, read_camera
-from .description import Description, find_layout, known_layouts, read_description
+from .description import MAX_PATTERN, Description, find_layout, known_layouts, read_description
 from .messages import Undecodable, decode_image, is_blank
 from .positions import frame_poses
 from .recording import Format, OpenOptions, UnreadableRecording
 from .stamps import ascending
-from .tables import CsvTable, read_table
+from .tables import CsvTable, Delimiter, read_table
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
+MAX_STARS = 8
+"""Wildcards in the name of a file."""
 
 
 class ImageFolder:
@@ -46,6 +49,7 @@ class ImageFolder:
         if not folder.is_dir():
             raise UnreadableRecording(f"{folder}: no such folder")
         self._sources: list[Path] = []
+        self._rows: list[str] = []
         frames = self._table(description.frames.csv, description.frames.header, description.frames.delimiter)
         paths = self._paths(frames)
         times = self._times(frames, len(paths))
@@ -92,7 +96,7 @@ class ImageFolder:
     def _find(self, pattern: str) -> Path:
         """The one file that a pattern names."""
         pattern = pattern.replace("{which}", self._description.which)
-        found = sorted(path for path in self._folder.glob(pattern) if path.is_file())
+        found = sorted(self._matching(pattern))
         if not found:
             raise UnreadableRecording(f"{self._folder}: no file {pattern} ({self._where} asks for it)")
         if len(found) > 1:
@@ -102,7 +106,20 @@ class ImageFolder:
             )
         return found[0]
 
-    def _table(self, pattern: str | None, header: bool, delimiter: str) -> CsvTable | None:
+    def _matching(self, pattern: str) -> list[Path]:
+        """The files in the folder that a pattern names."""
+        parts = Path(pattern).parts
+        if "\0" in pattern or len(pattern) > MAX_PATTERN or pattern.count("*") > MAX_STARS or pattern.count("**") > 1:
+            what = f"at most {MAX_PATTERN} characters, {MAX_STARS} stars and one **"
+            raise UnreadableRecording(f"{self._where}: the file name {shown(pattern)} is too complicated; {what}")
+        if not parts or Path(pattern).is_absolute() or ".." in parts:
+            raise UnreadableRecording(f"{self._where}: {shown(pattern)} names no file within the recording's folder")
+        try:
+            return [path for path in self._folder.glob(pattern) if path.is_file()]
+        except (OSError, ValueError) as error:
+            raise UnreadableRecording(f"{self._folder}: {shown(pattern)} cannot be looked for ({error})") from None
+
+    def _table(self, pattern: str | None, header: bool, delimiter: Delimiter) -> CsvTable | None:
         if pattern is None:
             return None
         path = self._find(pattern)
@@ -113,18 +130,28 @@ class ImageFolder:
         frames = self._description.frames
         if table is None:
             pattern = frames.images.replace("{which}", self._description.which)
-            found = [path for path in self._folder.glob(pattern or "*") if path.is_file()]
-            if not pattern or not found:
+            found = self._matching(pattern) if pattern else []
+            if not found:
                 raise UnreadableRecording(f"{self._folder}: no image fits '{pattern}' (frames.images in {self._where})")
-            return sorted(found, key=lambda path: [int(n) if n.isdigit() else n for n in re.split(r"(\d+)", path.name)])
+            self._rows = [f"frame {number}" for number in range(len(found))]
+            return sorted(
+                found, key=lambda path: [int(n) if n.isdecimal() else n for n in re.split(r"(\d+)", path.name)]
+            )
         if frames.file is None:
             raise UnreadableRecording(f"{self._where}: frames.file is missing: the column with file names")
         base = self._folder if frames.images.startswith("/") else table.path.parent
         base /= frames.images.lstrip("/")
         names = table.texts(frames.file)
-        for rename in frames.rename:
-            names = [rename(name) for name in names]
-        return [base / name for name in names]
+        self._rows = [f"{table.path.name}, line {line}" for line in table.lines]
+        return [base / self._renamed(name, row) for name, row in zip(names, self._rows, strict=True)]
+
+    def _renamed(self, name: str, row: str) -> str:
+        try:
+            for rename in self._description.frames.rename:
+                name = rename(name)
+        except ValueError as error:
+            raise UnreadableRecording(f"{self._folder}: {row}: {error}") from None
+        return name
 
     def _times(self, table: CsvTable | None, count: int) -> list[int | None]:
         frames = self._description.frames
@@ -138,11 +165,11 @@ class ImageFolder:
         rows = []
         for row, path in enumerate(paths):
             if times[row] is None:
-                self._drop("no_time", f"frame {row} has no time")
-            elif not path.is_file():
-                self._drop("missing_image", f"{path} does not exist")
+                self._drop("no_time", f"{self._rows[row]}: no time")
+            elif not _is_file(path):
+                self._drop("missing_image", f"{self._rows[row]}: no file {path}")
             elif not np.isfinite(truth[row]).all():
-                self._drop("no_position", f"frame {row} ({path.name}) has no position")
+                self._drop("no_position", f"{self._rows[row]} ({path.name}): no position")
             else:
                 rows.append(row)
         kept, repeated, backward = ascending([times[row] or 0 for row in rows])
@@ -172,6 +199,14 @@ class ImageFolder:
             if pixels is not None:
                 return int(pixels.shape[1]), int(pixels.shape[0])
         raise UnreadableRecording(f"{self._folder}: not one of its {len(self._paths_kept)} images can be decoded")
+
+
+def _is_file(path: Path) -> bool:
+    """Whether there is a file of that name; also of a name that no file can have."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 class DescribedFolder(Format):

@@ -5,8 +5,8 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.mcap.message import Location, Record
 from omninav.pipeline.mcap.reader import LogReader
 
@@ -46,9 +46,9 @@ class Mcap(Format):
 def _listed(path: Path) -> list[str]:
     """The files that a rosbag2 folder is made of, in their order; none where its metadata cannot be read."""
     try:
-        content = yaml.safe_load(path.read_text())
+        content = read_yaml(path)
         return [Path(file).name for file in content["rosbag2_bagfile_information"]["relative_file_paths"]]
-    except (OSError, yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError):
+    except (BadInput, KeyError, TypeError):
         return []
 
 

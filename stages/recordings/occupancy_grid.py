@@ -1,16 +1,43 @@
 """Occupancy grids as ROS map_server keeps them."""
 
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-import yaml
 
+from omninav.pipeline import Bounds
+from omninav.pipeline.files import digest_file, digest_text
+from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.signature import read_parameters
+from omninav.pipeline.graph.small_files import read_small, read_yaml
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+
+MAX_CELLS = 25_000_000
+"""Of a grid: 250 m x 250 m in cells of 5 cm."""
+Far = Annotated[float, Bounds(ge=-1e6, le=1e6)]
+Share = Annotated[float, Bounds(ge=0, le=1)]
+
+
+@dataclass(frozen=True)
+class MapServer:
+    """What is read of a map_server file."""
+
+    image: str
+    resolution: Annotated[float, Bounds(ge=0.001, le=100)]
+    """Metres."""
+    origin: tuple[Far, Far, Far]
+    """x, y (m) and turn (rad)."""
+    occupied_thresh: Share = 0.65
+    free_thresh: Share = 0.196
+    negate: bool = False
+    mode: Literal["trinary", "scale", "raw"] = "trinary"
 
 
 def grid_beside(logs: str | Sequence[str] | None) -> Path | None:
@@ -29,32 +56,61 @@ def read_occupancy(file: Path) -> OccupancyGrid:
     `free_thresh`, and what lies between is unknown, in the modes `trinary` and `scale`. In the mode `raw` levels are
     per cent, and those above 100 unknown. A turned origin is refused.
     """
+    about = _described(file)
+    if about.origin[2]:
+        raise BadInput(f"{file}: its origin is turned by {about.origin[2]} rad, which is not supported")
+    levels = _levels(file, about.image)
+    filled = np.arange(256) / 255.0 if about.negate else 1.0 - np.arange(256) / 255.0
+    if about.mode == "raw":
+        filled = np.where(np.arange(256) > 100, np.nan, np.arange(256) / 100.0)
+    states = np.full(256, UNKNOWN, np.uint8)
+    states[filled > about.occupied_thresh] = OCCUPIED
+    states[filled < about.free_thresh] = FREE
+    return OccupancyGrid(states[levels[::-1]], about.resolution, (about.origin[0], about.origin[1]))
+
+
+def grid_digest(file: Path) -> str:
+    """The hash of a map_server pair that can be read."""
+    return digest_text(digest_file(file), digest_file(file.parent / _described(file).image))
+
+
+def _described(file: Path) -> MapServer:
+    found, problems = convert_fields(_named(read_yaml(file), file), MapServer, "")
+    if problems:
+        what = f"{problems[0].where.lstrip('.')}: {problems[0].what}"
+        raise BadInput(f"{file}: not a map_server map ({what}); give the .yaml beside a map's image")
+    return MapServer(**found)
+
+
+def _named(content: Any, file: Path) -> dict[str, Any]:
+    """The keys of a map_server file that are read, with numbers that are written as 5e-2."""
+    if not isinstance(content, dict):
+        raise BadInput(f"{file}: not a map_server map; give the .yaml beside a map's image")
+    known = {key: content[key] for key in read_parameters(MapServer) if content.get(key) is not None}
+    for key in ("resolution", "occupied_thresh", "free_thresh"):
+        if isinstance(known.get(key), str):
+            with suppress(ValueError):
+                known[key] = float(known[key])
+    if known.get("negate") in (0, 1):
+        known["negate"] = bool(known["negate"])
+    return known
+
+
+def _levels(file: Path, image: str) -> npt.NDArray[np.uint8]:
+    """The grey levels of a grid's image."""
     try:
-        content = yaml.safe_load(file.read_text())
-        resolution, (x, y, turn) = float(content["resolution"]), map(float, content["origin"])
-        occupied, free = float(content.get("occupied_thresh", 0.65)), float(content.get("free_thresh", 0.196))
-        negate, mode = bool(content.get("negate", 0)), str(content.get("mode", "trinary"))
-        image = file.parent / str(content["image"])
-    except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError) as error:
-        why = " ".join(str(error).split())
-        raise BadInput(f"{file}: not a map_server map ({why}); give the .yaml beside a map's image") from None
-    levels = cv2.imread(str(image), cv2.IMREAD_GRAYSCALE)
+        content = np.frombuffer(read_small(file.parent / image, MAX_CELLS * 4), np.uint8)
+        levels = cv2.imdecode(content, cv2.IMREAD_GRAYSCALE) if len(content) else None
+    except BadInput as error:
+        raise BadInput(f"{file}: its image {error}") from None
+    except cv2.error as error:  # as of an image that says it is too large
+        raise BadInput(f"{file}: its image {image} cannot be read ({error.err or error})") from None
     if levels is None:
-        raise BadInput(f"{file}: its image {image.name} cannot be read")
-    if mode not in ("trinary", "scale", "raw"):
-        raise BadInput(f"{file}: its mode is '{mode}'; map_server knows trinary, scale and raw")
-    if turn:
-        raise BadInput(f"{file}: its origin is turned by {turn} rad, which is not supported")
-    if not resolution > 0.0:
-        raise BadInput(f"{file}: its resolution is {resolution:g} m; write the width of a cell in metres")
-    if mode == "raw":
-        filled = np.where(levels > 100, np.nan, levels / 100.0)
-    else:
-        filled = levels / 255.0 if negate else 1.0 - levels / 255.0
-    cells = np.full(levels.shape, UNKNOWN, np.uint8)
-    cells[filled > occupied] = OCCUPIED
-    cells[filled < free] = FREE
-    return OccupancyGrid(np.ascontiguousarray(cells[::-1]), resolution, (x, y))
+        raise BadInput(f"{file}: its image {image} cannot be read; expected PGM, PNG or another image")
+    if levels.size > MAX_CELLS:
+        rows, columns = levels.shape
+        raise BadInput(f"{file}: {columns} x {rows} cells, at most {MAX_CELLS:,} are read; make it coarser")
+    return np.asarray(levels, np.uint8)
 
 
 def coarser(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:

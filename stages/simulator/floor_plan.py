@@ -5,8 +5,7 @@ from typing import Annotated
 import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.files import digest_file
-from omninav.stages.recordings.occupancy_grid import grid_beside, read_grid
+from omninav.stages.recordings.occupancy_grid import grid_beside, grid_digest, read_grid
 from omninav.stages.values.floor_plan import FloorPlan
 
 from .config import WorldConfig
@@ -53,7 +52,7 @@ class DrivenPlan(Stage):
     def inputs_digest(self) -> str | None:
         """Hash of the grid file, if there is one."""
         grid = grid_beside(self.log)
-        return None if grid is None else digest_file(grid)
+        return None if grid is None else grid_digest(grid)
 
     def step(self, ctx: Context) -> Out:
         """Read or make the plan."""

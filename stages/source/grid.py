@@ -10,9 +10,8 @@ import numpy.typing as npt
 from scipy.spatial import KDTree
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.pipeline.files import digest_file
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.recordings.occupancy_grid import coarser, grid_beside, read_occupancy
+from omninav.stages.recordings.occupancy_grid import MAX_CELLS, coarser, grid_beside, grid_digest, read_occupancy
 from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.occupancy import occupancy
@@ -63,8 +62,8 @@ class PlaceGrid(Stage):
         file = self._file()
         if file is None:
             return None
-        read_occupancy(file)
-        return digest_file(file)
+        self._read(file)
+        return grid_digest(file)
 
     def step(self, ctx: Context, map: ReferenceGraph | None = None, length_scale: LengthScale | None = None) -> Out:
         """Read, take or make the grid."""
@@ -77,7 +76,7 @@ class PlaceGrid(Stage):
             ctx.fact("grid", "a stand-in made from the tour's free path: walls are where it ends, not where they are")
             ctx.count("grid_is_a_stand_in", detail="grid: made from the tour's free path; a map_server file is better")
         elif file is not None:
-            grid = coarser(read_occupancy(file), self.resolution_m)
+            grid = self._read(file)
             ctx.fact("grid", file.name)
         else:
             cells, origin = occupancy(World(self.world, 0), self.resolution_m)
@@ -91,6 +90,15 @@ class PlaceGrid(Stage):
         if space is None:
             raise BadInput(f"grid: no cell is free and {clearance:g} m from obstacles; use a smaller clearance_m")
         return self.Out(grid=grid, free=space)
+
+    def _read(self, file: Path) -> OccupancyGrid:
+        """The grid in a file. Raises BadInput also where it leaves a robot no room."""
+        grid = coarser(read_occupancy(file), self.resolution_m)
+        if free_space(grid, self.clearance_m, None) is None:
+            raise BadInput(
+                f"{file}: no cell is free and {self.clearance_m:g} m from obstacles; type nodes.grid.clearance_m=0"
+            )
+        return grid
 
     def _file(self) -> Path | None:
         if self.grid == FROM_TOUR:
@@ -145,6 +153,11 @@ def along_path(poses: Array, edges: npt.NDArray[np.int64], reach: float, resolut
     margin = reach + 2 * resolution
     origin = np.floor((places.min(axis=0) - margin) / resolution) * resolution
     columns, rows = (int(n) for n in np.ceil((places.max(axis=0) + margin - origin) / resolution))
+    if rows * columns > MAX_CELLS:
+        raise BadInput(
+            f"grid: a stand-in of {columns} x {rows} cells along the map's path, expected at most {MAX_CELLS:,}; type "
+            "nodes.grid.resolution_m=1, or give grid=FOLDER/map.yaml"
+        )
     grid = OccupancyGrid(
         np.full((rows, columns), UNKNOWN, np.uint8), resolution, (float(origin[0]), float(origin[1])), "tour"
     )

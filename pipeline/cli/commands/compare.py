@@ -3,10 +3,9 @@
 import json
 from pathlib import Path
 
-import yaml
-
 from omninav.pipeline.cli.terminal import show
 from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.report.terminal_tables import compare_table
 from omninav.pipeline.run.metrics_files import read_metrics
 
@@ -19,7 +18,7 @@ def command(arguments: list[str]) -> int:
     for word in arguments:
         folder = Path(word)
         metrics = read_metrics(folder)
-        config = yaml.safe_load((folder / "config.yaml").read_text())
+        config = read_yaml(folder / "config.yaml")
         manifest = json.loads((folder / "manifest.json").read_text())
         runs.append({"name": word.rstrip("/"), "metrics": metrics, "config": config, "manifest": manifest})
     show(compare_table(runs))

@@ -5,6 +5,7 @@ import dataclasses
 import pytest
 import yaml
 
+from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.mcap.message_types import make_message
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.camera.donut import Donut
@@ -59,17 +60,17 @@ def test_a_missing_key_is_named_with_its_file(key: str) -> None:
         ("a: 28.095", "a: long", r"'mirror\.a' is 'long' \(str\), expected float > 0"),
         ("a: 28.095", "a: -1", r"'mirror\.a' is -1\.0 is out of bounds, expected float > 0"),
         ("a: 28.095", "a: {b: 1}", r"'mirror\.a' must be a number or a word, not a dict"),
-        ("yaw: 0.3", "yaw: .nan", "'yaw' must be a number or a word, not nan"),
+        ("yaw: 0.3", "yaw: .nan", "line \\d+: '.nan' is not finite"),
         ("hyperbolic", "hyperbolik", "'projection' cannot be 'hyperbolik'; did you mean 'hyperbolic'"),
         ("yaw:", "yaww:", "key 'yaww' is not known; did you mean 'yaw'"),
         ("inner_radius_px: 34", "inner_radius_px: 340", "must be below"),
-        ("  width: 640", "  width: [", "not readable as YAML"),
+        ("  width: 640", "  width: [", "this is no YAML"),
         ("497.0", "0", "'K' must be"),
     ],
 )
 def test_a_wrong_key_is_named_with_what_to_write(old: str, new: str, said: str) -> None:
     assert old in HOUSE
-    with pytest.raises(UnreadableRecording, match=said) as caught:
+    with pytest.raises(BadInput, match=said) as caught:
         parse_camera(HOUSE.replace(old, new, 1), "camera.yaml")
     assert "\n" not in str(caught.value)
 
@@ -83,10 +84,21 @@ def test_a_wrong_key_is_named_with_what_to_write(old: str, new: str, said: str) 
         f"width: {'9' * 5000}",
         "a: &a [x, x]\nb: &b [*a, *a]\nprojection: hyperbolic\nK: *b\nimage: {width: 6, height: *b}",
         "- projection",
+        "projection: \0",
+        b"\xff\xfe\x00",
+        "[" * 5000,
+        "? {a: 1}\n: b",
+        "a: &a *a",
+        "a: &a {b: c}\n<<: [*a, 3]",
+        "projection: donut\nimage: {width: 40000, height: 1}",
+        "projection: donut\nimage: {width: 20000, height: 20000}",
+        "projection: perspective\nimage: {width: 6, height: 6}\nK: [nan, 0, 1, 0, 1, 1, 0, 0, 1]",
+        "projection: donut\nprojection: donut\nimage: {width: 6, height: 6}",
+        "x" * 2_000_000,
     ],
 )
-def test_a_hostile_file_is_refused_in_one_short_line(text: str) -> None:
-    with pytest.raises(UnreadableRecording, match=r"^camera\.yaml: ") as caught:
+def test_a_hostile_file_is_refused_in_one_short_line(text: str | bytes) -> None:
+    with pytest.raises(BadInput, match=r"^camera\.yaml(, line \d+)?: ") as caught:
         parse_camera(text, "camera.yaml")
     assert len(str(caught.value).splitlines()) == 1
     assert len(str(caught.value)) < 300

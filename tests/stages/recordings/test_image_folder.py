@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from conftest import DATA, needs_data
 
+from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.positions import track_directions
 from omninav.stages.recordings.recording import UnreadableRecording
@@ -120,6 +121,71 @@ def test_a_wrong_description_is_one_line_that_names_the_place(tmp_path: Path, ol
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"^.*/"', "'['", r"frames\.rename\[0\]: '\[' or its replacement '' is not understood"),
+        ('by: ""', "by: '\\9'", "invalid group reference"),
+        ('"^.*/"', "'(a+)+$'", "repeats a group; repeat characters"),
+        ('"^.*/"', "'(?:a|a)*$'", "repeats a group"),
+        ('"^.*/"', "'.*.*.*x'", "too complicated; at most 2 repeats"),
+        ('"^.*/"', "'" + "a" * 300 + "'", "'replace' has 1 to 200 characters"),
+        ('";"', "'**x'", r"positions\.delimiter: '\*\*x' \(str\), expected ','"),
+        ("csv: track.csv", "csv: /etc/passwd", "names no file within the recording's folder"),
+        ("csv: track.csv", "csv: ../../x", "names no file within the recording's folder"),
+        ("csv: track.csv", "csv: ''", "names no file within the recording's folder"),
+        ("csv: track.csv", "csv: '**/**/**/x'", "too complicated; at most"),
+        ("csv: track.csv", "csv: '" + "*a" * 30 + "'", "too complicated; at most"),
+        ("csv: track.csv", "csv: '[z-a]'", r"no file \[z-a\]"),
+        ("clock_offset: 10.0", "clock_offset: 1.0e+300", "out of bounds"),
+        ("images: pictures", "images: " + "x" * 300, r"6 missing_image; .*frames\.csv, line 2: no file"),
+    ],
+)
+def test_a_hostile_description_is_one_line_that_names_the_place(tmp_path: Path, old: str, new: str, said: str) -> None:
+    assert old in DESCRIPTION
+    with pytest.raises(BadInput, match=said) as caught:
+        open_recording(str(folder(tmp_path, DESCRIPTION.replace(old, new, 1))))
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize(
+    ("table", "line", "said"),
+    [
+        (
+            "track.csv",
+            "10.15;1e999999999;1;1",
+            r"track\.csv, line 2: column '1': '1e999999999' is out of all proportion",
+        ),
+        ("track.csv", "9e30;1;1;1", r"track\.csv, line 2: column '0': '9e30' is out of all proportion"),
+        ("track.csv", "1;" + "9" * 70 + ";1;1", r"track\.csv, line 2: column '1': .* is out of all proportion"),
+        ("track.csv", '1;"' + "x" * 200_000 + '";1;1', r"track\.csv, line 2: not readable as CSV"),
+        (
+            "frames.csv",
+            "x" * 300 + ", 100",
+            r"frames\.csv, line 2: 'xxx.*… has 300 characters, which no",
+        ),
+    ],
+)
+def test_a_hostile_row_is_one_line_that_names_it(tmp_path: Path, table: str, line: str, said: str) -> None:
+    path = folder(tmp_path)
+    lines = (path / table).read_text().splitlines()
+    (path / table).write_text("\n".join([lines[0], line, *lines[2:]]))
+    with pytest.raises(BadInput, match=said) as caught:
+        open_recording(str(path))
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 1000
+
+
+def test_a_row_whose_file_no_folder_can_hold_is_a_missing_image(tmp_path: Path) -> None:
+    path = folder(tmp_path, DESCRIPTION.replace('rename: [{replace: "^.*/", by: "", regex: true}]', ""))
+    (path / "frames.csv").write_text((path / "frames.csv").read_text().replace("/home/robot/p3", "x" * 300))
+    (path / "frames.csv").write_text((path / "frames.csv").read_text().replace("/home/robot/", ""))
+    recording = open_recording(str(path))
+    assert recording.dropped["missing_image"] == 1
+    assert "frames.csv, line 5: no file" in recording.details["missing_image"]
+
+
 def test_a_wrong_layout_is_refused_with_the_nearest_name(tmp_path: Path) -> None:
     with pytest.raises(UnreadableRecording, match="did you mean 'antworld'"):
         open_recording(f"antwrld:{tmp_path}")
@@ -134,7 +200,7 @@ def test_units_in_cells_go_before_the_columns_unit(tmp_path: Path) -> None:
     np.testing.assert_allclose(table.numbers(Angle("a", "rad")), [math.radians(21.3559), 0.5])
     np.testing.assert_allclose(table.numbers(Length(1, "m")), [0.05, 0.0508])
     assert table.nanoseconds(Time("c", "s")) == [1_700_000_000_000_000_001, None]
-    with pytest.raises(UnreadableRecording, match=r"table\.csv: column 'b': '5 cm' is not in rad or deg"):
+    with pytest.raises(UnreadableRecording, match=r"table\.csv, line 2: column 'b': '5 cm' is not in rad or deg"):
         table.numbers(Angle("b", "rad"))
 
 

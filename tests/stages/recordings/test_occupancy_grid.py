@@ -75,9 +75,10 @@ def test_a_coarser_cell_is_occupied_where_any_of_its_cells_is_else_unknown_where
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("mode: pretty\n", "trinary, scale and raw"),
-        ("resolution: 0\n", "width of a cell"),
-        ("image: [\n", "map_server"),
+        ("mode: pretty\n", "mode: 'pretty' .* 'trinary' | 'scale' | 'raw'"),
+        ("negate: 7\n", "negate: 7 .* expected bool"),
+        ("image: [\n", "no YAML"),
+        ("image: other.pgm\n", "line 6: the key 'image' stands there twice"),
     ],
 )
 def test_a_map_that_cannot_be_read_is_one_line_that_names_the_file(tmp_path, text, said):
@@ -86,6 +87,43 @@ def test_a_map_that_cannot_be_read_is_one_line_that_names_the_file(tmp_path, tex
         read_occupancy(file)
     assert str(file) in str(raised.value)
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("resolution", "1e-9", "resolution: 1e-09 is out of bounds"),
+        ("resolution", ".inf", "line 2: '.inf' is not finite"),
+        ("resolution", "0", "resolution: 0.0 is out of bounds"),
+        ("resolution", "fine", r"resolution: 'fine' \(str\), expected float"),
+        ("origin", "[1, 2]", "origin: .* expected"),
+        ("origin", "[1.0e+300, 2, 0]", "out of bounds"),
+        ("occupied_thresh", "7", "occupied_thresh: 7.0 is out of bounds"),
+        ("image", "/dev/zero", "/dev/zero: this is a device, expected a file"),
+        ("image", ".", "this is a folder, expected a file"),
+        ("image", "x" * 300, "File name too long"),
+        ("image", "map.yaml", "its image map.yaml cannot be read"),
+    ],
+)
+def test_values_without_bounds_are_refused_by_name(tmp_path, key, value, said):
+    text = "".join(f"{key}: {value}\n" if line.startswith(f"{key}:") else f"{line}\n" for line in YAML.splitlines())
+    file = written(tmp_path, [[254]], text)
+    with pytest.raises(BadInput, match=said) as raised:
+        PlaceGrid(grid=str(file), log="drive.mcap").inputs_digest()
+    assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) < 900
+
+
+def test_a_grid_that_leaves_no_room_is_refused_before_anything_runs(tmp_path):
+    with pytest.raises(BadInput, match=r"no cell is free and 0\.2 m from obstacles"):
+        PlaceGrid(grid=str(written(tmp_path, [[0, 0]]))).inputs_digest()
+
+
+def test_another_image_is_another_grid(tmp_path):
+    file = written(tmp_path, [[254, 254]])
+    first = PlaceGrid(grid=str(file), clearance_m=0.0).inputs_digest()
+    written(tmp_path, [[254, 0]])
+    assert PlaceGrid(grid=str(file), clearance_m=0.0).inputs_digest() != first
 
 
 def test_the_files_grid_comes_in_cells_of_the_wanted_size(tmp_path):
