@@ -4,15 +4,18 @@ import hashlib
 import importlib
 import io
 import json
+import math
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from omninav.pipeline.files import write_whole
+from omninav.pipeline.graph.contents import misfit
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.value import VALUE_TYPES, Value, value_name
 
@@ -21,6 +24,8 @@ from .codec import BadEncoding, decode, encode, field_names
 FORMAT = 1
 OWN_PACKAGE = __name__.partition(".")[0]
 _HEADER, _REST, _SUM = "header.json", "rest.npy", "sha256:"
+UNPACKED_BYTES, UNPACKED_RATIO = 1 << 26, 64
+"""How many bytes a file may unpack to: that many, or that many times its own."""
 
 
 def write_artifact(path: Path, value: Value, facts: dict[str, Any] | None = None) -> None:
@@ -58,54 +63,107 @@ def artifact_bytes(value: Value, facts: dict[str, Any] | None = None) -> bytes:
 
 
 def read_header(path: Path) -> dict[str, Any]:
-    """The header of an artifact file. Raises `BadInput` naming the file where it is missing, cut or changed."""
+    """The header of an artifact file. Raises `BadInput` naming the file where it is missing, cut, changed or none."""
     with _opened(path) as archive:
-        header: dict[str, Any] = json.loads(archive.read(_HEADER))
-    if header.get("format") != FORMAT:
-        raise BadInput(f"{path}: written in format {header.get('format')}, this version reads {FORMAT}; make it again")
-    return header
+        return _header(archive)
 
 
 def type_of(path: Path) -> type[Value]:
     """The type of the value in an artifact file. Raises `BadInput` where this version knows no such type."""
-    name = str(read_header(path)["type"])
-    if name not in VALUE_TYPES and name.startswith(f"{OWN_PACKAGE}."):
-        with suppress(ImportError):
-            importlib.import_module(name.rpartition(".")[0])
-        if name not in VALUE_TYPES:
-            raise BadInput(f"{path}: made with an older omninav (its '{name}' is no longer known); make it again")
-    if name not in VALUE_TYPES:
-        raise BadInput(f"{path}: holds a '{name}', which is no value known here; load the stage that made it")
-    return VALUE_TYPES[name]
+    with _opened(path) as archive:
+        return _type(_header(archive))
 
 
 def read_artifact(path: Path) -> Value:
-    """The value in an artifact file. Raises `BadInput` naming the file where it is missing, cut or changed."""
-    header, cls = read_header(path), type_of(path)
-    fields: dict[str, Any] = {}
+    """The value in an artifact file, checked against what its fields state (see `graph.contents`).
+
+    Raises `BadInput` naming the file where it is missing, cut or changed, and where its content is no such value.
+    """
     with _opened(path) as archive:
+        header = _header(archive)
+        cls, fields = _type(header), {}
         for name, digest in header["arrays"].items():
-            content = np.lib.format.read_array(io.BytesIO(archive.read(f"{name}.npy")), allow_pickle=False)
-            if hashlib.sha256(content.tobytes()).hexdigest() != digest:
-                raise BadInput(f"{path}: the array '{name}' is damaged (sha256 differs); make it again")
-            fields[name] = content
-    try:
-        fields |= decode(fields.pop("rest").tobytes())
-        return cls(**fields)
-    except (BadEncoding, TypeError) as error:
-        raise BadInput(f"{path}: does not fit {cls.__name__} of this version ({error}); make it again") from None
+            fields[name] = _array(archive.read(f"{name}.npy"))
+            if hashlib.sha256(fields[name].tobytes()).hexdigest() != digest:
+                raise _Unfit(f"the array '{name:.40}' is damaged (sha256 differs)")
+        try:
+            value = cls(**fields | decode(fields.pop("rest").tobytes()))
+        except (BadEncoding, TypeError) as error:
+            raise _Unfit(f"does not fit {cls.__name__} of this version ({error!s:.160})") from None
+        wrong = misfit(value)
+        if wrong is not None:
+            raise _Unfit(f"it is no sound {cls.__name__}: {wrong}")
+        return value
+
+
+class _Unfit(Exception):
+    """What is wrong with an artifact's content, without its file's name."""
+
+
+def _header(archive: zipfile.ZipFile) -> dict[str, Any]:
+    header = json.loads(archive.read(_HEADER))
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        found = header.get("format") if isinstance(header, dict) else None
+        raise _Unfit(f"written in format {found!r:.20}, this version reads {FORMAT}")
+    for key, kind in (("type", str), ("arrays", dict), ("facts", dict)):
+        if not isinstance(header.get(key), kind):
+            raise _Unfit(f"its header says no {key}")
+    return header
+
+
+def _type(header: Mapping[str, Any]) -> type[Value]:
+    name = str(header["type"])
+    if name not in VALUE_TYPES and name.startswith(f"{OWN_PACKAGE}."):
+        parts = name.split(".")
+        if all(part.isidentifier() and not part.startswith("_") for part in parts):
+            with suppress(ImportError):
+                importlib.import_module(".".join(parts[:-1]))
+        if name not in VALUE_TYPES:
+            raise _Unfit(f"made with an older omninav (its '{name:.80}' is no longer known)")
+    if name not in VALUE_TYPES:
+        raise _Unfit(f"holds a '{name:.80}', which is no value known here; load the stage that made it, or")
+    return VALUE_TYPES[name]
+
+
+def _array(content: bytes) -> npt.NDArray[Any]:
+    """The array in a `.npy` file whose content is as long as its header says: nothing is made larger than it is."""
+    file = io.BytesIO(content)
+    if np.lib.format.read_magic(file) != (1, 0):
+        raise _Unfit("an array is in another format than 1.0")
+    shape, by_column, dtype = np.lib.format.read_array_header_1_0(file)
+    count = math.prod(shape)
+    if (
+        dtype.hasobject
+        or by_column
+        or min(shape, default=0) < 0
+        or count * dtype.itemsize != len(content) - file.tell()
+    ):
+        raise _Unfit("an array is not as long as it says")
+    return np.frombuffer(content, dtype, count, file.tell()).reshape(shape).copy() if count else np.empty(shape, dtype)
 
 
 @contextmanager
 def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
+    """The zip in an artifact file, once its sum has been checked. What is wrong inside becomes `BadInput` too."""
     if not path.is_file():
         raise BadInput(f"{path}: there is no such file")
     content = path.read_bytes()
     size = len(_SUM) + 64
-    whole, comment = content[:-size], content[-size:]
+    whole, comment = memoryview(content)[:-size], content[-size:]
     if not comment.startswith(_SUM.encode()):
         raise BadInput(f"{path}: not an artifact file, or cut off at its end; make it again")
     if comment[len(_SUM) :].decode("ascii", "replace") != hashlib.sha256(whole).hexdigest():
         raise BadInput(f"{path}: damaged, its sha256 does not fit its content; make it again")
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        yield archive
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            unpacked = sum(member.file_size for member in archive.infolist())
+            if unpacked > max(UNPACKED_BYTES, UNPACKED_RATIO * len(content)):
+                raise _Unfit(f"it would unpack {len(content)} bytes to {unpacked}")
+            yield archive
+    except _Unfit as unfit:
+        raise BadInput(f"{path}: {unfit}; make it again") from None
+    except (
+        Exception
+    ) as error:  # a sum that is right says nothing of the content: it raises whatever it makes readers raise
+        said = " ".join(str(error).split()).strip("'\"") or type(error).__name__
+        raise BadInput(f"{path}: no sound artifact ({said:.160}); make it again") from None

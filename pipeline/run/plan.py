@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.engine.artifact import read_header, type_of
+from omninav.pipeline.engine.artifact import OWN_PACKAGE, read_header, type_of
 from omninav.pipeline.engine.code_version import graph_digest
 from omninav.pipeline.files import digest_file
 from omninav.pipeline.graph.builder import build
@@ -91,8 +91,9 @@ def plan(config: Mapping[str, Any]) -> Plan:
     if graph is not None:
         for made in artifacts:
             if made.file is not None:
-                made_by = read_header(made.file)["facts"].get("stages") or {}
-                problems += mismatches(made.name, made_by, graph, specs[made.name].must_match)
+                made_by = read_header(made.file)["facts"].get("stages")
+                if isinstance(made_by, Mapping):
+                    problems += mismatches(made.name, made_by, graph, specs[made.name].must_match)
         for name, origin in saves.items():
             if graph.port(str(origin)) is None:
                 problems.append(_no_output(f"saves.{name}", str(origin), graph))
@@ -158,11 +159,11 @@ def mismatches(name: str, made_by: Mapping[str, Any], graph: Graph, must_match: 
     present = stages_of(graph)
     for node in must_match:
         then, now = made_by.get(node), present.get(node)
-        if then is None or now is None:
+        if now is None or not isinstance(then, Mapping) or not isinstance(then.get("_target_"), str):
             continue
         again = f"or leave {name}=FILE away, and it is made anew"
         if not _is_known(then["_target_"]):
-            what = f"it was made with an older omninav ({then['_target_']} as '{node}')"
+            what = f"it was made with an older omninav ({then['_target_']:.80} as '{node}')"
             yield Problem(name, what, f"leave {name}=FILE away, and it is made anew")
             continue
         before, after = (spec["_target_"].replace(":", ".").rpartition(".")[2] for spec in (then, now))
@@ -173,11 +174,14 @@ def mismatches(name: str, made_by: Mapping[str, Any], graph: Graph, must_match: 
             yield Problem(name, what, f"{use}, {again}")
             continue
         for key in [key for key in then if key in now and key != "_target_" and then[key] != now[key]]:
-            what = f"it was made with nodes.{node}.{key}={then[key]}, and this run has {now[key]}"
+            what = f"it was made with nodes.{node}.{key}={then[key]!s:.80}, and this run has {now[key]}"
             yield Problem(name, what, f"type nodes.{node}.{key}={then[key]}, {again}")
 
 
 def _is_known(target: str) -> bool:
+    """Whether a stage that a file names still exists. For a file's sake nothing outside this package is imported."""
+    if not target.startswith(f"{OWN_PACKAGE}."):
+        return True
     try:
         resolve(target)
     except UnknownStage:

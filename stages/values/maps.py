@@ -1,11 +1,12 @@
 """Maps."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
+from omninav.pipeline.graph.contents import RowsOf, Shape
 
 from .features import SegmentFeatures, SegmentHistograms
 from .growable_arrays import GrowableArrays
@@ -29,10 +30,10 @@ class ReferenceGraph(GrowableArrays, Value):
 
     in_place = True
 
-    poses: npt.NDArray[np.float64]
-    features: npt.NDArray[np.float32]
+    poses: Annotated[npt.NDArray[np.float64], Shape("R", 3)]
+    features: Annotated[npt.NDArray[np.float32], Shape("R", "segments", "bins")]
     kind: FeatureKind
-    edges: npt.NDArray[np.int64]
+    edges: Annotated[npt.NDArray[np.int64], Shape("E", 2), RowsOf("R")]
     pose_source: PoseSource
 
     @classmethod

@@ -1,9 +1,12 @@
 """A projection learned from images."""
 
+from typing import Annotated
+
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
+from omninav.pipeline.graph.contents import Shape
 
 
 class Projection(Value):
@@ -13,5 +16,5 @@ class Projection(Value):
     images' variance along each row.
     """
 
-    components: npt.NDArray[np.float32]
-    explained: npt.NDArray[np.float64]
+    components: Annotated[npt.NDArray[np.float32], Shape("D", "P")]
+    explained: Annotated[npt.NDArray[np.float64], Shape("D")]

@@ -1,12 +1,13 @@
 """Thumbnails of a map's references, kept beside it."""
 
-from typing import cast
+from typing import Annotated, cast
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
+from omninav.pipeline.graph.contents import Shape, Starts
 
 from .image import Pixels
 
@@ -17,8 +18,8 @@ class Thumbnails(Value):
     `jpegs`: their JPEG bytes one after the other; image n lies from `ends[n]` to `ends[n + 1]`; empty: missing.
     """
 
-    jpegs: npt.NDArray[np.uint8]
-    ends: npt.NDArray[np.int64]
+    jpegs: Annotated[npt.NDArray[np.uint8], Shape("bytes")]
+    ends: Annotated[npt.NDArray[np.int64], Shape("N+1"), Starts("bytes")]
 
     def __len__(self) -> int:
         return len(self.ends) - 1

@@ -3,11 +3,13 @@
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import RowsOf, Shape, Starts
 from omninav.stages.geometry.appearance.visual_distance import ViewFeatures
 
 from .local_features import GlobalDescriptor, LocalFeatures, VerticalSegments, view_features
@@ -34,16 +36,16 @@ class StoredViews(Value):
     lower end; `column_descriptors` (C, 10) float16; `column_weights` (C,) uint8. `moments` (V, 3): colours of it all.
     """
 
-    starts: Ints
-    directions: Small
-    descriptors: Bytes
-    colours: npt.NDArray[np.int8]
-    sizes: Bytes
-    column_starts: Ints
-    column_directions: Small
-    column_descriptors: npt.NDArray[np.float16]
-    column_weights: Bytes
-    moments: Floats
+    starts: Annotated[Ints, Shape("V+1"), Starts("F")]
+    directions: Annotated[Small, Shape("F", 2)]
+    descriptors: Annotated[Bytes, Shape("F", "D")]
+    colours: Annotated[npt.NDArray[np.int8], Shape("F", 3)]
+    sizes: Annotated[Bytes, Shape("F")]
+    column_starts: Annotated[Ints, Shape("V+1"), Starts("C")]
+    column_directions: Annotated[Small, Shape("C", 3)]
+    column_descriptors: Annotated[npt.NDArray[np.float16], Shape("C", 10)]
+    column_weights: Annotated[Bytes, Shape("C")]
+    moments: Annotated[Floats, Shape("V", 3)]
 
     def __len__(self) -> int:
         return len(self.starts) - 1
@@ -130,19 +132,19 @@ class TopologicalMap(Value):
     its medoid as it is kept: what a distance in the right place is like.
     """
 
-    views: StoredViews
-    places: Ints
-    owner: Ints
-    names: tuple[str, ...]
-    links: Ints
-    kinds: npt.NDArray[np.int8]
-    way_starts: Ints
-    ways: Ints
-    frames: Ints
-    orders: Ints
-    poses: Array
+    views: Annotated[StoredViews, Shape("V")]
+    places: Annotated[Ints, Shape("P"), RowsOf("V")]
+    owner: Annotated[Ints, Shape("V"), RowsOf("P")]
+    names: Annotated[tuple[str, ...], Shape("P")]
+    links: Annotated[Ints, Shape("L", 2), RowsOf("P")]
+    kinds: Annotated[npt.NDArray[np.int8], Shape("L"), Bounds(ge=DRIVEN, le=LOOP)]
+    way_starts: Annotated[Ints, Shape("L+1"), Starts("W")]
+    ways: Annotated[Ints, Shape("W"), RowsOf("V")]
+    frames: Annotated[Ints, Shape("V")]
+    orders: Annotated[Ints, Shape("V")]
+    poses: Annotated[Array, Shape("V", 3)]
     pose_source: PoseSource
-    spread: float
+    spread: Annotated[float, Bounds(ge=0)]
 
     def __len__(self) -> int:
         return len(self.places)

@@ -1,11 +1,12 @@
 """Maps that are learned while they are used: views, each with the poses from which it may be seen."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import BadInput, Value
+from omninav.pipeline import BadInput, Bounds, Value
+from omninav.pipeline.graph.contents import Covariances, RowsOf, Shape
 
 from .growable_arrays import GrowableArrays
 from .pose import PoseSource
@@ -31,17 +32,17 @@ class ViewMixtures(GrowableArrays, Value):
 
     in_place = True
 
-    views: npt.NDArray[np.float32]
+    views: Annotated[npt.NDArray[np.float32], Shape("R", "D")]
     kind: str
-    ids: Ints
-    born: Ints
-    owner: Ints
-    means: Array
-    covariances: Array
-    weights: Array
-    counts: Array
-    steps: int
-    next_id: int
+    ids: Annotated[Ints, Shape("R"), Bounds(ge=0)]
+    born: Annotated[Ints, Shape("R"), Bounds(ge=0)]
+    owner: Annotated[Ints, Shape("C"), RowsOf("R")]
+    means: Annotated[Array, Shape("C", 3)]
+    covariances: Annotated[Array, Shape("C", 3, 3), Covariances()]
+    weights: Annotated[Array, Shape("C"), Bounds(ge=0, le=1)]
+    counts: Annotated[Array, Shape("C"), Bounds(ge=0)]
+    steps: Annotated[int, Bounds(ge=0)]
+    next_id: Annotated[int, Bounds(ge=0)]
     pose_source: PoseSource
     threshold: NoveltyThreshold | None = None
 

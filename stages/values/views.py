@@ -1,11 +1,12 @@
 """Whole views as one vector each, as maps learned during their use keep them."""
 
 from abc import abstractmethod
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
 from omninav.stages.geometry.appearance.rotated_distances import turned_distances, turns_of_nearest
 from omninav.stages.geometry.appearance.spectra import best_turns, spectral_distances
 
@@ -72,9 +73,9 @@ class NoveltyThreshold(Value):
     far; 0 where it is not known.
     """
 
-    distance: float
+    distance: Annotated[float, Bounds(ge=0)]
     settled: bool = True
-    metres: float = 0.0
+    metres: Annotated[float, Bounds(ge=0)] = 0.0
 
 
 class Neighbours(Value):

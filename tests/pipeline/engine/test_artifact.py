@@ -5,25 +5,44 @@ import io
 import json
 import zipfile
 from pathlib import Path
+from typing import Annotated
 
+import numpy as np
+import numpy.typing as npt
 import pytest
 
-from omninav.pipeline import BadInput
+from omninav.pipeline import BadInput, Value
 from omninav.pipeline.engine.artifact import read_artifact, read_header, type_of, write_artifact
+from omninav.pipeline.graph.contents import Shape
 from toys import Number
+
+
+class Points(Value):
+    points: Annotated[npt.NDArray[np.float64], Shape("N", 2)]
 
 
 def with_header(path: Path, **changes: object) -> Path:
     """A file like one of another version: its header changed, its sum made to fit."""
-    header = read_header(path) | changes
+    return with_members(path, **{"header.json": json.dumps(read_header(path) | changes).encode()})
+
+
+def with_members(path: Path, **members: bytes | None) -> Path:
+    """A file with other members (None: without it), its sum made to fit."""
     buffer = io.BytesIO()
-    with zipfile.ZipFile(path) as old, zipfile.ZipFile(buffer, "w") as new:
-        for name in old.namelist():
-            new.writestr(name, json.dumps(header) if name == "header.json" else old.read(name))
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as new:
+        for name, content in ({name: old.read(name) for name in old.namelist()} | members).items():
+            if content is not None:
+                new.writestr(name, content)
         new.comment = b" " * (len("sha256:") + 64)
     whole = buffer.getvalue()[: -len("sha256:") - 64]
     path.write_bytes(whole + b"sha256:" + hashlib.sha256(whole).hexdigest().encode())
     return path
+
+
+def npy(header: str) -> bytes:
+    """A .npy file that says it holds something and holds nothing."""
+    packed = header.encode().ljust(118) + b"\n"
+    return b"\x93NUMPY\x01\x00" + len(packed).to_bytes(2, "little") + packed
 
 
 @pytest.fixture
@@ -56,3 +75,33 @@ def test_a_file_of_another_version_is_refused_in_one_line(file: Path, changes: d
         read_artifact(with_header(file, **changes))
     assert str(refused.value).startswith(f"{file}: ")
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("members", "message"),
+    [
+        ({"header.json": None}, "no sound artifact"),
+        ({"header.json": b"[1]"}, "written in format None"),
+        ({"header.json": b"[" * 100_000}, "no sound artifact"),
+        ({"rest.npy": b""}, "no sound artifact"),
+        ({"rest.npy": npy("{'descr': '<f8', 'fortran_order': False, 'shape': (4611686018427387904,)}")}, "as long as"),
+        ({"rest.npy": npy("{'descr': '|O', 'fortran_order': False, 'shape': (1,)}")}, "as long as it says"),
+        ({"surplus.npy": bytes(100_000_000)}, r"it would unpack \d+ bytes to 1000\d+"),
+    ],
+)
+def test_a_file_whose_sum_is_right_and_whose_content_is_not_is_refused(file: Path, members: dict, message: str):
+    with pytest.raises(BadInput, match=message) as refused:
+        read_artifact(with_members(file, **members))
+    assert str(refused.value).startswith(f"{file}: ")
+    assert len(str(refused.value)) < 500
+
+
+def test_a_value_that_does_not_hold_what_its_fields_state_is_refused_by_name(tmp_path: Path):
+    write_artifact(tmp_path / "points.omap", Points(np.array([[0.0, np.nan]])))
+    with pytest.raises(BadInput, match="it is no sound Points: 'points' holds a number that is not finite"):
+        read_artifact(tmp_path / "points.omap")
+
+
+def test_a_type_named_by_a_file_imports_no_program(file: Path):
+    with pytest.raises(BadInput, match="no longer known"):
+        type_of(with_header(file, type="omninav.__main__.X"))

@@ -1,0 +1,78 @@
+"""A value says what its fields hold, and what does not fit is named."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import LARGEST, Covariances, RowsOf, Shape, Starts, misfit
+
+Reals = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+class Part(Value):
+    length: Annotated[float, Bounds(gt=0)]
+
+
+class Stated(Value):
+    points: Annotated[Reals, Shape("N", 2)]
+    names: Annotated[tuple[str, ...], Shape("N")]
+    pairs: Annotated[Ints, Shape("E", 2), RowsOf("N")]
+    starts: Annotated[Ints, Shape("G+1"), Starts("N")]
+    spread: Annotated[Reals, Shape("E", 2, 2), Covariances()]
+    kind: Literal["one", "other"]
+    part: Part | None
+    free: Reals
+    """Says nothing of its shape, so it may be anything."""
+
+
+def stated(**changes: object) -> Stated:
+    fields = {
+        "points": np.zeros((3, 2)),
+        "names": ("a", "b", "c"),
+        "pairs": np.array([[0, 2]]),
+        "starts": np.array([0, 1, 3]),
+        "spread": np.eye(2)[None],
+        "kind": "one",
+        "part": Part(1.0),
+        "free": np.array(np.nan),
+    }
+    return Stated(**fields | changes)
+
+
+def test_a_value_that_holds_what_it_states_is_sound():
+    assert misfit(stated()) is None
+    assert misfit(stated(part=None)) is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"points": np.zeros(6)}, "'points' has the shape (6,), expected (N, 2)"),
+        ({"names": ("a", "b")}, "'names' has the shape (2,), expected (N,), N = 3"),
+        ({"points": np.full((3, 2), np.nan)}, "'points' holds a number that is not finite"),
+        ({"points": np.full((3, 2), 10 * LARGEST)}, "beyond 1e+15"),
+        ({"points": np.zeros((3, 2), np.float32)}, "'points' is an array of float32"),
+        ({"points": np.zeros((3, 2), ">f8")}, "'points' is an array of >f8"),
+        ({"pairs": np.array([[0, 3]])}, "'pairs' names a row that does not exist, expected 0 to 2"),
+        ({"pairs": np.array([[0, -1]])}, "'pairs' names a row that does not exist"),
+        ({"starts": np.array([0, 2, 1, 3])}, "'starts' does not ascend from 0 to 3"),
+        ({"starts": np.array([0, 2])}, "'starts' does not ascend from 0 to 3"),
+        ({"starts": np.array([], np.int64)}, "'starts' has the shape (0,)"),
+        ({"spread": np.array([[[1.0, 2.0], [2.0, 1.0]]])}, "'spread' holds a matrix that is no covariance"),
+        ({"spread": np.array([[[1.0, 0.1], [0.0, 1.0]]])}, "'spread' holds a matrix that is no covariance"),
+        ({"kind": "third"}, "'kind' is 'third', not 'one' | 'other'"),
+        ({"names": [1, 2, 3]}, "'names' is list, not list of str"),
+        ({"part": Part(-1.0)}, "'part': 'length' holds a number that is not > 0"),
+        ({"part": Part(2**70)}, "'part': 'length' holds a number that is not finite, or beyond"),
+        ({"part": "x" * 1000}, "'part' is 'xxxx"),
+    ],
+)
+def test_what_does_not_fit_is_named(changes: dict[str, object], said: str):
+    wrong = misfit(stated(**changes))
+    assert wrong is not None
+    assert said in wrong
+    assert len(wrong) < 200
