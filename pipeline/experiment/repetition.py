@@ -138,7 +138,7 @@ def repeat(given: Mapping[str, Any], send: Send) -> None:
     for number, seed in enumerate(seeds):
         place = run.memory / f"seed_{seed}"
         record = bool(given["shared"]) and shared is None and number + 1 < len(seeds)
-        engine, recorded = _once(
+        engine, recorded = run_repetition(
             graph, artifacts, seed, place, cache if given["shared"] else None, shared, record, send
         )
         shared = recorded or shared
@@ -158,7 +158,7 @@ def repeat(given: Mapping[str, Any], send: Send) -> None:
     shutil.rmtree(run.memory, ignore_errors=True)
 
 
-def _once(
+def run_repetition(
     graph: Graph,
     artifacts: Mapping[str, Value],
     seed: int,

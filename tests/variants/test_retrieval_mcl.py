@@ -78,6 +78,7 @@ def test_a_robot_that_starts_anywhere_finds_itself(omninav, tmp_path: Path, tour
     after = metrics["after_convergence"]
     assert after["position_error_m"]["median"] < 0.5
     assert after["position_error_m"]["p90"] < 1.0
+    assert after["loss_rate"] == 0.0
     assert after["heading_error_deg"]["median"] < 8.0
     assert metrics["visibility"]["grid"] == ("tour" if grid == "from_tour" else "map")
     report = (run / "report.html").read_text()

@@ -6,7 +6,7 @@ import pytest
 
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.prefix import following
-from omninav.pipeline.experiment.repetition import _once
+from omninav.pipeline.experiment.repetition import run_repetition
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.run.results import results_of
@@ -43,7 +43,9 @@ def repetitions(graph: Graph, place: Path, cache: Cache | None, sharing: bool) -
     for seed in SEEDS:
         folder = place / f"seed_{seed}"
         folder.mkdir(parents=True)
-        engine, recorded = _once(graph, {}, seed, folder, cache, shared, sharing and shared is None, lambda words: None)
+        engine, recorded = run_repetition(
+            graph, {}, seed, folder, cache, shared, sharing and shared is None, lambda words: None
+        )
         shared = recorded or shared
         given.append(results_of(engine)[0].values["numbers"]["all"])
         computed.append(len(engine.calls["scale"].times))
@@ -106,7 +108,7 @@ def test_what_grows_in_place_starts_anew_for_each_seed(tmp_path: Path):
         for seed in SEEDS:
             folder = tmp_path / f"{number}_{seed}"
             folder.mkdir()
-            engine, recorded = _once(
+            engine, recorded = run_repetition(
                 grown, {"ledger": ledger}, seed, folder, None, shared, shared is None, lambda words: None
             )
             shared = recorded or shared
