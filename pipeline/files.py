@@ -1,10 +1,27 @@
 """Files appear whole or not at all, and are known by the hash of what is in them."""
 
+import errno
+import fcntl
 import hashlib
+import json
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+import stat
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
+
+SUM = "sha256"
+"""The key of a JSON file's own checksum."""
+
+
+class Damaged(ValueError):
+    """A file that does not hold what was written to it. The message is one line and names the file."""
+
+
+class Taken(Exception):
+    """Another process holds a lock. The message names the process."""
 
 
 def write_whole(path: Path, content: bytes | str) -> None:
@@ -18,6 +35,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     """A path to write to; renamed to `path` when the block ends well, removed when it does not."""
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    part.unlink(missing_ok=True)  # a link of that name would be written through
     try:
         yield part
         os.replace(part, path)
@@ -37,3 +55,68 @@ def digest_text(*parts: str) -> str:
     for part in parts:
         whole.update(f"{len(part)}:{part}".encode())
     return whole.hexdigest()
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write plain data as a JSON file that holds its own checksum, under `SUM`."""
+    plain = {key: value for key, value in json.loads(json.dumps(content, default=str)).items() if key != SUM}
+    write_whole(path, json.dumps({**plain, SUM: _sum(plain)}, indent=1) + "\n")
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """What `write_json` wrote, without the checksum. Raises `Damaged` where it is anything else."""
+    if not path.is_file():
+        raise Damaged(f"{path}: there is no such file")
+    try:
+        content = json.loads(path.read_bytes())
+        expected = content.pop(SUM)
+    except (ValueError, LookupError, AttributeError, TypeError, RecursionError):
+        raise Damaged(f"{path} is damaged, or was written by another version of omninav") from None
+    if expected != _sum(content):
+        raise Damaged(f"{path} is damaged or was changed: its sha256 does not fit its content")
+    return dict(content)
+
+
+def _sum(plain: Mapping[str, Any]) -> str:
+    return digest_text(json.dumps(plain, sort_keys=True))
+
+
+def open_itself(path: Path, flags: int) -> int:
+    """A file descriptor of a regular file that has this name only. A link is refused, as is a device or a pipe.
+
+    Who could place a link would have us write to a file elsewhere. Raises `OSError` naming the file.
+    """
+    try:
+        file = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise OSError(errno.ELOOP, "is a link, which is not followed; delete it", str(path)) from None
+        raise
+    found = os.fstat(file)
+    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
+        os.close(file)
+        raise OSError(errno.EINVAL, "is no file of its own (a link, a device or a pipe); delete it", str(path))
+    return file
+
+
+@contextmanager
+def locked(path: Path, wait: bool = True) -> Iterator[None]:
+    """Hold a lock file for as long as the block runs, or until this process dies, in whatever way.
+
+    Without `wait` raises `Taken` where another process holds it, or this one does already.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    file = open_itself(path, os.O_RDWR | os.O_CREAT)
+    try:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError:
+            time.sleep(0.1)  # its owner may have it for so short a time that it has not signed it yet
+            owner = os.pread(file, 20, 0).decode("ascii", "replace").strip()
+            raise Taken(f"process {owner}" if owner.isdigit() else "another process") from None
+        with suppress(OSError):  # a full disk: the lock holds without a name
+            os.ftruncate(file, 0)
+            os.pwrite(file, f"{os.getpid()}\n".encode(), 0)
+        yield
+    finally:
+        os.close(file)

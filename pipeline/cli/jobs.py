@@ -1,6 +1,5 @@
 """One job: a run or an experiment that Hydra calls, alone or as one of a sweep. It never raises and never exits."""
 
-import fcntl
 import json
 import os
 import sys
@@ -15,7 +14,7 @@ from hydra.types import RunMode
 from omegaconf import OmegaConf
 
 from omninav.pipeline.engine.call import StageFailed
-from omninav.pipeline.files import write_whole
+from omninav.pipeline.files import locked, write_json
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound, unreadable_yaml
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import plan
@@ -130,9 +129,8 @@ def _note_job(job: SweepJob, code: int, error: str) -> None:
     file = job.folder / "manifest.json"
     manifest = json.loads(file.read_text()) if file.exists() else {"status": "refused"}
     manifest |= {"job": job.number, "overrides": job.overrides} | ({"error": error} if error else {})
-    write_whole(file, json.dumps(manifest, indent=1) + "\n")
-    with (job.sweep / ".page.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    write_json(file, manifest)
+    with locked(job.sweep / ".page.lock"):
         write_sweep_page(job.sweep, sorted(_sweep_rows(job.sweep), key=lambda row: int(row["job"])))
 
 

@@ -1,11 +1,10 @@
 """The cache: results as files, by the hash of everything that made them."""
 
-import fcntl
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from omninav.pipeline.files import digest_text
+from omninav.pipeline.files import digest_text, locked
 
 
 class Cache:
@@ -24,9 +23,7 @@ class Cache:
     @contextmanager
     def lock(self, key: str) -> Iterator[None]:
         """Hold the key: others who want the same result wait here until it is there."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        with (self.folder / f"{key[:32]}.lock").open("w") as file:
-            fcntl.flock(file, fcntl.LOCK_EX)
+        with locked(self.path(key, ".lock")):
             yield
 
 

@@ -8,7 +8,11 @@ from omninav.pipeline.files import write_whole
 
 from .codec import BadEncoding, decode, encode, seal, unseal
 
-FORMAT = 2
+FORMAT = 3
+
+
+class OtherVersion(BadEncoding):
+    """A checkpoint that is whole, and was written in another format."""
 
 
 @dataclass
@@ -66,9 +70,12 @@ def save(path: Path, checkpoint: Checkpoint) -> None:
 def load(path: Path) -> Checkpoint:
     """Read a checkpoint. Raises `BadEncoding` naming the file where it is damaged or of another version."""
     content = decode(unseal(path.read_bytes(), str(path)))
-    if content.pop("format", None) != FORMAT:
-        raise BadEncoding(f"{path} was written by another version of omninav; start the run again")
-    objects = content.pop("objects")
-    content["channels"] = {key: [objects[n] for n in numbers] for key, numbers in content["channels"].items()}
-    content["held"] = {key: objects[n] for key, n in content["held"].items()}
-    return Checkpoint(**content)
+    try:
+        if content.pop("format", None) != FORMAT:
+            raise OtherVersion(f"{path} was written by another version of omninav; start the run again")
+        objects = content.pop("objects")
+        content["channels"] = {key: [objects[n] for n in numbers] for key, numbers in content["channels"].items()}
+        content["held"] = {key: objects[n] for key, n in content["held"].items()}
+        return Checkpoint(**content)
+    except (LookupError, TypeError, AttributeError):
+        raise BadEncoding(f"{path} is no checkpoint") from None

@@ -1,26 +1,38 @@
 """A sequence of values on disk: appended to while the loop runs, read lazily afterwards, cut back on resume."""
 
+import os
 import struct
+import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, overload
 
+from omninav.pipeline.files import open_itself
+
 from .codec import BadEncoding, decode, encode
 
-_RECORD = struct.Struct("<I")
+_RECORD = struct.Struct("<II")
+"""Before each record: its length and its checksum."""
 
 
 class DiskSequence(Sequence[Any]):
-    """Values in the order they came, each record its length and its bytes.
+    """Values in the order they came, each record its length, its checksum and its bytes.
 
     `append` adds one; reading decodes on demand. `cut(size)` drops everything behind a byte length that a
-    checkpoint remembers, so that a resumed run goes on exactly where the checkpoint stood.
+    checkpoint remembers, so that a resumed run goes on exactly where the checkpoint stood. `verify` reads all of it.
+
+    The checksum is CRC-32 over the record's place, its length and its bytes: it finds every flipped bit and every burst
+    of up to 32 bits with certainty, and costs less than a cryptographic hash, which would protect from no one here.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, append: bool = True) -> None:
+        """With `append` the file is made where it is not there; without, it is only read."""
         self.path = path
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = path.open("a+b")
+        if append:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        flags = os.O_RDWR | os.O_CREAT | os.O_APPEND if append else os.O_RDONLY
+        self._file = os.fdopen(open_itself(path, flags), "a+b" if append else "rb")
+        self._size = self._file.seek(0, os.SEEK_END)
         self._offsets: list[int] | None = None
 
     def flush(self) -> None:
@@ -31,14 +43,14 @@ class DiskSequence(Sequence[Any]):
     def size(self) -> int:
         """Length in bytes, with everything handed to the operating system."""
         self.flush()
-        self._file.seek(0, 2)
-        return self._file.tell()
+        return self._size
 
     def append(self, value: Any) -> None:
         """Add a value (None stands for an absent one)."""
         content = encode(value)
-        self._file.write(_RECORD.pack(len(content)))
+        self._file.write(_RECORD.pack(len(content), _checksum(self._size, content)))
         self._file.write(content)
+        self._size += _RECORD.size + len(content)
         self._offsets = None
 
     def cut(self, size: int) -> None:
@@ -46,7 +58,15 @@ class DiskSequence(Sequence[Any]):
         if self.size < size:
             raise BadEncoding(f"{self.path} is shorter than its checkpoint says ({self.size} < {size} bytes)")
         self._file.truncate(size)
+        self._size = size
         self._offsets = None
+
+    def verify(self, records: int) -> None:
+        """Read it once. Raises `BadEncoding` where a record is damaged, or where there are not as many as stated."""
+        for offset in self._index():
+            self._content(offset)
+        if len(self._index()) != records:
+            raise BadEncoding(f"{self.path} has {len(self._index())} records, and there were {records} ticks")
 
     def close(self) -> None:
         """Close the file; nothing can be appended or read afterwards."""
@@ -56,23 +76,29 @@ class DiskSequence(Sequence[Any]):
         if self._offsets is None:
             end, at = self.size, 0
             offsets = []
-            while at < end:
+            while at + _RECORD.size <= end:
                 self._file.seek(at)
-                (length,) = _RECORD.unpack(self._file.read(_RECORD.size))
+                length, _ = _RECORD.unpack(self._file.read(_RECORD.size))
                 offsets.append(at)
                 at += _RECORD.size + length
             if at != end:
-                raise BadEncoding(f"{self.path} ends inside a record")
+                raise BadEncoding(f"{self.path} is damaged: it ends inside a record")
             self._offsets = offsets
         return self._offsets
 
     def __len__(self) -> int:
         return len(self._index())
 
-    def _read(self, offset: int) -> Any:
+    def _content(self, offset: int) -> bytes:
         self._file.seek(offset)
-        (length,) = _RECORD.unpack(self._file.read(_RECORD.size))
-        return decode(self._file.read(length))
+        length, expected = _RECORD.unpack(self._file.read(_RECORD.size))
+        content = self._file.read(length)
+        if _checksum(offset, content) != expected:
+            raise BadEncoding(f"{self.path} is damaged: the checksum of the record at byte {offset} does not fit")
+        return content
+
+    def _read(self, offset: int) -> Any:
+        return decode(self._content(offset))
 
     @overload
     def __getitem__(self, index: int) -> Any: ...
@@ -86,6 +112,10 @@ class DiskSequence(Sequence[Any]):
     def __iter__(self) -> Iterator[Any]:
         for offset in list(self._index()):
             yield self._read(offset)
+
+
+def _checksum(offset: int, content: bytes) -> int:
+    return zlib.crc32(content, zlib.crc32(struct.pack("<QQ", offset, len(content))))
 
 
 class Present(Sequence[Any]):

@@ -20,8 +20,9 @@ from omninav.pipeline.graph.stage import Context, Source
 from . import checkpoint as checkpoints
 from .call import Call
 from .channel import Channel, channel_key, held_key
-from .checkpoint import Checkpoint
+from .checkpoint import Checkpoint, OtherVersion
 from .codec import BadEncoding, encode_state, restore_state
+from .damage import say_damaged
 from .disk_sequence import DiskSequence, Present
 
 
@@ -133,6 +134,7 @@ class Engine:
             self._loop(replayed)
             self.ended = True
             self._save()
+        self._verify_sequences()
         for node in self.graph.of_lifetime("after"):
             self._run_after(node)
         return {origin: self.last(origin) for origin in self.wanted}
@@ -242,20 +244,44 @@ class Engine:
         )
         checkpoints.save(self.options.memory / "checkpoint", present)
 
-    def _resume(self) -> None:
-        path = self.options.memory / "checkpoint" if self.options.memory is not None else None
+    def _verify_sequences(self) -> None:
+        """Nothing is computed from sequences that do not hold exactly what the ticks gave."""
         try:
-            found = checkpoints.load(path) if path is not None and path.exists() else None
+            for sequence in self.sequences.values():
+                sequence.verify(self.ticks)
         except BadEncoding as error:
+            raise BadInput(f"{error}; `omninav resume` begins this graph again") from None
+
+    def _whole_checkpoint(self) -> Checkpoint | None:
+        """The last checkpoint, where it is whole and the sequences are with it, cut back to it."""
+        path = self.options.memory / "checkpoint" if self.options.memory is not None else None
+        if path is None or not path.exists():
+            return None
+        try:
+            found = checkpoints.load(path)
+            if found.replayed and self.replay is None:  # the cache it read from is gone
+                return None
+            if found.identity != self.options.identity:
+                raise BadInput(
+                    f"{path} belongs to another run (its configuration, its inputs, the code or a library has changed):"
+                    " start a new run"
+                )
+            for name, sequence in self.sequences.items():
+                sequence.cut(found.sequences.get(name, 0))
+                sequence.verify(found.ticks)
+        except OtherVersion as error:
             raise BadInput(str(error)) from None
-        if found is None or (found.replayed and self.replay is None):  # or the cache it read from is gone: start anew
+        except BadEncoding as error:
+            say_damaged(f"{error}; this graph begins again at its first tick")
+            return None
+        return found
+
+    def _resume(self) -> None:
+        found = self._whole_checkpoint()
+        if found is None:
             for sequence in self.sequences.values():
                 sequence.cut(0)
             return
-        if found.identity != self.options.identity:
-            raise BadInput(
-                f"{path} belongs to another run (its configuration or its logs have changed): start a new run"
-            )
         self.ticks, self.ended = found.ticks, found.ended
         for key, waiting in found.channels.items():
             self.channels[key].waiting.clear()
@@ -267,5 +293,3 @@ class Engine:
                 restore_state(state, fields)
         for name, call in self.calls.items():
             call.ctx.restore(found.generators[name], found.notes[name])
-        for name, sequence in self.sequences.items():
-            sequence.cut(found.sequences[name])

@@ -2,11 +2,13 @@
 
 import json
 import logging
+import os
 import shutil
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +17,7 @@ from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.engine.engine import Engine
 from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix
-from omninav.pipeline.files import digest_file, write_whole
+from omninav.pipeline.files import digest_file, open_itself, write_whole
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.value import Value
@@ -24,10 +26,11 @@ from .artifacts import Execution, ProgressDisplay, companions, identity, obtain,
 from .metrics_files import write_metrics
 from .plan import Plan
 from .results import notes_of, results_of
-from .run_folder import Run
+from .run_folder import CONFIG, MANIFEST, Run
 from .timing import stage_times
 
 log = logging.getLogger("omninav")
+LOG = "run.log"
 
 
 def execute(run: Run, planned: Plan, display: ProgressDisplay | None = None) -> Metrics:
@@ -35,7 +38,7 @@ def execute(run: Run, planned: Plan, display: ProgressDisplay | None = None) -> 
 
     Raises `StageFailed` or `BadInput`; by then the manifest says so and the traceback is in `run.log`.
     """
-    with _logged(run):
+    with run.owned(), _logged(run):
         try:
             return _execute(run, planned, display)
         except KeyboardInterrupt:
@@ -100,10 +103,10 @@ def _finish(run: Run, engine: Engine, prefix_reason: str) -> Metrics:
     }
     for kind, entry in notes["dropped"].items():
         log.warning("%s: %s%s", kind, entry["count"], f" (first: {entry['first']})" if entry["first"] else "")
-    graph_svg, config_yaml = (run.folder / "graph.svg").read_text(), (run.folder / "config.yaml").read_text()
+    graph_svg, config_yaml = (run.folder / "graph.svg").read_text(), (run.folder / CONFIG).read_text()
     done = {**run.manifest, "status": "complete"}
     write_report(run.folder, done, metrics, timing, graph_svg, figures, tables, config_yaml)
-    run.manifest = done
+    run.manifest = done | {"files": _digests(run.folder)}
     run.save()
     for sequence in engine.sequences.values():
         sequence.close()
@@ -111,15 +114,34 @@ def _finish(run: Run, engine: Engine, prefix_reason: str) -> Metrics:
     return metrics
 
 
+def _digests(folder: Path) -> dict[str, str]:
+    """The content hashes of a complete run's files, so that damage to them is found."""
+    files = (path for path in sorted(folder.iterdir()) if path.is_file() and not path.is_symlink())
+    return {path.name: digest_file(path) for path in files if path.name not in (MANIFEST, LOG, ".lock")}
+
+
 def _fail(run: Run, status: str, what: str) -> None:
     run.manifest |= {"status": status, "error": what, "ended": datetime.now().isoformat(timespec="seconds")}
-    run.save()
+    with suppress(OSError):  # a full disk; what stopped the run is raised, and the run can go on without this
+        run.save()
     log.error("%s\n%s", what, traceback.format_exc())
+
+
+class _LogFile(logging.FileHandler):
+    """Appends to a file, never through a link; a full disk stops the run and not its log."""
+
+    def _open(self) -> TextIOWrapper:
+        return os.fdopen(
+            open_itself(Path(self.baseFilename), os.O_WRONLY | os.O_CREAT | os.O_APPEND), "a", encoding="utf-8"
+        )
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802
+        """Say nothing: what cannot be written here is told elsewhere."""
 
 
 @contextmanager
 def _logged(run: Run) -> Iterator[None]:
-    handler = logging.FileHandler(run.folder / "run.log", encoding="utf-8")
+    handler = _LogFile(run.folder / LOG, encoding="utf-8")
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     log.addHandler(handler)
     log.setLevel(logging.INFO)

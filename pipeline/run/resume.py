@@ -1,13 +1,19 @@
 """Going on with a run that was stopped."""
 
-import json
 import os
 import shlex
 import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import yaml
 
+from omninav.pipeline.engine.codec import BadEncoding, decode, unseal
+from omninav.pipeline.engine.damage import say_damaged
+from omninav.pipeline.files import Damaged, digest_file, digest_text, read_json
+from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.graph.results import Metrics
 
@@ -15,35 +21,101 @@ from .artifacts import ProgressDisplay
 from .execution import execute
 from .metrics_files import read_metrics
 from .plan import input_digests, plan
-from .run_folder import Run
+from .run_folder import CONFIG, MANIFEST, Run
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a run goes on by."""
+
+    status: str
+    argv: tuple[str, ...]
+    cwd: str
+    config: str
+    """`digest_text` of config.yaml."""
+    inputs: dict[str, str]
+    """Hashes of what the run reads, by node or artifact."""
+    files: dict[str, str]
+    """Hashes of a complete run's files."""
 
 
 def resume(folder: Path, display: ProgressDisplay | None = None) -> tuple[Run, Metrics]:
-    """Go on with a run that was stopped, from its last checkpoint, to the bytes it would have given unbroken."""
-    manifest_file, config_file = folder / "manifest.json", folder / "config.yaml"
-    if not manifest_file.is_file() or not config_file.is_file():
+    """Go on with a run that was stopped, from its last checkpoint, to the bytes it would have given unbroken.
+
+    What is damaged in its folder is made again, from the start where need be. Raises `BadInput` where another process
+    runs it, and where too much is damaged to know what the run was.
+    """
+    run = Run(folder.resolve())
+    if not (folder / MANIFEST).is_file() and not run.beginning.is_file():
         raise BadInput(f"{folder}: not a run folder (no manifest.json and config.yaml); `ls runs` shows what there is")
-    run = Run(folder.resolve(), json.loads(manifest_file.read_text()))
+    with run.owned():
+        return _resume(run, folder, display)
+
+
+def _resume(run: Run, folder: Path, display: ProgressDisplay | None) -> tuple[Run, Metrics]:
     for half_written in folder.glob("*.part"):  # by the process that was killed; it is written anew
         half_written.unlink()
-    if run.manifest["status"] == "complete":
-        shutil.rmtree(run.memory, ignore_errors=True)
-        return run, read_metrics(folder)
-    if Path(run.manifest["cwd"]).is_dir():
-        os.chdir(run.manifest["cwd"])  # its paths are relative to where it was started
+    began, config = _beginning(run, folder)
+    if began.status == "complete":
+        damaged = next((name for name, digest in began.files.items() if not _is_whole(run.folder / name, digest)), None)
+        if damaged is None:
+            shutil.rmtree(run.memory, ignore_errors=True)
+            run.complete = True
+            return run, read_metrics(folder)
+        say_damaged(f"{folder}: {damaged} is damaged or gone; the run is made again")
+    if Path(began.cwd).is_dir():
+        os.chdir(began.cwd)  # its paths are relative to where it was started
+    again = shlex.join(began.argv)
     try:
-        planned = plan(yaml.safe_load(config_file.read_text()))
+        planned = plan(yaml.safe_load(config))
     except ProblemsFound as found:
         if all(problem.where.startswith(("nodes.", "wires.", "artifacts.")) for problem in found.problems):
-            again = shlex.join(run.manifest["argv"])
             message = f"{folder}: made with an older omninav, whose stages are no longer known; start it again: {again}"
             raise BadInput(message) from None
         raise
     inputs = input_digests(planned)
-    changed = [name for name, digest in inputs.items() if run.manifest["inputs"].get(name) != digest]
+    changed = [name for name, digest in inputs.items() if began.inputs.get(name) != digest]
     if changed:
         raise BadInput(f"{folder}: {', '.join(changed)} changed since the run was started; start a new run")
+    run.describe(planned)
     run.manifest["status"] = "running"
-    run.manifest.pop("error", None)
+    for name in ("error", "ended", "files", "saved", "artifacts"):
+        run.manifest.pop(name, None)
+    run.seal_beginning(config)
     run.save()
     return run, execute(run, planned, display)
+
+
+def _beginning(run: Run, folder: Path) -> tuple[Manifest, str]:
+    """The manifest and the text of the configuration, or what was sealed of them where they are damaged."""
+    sealed: Mapping[str, Any] = {}
+    try:
+        if run.beginning.is_file():
+            sealed = decode(unseal(run.beginning.read_bytes(), str(run.beginning)))
+    except BadEncoding:
+        pass  # it is only there for when something else is damaged
+    try:
+        run.manifest = read_json(run.folder / MANIFEST)
+    except Damaged as damaged:
+        if not sealed:
+            raise BadInput(f"{damaged}; what the run was is no longer known: start it again") from None
+        say_damaged(f"{damaged}; it is written again")
+        run.manifest = dict(sealed["manifest"])
+    known = {name: run.manifest[name] for name in Manifest.__dataclass_fields__ if name in run.manifest}
+    arguments, problems = convert_fields({"files": {}} | known, Manifest, MANIFEST)
+    if problems:
+        raise BadInput(f"{folder}: {problems[0].where}: {problems[0].what}; start the run again")
+    began = Manifest(**arguments)
+    file = run.folder / CONFIG
+    text = file.read_bytes().decode("utf-8", "replace") if file.is_file() else ""
+    if digest_text(text) != began.config:
+        text = str(sealed.get("config", ""))
+        if digest_text(text) != began.config:
+            again = shlex.join(began.argv)
+            raise BadInput(f"{folder}: config.yaml is damaged, or was changed by hand; start the run again: {again}")
+        say_damaged(f"{folder}: config.yaml is damaged, or was changed by hand; it is written again as it was")
+    return began, text
+
+
+def _is_whole(file: Path, digest: str) -> bool:
+    return file.is_file() and digest_file(file) == digest

@@ -1,9 +1,9 @@
 """A run's folder: made with all that a resume needs, and its manifest."""
 
-import json
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -11,29 +11,76 @@ from typing import Any
 
 import yaml
 
-from omninav.pipeline.files import write_whole
+from omninav.pipeline.engine.codec import encode, seal
+from omninav.pipeline.files import Damaged, Taken, digest_text, locked, read_json, write_json, write_whole
 from omninav.pipeline.graph.problems import BadInput
 
 from .inputs import refuse_missing
 from .plan import Plan, input_digests
 from .provenance import LIBRARIES, git_commit, version
 
+MANIFEST, CONFIG = "manifest.json", "config.yaml"
+
 
 @dataclass
 class Run:
-    """A run folder with its manifest, which is written at the start and completed at the end."""
+    """A run folder with its manifest, which is written at the start and completed at the end.
+
+    One process owns it at a time, until it releases it or dies.
+    """
 
     folder: Path
     manifest: dict[str, Any] = field(default_factory=dict)
+    complete: bool = False
+    """Whether it was complete when it was to go on: then nothing was done."""
+    _owned: bool = False
 
     def save(self) -> None:
         """Write the manifest as it stands."""
-        write_whole(self.folder / "manifest.json", json.dumps(self.manifest, indent=1, default=str) + "\n")
+        write_json(self.folder / MANIFEST, self.manifest)
 
     @property
     def memory(self) -> Path:
         """Where checkpoints and sequences lie."""
         return self.folder / "checkpoints"
+
+    @property
+    def beginning(self) -> Path:
+        """Manifest and configuration as the run began with them, sealed; only while it is unfinished."""
+        return self.memory / "start"
+
+    @contextmanager
+    def owned(self) -> Iterator[None]:
+        """Keep other processes from running it while the block runs. Raises `BadInput` naming the one that does."""
+        if self._owned:
+            yield
+            return
+        try:
+            with locked(self.folder / ".lock", wait=False):
+                self._owned = True
+                yield
+        except Taken as taken:
+            raise BadInput(f"{self.folder}: {taken} is running it; wait until it has ended") from None
+        finally:
+            self._owned = False
+
+    def seal_beginning(self, config: str) -> None:
+        """Keep the manifest as it stands, and the text of the configuration, where damage to their files is found."""
+        write_whole(self.beginning, seal(encode({"manifest": self.manifest, "config": config})))
+
+    def describe(self, planned: Plan) -> None:
+        """Write what follows from the plan: config and graph."""
+        from omninav.pipeline.report.graph_svg import svg  # drawing is not needed to start the command line
+        from omninav.pipeline.report.mermaid import mermaid
+
+        write_whole(self.folder / CONFIG, config_text(planned))
+        write_whole(self.folder / "graph.svg", svg(planned.graph))
+        write_whole(self.folder / "graph.mmd", mermaid(planned.graph))
+
+
+def config_text(planned: Plan) -> str:
+    """A plan's configuration as its file holds it."""
+    return yaml.safe_dump(dict(planned.config), sort_keys=False, allow_unicode=True, width=120)
 
 
 def start(
@@ -51,6 +98,7 @@ def start(
     beginning = root / f".{named}.{os.getpid()}.part" if folder is None else folder
     beginning.mkdir(parents=True, exist_ok=True)
     run = Run(beginning)
+    config_file = config_text(planned)
     run.manifest = {
         "omninav": version("omninav"),
         "status": "running",
@@ -60,20 +108,18 @@ def start(
         "started": datetime.now().isoformat(timespec="seconds"),
         "git_commit": git_commit(),
         "graph": planned.digest,
+        "config": digest_text(config_file),
         "inputs": inputs,
         "seed": planned.seed,
         "python": platform.python_version(),
         "libraries": {name: version(name) for name in LIBRARIES},
     }
-    write_whole(beginning / "config.yaml", yaml.safe_dump(dict(config), sort_keys=False, allow_unicode=True, width=120))
-    for name, content in (files or {}).items():
-        write_whole(beginning / name, content)
-    from omninav.pipeline.report.graph_svg import svg  # drawing is not needed to start the command line
-    from omninav.pipeline.report.mermaid import mermaid
-
-    write_whole(beginning / "graph.svg", svg(planned.graph))
-    write_whole(beginning / "graph.mmd", mermaid(planned.graph))
-    run.save()
+    with run.owned():
+        run.describe(planned)
+        for name, content in (files or {}).items():
+            write_whole(beginning / name, content)
+        run.seal_beginning(config_file)
+        run.save()
     if folder is None:
         run.folder = _named(beginning, root, named)
         _point_latest(run.folder)
@@ -81,9 +127,12 @@ def start(
 
 
 def status(folder: Path) -> str | None:
-    """What a run folder's manifest says of the run (`running`, `complete`, `failed`, …); None where there is none."""
-    file = folder / "manifest.json"
-    return str(json.loads(file.read_text()).get("status")) if file.is_file() else None
+    """What a run folder's manifest says of the run (`running`, `complete`, …); None where there is none, or no whole
+    one."""
+    try:
+        return str(read_json(folder / MANIFEST).get("status"))
+    except Damaged:
+        return None
 
 
 def _named(folder: Path, root: Path, name: str) -> Path:

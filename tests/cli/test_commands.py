@@ -214,6 +214,7 @@ def test_the_embedded_default_leaves_everything_a_run_should(demo: Path):
     names = {path.name for path in demo.iterdir()}
     assert names == {
         ".hydra",
+        ".lock",
         "config.yaml",
         "graph.mmd",
         "graph.svg",

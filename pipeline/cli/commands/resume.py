@@ -12,7 +12,6 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.report.terminal_tables import results_table
 from omninav.pipeline.run.resume import resume
-from omninav.pipeline.run.run_folder import status
 
 
 def command(arguments: list[str]) -> int:
@@ -22,7 +21,6 @@ def command(arguments: list[str]) -> int:
     here, folder = Path.cwd(), Path(arguments[0]).resolve()
     if (folder / "experiment.json").is_file():
         return _resume_experiment(folder)
-    ended = status(folder) == "complete"
     try:
         with Progress() as progress:
             run, metrics = resume(folder, progress)
@@ -31,7 +29,7 @@ def command(arguments: list[str]) -> int:
         return 1
     finally:
         os.chdir(here)  # a run goes on where it was started
-    if ended:
+    if run.complete:
         print(f"{arguments[0]} was complete: there was nothing to go on with. Its results:")
     show(results_table(metrics))
     print(f"report: {shown(run.folder / 'report.html')}")

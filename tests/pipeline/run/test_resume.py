@@ -8,6 +8,7 @@ import yaml
 
 from omninav.pipeline.engine.artifact import write_artifact
 from omninav.pipeline.engine.codec import encode, seal
+from omninav.pipeline.files import digest_text
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.run.plan import plan
 from omninav.pipeline.run.resume import resume
@@ -27,9 +28,12 @@ def begun(place: Path, **changes: Any) -> Run:
 
 
 def rewrite(run: Run, **nodes: str) -> None:
+    """As if the run had been started with these stages."""
     config = yaml.safe_load((run.folder / "config.yaml").read_text())
     config["nodes"] |= {name: {"_target_": target} for name, target in nodes.items()}
     (run.folder / "config.yaml").write_text(yaml.safe_dump(config))
+    run.manifest["config"] = digest_text(yaml.safe_dump(config))
+    run.save()
 
 
 def test_a_run_that_was_stopped_ends_in_its_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -52,7 +56,6 @@ def test_a_run_of_an_older_version_says_how_to_start_it_again(tmp_path: Path, mo
 def test_a_checkpoint_of_an_older_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     run = begun(tmp_path)
-    run.memory.mkdir()
     (run.memory / "checkpoint").write_bytes(seal(encode({"format": 1})))
     with pytest.raises(BadInput, match="was written by another version of omninav; start the run again"):
         resume(run.folder)

@@ -1,0 +1,17 @@
+"""What was found damaged and is made again: said once, on the terminal and in the run's log."""
+
+import logging
+import sys
+
+_log = logging.getLogger("omninav")
+_said: set[str] = set()
+
+
+def say_damaged(what: str) -> None:
+    """Say in one line what was damaged and what is done about it."""
+    if what in _said:
+        return
+    _said.add(what)
+    print(what, file=sys.stderr, flush=True)
+    if _log.handlers:
+        _log.warning("%s", what)
