@@ -7,7 +7,7 @@ from typing import Annotated
 from omninav.pipeline import Bounds
 from omninav.stages.geometry.plane.odometry_motion import decompose_motion
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.values.pose import Motion, UncertainMotion
+from omninav.stages.values.pose import BridgedMotion, Motion, UncertainMotion
 
 
 @dataclass(kw_only=True, eq=False)
@@ -17,7 +17,8 @@ class OdometryNoiseModel:
     Variances are proportional to distance and turn, so that many small motions are as uncertain as their sum, whatever
     the camera's rate. Each rotation has sigma^2 = (rotation_per_rotation^2 |turn| + rotation_per_metre^2 distance +
     rotation_floor^2) / 2 (rad^2); the translation has sigma^2 = translation_per_metre^2 distance +
-    translation_per_rotation^2 |turn| + translation_floor^2 (m^2). `turn` is the sum of both rotations, so that wheel
+    translation_per_rotation^2 |turn| + translation_floor^2 (m^2). Seconds that odometry says nothing of add
+    (unmeasured_turn t)^2 / 2 and (unmeasured_speed t)^2. `turn` is the sum of both rotations, so that wheel
     jitter sideways is no turn.
     """
 
@@ -33,22 +34,29 @@ class OdometryNoiseModel:
     """Standard deviation (rad) added at each image, also where the robot stands."""
     translation_floor: Annotated[float, Bounds(ge=0)] = 0.001
     """Standard deviation (m) added at each image, also where the robot stands."""
+    unmeasured_turn: Annotated[float, Bounds(ge=0)] = 0.5
+    """Standard deviation (rad) of the heading for each second about which no odometry is believed: half a slow turn."""
+    unmeasured_speed: Annotated[float, Bounds(ge=0)] = 0.5
+    """Standard deviation (m) of the distance for each such second: half of what an indoor robot may make."""
 
     def model(self, motion: Motion) -> UncertainMotion:
         """A motion as rotation, translation, rotation, with the standard deviation of each."""
         steps = decompose_motion(motion.x, motion.y, motion.turn)
-        return UncertainMotion(steps, self.sigmas(steps))
+        unmeasured_s = motion.unmeasured_s if isinstance(motion, BridgedMotion) else 0.0
+        return UncertainMotion(steps, self.sigmas(steps, unmeasured_s))
 
-    def sigmas(self, steps: tuple[float, float, float]) -> tuple[float, float, float]:
+    def sigmas(self, steps: tuple[float, float, float], unmeasured_s: float = 0.0) -> tuple[float, float, float]:
         """Standard deviations of the first rotation (rad), the translation (m) and the second rotation (rad)."""
         distance, turn = abs(steps[1]), abs(float(wrap(steps[0] + steps[2])))
         rotation = math.sqrt(
             0.5
             * (self.rotation_per_rotation**2 * turn + self.rotation_per_metre**2 * distance + self.rotation_floor**2)
+            + 0.5 * (self.unmeasured_turn * unmeasured_s) ** 2
         )
         translation = math.sqrt(
             self.translation_per_metre**2 * distance
             + self.translation_per_rotation**2 * turn
             + self.translation_floor**2
+            + (self.unmeasured_speed * unmeasured_s) ** 2
         )
         return rotation, translation, rotation

@@ -1,5 +1,6 @@
 """Adds noise to the odometry, in nine levels."""
 
+from dataclasses import replace
 from typing import Annotated
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
@@ -45,4 +46,5 @@ class NoisyOdometry(Stage):
         """One increment."""
         increment = [[motion.x, motion.y, motion.turn]]
         row = add_odometry_noise(increment, self.levels[self.level], ctx.rng.normal(size=(1, 3)))[0]
-        return self.Out(motion=Motion(*(float(value) for value in row)))
+        x, y, turn = (float(value) for value in row)
+        return self.Out(motion=replace(motion, x=x, y=y, turn=turn))

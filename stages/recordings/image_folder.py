@@ -20,7 +20,7 @@ from .description import MAX_PATTERN, Description, find_layout, known_layouts, r
 from .messages import Undecodable, decode_image, is_blank
 from .positions import frame_poses
 from .recording import Format, OpenOptions, UnreadableRecording
-from .stamps import ascending
+from .stamps import ascending, lone
 from .tables import CsvTable, Delimiter, read_table
 
 Array = npt.NDArray[np.float64]
@@ -32,16 +32,15 @@ MAX_STARS = 8
 class ImageFolder:
     """A described folder of images as a `Recording`. It has positions (as truth) and no odometry.
 
-    Counted in `dropped`: `missing_image`, `no_position`, `no_time`, `duplicate_frame`, `backward_stamp`, and when
-    images are read `undecodable_image`, `blank_image`, `wrong_size`.
+    Counted in `dropped`: `missing_image`, `impossible_motion`, `no_position`, `no_time`, `duplicate_frame`,
+    `backward_stamp`, `lone_stamp`, and when images are read `undecodable_image`, `blank_image`, `wrong_size`.
     Raises `UnreadableRecording` for a file or column that is not there, and where nothing usable remains.
     """
 
     odometry: None = None
+    unmeasured_s: None = None
 
-    def __init__(
-        self, name: str, folder: Path, description: Description, where: str, camera: Path | None = None
-    ) -> None:
+    def __init__(self, name: str, folder: Path, description: Description, where: str, options: OpenOptions) -> None:
         self.name = name
         self.dropped: Counter[str] = Counter()
         self.details: dict[str, str] = {}
@@ -55,12 +54,14 @@ class ImageFolder:
         times = self._times(frames, len(paths))
         positions = description.positions
         own = self._table(positions.csv, positions.header, positions.delimiter)
-        truth = frame_poses(description, where, frames, own, times)
+        truth, unlikely = frame_poses(description, where, frames, own, times, options.limits)
+        for what in unlikely:
+            self._drop("impossible_motion", what)
         keep = self._usable(paths, times, truth)
         self._paths_kept = [paths[row] for row in keep]
         self.stamps: Stamps = np.array([times[row] for row in keep], dtype=np.int64)
         self.truth: Array | None = truth[keep]
-        self.camera = self._find_camera(camera)
+        self.camera = self._find_camera(options.camera)
 
     def image(self, frame: int) -> Pixels | None:
         """The image of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
@@ -177,6 +178,10 @@ class ImageFolder:
             self._drop("duplicate_frame", f"{paths[rows[number]].name} repeats a time")
         for number in backward:
             self._drop("backward_stamp", f"{paths[rows[number]].name} goes back in time")
+        apart = lone(np.array([times[rows[number]] for number in kept], dtype=np.int64))
+        for number in np.array(kept, dtype=np.int64)[apart]:
+            self._drop("lone_stamp", f"{paths[rows[number]].name} was taken hours from all others")
+        kept = [number for number, alone in zip(kept, apart, strict=True) if not alone]
         if not kept:
             lost = ", ".join(f"{count} {kind}" for kind, count in sorted(self.dropped.items())) or "there are none"
             first = next(iter(self.details.values()), "")
@@ -237,7 +242,7 @@ class DescribedFolder(Format):
         description = read_description(file, options.layout_folders)
         if which:
             description = replace(description, which=which)
-        return ImageFolder(log, folder, description, str(file), options.camera)
+        return ImageFolder(log, folder, description, str(file), options)
 
     def hint(self, folder: str, options: OpenOptions) -> str:
         """What to type for a folder that nothing describes."""
@@ -249,4 +254,4 @@ class DescribedFolder(Format):
         if description.folder is None and file.name != "recording.yaml":
             raise UnreadableRecording(f"{file}: folder is missing; type log={file}:FOLDER, or write folder: … into it")
         folder = file.parent / Path(description.folder or "").expanduser()
-        return ImageFolder(log, folder, description, str(file), options.camera)
+        return ImageFolder(log, folder, description, str(file), options)

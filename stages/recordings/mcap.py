@@ -32,7 +32,7 @@ class Mcap(Format):
         """The files of a folder in the order of its metadata. Raises `UnreadableRecording` or `LogError`."""
         path = Path(log).expanduser()
         if not path.is_dir():
-            return record_topics(log, LogReader(path), options.topics, options.camera, [path])
+            return record_topics(log, LogReader(path), options, [path])
         parts = sorted(path.glob("*.mcap"))
         listed = _listed(path / "metadata.yaml") or [part.name for part in parts]
         there = [path / file for file in listed if (path / file).is_file()] or parts
@@ -40,7 +40,7 @@ class Mcap(Format):
         for file in listed:
             if not (path / file).is_file():
                 feed.drop("missing_file", f"{log}: its part {file} does not exist")
-        return record_topics(log, feed, options.topics, options.camera, there)
+        return record_topics(log, feed, options, there)
 
 
 def _listed(path: Path) -> list[str]:

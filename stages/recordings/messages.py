@@ -13,6 +13,8 @@ from omninav.stages.values.scan import Scan
 POSE_TYPES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped")
 SCAN_TYPE = "sensor_msgs/msg/LaserScan"
 IMAGE_TYPES = ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image")
+MAX_COORDINATE_M = 1e8
+"""Twice the way around the Earth: further away no map projection puts anything."""
 LEVELS_OF_A_BLANK = 2
 """A constant image may differ by this much after JPEG compression (rounding of one level to either side)."""
 
@@ -32,6 +34,10 @@ _AS_BGR = {
 }
 
 
+class ImpossiblePose(ValueError):
+    """A pose that nothing on Earth has; the message says why."""
+
+
 class Undecodable(ValueError):
     """Bytes that are no image; the message says what is wrong with them."""
 
@@ -39,14 +45,20 @@ class Undecodable(ValueError):
 def pose_of(message: Any) -> tuple[float, float, float]:
     """x, y (m) and heading (rad) of an Odometry, PoseStamped or PoseWithCovarianceStamped message.
 
-    Raises ValueError where they are not finite numbers.
+    Raises ValueError where they are not finite numbers, `ImpossiblePose` where they are nowhere on Earth or the
+    quaternion's length is far from 1.
     """
     pose = message.pose
     pose = getattr(pose, "pose", pose)
     position, q = pose.position, pose.orientation
-    heading = math.atan2(2 * (q.w * q.z + q.x * q.y), q.w * q.w + q.x * q.x - q.y * q.y - q.z * q.z)
-    if not math.isfinite(position.x + position.y + heading):
+    length = math.hypot(q.x, q.y, q.z, q.w)
+    if not math.isfinite(position.x + position.y + length):
         raise ValueError("its pose is not finite")
+    if math.hypot(position.x, position.y) > MAX_COORDINATE_M:
+        raise ImpossiblePose(f"{math.hypot(position.x, position.y):.1e} m from its origin: further than the Earth is")
+    if not 0.5 <= length <= 2.0:
+        raise ImpossiblePose(f"its orientation is a quaternion of length {length:.2g}, not 1")
+    heading = math.atan2(2 * (q.w * q.z + q.x * q.y), q.w * q.w + q.x * q.x - q.y * q.y - q.z * q.z)
     return float(position.x), float(position.y), heading
 
 

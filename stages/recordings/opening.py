@@ -4,19 +4,25 @@ import importlib
 from collections.abc import Sequence
 from pathlib import Path
 
+from .plausibility import MotionLimits
 from .recording import FORMATS, Format, OpenOptions, Recording, Topics, UnreadableRecording
 
 
 def open_recording(
-    log: str, topics: Topics | None = None, camera: str | None = None, layout_folders: Sequence[str] = ()
+    log: str,
+    topics: Topics | None = None,
+    camera: str | None = None,
+    layout_folders: Sequence[str] = (),
+    limits: MotionLimits | None = None,
 ) -> Recording:
     """Open what `log` names: a file, a folder, or a layout and a folder (see each format's `open`).
 
     `camera`: a camera.yaml that replaces the recording's own; `layout_folders`: where else descriptions of folders of
-    images lie. Raises `UnreadableRecording` (or another `BadInput`) with one line: file, what is wrong, what to type.
+    images lie; `limits`: what the robot can do. Raises `UnreadableRecording` (or another `BadInput`) with one line:
+    file, what is wrong, what to type.
     """
     named = None if camera is None else Path(camera).expanduser()
-    options = OpenOptions(topics or Topics(), named, tuple(layout_folders))
+    options = OpenOptions(topics or Topics(), named, tuple(layout_folders), limits or MotionLimits())
     formats, path = log_formats(), Path(log).expanduser()
     meant = next((one for one in formats if one.opens(log)), None)
     if meant is not None and (path.exists() or path.suffix not in meant.suffixes):

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from omninav.stages.geometry.plane.se2 import wrap
 
 from .description import Description
+from .plausibility import MotionLimits, believed
 from .recording import UnreadableRecording
 from .stamps import ascending, poses_at
 from .tables import Angle, CsvTable
@@ -17,9 +18,14 @@ Stamps = npt.NDArray[np.int64]
 
 
 def frame_poses(
-    description: Description, where: str, frames: CsvTable | None, own: CsvTable | None, times: list[int | None]
-) -> Array:
-    """Poses (N, 3) of all frames at their `times` (ns), NaN where there is none.
+    description: Description,
+    where: str,
+    frames: CsvTable | None,
+    own: CsvTable | None,
+    times: list[int | None],
+    limits: MotionLimits,
+) -> tuple[Array, list[str]]:
+    """Poses (N, 3) of all frames at their `times` (ns), NaN where there is none, and which rows are not believed.
 
     `frames` and `own`: the tables of the frames and of the positions alone, as far as there are any. Raises
     `UnreadableRecording`, naming `where` the description stands.
@@ -39,14 +45,17 @@ def frame_poses(
     known = [row for row, time in enumerate(track_times) if time is not None and np.isfinite(x[row] + y[row])]
     kept, _, _ = ascending([track_times[row] or 0 for row in known])
     rows = np.array([known[number] for number in kept], dtype=np.int64)
+    stamps = np.array([track_times[row] for row in rows], dtype=np.int64)
+    likely = believed(stamps, np.column_stack([x[rows], y[rows], np.zeros(len(rows))]), limits).rows
+    said = [f"{table.path.name}: row {row}: no robot gets to its position" for row in np.delete(rows, likely)]
+    rows, stamps = rows[likely], stamps[likely]
     if len(rows) < 2:
         raise UnreadableRecording(f"{table.path}: fewer than two rows with a position")
-    stamps = np.array([track_times[row] for row in rows], dtype=np.int64)
     track = np.column_stack([x[rows], y[rows], headings(description, table, rows, stamps, x[rows], y[rows])])
     poses = np.full((len(times), 3), np.nan)
     if own is None:
         poses[rows] = track
-        return poses
+        return poses, said
     timed = [row for row, time in enumerate(times) if time is not None]
     shifted = np.array([times[row] for row in timed], dtype=np.int64) + round(positions.clock_offset * 1e9)
     sure = np.isfinite(track).all(axis=1)
@@ -56,7 +65,7 @@ def frame_poses(
     after = np.clip(np.searchsorted(stamps, shifted), 1, len(stamps) - 1)
     gap = np.minimum(np.abs(shifted - stamps[after - 1]), np.abs(stamps[after] - shifted))
     poses[np.array(timed, dtype=np.int64)[gap > positions.max_gap * 1e9]] = np.nan
-    return poses
+    return poses, said
 
 
 def headings(

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
@@ -13,6 +13,8 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.camera.model import Camera
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
+
+from .plausibility import MotionLimits
 
 Array = npt.NDArray[np.float64]
 
@@ -28,7 +30,8 @@ class Recording(Protocol):
     nanoseconds, strictly ascending, of the frames that can be used as far as is known without decoding an image.
     `odometry`: (N, 3) odometry pose at each stamp in the odometry's own frame, or None. `truth`: (N, 3) true pose in
     the map frame, rows of NaN where it is not known, or None. `dropped`: how many records were left out, by kind, and
-    `details`: the first case of each kind in words.
+    `details`: the first case of each kind in words. `unmeasured_s`: (N,) seconds of the way to each frame about which
+    no odometry is believed, or None where there are none.
     """
 
     @property
@@ -39,6 +42,8 @@ class Recording(Protocol):
     def stamps(self) -> npt.NDArray[np.int64]: ...
     @property
     def odometry(self) -> Array | None: ...
+    @property
+    def unmeasured_s(self) -> Array | None: ...
     @property
     def truth(self) -> Array | None: ...
     @property
@@ -79,6 +84,8 @@ class OpenOptions:
     """A camera.yaml in place of the recording's own."""
     layout_folders: tuple[str, ...] = ()
     """Folders with further descriptions of folders of images."""
+    limits: MotionLimits = field(default_factory=MotionLimits)
+    """What the robot can do."""
 
 
 FORMATS: list[type["Format"]] = []

@@ -32,7 +32,7 @@ class Rosbag(Format):
         """With the library rosbags. Raises `UnreadableRecording`."""
         path = Path(log).expanduser()
         files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
-        return record_topics(log, BagFeed(path), options.topics, options.camera, files)
+        return record_topics(log, BagFeed(path), options, files)
 
 
 class BagFeed:

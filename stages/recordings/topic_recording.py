@@ -54,7 +54,9 @@ class TopicRecording:
         read_image: Callable[[int], Pixels],
         files: Sequence[Path],
         scans: Sequence[Record] = (),
+        unmeasured_s: Array | None = None,
     ) -> None:
+        self.unmeasured_s = unmeasured_s
         self.name, self.camera, self.stamps, self.odometry, self.truth = name, camera, stamps, odometry, truth
         self._feed, self._read_image, self._files, self._scans = feed, read_image, files, scans
         self._scan_stamps = np.array([record.stamp for record in scans], dtype=np.int64)

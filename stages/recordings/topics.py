@@ -14,9 +14,11 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from_info, parse_camera, read_camera
-from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, Undecodable, pixels_of, pose_of
-from .recording import Topics, UnreadableRecording
-from .stamps import ascending, poses_at, within
+from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, ImpossiblePose, Undecodable, pixels_of, pose_of
+from .plausibility import MotionLimits, seconds_within
+from .pose_topic import NOWHERE, PoseTopic, Track
+from .recording import OpenOptions, Topics, UnreadableRecording
+from .stamps import ascending, lone, poses_at, within
 from .topic_recording import Feed, TopicRecording
 
 Array = npt.NDArray[np.float64]
@@ -24,22 +26,24 @@ Stamps = npt.NDArray[np.int64]
 IMAGE_TOPICS = ("/camera/image/compressed", "/camera/image")
 
 
-def record_topics(name: str, feed: Feed, topics: Topics, camera: Path | None, files: Sequence[Path]) -> TopicRecording:
+def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[Path]) -> TopicRecording:
     """A recording from a feed of messages.
 
-    `camera`: a camera.yaml named by the user; else one attached, else one beside the file, else CameraInfo.
+    Camera: a camera.yaml named by the user; else one attached, else one beside the file, else CameraInfo.
     Raises `UnreadableRecording` where a topic is missing, or nothing usable remains.
     """
+    topics = options.topics
     wanted = {topic for topic in (topics.camera_info, topics.odometry, topics.truth, topics.scan) if topic}
     wanted |= {topics.image} if topics.image else set(IMAGE_TOPICS)
     found: dict[str, list[Record]] = {topic: [] for topic in wanted}
-    poses: dict[str, list[tuple[float, float, float]]] = {topic: [] for topic in wanted}
+    poses = {topic: PoseTopic(topic) for topic in (topics.odometry, topics.truth) if topic}
     infos: list[Any] = []
     for record in feed.scan(wanted):
         try:
-            if record.topic in (topics.odometry, topics.truth):
-                poses[record.topic].append(_pose(feed, record, name))
-            elif record.topic == topics.camera_info:
+            if record.topic in poses:
+                poses[record.topic].add(record.stamp, record.log_time, _pose(feed, record, name))
+                continue
+            if record.topic == topics.camera_info:
                 if not infos:
                     infos.append(feed.decode(record.topic, record.data))
                 continue
@@ -49,16 +53,16 @@ def record_topics(name: str, feed: Feed, topics: Topics, camera: Path | None, fi
         found[record.topic].append(record._replace(data=b""))
 
     image_topic = _image_topic(name, feed, topics, found)
-    odometry = _track(name, feed, "odometry", topics.odometry, found, poses)
-    truth = _track(name, feed, "truth", topics.truth, found, poses)
+    odometry = _track(name, feed, "odometry", topics.odometry, poses, options.limits)
+    truth = _track(name, feed, "truth", topics.truth, poses, options.limits)
     frames = _in_order(feed, name, image_topic, found[image_topic], "duplicate_frame")
     stamps = np.array([frame.stamp for frame in frames], dtype=np.int64)
     keep = np.ones(len(frames), dtype=bool)
     if odometry is not None:
-        keep = within(stamps, odometry[0])
+        keep = within(stamps, odometry.stamps)
         _drop_frames(feed, name, "outside_odometry", stamps, ~keep, f"outside the time of {topics.odometry}")
     elif truth is not None:
-        keep = within(stamps, truth[0])
+        keep = within(stamps, truth.stamps)
         _drop_frames(feed, name, "no_position", stamps, ~keep, f"outside the time of {topics.truth}")
     frames, stamps = [frame for frame, kept in zip(frames, keep, strict=True) if kept], stamps[keep]
     if not frames:
@@ -68,13 +72,14 @@ def record_topics(name: str, feed: Feed, topics: Topics, camera: Path | None, fi
     def read_image(frame: int) -> Pixels:
         return pixels_of(feed.decode(image_topic, feed.fetch(frames[frame].location)))
 
-    view, camera_files = find_camera(name, feed, camera, files, infos)
+    view, camera_files = find_camera(name, feed, options.camera, files, infos)
     recording = TopicRecording(
         name=name,
         camera=view,
         stamps=stamps,
-        odometry=None if odometry is None else poses_at(*odometry, stamps),
-        truth=None if truth is None else poses_at(*truth, stamps),
+        odometry=None if odometry is None else poses_at(odometry.stamps, odometry.poses, stamps),
+        truth=None if truth is None else poses_at(truth.stamps, truth.poses, stamps),
+        unmeasured_s=None if odometry is None else seconds_within(odometry.gaps, stamps),
         feed=feed,
         read_image=read_image,
         files=[*files, *camera_files],
@@ -112,7 +117,9 @@ def _pose(feed: Feed, record: Record, name: str) -> tuple[float, float, float]:
             f"{name}: {record.topic} carries {kind}, which holds no pose (known: {', '.join(POSE_TYPES)})"
         ) from None
     except ValueError as error:
-        raise BadMessage(f"{name}: a message on {record.topic}: {error}") from None
+        kind = "impossible_pose" if isinstance(error, ImpossiblePose) else "bad_message"
+        feed.drop(kind, f"{name}: a message on {record.topic}: {error}")
+        return NOWHERE
 
 
 def _image_topic(name: str, feed: Feed, topics: Topics, found: dict[str, list[Record]]) -> str:
@@ -145,13 +152,8 @@ def _known_image_topics(feed: Feed, wanted: str = "") -> str:
 
 
 def _track(
-    name: str,
-    feed: Feed,
-    role: str,
-    topic: str | None,
-    found: dict[str, list[Record]],
-    poses: dict[str, list[tuple[float, float, float]]],
-) -> tuple[Stamps, Array] | None:
+    name: str, feed: Feed, role: str, topic: str | None, poses: dict[str, PoseTopic], limits: MotionLimits
+) -> Track | None:
     """Stamps and poses of a pose topic in ascending order; None where the recording does not have it."""
     if topic is None:
         return None
@@ -165,18 +167,7 @@ def _track(
         raise UnreadableRecording(
             f"{name}: no topic {topic}; {hint}topics.{role}=null to do without (topics: {', '.join(feed.topics)})"
         )
-    records = found[topic]
-    if not records:
-        return None
-    order = sorted(range(len(records)), key=lambda number: records[number].log_time)
-    kept, repeated, backward = ascending([records[number].stamp for number in order])
-    for number in repeated:
-        feed.drop("duplicate_stamp", f"{name}: {topic} repeats the stamp {records[order[number]].stamp} ns")
-    for number in backward:
-        feed.drop("backward_stamp", f"{name}: {topic} has a stamp out of order, {records[order[number]].stamp} ns")
-    chosen = [order[number] for number in kept]
-    stamps = np.array([records[number].stamp for number in chosen], dtype=np.int64)
-    return stamps, np.array([poses[topic][number] for number in chosen], dtype=np.float64)
+    return poses[topic].track(feed, name, limits, jumps=role == "truth")
 
 
 def _scans(name: str, feed: Feed, topic: str | None, found: dict[str, list[Record]]) -> list[Record]:
@@ -201,7 +192,10 @@ def _in_order(feed: Feed, name: str, topic: str, records: list[Record], repeats:
         feed.drop(repeats, f"{name}: {topic} repeats the stamp {records[number].stamp} ns")
     for number in backward:
         feed.drop("backward_stamp", f"{name}: {topic} has a stamp out of order, {records[number].stamp} ns")
-    return [records[number] for number in kept]
+    apart = lone(np.array([records[number].stamp for number in kept], dtype=np.int64))
+    for number in np.array(kept, dtype=np.int64)[apart]:
+        feed.drop("lone_stamp", f"{name}: {topic} has a stamp hours from all others, {records[number].stamp} ns")
+    return [records[number] for number, alone in zip(kept, apart, strict=True) if not alone]
 
 
 def _drop_frames(feed: Feed, name: str, kind: str, stamps: Stamps, lost: npt.NDArray[np.bool_], why: str) -> None:

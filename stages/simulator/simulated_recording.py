@@ -64,6 +64,7 @@ class SimulatedRecording:
         self.camera = camera_of(world)
         self.dropped: Counter[str] = Counter()
         self.details: dict[str, str] = {}
+        self.unmeasured_s: None = None
         self._start = DAY_0_NS + day * 86400 * 10**9 + (9 + sorted(world.routes).index(route)) * 3600 * 10**9
         self._drive()
         self._schedule_images()

@@ -14,11 +14,12 @@ from omninav.pipeline.files import digest_text
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.plausibility import MotionLimits
 from omninav.stages.recordings.recording import Recording, Topics, UnreadableRecording
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.values.image import Image
-from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.pose import BridgedMotion, Motion, Pose
 from omninav.stages.values.scan import Scan
 
 from .cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames
@@ -65,6 +66,8 @@ class LogSource(Source):
     heading]} (s, m, rad)."""
     topics: Topics = Topics()
     """Which topics of the log are read."""
+    limits: MotionLimits = MotionLimits()
+    """What the robot can do: odometry and truth beyond it are dropped, counted, and odometry's gaps bridged."""
     camera: str | None = None
     """A camera.yaml in place of the log's own."""
     layout_folders: tuple[str, ...] = ()
@@ -173,16 +176,19 @@ class LogSource(Source):
             first_of_log=first,
         )
         truth = None if recording.truth is None else recording.truth[frame]
-        odometry, increment = None, None
+        odometry, motion = None, None
         measured = self._odometry[position.log]
         if recording.odometry is not None:
             odometry = measured[frame]
-            increment = None if last is None else between(measured[last], odometry)
+            if last is not None:
+                gap = 0.0 if recording.unmeasured_s is None else float(np.ptp(recording.unmeasured_s[[last, frame]]))
+                motion = _motion(between(measured[last], odometry), gap)
         elif recording.truth is not None:
             if last is not None:
                 increment = self._synthetic(ctx, between(measured[last], measured[frame]))
                 moved = compose((position.x, position.y, position.heading), increment)
                 position.x, position.y, position.heading = (float(value) for value in moved)
+                motion = _motion(increment)
             odometry = np.array([position.x, position.y, position.heading])
         position.last, position.next, position.ticks = position.next, position.next + 1, position.ticks + 1
         return self.Out(
@@ -190,7 +196,7 @@ class LogSource(Source):
             image=image,
             camera=recording.camera,
             odometry=_pose(odometry),
-            motion=None if increment is None else Motion(*(float(value) for value in increment)),
+            motion=motion,
             truth=_pose(truth),
             scan=recording.scan(frame) if ctx.is_read("scan") else None,
         )
@@ -220,7 +226,9 @@ class LogSource(Source):
         elif not names or None in names:
             raise UnreadableRecording("no recording is named; type log=PATH")
         else:
-            recordings = [open_recording(str(name), self.topics, self.camera, self.layout_folders) for name in names]
+            recordings = [
+                open_recording(str(name), self.topics, self.camera, self.layout_folders, self.limits) for name in names
+            ]
         self._recordings, self._frames, self._odometry = [], [], []
         for recording in recordings:
             check_cuts(self.cuts, len(recording.stamps), recording.name)
@@ -267,6 +275,11 @@ def _odometry_kind(recording: Recording) -> str:
     if recording.odometry is not None:
         return "measured"
     return "missing" if recording.truth is None else "synthetic"
+
+
+def _motion(increment: Array, unmeasured_s: float = 0.0) -> Motion:
+    x, y, turn = (float(value) for value in increment)
+    return BridgedMotion(x, y, turn, unmeasured_s) if unmeasured_s else Motion(x, y, turn)
 
 
 def _pose(row: Array | None) -> Pose | None:

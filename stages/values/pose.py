@@ -24,6 +24,15 @@ class Motion(Value):
     turn: float
 
 
+class BridgedMotion(Motion):
+    """A motion across a gap of the odometry, bridged from what lies about it: less certain than a measured one.
+
+    `unmeasured_s`: how long the gap is, in seconds.
+    """
+
+    unmeasured_s: float
+
+
 class UncertainMotion(Value):
     """A motion as rotation (rad), translation (m, negative: backwards) and rotation (rad), with their uncertainty.
 

@@ -1,0 +1,88 @@
+"""The poses on one topic: gathered as they are read, then put in order, and what no robot does left out."""
+
+from array import array
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from .plausibility import MotionLimits, believed, without_jumps
+from .stamps import ascending, lone
+from .topic_recording import Feed
+
+Array = npt.NDArray[np.float64]
+Stamps = npt.NDArray[np.int64]
+NOWHERE = (float("nan"),) * 3
+
+
+class Track(NamedTuple):
+    """Poses (N, 3) at ascending stamps (N,) in ns; `gaps` (G, 2): stamps between which no measurement is believed."""
+
+    stamps: Stamps
+    poses: Array
+    gaps: Stamps
+
+
+class PoseTopic:
+    """Stamps, log times and poses of a topic's messages: 40 bytes each, since a log may hold millions."""
+
+    def __init__(self, topic: str) -> None:
+        self.topic = topic
+        self._stamps, self._log_times, self._poses = array("q"), array("Q"), array("d")
+
+    def add(self, stamp: int, log_time: int, pose: tuple[float, float, float]) -> None:
+        """One message; `NOWHERE` for one whose pose cannot be."""
+        self._stamps.append(stamp)
+        self._log_times.append(log_time)
+        self._poses.extend(pose)
+
+    def track(self, feed: Feed, name: str, limits: MotionLimits, jumps: bool) -> Track | None:
+        """What is believed of it; None where nothing is. What is left out is counted with `feed`.
+
+        `jumps`: the track may jump, as the true pose of a robot does that is carried; else it is joined where it does.
+        """
+        poses, stamps = np.array(self._poses).reshape(-1, 3), np.array(self._stamps, np.int64)
+        order = np.argsort(np.array(self._log_times), kind="stable")
+        kept = self._in_order(feed, name, stamps[order])
+        stamps, poses = stamps[order[kept]], poses[order[kept]]
+        rows, begun, gaps = believed(stamps, poses, limits)
+        unlikely = np.setdiff1d(np.flatnonzero(np.isfinite(poses).all(axis=1)), rows)
+        for row in unlikely:
+            feed.drop("impossible_motion", f"{self._at(name, stamps, row)}: {_step(stamps, poses, row, limits)}")
+        stamps, poses = stamps[rows], poses[rows]
+        if not len(rows):
+            return None
+        if not jumps:
+            for row in begun:
+                feed.drop("odometry_jump", f"{self._at(name, stamps, row)}: {_step(stamps, poses, row, limits)}")
+            poses = without_jumps(stamps, poses, begun)
+        return Track(stamps, poses, gaps)
+
+    def _in_order(self, feed: Feed, name: str, stamps: Stamps) -> npt.NDArray[np.int64]:
+        """Which messages to keep so that stamps ascend."""
+        kept = np.arange(len(stamps))
+        if (np.diff(stamps) <= 0).any():
+            chosen, repeated, backward = ascending(stamps.tolist())
+            for number in repeated:
+                feed.drop("duplicate_stamp", f"{name}: {self.topic} repeats the stamp {stamps[number]} ns")
+            for number in backward:
+                feed.drop("backward_stamp", f"{name}: {self.topic} has a stamp out of order, {stamps[number]} ns")
+            kept = np.array(chosen, np.int64)
+        apart = lone(stamps[kept])
+        for stamp in stamps[kept[apart]]:
+            feed.drop("lone_stamp", f"{name}: {self.topic} has a stamp hours from all others, {stamp} ns")
+        return kept[~apart]
+
+    def _at(self, name: str, stamps: Stamps, row: int) -> str:
+        return f"{name}: {self.topic} at {stamps[row] / 1e9:.3f} s"
+
+
+def _step(stamps: Stamps, poses: Array, row: int, limits: MotionLimits) -> str:
+    """What a pose would need of the robot, by its neighbour."""
+    other = row - 1 if row else min(1, len(poses) - 1)
+    metres = float(np.hypot(*(poses[row, :2] - poses[other, :2])))
+    seconds = abs(float(stamps[row] - stamps[other])) / 1e9
+    return (
+        f"{metres:.3g} m from its neighbour {seconds:.3g} s away; no robot is believed to be faster than "
+        f"{limits.speed:g} m/s and {limits.turn:.3g} rad/s (nodes.source.limits)"
+    )

@@ -1,0 +1,197 @@
+"""What no robot does: it is dropped and counted, and the track is that of the undamaged log."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from made_logs import (
+    FRAMES,
+    IMAGE,
+    ODOMETRY,
+    START,
+    TRUTH,
+    Made,
+    compressed,
+    encoded,
+    messages,
+    picture,
+    pose_at,
+    pose_fields,
+    write_mcap,
+)
+
+from omninav.pipeline import Context
+from omninav.pipeline.mcap.message_types import make_message
+from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
+from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.plausibility import MotionLimits, believed, seconds_within, without_jumps
+from omninav.stages.source.log import LogSource, LogSourceState
+from omninav.stages.values.pose import BridgedMotion, Motion
+
+Pose = tuple[float, float, float]
+
+
+def step_of(made: Made) -> int:
+    return round((made.stamp - START) / 50_000_000)
+
+
+def posed(made: Made, pose: Pose, quaternion: dict[str, float] | None = None) -> Made:
+    fields: dict[str, Any] = pose_fields(*pose)
+    fields |= {"orientation": quaternion} if quaternion is not None else {}
+    whole = {"pose": {"pose": fields}} if made.topic == ODOMETRY else {"pose": fields}
+    return made._replace(content=make_message(made.msgtype, whole, made.stamp))
+
+
+def log_with(path: Path, change: Callable[[Made, int], Made], topic: str = ODOMETRY) -> Path:
+    return write_mcap(path, messages(lambda made: [change(made, step_of(made)) if made.topic == topic else made]))
+
+
+def far(metres: float) -> Callable[[Made, int], Made]:
+    return lambda made, step: posed(made, (metres, 0.0, 0.0)) if step == 82 else made
+
+
+def turned(made: Made, step: int) -> Made:
+    x, y, heading = pose_at(step * 0.05)
+    return posed(made, (x, y, heading + 2.0)) if step == 82 else made
+
+
+def alternating(made: Made, step: int) -> Made:
+    return posed(made, (1e4 * math.sin(step), 0.0, 0.0)) if step % 2 and 60 < step < 100 else made
+
+
+def first_is_far(made: Made, step: int) -> Made:
+    return posed(made, (-7e3, 0.0, 0.0)) if step == 0 else made
+
+
+def half_a_second_away(made: Made, step: int) -> Made:
+    x, y, heading = pose_at(step * 0.05)
+    return posed(made, (x + 30.0, y, heading)) if 80 <= step < 90 else made
+
+
+def no_length(made: Made, step: int) -> Made:
+    return posed(made, pose_at(step * 0.05), {"w": 0.0}) if step == 82 else made
+
+
+DAMAGES: dict[str, tuple[Callable[[Made, int], Made], dict[str, int]]] = {
+    "20 m away": (far(20.0), {"impossible_motion": 1}),
+    "1e4 m away": (far(1e4), {"impossible_motion": 1}),
+    "1e30 m away": (far(1e30), {"impossible_pose": 1}),
+    "1e308 m away": (far(1e308), {"impossible_pose": 1}),
+    "turned": (turned, {"impossible_motion": 1}),
+    "every other": (alternating, {"impossible_motion": 20}),
+    "the first": (first_is_far, {"impossible_motion": 1}),
+    "half a second": (half_a_second_away, {"impossible_motion": 10}),
+    "quaternion of no length": (no_length, {"impossible_pose": 1}),
+}
+
+
+@pytest.mark.parametrize("topic", [ODOMETRY, TRUTH])
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_impossible_poses_are_dropped_and_the_track_is_the_undamaged_one(
+    damage: str, topic: str, tmp_path: Path
+) -> None:
+    change, counted = DAMAGES[damage]
+    whole = open_recording(str(write_mcap(tmp_path / "whole.mcap")))
+    recording = open_recording(str(log_with(tmp_path / "log.mcap", change, topic)))
+    assert recording.dropped == counted
+    assert f"log.mcap: {'' if counted.get('impossible_motion') else 'a message on '}{topic}" in next(
+        iter(recording.details.values())
+    )
+    assert recording.stamps.tolist() == whole.stamps.tolist()
+    np.testing.assert_allclose(recording.odometry, whole.odometry, atol=0.005)
+    np.testing.assert_allclose(recording.truth, whole.truth, atol=0.005)
+
+
+def test_odometry_that_is_reset_goes_on_where_it_was(tmp_path: Path) -> None:
+    def reset(made: Made, step: int) -> Made:
+        return posed(made, pose_at((step - 100) * 0.05)) if step >= 100 else made
+
+    whole = open_recording(str(write_mcap(tmp_path / "whole.mcap")))
+    recording = open_recording(str(log_with(tmp_path / "log.mcap", reset)))
+    assert recording.dropped == {"odometry_jump": 1}
+    assert "/odom at 1700000005.000 s" in recording.details["odometry_jump"]
+    np.testing.assert_allclose(recording.odometry, whole.odometry, atol=1e-6)
+
+
+def test_true_poses_may_jump_as_those_of_a_robot_that_is_carried(tmp_path: Path) -> None:
+    def carried(made: Made, step: int) -> Made:
+        x, y, heading = pose_at(step * 0.05)
+        return posed(made, (x + 40.0, y, heading)) if step >= 100 else made
+
+    recording = open_recording(str(log_with(tmp_path / "log.mcap", carried, TRUTH)))
+    assert not recording.dropped
+    assert recording.truth[-1, 0] > 40.0
+
+
+def test_the_motion_across_a_gap_is_less_certain(tmp_path: Path) -> None:
+    path = log_with(tmp_path / "log.mcap", far(1e4))
+    source, state, ctx = LogSource(log=str(path)), LogSourceState(), Context("source", np.random.default_rng(0))
+    source.setup(ctx)
+    motions = [source.step(ctx, state).motion for _ in range(FRAMES)]
+    assert ctx.counts == {"impossible_motion": 1}
+    assert [number for number, motion in enumerate(motions) if isinstance(motion, BridgedMotion)] == [8]
+    assert motions[8].unmeasured_s == pytest.approx(0.1)
+    model = RotationTranslationRotation()
+    plain = model.model(Motion(motions[8].x, motions[8].y, motions[8].turn))
+    assert model.model(motions[8]).steps == plain.steps
+    assert model.model(motions[8]).sigmas[1] ** 2 == pytest.approx(plain.sigmas[1] ** 2 + 0.05**2)
+    assert model.model(motions[8]).sigmas[0] ** 2 == pytest.approx(plain.sigmas[0] ** 2 + 0.05**2 / 2)
+
+
+def test_a_faster_robot_is_believed_where_its_limits_say_so(tmp_path: Path) -> None:
+    def fast(made: Made, step: int) -> Made:
+        return posed(made, (step * 0.05 * 20.0, 0.0, 0.0))
+
+    path = str(log_with(tmp_path / "log.mcap", fast))
+    assert open_recording(path).dropped["impossible_motion"] == FRAMES * 10 + 1
+    recording = open_recording(path, limits=MotionLimits(speed=25.0))
+    assert not recording.dropped
+    np.testing.assert_allclose(np.diff(recording.odometry[:, 0]), 10.0)
+
+
+@pytest.mark.parametrize(("topic", "kept"), [(ODOMETRY, FRAMES), (IMAGE, FRAMES - 1)])
+def test_a_stamp_hours_from_all_others_is_dropped(topic: str, kept: int, tmp_path: Path) -> None:
+    late = START + 10 * 3600 * 10**9
+    last = max(made.stamp for made in messages() if made.topic == topic)
+
+    def changed(made: Made) -> list[Made]:
+        if made.topic != topic or made.stamp != last:
+            return [made]
+        if topic == IMAGE:
+            return [made._replace(stamp=late, content=compressed(late, encoded(picture(FRAMES))))]
+        return [posed(made._replace(stamp=late), pose_at(10.0))]
+
+    recording = open_recording(str(write_mcap(tmp_path / "log.mcap", messages(changed))))
+    assert recording.dropped["lone_stamp"] == 1
+    assert len(recording.stamps) == kept
+
+
+def test_stretches_are_told_apart_by_hand() -> None:
+    seconds = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 3.0, 3.1, 6.0, 6.1])
+    x = np.array([0.0, 0.1, 50.0, 0.3, np.nan, 0.5, 90.0, 90.1, 3.0, 3.1])
+    stamps = np.round(seconds * 1e9).astype(np.int64)
+    poses = np.column_stack([x, np.zeros(10), np.zeros(10)])
+    track = believed(stamps, poses, MotionLimits())
+    assert track.rows.tolist() == [0, 1, 3, 5, 6, 7, 8, 9]
+    assert track.jumps.tolist() == [4, 6]
+    assert (track.gaps / 1e8).round().astype(int).tolist() == [[1, 3], [3, 5], [5, 30], [31, 60]]
+    rows = track.rows
+    joined = without_jumps(stamps[rows], poses[rows], track.jumps)
+    np.testing.assert_allclose(joined[:, 0], [0.0, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 1.0])
+    at = np.array([0, 2, 4, 30, 45, 61], np.int64) * 10**8
+    np.testing.assert_allclose(seconds_within(track.gaps, at), [0.0, 0.1, 0.3, 2.9, 4.3, 5.8])
+
+
+def test_a_track_of_noise_ends_with_what_can_have_been_driven() -> None:
+    rng = np.random.default_rng(3)
+    stamps = np.cumsum(rng.integers(10**7, 10**8, 400))
+    poses = np.where(rng.random((400, 1)) < 0.7, rng.uniform(-1e3, 1e3, (400, 3)), 0.0)
+    limits = MotionLimits()
+    rows, jumps, _ = believed(stamps, poses, limits)
+    joined = without_jumps(stamps[rows], poses[rows], jumps)
+    speeds = np.hypot(*np.diff(joined[:, :2], axis=0).T) / np.maximum(np.diff(stamps[rows]) / 1e9, 0.05)
+    assert len(rows) > 80
+    assert speeds.max() <= limits.speed
