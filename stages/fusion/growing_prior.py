@@ -11,11 +11,11 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.gaussians import drawn, floored, moments
 from omninav.stages.values.belief import GaussianMixture, Particles
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.pose import Pose, StartPose
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 Array = npt.NDArray[np.float64]
-Where = Literal["uniform", "truth", "origin"] | tuple[float, float, float, float, float]
+Where = Literal["uniform", "truth", "origin"] | StartPose
 
 
 @dataclass(kw_only=True, eq=False)

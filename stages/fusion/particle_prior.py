@@ -12,7 +12,7 @@ from omninav.stages.values.belief import Particles
 from omninav.stages.values.grid import FreeSpace
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.pose import Pose, StartPose
 
 
 class ParticlePrior(Stage):
@@ -22,7 +22,7 @@ class ParticlePrior(Stage):
     there is neither free space nor a map.
     """
 
-    at: Literal["uniform", "truth", "origin"] | tuple[float, float, float, float, float] = "uniform"
+    at: Literal["uniform", "truth", "origin"] | StartPose = "uniform"
     """First pose: `uniform` over the free space (port `area`) or around the map's references, with all headings;
     `truth` or `origin`, with sigmas of 0.1 m and 0.1 rad; or [x, y, heading, sigma_xy, sigma_heading] (m, rad)."""
     number: Annotated[int, Bounds(ge=1)] = 5000

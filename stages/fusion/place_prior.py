@@ -7,7 +7,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.belief import PlaceBelief
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.pose import Pose, StartPose
 from omninav.stages.values.topological_map import TopologicalMap
 
 
@@ -18,7 +18,7 @@ class PlacePrior(Stage):
     no place.
     """
 
-    at: Literal["uniform", "truth", "origin"] | tuple[float, float, float, float, float] = "uniform"
+    at: Literal["uniform", "truth", "origin"] | StartPose = "uniform"
     """`uniform`: a kidnapped robot. Else the place whose medoid was taken closest to the log's first true pose, to the
     origin, or to x, y (m) of a pose and its spread, of which nothing else counts."""
     restart_after: Annotated[int, Bounds(ge=1)] | None = None

@@ -14,7 +14,7 @@ POSE_TYPES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", "geometr
 SCAN_TYPE = "sensor_msgs/msg/LaserScan"
 IMAGE_TYPES = ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image")
 MAX_COORDINATE_M = 1e8
-"""Twice the way around the Earth: further away no map projection puts anything."""
+"""Twice the way around the Earth: no map projection puts anything further away."""
 LEVELS_OF_A_BLANK = 2
 """A constant image may differ by this much after JPEG compression (rounding of one level to either side)."""
 

@@ -1,8 +1,15 @@
 """Poses and motions in the plane: metres, radians, x forward, y left, heading counter-clockwise."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+
+Coordinate = Annotated[float, Bounds(ge=-1e8, le=1e8)]
+"""Metres: no map is larger than the Earth."""
+Spread = Annotated[float, Bounds(ge=0, le=1e8)]
+"""A standard deviation, in metres or radians."""
+StartPose = tuple[Coordinate, Coordinate, Coordinate, Spread, Spread]
+"""A first pose as a user gives it: x, y (m), heading (rad), sigma_xy (m), sigma_heading (rad)."""
 
 
 class Pose(Value):

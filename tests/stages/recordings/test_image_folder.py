@@ -65,6 +65,14 @@ def test_columns_units_clock_and_heading_conventions_are_configuration(tmp_path:
     assert recording.image(0).shape == (4, 16, 3)
 
 
+def test_a_position_that_no_robot_reaches_is_dropped_and_counted(tmp_path: Path) -> None:
+    path = folder(tmp_path)
+    (path / "track.csv").write_text((path / "track.csv").read_text().replace("10.25;2;", "10.25;900;"))
+    recording = open_recording(str(path))
+    assert recording.dropped == {"no_position": 2, "impossible_motion": 1}
+    np.testing.assert_allclose(recording.truth[:, 0], 5 + np.array([0.5, 1.5, 2.5, 3.5]) * 0.0254)
+
+
 def test_missing_images_are_counted(tmp_path: Path) -> None:
     recording = open_recording(str(folder(tmp_path, skip=(2, 3))))
     assert recording.dropped == {"no_position": 2, "missing_image": 2}
