@@ -2,9 +2,9 @@
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from io import BytesIO
-from typing import Any
+from typing import Any, NamedTuple
 
 import zstandard
 from lz4 import frame as lz4
@@ -15,6 +15,22 @@ RECORD_HEAD = struct.Struct("<BQ")
 """A record's opcode and length."""
 _CHUNK_HEAD = struct.Struct("<QQQII")
 _LENGTH = struct.Struct("<Q")
+MAX_BYTES = 1 << 27
+"""Of a record, and of an unpacked chunk: a raw image of 40 megapixels in colour fits."""
+MAX_RATIO = 256
+"""How many times as long as packed a chunk of more than 4 MB may be unpacked."""
+
+
+class Place(NamedTuple):
+    """Where a record lies in its file, with its head: first byte and length."""
+
+    start: int
+    length: int
+
+    @property
+    def end(self) -> int:
+        """The first byte behind it."""
+        return self.start + self.length
 
 
 def records_in(data: bytes) -> Iterator[tuple[int, int, int]]:
@@ -37,37 +53,38 @@ def parse(kind: Any, content: bytes) -> Any:
 def unpack(content: bytes, whole: bool, check: bool = True) -> bytes:
     """The records in a chunk. A chunk that was cut off gives what its compression has let through so far.
 
-    Raises whatever a damaged chunk makes the decompressors raise, and ValueError for a wrong checksum (with `check`).
+    Raises whatever a damaged chunk makes the decompressors raise, and ValueError for a wrong checksum (with `check`)
+    and for sizes that no log has: they are refused before anything is unpacked.
     """
-    if not whole:
-        return _unpack_cut(content)
     _, _, size, checksum, named = _CHUNK_HEAD.unpack_from(content)
     at = _CHUNK_HEAD.size + named
     compression = content[_CHUNK_HEAD.size : at].decode()
     packed = memoryview(content)[at + _LENGTH.size :]
-    if len(packed) < _LENGTH.unpack_from(content, at)[0]:
+    limit = min(MAX_BYTES, max(MAX_BYTES // 32, MAX_RATIO * len(content)))
+    if whole and size > limit:
+        raise ValueError(f"it says that its {len(packed)} bytes unpack to {size}")
+    if whole and len(packed) < _LENGTH.unpack_from(content, at)[0]:
         raise ValueError("it is shorter than it says")
-    packed = packed[: _LENGTH.unpack_from(content, at)[0]]
-    if compression == "zstd":
-        data = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
-    elif compression == "lz4":
-        data = lz4.decompress(packed)  # type: ignore[attr-defined]
-    elif compression == "":
-        data = bytes(packed)
-    else:
-        raise ValueError(f"its compression '{compression}' is not known")
-    if check and checksum and zlib.crc32(data) != checksum:
+    data = _UNPACK[compression](packed[: _LENGTH.unpack_from(content, at)[0]], min(size, limit))
+    if whole and len(data) != size:
+        raise ValueError("it is not as long as it says")
+    if whole and check and checksum and zlib.crc32(data) != checksum:
         raise ValueError("checksum is wrong")
     return data
 
 
-def _unpack_cut(content: bytes) -> bytes:
-    stream = ReadDataStream(BytesIO(content))
-    stream.read(8 + 8 + 8 + 4)  # times, size and checksum of what is not all there
-    compression = stream.read_prefixed_string()
-    data = content[8 + 8 + 8 + 4 + 4 + len(compression) + 8 :]
-    if compression == "zstd":
-        return zstandard.ZstdDecompressor().decompressobj().decompress(data)
-    if compression == "lz4":
-        return bytes(lz4.LZ4FrameDecompressor().decompress(data))  # type: ignore[no-untyped-call]
-    return data if compression == "" else b""
+def _zstd(packed: memoryview, size: int) -> bytes:
+    with zstandard.ZstdDecompressor(max_window_size=MAX_BYTES).stream_reader(packed) as stream:
+        return stream.read(size + 1)
+
+
+def _lz4(packed: memoryview, size: int) -> bytes:
+    return bytes(lz4.LZ4FrameDecompressor().decompress(bytes(packed), max_length=size + 1))  # type: ignore[no-untyped-call]
+
+
+_UNPACK: dict[str, Callable[[memoryview, int], bytes]] = {
+    "zstd": _zstd,
+    "lz4": _lz4,
+    "": lambda packed, size: bytes(packed[: size + 1]),
+}
+"""By compression: up to one byte more than the given size."""

@@ -6,29 +6,29 @@ import zlib
 from collections import Counter, OrderedDict
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, ChunkIndex, Footer, Schema
+from mcap.records import Attachment, Channel, MessageIndex, Schema
 
-from .chunks import MAGIC, RECORD_HEAD, parse, records_in, unpack
+from .chunks import MAGIC, RECORD_HEAD, Place, parse, records_in, unpack
 from .message import BadMessage, Location, LogError, Message, Record
 from .message_types import standard_types, types_of
+from .summary import read_summary, walk
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 _MESSAGE = struct.Struct("<HIQQ")
 _STAMP_LITTLE, _STAMP_BIG = struct.Struct("<iI").unpack_from, struct.Struct(">iI").unpack_from
-_FOOTER_SIZE = RECORD_HEAD.size + 20 + len(MAGIC)
 _BYTES_IN_MEMORY = 32_000_000
 """Of unpacked chunks, beside the last one used: logs up to that size are unpacked once."""
 
 
-class _Chunk(NamedTuple):
-    start: int
-    length: int
-    whole: bool
+_BYTES_OF_ATTACHMENTS = 32_000_000
+"""That are kept: a camera or a robot is described in less."""
+_LAST_TIME = 2**63
+"""Times are kept as signed numbers of 64 bits, as ROS has them."""
 
 
 class LogReader:
@@ -39,7 +39,10 @@ class LogReader:
     `dropped` counts what was lost, by kind, and `details` tells the first case of each:
 
     * `cut_file`: the file ends before its end record;
+    * `bad_summary`: what the file says of itself at its end is damaged, so that nothing says what is missing;
     * `bad_chunk`: a chunk with a wrong checksum, or one that cannot be unpacked or found;
+    * `bad_checksum`: the file's bytes were changed, and nothing says where;
+    * `missing_message`: how many messages fewer there are than the file says it has;
     * `bad_attachment`: an attachment with a wrong checksum;
     * `bad_message`: a message that its type's definition cannot decode (counted by whoever decodes).
 
@@ -52,7 +55,7 @@ class LogReader:
         self.details: dict[str, str] = {}
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
-        self._chunks: list[_Chunk] = []
+        self._chunks: list[tuple[Place, bool]] = []
         self._unpacked: OrderedDict[int, bytes] = OrderedDict()
         self._in_memory = 0
         self._stores: dict[str, Typestore] = {}
@@ -65,11 +68,9 @@ class LogReader:
                 if file.read(len(MAGIC)) != MAGIC:
                     raise LogError(f"{self.path}: not an MCAP file (its first bytes are wrong)")
                 self._size = file.seek(0, 2)
-                self._known_chunks: list[ChunkIndex] = []
-                try:
-                    self._known_chunks = self._read_summary(file)
-                except Exception:  # a damaged summary is as good as none: the scan finds everything else
-                    self._channels.clear()
+                self._summary = read_summary(file, self._size)
+                for opcode, content in self._summary.descriptions:
+                    self._learn(opcode, content)
         except OSError as error:
             raise LogError(f"{self.path}: {error.strerror or error}") from None
 
@@ -110,10 +111,10 @@ class LogReader:
                 return file.read(location.length)
         data = self._unpacked.get(location.chunk)
         if data is None:
-            chunk = self._chunks[location.chunk]
+            place, whole = self._chunks[location.chunk]
             with self.path.open("rb") as file:
-                packed = os.pread(file.fileno(), chunk.length, chunk.start)
-            data = unpack(packed, chunk.whole, check=False)  # `scan` has checked it
+                packed = os.pread(file.fileno(), place.length, place.start)
+            data = unpack(packed[RECORD_HEAD.size :], whole, check=False)  # `scan` has checked it
             self._unpacked[location.chunk] = data
             self._in_memory += len(data)
             while self._in_memory > _BYTES_IN_MEMORY and len(self._unpacked) > 1:
@@ -141,33 +142,10 @@ class LogReader:
                 continue
             yield Message(record.topic, self._type_on(record.topic), stamp, record.log_time, content)
 
-    def drop(self, kind: str, detail: str) -> None:
+    def drop(self, kind: str, detail: str, number: int = 1) -> None:
         """Count something lost."""
-        self.dropped[kind] += 1
+        self.dropped[kind] += number
         self.details.setdefault(kind, detail)
-
-    def _read_summary(self, file: Any) -> list[ChunkIndex]:
-        """Schemas, channels and the places of chunks from the end of the file; nothing of it where it is not sound."""
-        if self._size < _FOOTER_SIZE + len(MAGIC):
-            return []
-        file.seek(self._size - _FOOTER_SIZE)
-        tail = file.read(_FOOTER_SIZE)
-        if tail[-len(MAGIC) :] != MAGIC or tail[0] != Opcode.FOOTER:
-            return []
-        footer = parse(Footer, tail[RECORD_HEAD.size :])
-        if not 0 < footer.summary_start <= self._size - _FOOTER_SIZE:
-            return []
-        file.seek(footer.summary_start)
-        summary = file.read(self._size - _FOOTER_SIZE - footer.summary_start)
-        if footer.summary_crc and zlib.crc32(tail[: -len(MAGIC) - 4], zlib.crc32(summary)) != footer.summary_crc:
-            return []
-        chunks = []
-        for opcode, start, end in records_in(summary):
-            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._learn(opcode, summary[start:end])
-            elif opcode == Opcode.CHUNK_INDEX:
-                chunks.append(parse(ChunkIndex, summary[start:end]))
-        return sorted(chunks, key=lambda chunk: chunk.chunk_start_offset)
 
     def _complete(self) -> None:
         """Go through the file once if that has not happened: attachments, and what the summary would have held."""
@@ -187,80 +165,79 @@ class LogReader:
             self.drop("bad_chunk", f"{self.path}: a topic's description is damaged ({error})")
 
     def _scan(self, topics: Collection[str] | None) -> Iterator[Record]:
-        seen = set()
+        before, seen, checksum = self.dropped.total(), set(), zlib.crc32(MAGIC)
+        self._found: Counter[int] = Counter()
+        expected = Counter(self._summary.counts or {})
+        opcode, unbroken = 0, True
         with self.path.open("rb") as file:
-            for opcode, start, length, whole in self._walk(file):
-                if opcode == Opcode.CHUNK:
-                    seen.add(start - RECORD_HEAD.size)
-                    packed = os.pread(file.fileno(), length, start)  # past the file's buffer, which would copy it
-                    self._chunks.append(_Chunk(start, length, whole))
-                    try:
-                        data = unpack(packed, whole)
-                    except Exception as error:
-                        if whole:
-                            self.drop(
-                                "bad_chunk",
-                                f"{self.path}: chunk at byte {start - RECORD_HEAD.size}: {error}",
-                            )
-                        continue
-                    number = len(self._chunks) - 1
-                    if self._in_memory + len(data) <= _BYTES_IN_MEMORY:
-                        self._unpacked[number] = data
-                        self._in_memory += len(data)
-                    yield from self._in_chunk(data, number, topics, whole)
-                elif not whole:
-                    continue
+            for opcode, place, follows in walk(
+                file, self._size, sorted(self._summary.chunks + self._summary.attachments)
+            ):
+                if opcode == Opcode.DATA_END:
+                    if self._summary.damage:  # bytes that are missing moved it away from where the file's end says
+                        expected = Counter(read_summary(file, self._size, place.end).counts) or expected
+                    break
+                unbroken = unbroken and follows
+                record = os.pread(file.fileno(), place.length, place.start)
+                checksum = zlib.crc32(record, checksum) if self._summary.checksum else 0
+                content = record[RECORD_HEAD.size :]
+                if opcode == Opcode.CHUNK or (opcode == 0 and record[:1] == bytes([Opcode.CHUNK])):
+                    seen.add(place)
+                    yield from self._chunk(content, place, topics, whole=opcode > 0)
                 elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                    file.seek(start)
-                    self._learn(opcode, file.read(length))
-                elif opcode == Opcode.MESSAGE and length >= _MESSAGE.size:
-                    file.seek(start)
-                    content = file.read(length)
+                    self._learn(opcode, content)
+                elif opcode == Opcode.MESSAGE and len(content) >= _MESSAGE.size:
                     channel, _, log_time, _ = _MESSAGE.unpack_from(content)
-                    data_at = Location(-1, start + _MESSAGE.size, length - _MESSAGE.size)
+                    start = place.start + RECORD_HEAD.size + _MESSAGE.size
+                    data_at = Location(-1, start, len(content) - _MESSAGE.size)
                     yield from self._record(channel, log_time, content[_MESSAGE.size :], data_at, topics)
                 elif opcode == Opcode.ATTACHMENT:
-                    file.seek(start)
-                    self._attach(file.read(length), start)
-        for chunk in self._known_chunks:
-            if chunk.chunk_start_offset not in seen:
-                self.drop(
-                    "bad_chunk",
-                    f"{self.path}: chunk at byte {chunk.chunk_start_offset} cannot be found",
-                )
+                    self._attach(content, place.start)
+                elif opcode == Opcode.MESSAGE_INDEX and self._summary.counts is None:
+                    self._expect(content, expected)
+        for chunk in self._summary.chunks:
+            if chunk not in seen:
+                self.drop("bad_chunk", f"{self.path}: chunk at byte {chunk.start} cannot be found")
+        self._compare(opcode == Opcode.DATA_END, unbroken, checksum, expected, before)
 
-    def _walk(self, file: Any) -> Iterator[tuple[int, int, int, bool]]:
-        """Records of the data section: opcode, first byte of the content, length, whether it is all there.
+    def _compare(self, ended: bool, unbroken: bool, checksum: int, expected: Counter[int], before: int) -> None:
+        """Count what the file says it has and what was not found in it."""
+        missing = {number: count - self._found[number] for number, count in expected.items()}
+        missing = {number: count for number, count in missing.items() if count > 0}
+        if missing:
+            named = sorted((self._topic_of(number), count, expected[number]) for number, count in missing.items())
+            said = ", ".join(f"{count} of {of} on {topic:.80}" for topic, count, of in named[:3])
+            more = f" and of {len(named) - 3} more topics" if len(named) > 3 else ""
+            self.drop("missing_message", f"{self.path}: messages are missing: {said}{more}", sum(missing.values()))
+        if self._summary.damage:
+            kind = "bad_summary" if ended and not self._summary.damage.startswith("it ends") else "cut_file"
+            self.drop(kind, f"{self.path}: {self._summary.damage}, after {self._size} bytes")
+            return
+        sound = ended and unbroken and self._summary.checksum in (0, checksum)
+        if not sound and self.dropped.total() == before:  # nothing else explains a checksum that is wrong
+            self.drop("bad_checksum", f"{self.path}: its bytes were changed, their checksum is wrong")
 
-        Where a record's length cannot be true, the walk goes on at the next chunk that the summary knows of; without a
-        summary the file counts as cut there.
-        """
-        at = len(MAGIC)
-        starts = [chunk.chunk_start_offset for chunk in self._known_chunks]
-        while True:
-            file.seek(at)
-            head = file.read(RECORD_HEAD.size)
-            opcode, length = RECORD_HEAD.unpack(head) if len(head) == RECORD_HEAD.size else (0, 0)
-            if opcode == Opcode.DATA_END:
-                return
-            start, end = at + RECORD_HEAD.size, at + RECORD_HEAD.size + length
-            beyond = [known for known in starts if known > at]
-            leaps = bool(beyond) and end > beyond[0]
-            if head and opcode > 0 and end <= self._size and not leaps and len(head) == RECORD_HEAD.size:
-                yield opcode, start, length, True
-                at = end
-            elif beyond:
-                at = beyond[0]
-            elif starts:  # the last chunk's own frame is damaged, and nothing follows that is needed
-                return
-            else:
-                self.drop(
-                    "cut_file",
-                    f"{self.path}: ends at byte {self._size} in the middle of a record, without its end",
-                )
-                if opcode == Opcode.CHUNK:
-                    yield opcode, start, self._size - start, False
-                return
+    def _expect(self, index: bytes, expected: Counter[int]) -> None:
+        """Count the messages that the chunk before a message index holds, or held."""
+        try:
+            entries = parse(MessageIndex, index)
+            expected[entries.channel_id] += len(entries.records)
+        except Exception as error:
+            self.drop("bad_chunk", f"{self.path}: a message index is damaged ({error!s:.80})")
+
+    def _chunk(self, content: bytes, place: Place, topics: Collection[str] | None, whole: bool) -> Iterator[Record]:
+        self._chunks.append((place, whole))
+        try:
+            data = unpack(content, whole)
+        except Exception as error:
+            if whole:
+                self.drop("bad_chunk", f"{self.path}: chunk at byte {place.start}: {' '.join(str(error).split()):.160}")
+            return
+        number = len(self._chunks) - 1
+        if self._in_memory + len(data) <= _BYTES_IN_MEMORY:
+            self._unpacked[number] = data
+            self._in_memory += len(data)
+        yield from self._in_chunk(data, number, topics, whole)
 
     def _in_chunk(self, data: bytes, chunk: int, topics: Collection[str] | None, whole: bool) -> Iterator[Record]:
         end = 0
@@ -286,6 +263,7 @@ class LogReader:
         at: Location,
         topics: Collection[str] | None,
     ) -> Iterator[Record]:
+        self._found[number] += 1
         known = self._read_as(number)
         if known is None:
             self.drop("bad_message", f"{self.path}: a message names channel {number}, which is not described")
@@ -296,6 +274,9 @@ class LogReader:
             if has_header and len(data) >= 12:
                 seconds, nanoseconds = _STAMP_LITTLE(data, 4) if data[1] & 1 else _STAMP_BIG(data, 4)
                 stamp = seconds * 1_000_000_000 + nanoseconds
+            if stamp >= _LAST_TIME:
+                self.drop("bad_message", f"{self.path}: a message on {topic:.80} has the time {stamp} ns")
+                return
             yield Record(topic, stamp, log_time, data, at)
 
     def _attach(self, content: bytes, start: int) -> None:
@@ -305,15 +286,20 @@ class LogReader:
                 zlib.crc32(content[:-4]),
             ):
                 raise ValueError("checksum is wrong")
+            if sum(map(len, self._attachments.values())) + len(content) > _BYTES_OF_ATTACHMENTS:
+                raise ValueError(f"all together are larger than {_BYTES_OF_ATTACHMENTS} bytes")
             attachment = parse(Attachment, content)
             self._attachments[attachment.name] = attachment.data
         except Exception as error:
-            self.drop("bad_attachment", f"{self.path}: attachment at byte {start}: {error}")
+            self.drop("bad_attachment", f"{self.path}: attachment at byte {start}: {error!s:.160}")
 
     def _type_on(self, topic: str) -> str:
         if topic not in self._types:
             self._types = {channel.topic: self._type_of(channel) for channel in self._channels.values()}
         return self._types[topic]
+
+    def _topic_of(self, number: int) -> str:
+        return self._channels[number].topic if number in self._channels else f"channel {number}"
 
     def _type_of(self, channel: Channel) -> str:
         schema = self._schemas.get(channel.schema_id)

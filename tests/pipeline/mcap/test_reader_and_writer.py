@@ -2,10 +2,12 @@
 
 import random
 import struct
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
 
 from omninav.pipeline.mcap.chunks import MAGIC
 from omninav.pipeline.mcap.message import BadMessage, LogError
@@ -128,7 +130,7 @@ def test_a_bad_chunk_costs_only_itself(tmp_path: Path, which: int) -> None:
     found = keys(reader)
     assert set(found) < set(whole)
     assert len(whole) - len(found) <= 2 * len(whole) / len(chunks)
-    assert reader.dropped == {"bad_chunk": 1}
+    assert reader.dropped == {"bad_chunk": 1, "missing_message": len(whole) - len(found)}
     assert str(path) in reader.details["bad_chunk"]
 
 
@@ -139,7 +141,7 @@ def test_a_chunk_whose_length_is_damaged_costs_only_itself(tmp_path: Path) -> No
     found = keys(reader)
     assert found == [key for key in whole if key in set(found)]
     assert len(whole) - len(found) <= 2 * len(whole) / len(chunks)
-    assert reader.dropped == {"bad_chunk": 1}
+    assert reader.dropped == {"bad_chunk": 1, "missing_message": len(whole) - len(found)}
 
 
 def test_a_flipped_bit_anywhere_is_never_delivered_as_data(tmp_path: Path) -> None:
@@ -162,8 +164,9 @@ def test_a_second_scan_counts_no_damage_twice(tmp_path: Path) -> None:
     path = written(tmp_path / "log.mcap")
     start, length = chunk_places(path)[1]
     reader = LogReader(flipped(path, start + length // 2))
-    assert keys(reader) == keys(reader)
-    assert reader.dropped == {"bad_chunk": 1}
+    found = keys(reader)
+    assert keys(reader) == found
+    assert reader.dropped == {"bad_chunk": 1, "missing_message": 2 * COUNT - len(found)}
 
 
 def test_a_message_that_its_definition_cannot_decode_is_counted(tmp_path: Path) -> None:
@@ -301,3 +304,88 @@ def make_text(number: int) -> memoryview:
 
     noise = "".join(chr(letter) for letter in np.random.default_rng(number).integers(33, 127, 200))
     return standard_types().serialize_cdr(make_message("std_msgs/msg/String", {"data": noise}), "std_msgs/msg/String")
+
+
+def records_of(path: Path) -> list[bytes]:
+    """Every record of a file with its head, up to its end record."""
+    data, at, found = path.read_bytes(), len(MAGIC), []
+    while at + 9 <= len(data) - len(MAGIC):
+        length = 9 + struct.unpack_from("<Q", data, at + 1)[0]
+        found.append(data[at : at + length])
+        at += length
+    return found
+
+
+def test_a_chunk_that_was_taken_out_is_missed_by_topic(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.mcap")
+    whole, records = keys(LogReader(path)), records_of(path)
+    number = [n for n, record in enumerate(records) if record[0] == 0x06][2]
+    end = next(n for n in range(number + 1, len(records)) if records[n][0] != 0x07)  # its message indexes too
+    path.write_bytes(MAGIC + b"".join(records[:number] + records[end:]) + MAGIC)
+    reader = LogReader(path)
+    lost = len(whole) - len(keys(reader))
+    assert lost > 0
+    assert reader.dropped["missing_message"] == lost
+    assert "of 60 on /blob" in reader.details["missing_message"]
+    assert "of 60 on /pose" in reader.details["missing_message"]
+
+
+def test_chunks_in_each_others_place_lose_nothing_and_are_noticed(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.mcap")
+    whole, records = keys(LogReader(path)), records_of(path)
+    one, other = [n for n, record in enumerate(records) if record[0] == 0x06][1:4:2]
+    records[one], records[other] = records[other], records[one]
+    path.write_bytes(MAGIC + b"".join(records) + MAGIC)
+    reader = LogReader(path)
+    assert sorted(keys(reader)) == sorted(whole)
+    assert reader.dropped
+
+
+def test_a_changed_byte_that_no_chunk_covers_is_noticed(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.mcap")
+    whole, (start, _) = keys(LogReader(path)), chunk_places(path)[0]
+    reader = LogReader(flipped(path, start + 3))  # the time that a chunk says it starts at
+    assert keys(reader) == whole
+    assert reader.dropped == {"bad_checksum": 1}
+
+
+def test_a_summary_that_names_places_beyond_the_file_does_no_harm(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.mcap")
+    whole, records = keys(LogReader(path)), records_of(path)
+    for number, record in enumerate(records):
+        if record[0] == 0x08:
+            records[number] = record[:25] + struct.pack("<Q", 2**63 + number) + record[33:]
+        elif record[0] == 0x02:
+            records[number] = record[:25] + bytes(4)
+    path.write_bytes(MAGIC + b"".join(records) + MAGIC)
+    reader = LogReader(path)
+    assert keys(reader) == whole
+    assert set(reader.dropped) == {"bad_chunk"}
+
+
+def test_a_time_that_no_clock_shows_costs_its_message(tmp_path: Path) -> None:
+    with LogWriter(tmp_path / "log.mcap") as log:
+        log.write("/text", "std_msgs/msg/String", 7, {"data": "seven"}, log_time=2**64 - 1)
+        log.write("/text", "std_msgs/msg/String", 8, {"data": "eight"})
+    reader = LogReader(tmp_path / "log.mcap")
+    assert [message.content.data for message in reader.messages()] == ["eight"]
+    assert reader.dropped == {"bad_message": 1}
+
+
+@pytest.mark.parametrize("size", [6_000_000_000, 400_000_000, 100])
+def test_a_chunk_that_unpacks_to_far_more_than_a_log_holds_is_not_unpacked(tmp_path: Path, size: int) -> None:
+    path = written(tmp_path / "log.mcap")
+    whole, records = keys(LogReader(path)), records_of(path)
+    number = next(n for n, record in enumerate(records) if record[0] == 0x06)
+    packed = zstandard.compress(bytes(400_000_000))
+    content = struct.pack("<QQQII", 0, 0, size, 0, 4) + b"zstd" + struct.pack("<Q", len(packed)) + packed
+    records[number] = struct.pack("<BQ", 0x06, len(content)) + content
+    path.write_bytes(MAGIC + b"".join(records) + MAGIC)
+    tracemalloc.start()
+    reader = LogReader(path)
+    found = keys(reader)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert set(found) < set(whole)
+    assert reader.dropped["bad_chunk"]
+    assert peak < 50_000_000
