@@ -3,21 +3,23 @@
 import hashlib
 import re
 from collections import Counter
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.files import digest_file
-from omninav.pipeline.graph.problems import shown
+from omninav.pipeline.graph.problems import BadInput, shown
+from omninav.pipeline.graph.small_files import read_small
 from omninav.stages.camera.model import Camera
+from omninav.stages.values.encoded_image import MAX_FILE_BYTES, Undecodable, decode_image
 from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from, read_camera
 from .description import MAX_PATTERN, Description, find_layout, known_layouts, read_description
-from .messages import Undecodable, decode_image, is_blank
+from .messages import is_blank
 from .positions import frame_poses
 from .recording import Format, OpenOptions, UnreadableRecording
 from .stamps import ascending, lone
@@ -67,8 +69,8 @@ class ImageFolder:
         """The image of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
         path = self._paths_kept[frame]
         try:
-            pixels = decode_image(path.read_bytes())
-        except (Undecodable, OSError) as error:
+            pixels = decode_image(read_small(path, MAX_FILE_BYTES))
+        except (Undecodable, BadInput) as error:
             self._drop("undecodable_image", f"{path}: {error}")
             return None
         height, width = pixels.shape[:2]
@@ -200,9 +202,9 @@ class ImageFolder:
 
     def _picture_size(self) -> tuple[int, int]:
         for path in self._paths_kept:
-            pixels = cv2.imread(str(path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
-            if pixels is not None:
-                return int(pixels.shape[1]), int(pixels.shape[0])
+            with suppress(Undecodable, BadInput):
+                height, width = decode_image(read_small(path, MAX_FILE_BYTES)).shape[:2]
+                return width, height
         raise UnreadableRecording(f"{self._folder}: not one of its {len(self._paths_kept)} images can be decoded")
 
 

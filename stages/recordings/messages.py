@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from omninav.stages.values.encoded_image import Undecodable, decode_image
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
@@ -36,10 +37,6 @@ _AS_BGR = {
 
 class ImpossiblePose(ValueError):
     """A pose that nothing on Earth has; the message says why."""
-
-
-class Undecodable(ValueError):
-    """Bytes that are no image; the message says what is wrong with them."""
 
 
 def pose_of(message: Any) -> tuple[float, float, float]:
@@ -81,24 +78,6 @@ def pixels_of(message: Any) -> Pixels:
     Raises `Undecodable`.
     """
     return decode_image(bytes(message.data)) if hasattr(message, "format") else _raw_pixels(message)
-
-
-def decode_image(data: bytes) -> Pixels:
-    """A JPEG, PNG or other image file's bytes as (height, width, 3) uint8 blue-green-red.
-
-    Raises `Undecodable`; also for a JPEG or PNG that was cut off, whose missing part OpenCV would fill with grey.
-    """
-    if data.startswith(b"\xff\xd8") and b"\xff\xd9" not in data[-4096:]:
-        raise Undecodable("a JPEG without its end")
-    if data.startswith(b"\x89PNG") and b"IEND" not in data[-4096:]:
-        raise Undecodable("a PNG without its end")
-    try:
-        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
-    except cv2.error as error:
-        raise Undecodable(str(error.err or error)) from None
-    if pixels is None:
-        raise Undecodable(f"{len(data)} bytes that are no image OpenCV knows")
-    return np.asarray(pixels, dtype=np.uint8)
 
 
 def is_blank(pixels: Pixels) -> bool:

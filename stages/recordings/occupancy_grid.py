@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -16,6 +15,7 @@ from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.signature import read_parameters
 from omninav.pipeline.graph.small_files import read_small, read_yaml
+from omninav.stages.values.encoded_image import Undecodable, decode_image
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 
@@ -99,18 +99,11 @@ def _named(content: Any, file: Path) -> dict[str, Any]:
 def _levels(file: Path, image: str) -> npt.NDArray[np.uint8]:
     """The grey levels of a grid's image."""
     try:
-        content = np.frombuffer(read_small(file.parent / image, MAX_CELLS * 4), np.uint8)
-        levels = cv2.imdecode(content, cv2.IMREAD_GRAYSCALE) if len(content) else None
+        return decode_image(read_small(file.parent / image, MAX_CELLS * 4), colour=False, max_pixels=MAX_CELLS)
     except BadInput as error:
         raise BadInput(f"{file}: its image {error}") from None
-    except cv2.error as error:  # as of an image that says it is too large
-        raise BadInput(f"{file}: its image {image} cannot be read ({error.err or error})") from None
-    if levels is None:
-        raise BadInput(f"{file}: its image {image} cannot be read; expected PGM, PNG or another image")
-    if levels.size > MAX_CELLS:
-        rows, columns = levels.shape
-        raise BadInput(f"{file}: {columns} x {rows} cells, at most {MAX_CELLS:,} are read; make it coarser")
-    return np.asarray(levels, np.uint8)
+    except Undecodable as error:
+        raise BadInput(f"{file}: its image {image:.100} cannot be read ({error}); expected PGM or PNG") from None
 
 
 def coarser(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:

@@ -12,10 +12,11 @@ import numpy.typing as npt
 from omninav.pipeline.files import digest_file
 from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.stages.camera.model import Camera
+from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
-from .messages import Undecodable, is_blank, scan_of
+from .messages import is_blank, scan_of
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]

@@ -11,10 +11,11 @@ import numpy.typing as npt
 from omninav.pipeline.graph.problems import nearest
 from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.stages.camera.model import Camera
+from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from_info, parse_camera, read_camera
-from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, ImpossiblePose, Undecodable, pixels_of, pose_of
+from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, ImpossiblePose, pixels_of, pose_of
 from .plausibility import MotionLimits, seconds_within
 from .pose_topic import NOWHERE, PoseTopic, Track
 from .recording import OpenOptions, Topics, UnreadableRecording

@@ -2,16 +2,15 @@
 
 from pathlib import Path
 
-import cv2
-import numpy as np
-
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.files import digest_file
 from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.small_files import read_small
 from omninav.stages.camera.model import Camera
 from omninav.stages.simulator.cameras import camera_of
 from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.demo import DEMO
+from omninav.stages.values.encoded_image import MAX_FILE_BYTES, Undecodable, decode_image
 from omninav.stages.values.image import Image, Pixels
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".tif", ".tiff", ".webp")
@@ -67,7 +66,9 @@ class GoalImage(Stage):
 
 def read_image(file: Path) -> Pixels:
     """The pixels of an image file. Raises BadInput where it cannot be read as one."""
-    pixels = cv2.imdecode(np.frombuffer(file.read_bytes() or b"\0", np.uint8), cv2.IMREAD_COLOR)
-    if pixels is None:
-        raise BadInput(f"goal: {file} cannot be read as an image; give a .png or .jpg that the robot's camera took")
-    return np.asarray(pixels, np.uint8)
+    try:
+        return decode_image(read_small(file, MAX_FILE_BYTES))
+    except Undecodable as error:
+        raise BadInput(
+            f"goal: {file} cannot be read as an image ({error}); give a .png or .jpg that the robot's camera took"
+        ) from None

@@ -1,14 +1,14 @@
 """Thumbnails of a map's references, kept beside it."""
 
-from typing import Annotated, cast
+from typing import Annotated
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
 from omninav.pipeline.graph.contents import Shape, Starts
 
+from .encoded_image import decode_image
 from .image import Pixels
 
 
@@ -31,8 +31,4 @@ class Thumbnails(Value):
 
 def decoded(jpeg: bytes | npt.NDArray[np.uint8]) -> Pixels:
     """Decode an image from JPEG bytes that were encoded here: (rows, columns, 3), blue-green-red."""
-    content = np.frombuffer(jpeg, np.uint8) if isinstance(jpeg, bytes) else jpeg
-    pixels = cv2.imdecode(content, cv2.IMREAD_COLOR)
-    if pixels is None:
-        raise ValueError("an image that was encoded here cannot be decoded")
-    return cast(Pixels, pixels.astype(np.uint8, copy=False))
+    return decode_image(bytes(jpeg))

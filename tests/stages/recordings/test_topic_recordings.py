@@ -28,10 +28,11 @@ from made_logs import (
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.mcap.message_types import make_message
 from omninav.pipeline.mcap.reader import LogReader
-from omninav.stages.recordings.messages import decode_image, is_blank, pixels_of
+from omninav.stages.recordings.messages import is_blank, pixels_of
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
 from omninav.stages.recordings.stamps import ascending
+from omninav.stages.values.encoded_image import decode_image
 
 
 def only(topic: str):

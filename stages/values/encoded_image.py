@@ -1,0 +1,129 @@
+"""Images as the bytes of a file: how large they say they are, and their pixels."""
+
+import re
+import struct
+from collections.abc import Callable, Iterator
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+MAX_PIXELS = 1 << 25
+"""Of an image that is decoded, 33 megapixels: an equirectangular image of 8000 x 4000."""
+MAX_FILE_BYTES = 100_000_000
+"""Of such an image."""
+MAX_SCANS = 64
+"""Of a JPEG: a progressive one has some ten, and each costs as much as decoding the whole."""
+
+
+class Undecodable(ValueError):
+    """Bytes that are no image; the message says what is wrong with them."""
+
+
+def decode_image(data: bytes, colour: bool = True, max_pixels: int = MAX_PIXELS) -> npt.NDArray[np.uint8]:
+    """An image file's bytes as (height, width, 3) uint8 blue-green-red, or (height, width) without `colour`.
+
+    JPEG, PNG, BMP, PNM, WebP and TIFF. Raises `Undecodable`; before anything is unpacked where the file says that it is
+    larger than `max_pixels`; also for a JPEG or PNG that was cut off, whose missing part OpenCV would fill with grey.
+    """
+    width, height = size_of(data)
+    if not 0 < width * height <= max_pixels or min(width, height) < 1:
+        raise Undecodable(f"{width} x {height} pixels, at most {max_pixels:,} are read")
+    if data.startswith(b"\xff\xd8") and b"\xff\xd9" not in data[-4096:]:
+        raise Undecodable("a JPEG without its end")
+    if data.startswith(b"\xff\xd8") and data.count(b"\xff\xda") > MAX_SCANS:
+        raise Undecodable(f"a JPEG of more than {MAX_SCANS} scans")
+    if data.startswith(b"\x89PNG") and b"IEND" not in data[-4096:]:
+        raise Undecodable("a PNG without its end")
+    flags = (cv2.IMREAD_COLOR if colour else cv2.IMREAD_GRAYSCALE) | cv2.IMREAD_IGNORE_ORIENTATION
+    try:
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except cv2.error as error:
+        raise Undecodable(" ".join(str(error.err or error).split())[:200]) from None
+    if pixels is None:
+        raise Undecodable(f"{len(data)} bytes that are no image OpenCV knows")
+    return np.asarray(pixels, dtype=np.uint8)
+
+
+def size_of(data: bytes) -> tuple[int, int]:
+    """Width and height (pixels) that an image file states in its head. Raises `Undecodable`."""
+    read = next((read for start, read in _KINDS if re.match(start, data, re.DOTALL)), None)
+    if read is None:
+        raise Undecodable(f"{len(data)} bytes that are no JPEG, PNG, BMP, PNM, WebP or TIFF")
+    try:
+        return read(data)
+    except (struct.error, StopIteration, ValueError):
+        raise Undecodable(f"{len(data)} bytes of an image that does not say its size") from None
+
+
+def _png(data: bytes) -> tuple[int, int]:
+    width, height = struct.unpack_from(">II", data, 16)
+    return width, height
+
+
+def _jpeg(data: bytes) -> tuple[int, int]:
+    return next(_jpeg_frames(data))
+
+
+def _jpeg_frames(data: bytes) -> Iterator[tuple[int, int]]:
+    at = 2
+    while at + 4 <= len(data):
+        if data[at] != 0xFF:
+            at += 1  # OpenCV, too, looks for the next marker
+            continue
+        marker, (length,) = data[at + 1], struct.unpack_from(">H", data, at + 2)
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
+            height, width = struct.unpack_from(">HH", data, at + 5)
+            yield width, height
+        at += 1 if marker == 0xFF else 2 if marker in (0x00, 0x01, *range(0xD0, 0xD9)) else 2 + max(length, 2)
+
+
+def _bmp(data: bytes) -> tuple[int, int]:
+    if struct.unpack_from("<I", data, 14)[0] == 12:
+        width, height = struct.unpack_from("<HH", data, 18)
+    else:
+        width, height = struct.unpack_from("<ii", data, 18)
+    return abs(width), abs(height)
+
+
+def _pnm(data: bytes) -> tuple[int, int]:
+    words = re.match(rb"P[1-6](?:\s+(?:#[^\n]*\n\s*)*)(\d{1,9})(?:\s+(?:#[^\n]*\n\s*)*)(\d{1,9})\s", data[:4096])
+    if words is None:
+        raise ValueError
+    return int(words[1]), int(words[2])
+
+
+def _webp(data: bytes) -> tuple[int, int]:
+    kind = data[12:16]
+    if kind == b"VP8X":
+        return 1 + int.from_bytes(data[24:27], "little"), 1 + int.from_bytes(data[27:30], "little")
+    if kind == b"VP8L":
+        bits = int.from_bytes(data[21:25], "little")
+        return 1 + (bits & 0x3FFF), 1 + (bits >> 14 & 0x3FFF)
+    width, height = struct.unpack_from("<HH", data, 26)
+    return width & 0x3FFF, height & 0x3FFF
+
+
+def _tiff(data: bytes) -> tuple[int, int]:
+    order = "<" if data.startswith(b"II") else ">"
+    (at,) = struct.unpack_from(f"{order}I", data, 4)
+    sizes = {}
+    for number in range(min(struct.unpack_from(f"{order}H", data, at)[0], 200)):
+        tag, kind = struct.unpack_from(f"{order}HH", data, at + 2 + 12 * number)
+        if tag in (256, 257):
+            form = f"{order}{'H' if kind == 3 else 'I'}"
+            sizes[tag] = struct.unpack_from(form, data, at + 2 + 12 * number + 8)[0]
+    if len(sizes) < 2:
+        raise ValueError
+    return sizes[256], sizes[257]
+
+
+_KINDS: tuple[tuple[bytes, Callable[[bytes], tuple[int, int]]], ...] = (
+    (rb"\x89PNG\r\n\x1a\n", _png),
+    (rb"\xff\xd8\xff", _jpeg),
+    (rb"BM", _bmp),
+    (rb"P[1-6]\s", _pnm),
+    (rb"RIFF....WEBP", _webp),
+    (rb"II\*\x00|MM\x00\*", _tiff),
+)
+"""How files of each kind begin, and what reads their size."""
