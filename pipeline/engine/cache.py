@@ -1,14 +1,21 @@
 """The cache: results as files, by the hash of everything that made them."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
-from omninav.pipeline.files import digest_text, locked
+from omninav.pipeline.files import digest_file, digest_text, locked, whole_file, write_whole
+
+from .codec import BadEncoding, decode, encode, seal, unseal
+from .damage import say_damaged
 
 
 class Cache:
     """Results by content: a folder of files named by the hash of everything that made them.
+
+    Beside each file lies its entry: the whole key, the file's sha256 and notes, sealed. So a file that is damaged, or
+    another key's under this name, is no result: it is thrown away and made again.
 
     One process at a time makes a result (`lock`), so parallel jobs make each once; a lock dies with its process.
     """
@@ -20,11 +27,45 @@ class Cache:
         """Where the result with this key lies, or would lie."""
         return self.folder / f"{key[:32]}{suffix}"
 
+    def find(self, key: str, suffix: str) -> tuple[Path, Any] | None:
+        """The result with this key, and its notes; None where there is none, or no whole one."""
+        path, entry = self.path(key, suffix), self._entry(key, suffix)
+        if not path.is_file() or not entry.is_file():  # without its entry it was never finished
+            return None
+        try:
+            stated = decode(unseal(entry.read_bytes(), str(entry)))
+            if stated["key"] != key:
+                raise BadEncoding(f"{path} was made for another key")
+            if stated["sha256"] != digest_file(path):
+                raise BadEncoding(f"{path} is damaged: its sha256 does not fit its content")
+            return path, stated["notes"]
+        except (BadEncoding, LookupError, TypeError) as error:
+            self.discard(key, suffix, str(error))
+            return None
+
+    @contextmanager
+    def keep(self, key: str, suffix: str, notes: Any = None) -> Iterator[Path]:
+        """A path to write a result to; it is there, with its notes, when the block ends well."""
+        with whole_file(self.path(key, suffix)) as part:
+            yield part
+            digest = digest_file(part)
+        write_whole(self._entry(key, suffix), seal(encode({"key": key, "sha256": digest, "notes": notes})))
+
+    def discard(self, key: str, suffix: str, why: str) -> None:
+        """Throw a result away, and say why."""
+        say_damaged(f"{why}; it is thrown away and made again")
+        for file in (self._entry(key, suffix), self.path(key, suffix)):
+            with suppress(FileNotFoundError):
+                file.unlink()
+
     @contextmanager
     def lock(self, key: str) -> Iterator[None]:
         """Hold the key: others who want the same result wait here until it is there."""
         with locked(self.path(key, ".lock")):
             yield
+
+    def _entry(self, key: str, suffix: str) -> Path:
+        return self.path(key, f"{suffix}.entry")
 
 
 def seeded(key: str, seed: int) -> str:

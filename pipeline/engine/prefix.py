@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.files import digest_file, digest_text, whole_file, write_whole
+from omninav.pipeline.files import digest_text
 from omninav.pipeline.graph.graph import ARTIFACTS, Graph
 
 from .cache import Cache, seeded
 from .code_version import graph_digest
-from .codec import BadEncoding, decode, encode, seal, unseal
 from .disk_sequence import DiskSequence
 from .engine import Engine, PrefixReplay
 
@@ -139,16 +138,8 @@ def cached_prefix(graph: Graph, cache: Cache | None, seed: int) -> Iterator[Cach
 
 
 def _found(cache: Cache, key: str, nodes: frozenset[str]) -> PrefixReplay | None:
-    path, notes_path = cache.path(key, ".prefix"), cache.path(key, ".notes")
-    if not path.exists():
-        return None
-    try:
-        notes = decode(unseal(notes_path.read_bytes(), str(path)))
-        if digest_file(path) == notes["digest"]:
-            return PrefixReplay(nodes, DiskSequence(path), notes["nodes"], {})
-    except (BadEncoding, FileNotFoundError):
-        path.unlink(missing_ok=True)  # half a result is no result: it is made again
-    return None
+    found = cache.find(key, ".prefix")
+    return None if found is None else PrefixReplay(nodes, DiskSequence(found[0], append=False), found[1], {})
 
 
 def keep_prefix(engine: Engine, prefix: CachedPrefix | None, cache: Cache | None) -> None:
@@ -166,7 +157,5 @@ def _keep(
 ) -> None:
     drew = any(note["drew"] for note in notes.values())
     key = seeded(prefix.key, seed) if drew else prefix.key
-    with whole_file(cache.path(key, ".prefix")) as part:
+    with cache.keep(key, ".prefix", dict(notes)) as part:
         shutil.copyfile(sequence, part)
-        digest = digest_file(part)
-    write_whole(cache.path(key, ".notes"), seal(encode({"digest": digest, "nodes": dict(notes)})))

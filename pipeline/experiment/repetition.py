@@ -13,6 +13,7 @@ from typing import Any
 
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.code_version import graph_digest
+from omninav.pipeline.engine.damage import say_damaged
 from omninav.pipeline.engine.disk_sequence import DiskSequence
 from omninav.pipeline.engine.engine import Engine, EngineOptions, PrefixReplay
 from omninav.pipeline.engine.prefix import (
@@ -23,7 +24,7 @@ from omninav.pipeline.engine.prefix import (
     keep_prefix,
     prefix_nodes,
 )
-from omninav.pipeline.files import digest_file, digest_text, write_whole
+from omninav.pipeline.files import Damaged, digest_file, digest_text, locked, read_json, write_json
 from omninav.pipeline.graph.graph import Graph, Node
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
@@ -97,11 +98,19 @@ def finished(folder: Path, key: str, seeds: Sequence[int], cache: Cache | None =
     found = {}
     for seed in seeds:
         for path in _results(folder, key, seed, cache):
-            result = json.loads(path.read_text()) if path.exists() else {}
-            if result.get("key") == key:
+            result = _read(path)
+            if result.get("key") == key and result.get("seed") == seed:
                 found[seed] = result
                 break
     return found
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return read_json(path) if path.exists() else {}
+    except Damaged as damaged:
+        say_damaged(f"{damaged}; this repetition runs again")
+        return {}
 
 
 def _results(folder: Path, key: str, seed: int, cache: Cache | None) -> list[Path]:
@@ -119,6 +128,11 @@ def repeat(given: Mapping[str, Any], send: Send) -> None:
     stages whose time together is measured). Raises `BadInput` where the code has changed since the experiment was
     started.
     """
+    with locked(Path(given["folder"]) / ".lock"):  # a job whose experiment was killed lives on for a moment
+        _repeat(given, send)
+
+
+def _repeat(given: Mapping[str, Any], send: Send) -> None:
     folder, seeds = Path(given["folder"]), list(given["seeds"])
     planned = plan(given["config"])
     if planned.digest != given["code"]:
@@ -153,7 +167,7 @@ def repeat(given: Mapping[str, Any], send: Send) -> None:
         if recorded is None:
             shutil.rmtree(place, ignore_errors=True)
         for path in _results(folder, given["key"], seed, cache if given["shared"] else None):
-            write_whole(path, json.dumps(result, indent=1, sort_keys=True, default=str) + "\n")
+            write_json(path, result)
         send({"seed": seed})
     shutil.rmtree(run.memory, ignore_errors=True)
 
@@ -193,7 +207,7 @@ def run_repetition(
     notes = {name: engine.calls[name].ctx.notes() for name in sorted(nodes | set(before))}
     engine.sequences.pop(SHARED).flush()
     given = {origin: value for origin, value in engine.values.items() if origin.partition(".")[0] in before}
-    ticks = DiskSequence(place / f"{SHARED}.sequence")
+    ticks = DiskSequence(place / f"{SHARED}.sequence", append=False)
     return engine, PrefixReplay(nodes | frozenset(before), ticks, notes, given)
 
 

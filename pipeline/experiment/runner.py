@@ -1,6 +1,5 @@
 """Running an experiment: recordings, artifacts, repetitions and the page; what was finished before is found again."""
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,7 +9,8 @@ from typing import Any
 
 import yaml
 
-from omninav.pipeline.files import write_whole
+from omninav.pipeline.files import Damaged, Taken, locked, read_json, write_json, write_whole
+from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.run.provenance import LIBRARIES, git_commit, version
 
@@ -30,6 +30,9 @@ from .process_pool import Job, run_jobs
 from .repetition import finished
 from .shared_inputs import Recording, artifacts_of, recordings_of
 from .specification import Experiment, read_experiment
+
+STATE = "experiment.json"
+"""In an experiment's folder: with what it was started, and how far it is."""
 
 
 @dataclass
@@ -58,7 +61,14 @@ class ExperimentRun:
         return [*self.conditions, *(run for several in self.references for run in several)]
 
     def run(self) -> bool:
-        """All phases. Returns whether every job came to its end."""
+        """All phases. Returns whether every job came to its end. Raises `BadInput` where another process runs it."""
+        try:
+            with locked(self.folder / ".lock", wait=False):
+                return self._run()
+        except Taken as taken:
+            raise BadInput(f"{self.folder}: {taken} is running it; wait until it has ended") from None
+
+    def _run(self) -> bool:
         write_whole(self.folder / "experiment.yaml", self.file)
         self._write_state("running")
         self._record()
@@ -92,7 +102,7 @@ class ExperimentRun:
 
     def _make_artifacts(self) -> None:
         artifacts = artifacts_of([run for run in self.all_runs if run.unfinished], self.folder)
-        failed = self._run_jobs([each.job() for each in artifacts if not each.file.exists()], "artifacts")
+        failed = self._run_jobs([each.job() for each in artifacts if not each.made], "artifacts")
         for each in artifacts:
             if each.name in failed:
                 for run, name in each.readers:
@@ -176,13 +186,13 @@ class ExperimentRun:
             "cores": self.cores,
             "libraries": {name: version(name) for name in LIBRARIES},
         }
-        write_whole(self.folder / "experiment.json", json.dumps(manifest, indent=1) + "\n")
+        write_json(self.folder / STATE, manifest)
 
     def _made_with(self) -> str:
         """The version and commit that experiment.json states."""
-        path = self.folder / "experiment.json"
-        stated: dict[str, Any] = json.loads(path.read_text()) if path.exists() else {}
-        if not stated:
+        try:
+            stated = read_json(self.folder / STATE)
+        except Damaged:
             return ""
         commit, dirty, _ = str(stated.get("git_commit") or "").partition("-dirty")
         known = f", commit {commit[:12]}" + (" with changes that are not committed" if dirty else "") if commit else ""

@@ -1,6 +1,5 @@
 """What several conditions of an experiment read, made once: recordings of sources that compute, and artifacts."""
 
-import json
 import math
 import re
 import shutil
@@ -9,9 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from omninav.pipeline.engine.artifact import read_header
 from omninav.pipeline.engine.cache import Cache
-from omninav.pipeline.files import write_whole
+from omninav.pipeline.engine.damage import say_damaged
+from omninav.pipeline.files import Damaged, digest_file, locked, read_json, write_json
 from omninav.pipeline.graph.graph import Node
+from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.recordable import Recordable
 from omninav.pipeline.graph.stage import Context
 from omninav.pipeline.run.artifacts import Execution, obtain
@@ -24,7 +26,7 @@ from .process_pool import Job, Send
 from .repetition import BASE_SEED, artifact_key
 
 FACTS = "facts.json"
-"""In a recording's folder: what its source stated of it."""
+"""In a recording's folder: of what it is, what its source stated of it, and the hashes of its files."""
 
 
 @dataclass
@@ -32,6 +34,7 @@ class Recording:
     """What a source computes, recorded for all runs that read it."""
 
     name: str
+    key: str
     folder: Path
     stage: Recordable
     artifact: str | None
@@ -41,19 +44,22 @@ class Recording:
 
     @property
     def made(self) -> bool:
-        """Whether it is there: a folder appears as a whole."""
-        return self.folder.exists()
+        """Whether it is there, whole."""
+        return is_recorded(self.folder, self.key)
 
     @property
     def facts(self) -> dict[str, Any]:
         """What was stated when it was recorded."""
-        path = self.folder / FACTS
-        facts: dict[str, Any] = json.loads(path.read_text()) if path.exists() else {}
-        return facts
+        return dict(_stated(self.folder).get("facts", {}))
 
     def job(self, folder: Path) -> Job:
         """The job that records it; its log lies in `folder`."""
-        given = {"config": self.readers[0][0].config, "artifact": self.artifact, "folder": str(self.folder)}
+        given = {
+            "config": self.readers[0][0].config,
+            "artifact": self.artifact,
+            "key": self.key,
+            "folder": str(self.folder),
+        }
         return Job(self.name, f"{__name__}:record", given, folder / f"{self.folder.name}.log")
 
     def use(self) -> None:
@@ -85,7 +91,7 @@ def recordings_of(runs: Sequence[ConditionRun], folder: Path) -> list[Recording]
             if key not in found:
                 name = f"{node.stage.recording_name()} {key[:12]}"
                 own = place / re.sub("[^A-Za-z0-9]+", "_", name)
-                found[key] = Recording(name, own, node.stage, artifact)
+                found[key] = Recording(name, key, own, node.stage, artifact)
             found[key].readers.append((run, artifact))
     return list(found.values())
 
@@ -97,6 +103,26 @@ def _source_of(planned: Plan, artifact: str | None) -> Node | None:
     return graph.source if graph is not None else None
 
 
+def is_recorded(folder: Path, key: str) -> bool:
+    """Whether a folder holds the whole recording with this key."""
+    if not folder.is_dir():
+        return False
+    stated = _stated(folder)
+    files = dict(stated.get("files", {}))
+    whole = all((folder / name).is_file() and digest_file(folder / name) == digest for name, digest in files.items())
+    if stated.get("key") == key and files and whole:
+        return True
+    say_damaged(f"{folder}: the recording in it is damaged; it is recorded again")
+    return False
+
+
+def _stated(folder: Path) -> dict[str, Any]:
+    try:
+        return read_json(folder / FACTS)
+    except Damaged:
+        return {}
+
+
 def record(given: Mapping[str, Any], send: Send) -> None:
     """Record a source, as a job: that of the plain configuration `config`, or of its `artifact`, into `folder`."""
     node = _source_of(plan(given["config"]), given["artifact"])
@@ -104,13 +130,18 @@ def record(given: Mapping[str, Any], send: Send) -> None:
     assert isinstance(node.stage, Recordable)
     folder = Path(given["folder"])
     part = folder.with_name(f"{folder.name}.part")
-    shutil.rmtree(part, ignore_errors=True)
-    part.mkdir(parents=True)
-    ctx = Context(node.name, folder=part)
-    ctx.progress = Heartbeat(send).step
-    node.stage.record(ctx, part)
-    write_whole(part / FACTS, json.dumps(ctx.facts, indent=1, sort_keys=True) + "\n")
-    part.rename(folder)
+    with locked(folder.with_name(f"{folder.name}.lock")):  # another experiment may record the same
+        if is_recorded(folder, given["key"]):
+            return
+        for half_written in (part, folder):
+            shutil.rmtree(half_written, ignore_errors=True)
+        part.mkdir(parents=True)
+        ctx = Context(node.name, folder=part)
+        ctx.progress = Heartbeat(send).step
+        node.stage.record(ctx, part)
+        files = {str(path.relative_to(part)): digest_file(path) for path in sorted(part.rglob("*")) if path.is_file()}
+        write_json(part / FACTS, {"key": given["key"], "facts": ctx.facts, "files": files})
+        part.rename(folder)
 
 
 @dataclass
@@ -126,6 +157,15 @@ class SharedArtifact:
     def file(self) -> Path:
         """Where it lies once it is made."""
         return self.folder / f"{self.readers[0][1]}.omap"
+
+    @property
+    def made(self) -> bool:
+        """Whether it is there, whole."""
+        try:
+            return self.file.exists() and bool(read_header(self.file))
+        except BadInput as damaged:
+            say_damaged(f"{damaged}; it is made again")
+            return False
 
     def job(self) -> Job:
         """The job that makes it."""
@@ -157,6 +197,11 @@ def artifacts_of(runs: Sequence[ConditionRun], folder: Path) -> list[SharedArtif
 
 def make_artifact(given: Mapping[str, Any], send: Send) -> None:
     """Make an artifact, as a job: the one called `name` of the plain configuration `config`, into `folder`."""
+    with locked(Path(given["folder"]).with_suffix(".lock")):  # a job whose experiment was killed lives on for a moment
+        _make_artifact(given, send)
+
+
+def _make_artifact(given: Mapping[str, Any], send: Send) -> None:
     planned = plan(given["config"])
     cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
     run = Run(Path(given["folder"]))

@@ -1,7 +1,7 @@
 """Artifacts: loaded from their files, found in the cache, or made by running their graphs."""
 
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -11,7 +11,7 @@ from omninav.pipeline.engine.cache import Cache, seeded
 from omninav.pipeline.engine.code_version import graph_digest
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix
-from omninav.pipeline.files import digest_file, digest_text
+from omninav.pipeline.files import digest_file, digest_text, whole_file
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.value import Value
@@ -73,26 +73,51 @@ def obtain(
     target = run.folder / f"{artifact.name}.omap"
     if artifact.file is not None:
         value = read_artifact(artifact.file)
-        shutil.copyfile(artifact.file, target)
+        _copy(artifact.file, target)
         loaded = {"file": str(artifact.file), "sha256": digest_file(target), "reason": "loaded from a file"}
         return value, {**loaded, **read_header(artifact.file)["facts"]}
     cache = execution.cache or Cache(run.memory / "artifacts")
     key = _key(artifact)
     with cache.lock(key):
-        found = next((path for k in (key, seeded(key, seed)) if (path := cache.path(k, ".omap")).exists()), None)
-        reason = "found: the same graph over the same log had made it before"
-        if found is None:
+        found = _found(cache, key, seed)
+        if found is not None:
+            file, value = found
+            reason = "found: the same graph over the same log had made it before"
+        else:
+            file, value = _into(cache, seed, _make(execution, [artifact, *together]))
             reason = "made: code, parameters or log are new to the cache"
-            for each, value, header, drew in _make(execution, [artifact, *together]):
-                own = _key(each)
-                path = cache.path(seeded(own, seed) if drew else own, ".omap")
-                write_artifact(path, value, header)
-                found = found or path  # the first is the one that is wanted
-        assert found is not None
-    value = read_artifact(found)
-    shutil.copyfile(found, target)
+        _copy(file, target)
     made = {"variant": artifact.variant, "output": artifact.origin, "sha256": digest_file(target), "reason": reason}
-    return value, {**made, **read_header(found)["facts"]}
+    return value, {**made, **read_header(target)["facts"]}
+
+
+def _found(cache: Cache, key: str, seed: int) -> tuple[Path, Value] | None:
+    for candidate in (key, seeded(key, seed)):
+        found = cache.find(candidate, ".omap")
+        if found is not None:
+            try:
+                return found[0], read_artifact(found[0])
+            except BadInput as unfit:
+                cache.discard(candidate, ".omap", str(unfit))
+    return None
+
+
+def _into(
+    cache: Cache, seed: int, made: Iterable[tuple[ArtifactPlan, Value, dict[str, Any], bool]]
+) -> tuple[Path, Value]:
+    """Put artifacts into the cache. The first is the one that is wanted; it is read as the next run will read it."""
+    files = []
+    for artifact, value, header, drew in made:
+        key = seeded(_key(artifact), seed) if drew else _key(artifact)
+        with cache.keep(key, ".omap") as part:
+            write_artifact(part, value, header)
+        files.append(cache.path(key, ".omap"))
+    return files[0], read_artifact(files[0])
+
+
+def _copy(file: Path, target: Path) -> None:
+    with whole_file(target) as part:
+        shutil.copyfile(file, part)
 
 
 def _key(artifact: ArtifactPlan) -> str:

@@ -1,6 +1,5 @@
 """`omninav resume`: go on with a run or an experiment that was stopped."""
 
-import json
 import os
 import shlex
 import sys
@@ -8,6 +7,7 @@ from pathlib import Path
 
 from omninav.pipeline.cli.terminal import show, shown
 from omninav.pipeline.engine.call import StageFailed
+from omninav.pipeline.files import Damaged, read_json
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.report.terminal_tables import results_table
@@ -40,7 +40,10 @@ def _resume_experiment(folder: Path) -> int:
     """An experiment goes on when its command is typed again, where it was typed."""
     from .run import command as run
 
-    manifest = json.loads((folder / "experiment.json").read_text())
+    try:
+        manifest = read_json(folder / "experiment.json")
+    except Damaged as damaged:
+        raise BadInput(f"{damaged}; type the experiment's command again: what it has done is found again") from None
     words, place = manifest["argv"][1:], Path(manifest["cwd"])
     print(f"{shlex.join(['omninav', *words])}   (in {place})", flush=True)
     os.chdir(place)

@@ -1,15 +1,17 @@
 """Results of repetitions are found again by what they are results of."""
 
-import json
 from pathlib import Path
+
+import pytest
 
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.experiment.repetition import finished
-from omninav.pipeline.files import digest_text, write_whole
+from omninav.pipeline.experiment.shared_inputs import is_recorded
+from omninav.pipeline.files import digest_file, digest_text, write_json, write_whole
 
 
 def kept(path: Path, key: str, seed: int) -> None:
-    write_whole(path, json.dumps({"key": key, "seed": seed}))
+    write_json(path, {"key": key, "seed": seed})
 
 
 def test_a_condition_that_another_experiment_has_run_is_found_in_the_cache(tmp_path: Path):
@@ -23,3 +25,26 @@ def test_results_of_another_key_are_not_taken_for_this_one_s(tmp_path: Path):
     kept(tmp_path / "seed_0.json", "before the change", 0)
     assert finished(tmp_path, "after the change", [0]) == {}
     assert list(finished(tmp_path, "before the change", [0])) == [0]
+
+
+def test_a_damaged_result_is_computed_again_and_this_is_said(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    kept(tmp_path / "seed_0.json", "a", 0)
+    content = (tmp_path / "seed_0.json").read_text()
+    for damaged in (content.replace('"seed": 0', '"seed": 1'), content[:20], "[]", ""):
+        (tmp_path / "seed_0.json").write_text(damaged)
+        assert finished(tmp_path, "a", [0]) == {}
+    assert "this repetition runs again" in capfd.readouterr().err
+
+
+def test_a_recording_is_whole_or_made_again(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    folder = tmp_path / "drive"
+    assert not is_recorded(folder, "a")
+    write_whole(folder / "drive.mcap", b"frames")
+    write_json(
+        folder / "facts.json", {"key": "a", "facts": {}, "files": {"drive.mcap": digest_file(folder / "drive.mcap")}}
+    )
+    assert is_recorded(folder, "a")
+    assert not is_recorded(folder, "another")
+    write_whole(folder / "drive.mcap", b"framex")
+    assert not is_recorded(folder, "a")
+    assert "it is recorded again" in capfd.readouterr().err

@@ -7,11 +7,13 @@ import pytest
 
 import toys
 from omninav.pipeline.engine.artifact import write_artifact
+from omninav.pipeline.engine.codec import decode, encode, seal, unseal
+from omninav.pipeline.files import digest_file, write_whole
 from omninav.pipeline.graph.problems import ProblemsFound
 from omninav.pipeline.run.artifact_specification import read_specifications, without_companions
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import plan
-from omninav.pipeline.run.run_folder import start
+from omninav.pipeline.run.run_folder import Run, start
 
 
 def configuration(port: str, file: Path | None) -> dict[str, Any]:
@@ -88,6 +90,35 @@ def test_what_one_graph_gives_is_made_in_one_run_and_each_is_found_by_itself(tmp
     other = start(plan(alone), ["toys"])
     execute(other, plan(alone))
     assert other.manifest["artifacts"]["map"]["sha256"] == made.manifest["artifacts"]["map"]["sha256"]
+
+
+@pytest.mark.parametrize("damage", ["a bit", "another's content", "an artifact that does not fit"])
+def test_a_damaged_map_in_the_cache_is_made_again_and_is_the_same(
+    tmp_path: Path, damage: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    planned = plan(two_of_one_graph(tmp_path))
+    first, again = start(planned, ["toys"]), start(planned, ["toys"])
+    execute(first, planned)
+    cached = next(file for file in (tmp_path / "cache").glob("*.omap") if digest_file(file) == sum_of(first))
+    content = cached.read_bytes()
+    if damage == "a bit":
+        cached.write_bytes(content[:70] + bytes([content[70] ^ 1]) + content[71:])
+    else:
+        write_artifact(cached, toys.Number(7.0))
+    if damage == "an artifact that does not fit":
+        write_whole(cached, cached.read_bytes()[:-5])
+        entry = cached.with_suffix(".omap.entry")
+        stated = decode(unseal(entry.read_bytes(), "entry")) | {"sha256": digest_file(cached)}
+        write_whole(entry, seal(encode(stated)))
+    execute(again, planned)
+    assert again.manifest["artifacts"]["map"]["reason"].startswith("made")
+    assert sum_of(again) == sum_of(first)
+    assert capfd.readouterr().err.count("it is thrown away and made again") == 1
+    assert cached.read_bytes() == content
+
+
+def sum_of(run: Run) -> str:
+    return str(run.manifest["artifacts"]["map"]["sha256"])
 
 
 def test_what_comes_with_a_map_is_not_there_where_the_map_is_from_a_file(tmp_path: Path) -> None:
