@@ -69,9 +69,10 @@ def prefix_nodes(graph: Graph, artifacts: bool = False, without: Collection[str]
     return frozenset(prefix)
 
 
-def frontier_of(graph: Graph, nodes: frozenset[str]) -> list[str]:
-    """What other nodes read of a prefix, and the source's tick."""
+def frontier_of(graph: Graph, nodes: frozenset[str], wanted: Collection[str] = ()) -> list[str]:
+    """What other nodes read of a prefix, what is `wanted` of it, and the source's tick."""
     read = {wire.origin for wire in graph.wires if wire.from_node in nodes and wire.to_node not in nodes}
+    read |= {origin for origin in wanted if origin.partition(".")[0] in nodes}
     return sorted(read | ({f"{graph.source.name}.tick"} if graph.source else set()))
 
 
@@ -110,13 +111,18 @@ def prefix_key(graph: Graph, nodes: frozenset[str]) -> str:
 
 
 @contextmanager
-def cached_prefix(graph: Graph, cache: Cache | None, seed: int) -> Iterator[CachedPrefix | None]:
-    """The prefix of a graph, found in the cache or to be recorded. Others who want the same one wait meanwhile."""
+def cached_prefix(
+    graph: Graph, cache: Cache | None, seed: int, wanted: Collection[str] = ()
+) -> Iterator[CachedPrefix | None]:
+    """The prefix of a graph, found in the cache or to be recorded. Others who want the same one wait meanwhile.
+
+    `wanted`: outputs that are wanted of the graph's run.
+    """
     nodes = prefix_nodes(graph)
     if cache is None or not nodes or graph.source is None:
         yield None
         return
-    frontier = tuple(frontier_of(graph, nodes))
+    frontier = tuple(frontier_of(graph, nodes, wanted))
     bulky = next((origin for origin in frontier if graph.is_marked(origin, "bulky")), None)
     if bulky is not None:
         readers = ", ".join(name for name in graph.readers_of(bulky) if name not in nodes)

@@ -134,7 +134,7 @@ def _make(
     assert graph is not None
     memory = execution.run.memory / artifact.name
     options = execution.options(artifact.variant, memory, identity(graph, execution.seed))
-    with cached_prefix(graph, execution.cache, execution.seed) as prefix:
+    with cached_prefix(graph, execution.cache, execution.seed, origins) as prefix:
         replay, recorded = (prefix.replay, prefix.recorded()) if prefix is not None else (None, {})
         engine = Engine(graph, {}, options, wanted=origins, replay=replay, recorded=recorded)
         values = engine.run()

@@ -65,9 +65,9 @@ def _execute(run: Run, planned: Plan, display: ProgressDisplay | None) -> Metric
     run.save()
     own = identity(planned.graph, planned.seed, *(facts["sha256"] for facts in made.values()))
     options = execution.options(planned.variant, run.memory, own, run.folder)
-    with cached_prefix(planned.graph, cache, planned.seed) as prefix:
+    wanted = sorted(set(planned.saves.values()))
+    with cached_prefix(planned.graph, cache, planned.seed, wanted) as prefix:
         replay, recorded = (prefix.replay, prefix.recorded()) if prefix is not None else (None, {})
-        wanted = sorted(set(planned.saves.values()))
         engine = Engine(planned.graph, artifacts, options, wanted=wanted, replay=replay, recorded=recorded)
         last = engine.run()
         keep_prefix(engine, prefix, cache)
