@@ -1,10 +1,12 @@
-"""Which code, parameters and wires a graph's results follow from."""
+"""Which code, libraries, parameters and wires a graph's results follow from."""
 
 import ast
 import dataclasses
 import functools
+import importlib.metadata
 import inspect
 import json
+import platform
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -13,11 +15,46 @@ from omninav.pipeline.files import digest_text
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.graph.stage import Stage
 
+LIBRARIES = (
+    "numpy",
+    "scipy",
+    "opencv-python-headless",
+    "numba",
+    "llvmlite",
+    "poselib",
+    "networkx",
+    "hydra-core",
+    "mcap",
+    "rosbags",
+)
+"""Distributions whose versions a run states, and on which its results depend."""
+ROOMS = ("files.py", "graph", "engine", "run", "mcap")
+"""The framework's code that results follow from; commands, experiments and reports only show them."""
+FRAMEWORK = Path(__file__).resolve().parents[1]
+
+
+def version(distribution: str) -> str:
+    """The installed version of a distribution, or that there is none."""
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
+
+
+@functools.cache
+def surroundings() -> str:
+    """A hash over what every graph runs in: the framework's code, and the versions of Python and the libraries."""
+    files = [file for room in ROOMS for file in sorted([FRAMEWORK / room, *(FRAMEWORK / room).rglob("*.py")])]
+    code = [text for file in files if file.is_file() for text in (str(file.relative_to(FRAMEWORK)), file.read_text())]
+    versions = [f"{name} {version(name)}" for name in LIBRARIES]
+    return digest_text(platform.python_version(), platform.machine(), *versions, *code)
+
 
 def graph_digest(graph: Graph, only: Iterable[str] | None = None) -> str:
-    """A hash over stages' code, parameters and wires: of the whole graph, or of some nodes and what enters them."""
+    """A hash over stages' code, parameters and wires, of the whole graph, or of some nodes and what enters them; and
+    over the `surroundings` in which they run."""
     names = sorted(graph.nodes if only is None else only)
-    parts = []
+    parts = [surroundings()]
     for name in names:
         node = graph.nodes[name]
         parameters = json.dumps(node.parameters, sort_keys=True, default=str)
@@ -30,13 +67,18 @@ def code_version(cls: type[Stage]) -> str:
     """A hash over the source of a stage's module and of all that it imports of its own package, directly or not.
 
     A change there makes its cached results stale, one elsewhere in the package does not. Imports are read off the
-    source, so that those count as well which run at need only. What other packages hold does not count.
+    source, so that those count as well which run at need only. What other packages hold counts by its version, where
+    it is one of `LIBRARIES`.
     """
-    return _of_module(cls.__module__)
+    return module_version(cls.__module__)
 
 
 @functools.cache
-def _of_module(module: str) -> str:
+def module_version(module: str, without: str = "") -> str:
+    """A hash over the source of a loaded module and of all that it imports of its own package, directly or not.
+
+    Modules of the package `without` are left out.
+    """
     file = Path(inspect.getfile(sys.modules[module])).resolve()
     root = file.parent
     while (root / "__init__.py").exists():
@@ -48,7 +90,11 @@ def _of_module(module: str) -> str:
     to_read = [module] if ".".join(names[-len(inside) :]) == ".".join(inside) else []
     while to_read:
         name = to_read.pop()
-        if name in found or not f"{name}.".startswith(f"{outer}."):
+        if (
+            name in found
+            or not f"{name}.".startswith(f"{outer}.")
+            or (without and f"{name}.".startswith(f"{without}."))
+        ):
             continue
         place = _file_of(root / inside[0], name[len(outer) + 1 :])
         if place is not None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from omninav.pipeline.engine.cache import Cache
-from omninav.pipeline.engine.code_version import graph_digest
+from omninav.pipeline.engine.code_version import graph_digest, module_version
 from omninav.pipeline.engine.damage import say_damaged
 from omninav.pipeline.engine.disk_sequence import DiskSequence
 from omninav.pipeline.engine.engine import Engine, EngineOptions, PrefixReplay
@@ -62,7 +62,12 @@ def condition_key(planned: Plan, groups: Sequence[Sequence[str]] = ()) -> str:
     `groups`: stages whose time together is among them.
     """
     graph = measured(planned.graph)
-    parts = [graph_digest(graph), *known_digests(graph), *("+".join(group) for group in groups)]
+    parts = [
+        module_version(__name__),
+        graph_digest(graph),
+        *known_digests(graph),
+        *("+".join(group) for group in groups),
+    ]
     for artifact in planned.artifacts:
         parts += [artifact.name, artifact_key(artifact)]
     return digest_text("condition", *parts)

@@ -9,10 +9,11 @@ from typing import Any
 
 import yaml
 
+from omninav.pipeline.engine.code_version import LIBRARIES, version
 from omninav.pipeline.files import Damaged, Taken, locked, read_json, write_json, write_whole
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.report.progress import Progress
-from omninav.pipeline.run.provenance import LIBRARIES, git_commit, version
+from omninav.pipeline.run.provenance import git_commit
 
 from .conditions import (
     Compose,

@@ -1,18 +1,7 @@
-"""With what a run was made: versions of libraries, and the commit of omninav itself."""
+"""With what a run was made: the commit of omninav itself. Versions of libraries are in `engine/code_version.py`."""
 
-import importlib.metadata
 import subprocess
 from pathlib import Path
-
-LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "numba", "networkx", "hydra-core", "mcap", "rosbags")
-
-
-def version(distribution: str) -> str:
-    """The installed version of a distribution, or that there is none."""
-    try:
-        return importlib.metadata.version(distribution)
-    except importlib.metadata.PackageNotFoundError:
-        return "not installed"
 
 
 def git_commit() -> str | None:

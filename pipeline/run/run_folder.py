@@ -11,13 +11,14 @@ from typing import Any
 
 import yaml
 
+from omninav.pipeline.engine.code_version import LIBRARIES, version
 from omninav.pipeline.engine.codec import encode, seal
 from omninav.pipeline.files import Damaged, Taken, digest_text, locked, read_json, write_json, write_whole
 from omninav.pipeline.graph.problems import BadInput
 
 from .inputs import refuse_missing
 from .plan import Plan, input_digests
-from .provenance import LIBRARIES, git_commit, version
+from .provenance import git_commit
 
 MANIFEST, CONFIG = "manifest.json", "config.yaml"
 

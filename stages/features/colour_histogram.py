@@ -3,11 +3,11 @@
 from typing import Annotated, Literal, cast
 
 import cv2
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels
 
@@ -25,7 +25,7 @@ CONVERSIONS = {"lab": cv2.COLOR_BGR2Lab, "ycrcb": cv2.COLOR_BGR2YCrCb, "hsv": cv
 LEVELS = {"rgb": (256, 256, 256), "lab": (256, 256, 256), "ycrcb": (256, 256, 256), "hsv": (180, 256, 256)}
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _count(pixels: Pixels, edges: Ints, bins: Ints, sizes: Ints, offsets: Ints, joint: bool, length: int) -> Floats:
     segments = len(edges) - 1
     counts = np.zeros((segments, length), np.float32)

@@ -1,9 +1,9 @@
 """Colours of a patch by generalised moments: how its colour channels vary together."""
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.values.image import Pixels
 
 Floats = npt.NDArray[np.float32]
@@ -14,7 +14,7 @@ PAIRS = ((2, 1), (2, 0), (1, 0))
 """Red with green, red with blue, green with blue: channels of a blue-green-red image."""
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def add_pixel(sums: Sums, blue: float, green: float, red: float) -> None:
     """One more pixel in the ten sums of a patch: 1, b, g, r, bb, gg, rr, rg, rb, gb."""
     sums[0] += 1.0
@@ -29,7 +29,7 @@ def add_pixel(sums: Sums, blue: float, green: float, red: float) -> None:
     sums[9] += green * blue
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def correlations(sums: Sums, out: Floats) -> None:
     """C_RG, C_RB, C_GB of a patch's ten sums into `out` (3,); 0 where a channel does not vary.
 
@@ -49,7 +49,7 @@ def correlations(sums: Sums, out: Floats) -> None:
     out[2] = 0.0 if flat_g or flat_b else (sums[9] - sums[2] * sums[1] / number) / np.sqrt(gb)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _disc_colours(pixels: Pixels, seen: Bools, points: Sums, radii: Sums, out: Floats) -> None:
     rows, columns = seen.shape
     sums = np.empty(10)

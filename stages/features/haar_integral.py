@@ -3,11 +3,11 @@
 from typing import Annotated, Literal, NamedTuple
 
 import cv2
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
 from omninav.stages.geometry.appearance.haar_integrals import AngularWeights, Kernel, padded
@@ -54,7 +54,7 @@ class Binning(NamedTuple):
         return shares, float(np.sqrt(variance / len(values)))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _count(values: Floats, usable: Bools, bins: int, joint: bool, weighted: bool, counts: Array) -> float:
     # Gives the sum over values of their squared shares: 1 each where all of a value goes to one bin.
     low, part = np.empty(3, np.int64), np.empty(3)

@@ -3,11 +3,11 @@
 from typing import Annotated, Literal, cast
 
 import cv2
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels
 
@@ -16,7 +16,7 @@ from .segments import segment_edges
 Floats = npt.NDArray[np.float32]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _count(
     hsv: Pixels,
     edges: npt.NDArray[np.int64],

@@ -4,11 +4,11 @@ import math
 from typing import Annotated, NamedTuple, cast
 
 import cv2
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.feature_matching import spreads
 from omninav.stages.values.image import Image, Panorama, Pixels
@@ -40,7 +40,7 @@ class Segments(NamedTuple):
     descriptors: Floats
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _edges(steps: Floats, min_step: float, lines: Ints, rows: Array) -> int:
     height, width = steps.shape
     found = 0
@@ -55,7 +55,7 @@ def _edges(steps: Floats, min_step: float, lines: Ints, rows: Array) -> int:
     return found
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _describe(
     pixels: Pixels, grey: Floats, lines: Ints, ends: Array, margin: float, basis: Floats, out: Floats
 ) -> None:
@@ -118,7 +118,7 @@ def segments_of(
     return Segments(lines[kept], ends, descriptors)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _count_neighbours(
     starts: Ints, ends: Array, scaled: Floats, reach: int, scale: float, distance: float, circle: bool, crowd: Floats
 ) -> None:
@@ -145,7 +145,7 @@ def _count_neighbours(
                             crowd[j] += share
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _prototypes(
     order: Ints,
     lines: Ints,

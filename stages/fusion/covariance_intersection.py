@@ -2,11 +2,11 @@
 
 from typing import Annotated, Literal
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.probability.gaussians import (
     farther_apart,
     intersect_into,
@@ -64,13 +64,13 @@ def fuse(
     return means, covariances, weights
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _ratio(log_det_a: float, log_det_b: float, weight_a: float, weight_b: float) -> float:
     alpha: float = 1.0 / (1.0 + weight_a / weight_b * np.exp(log_det_b - log_det_a))
     return alpha
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _min_determinant(cov_a: Array, inverse_b: Array) -> float:
     # det(C^-1) over det(C_a^-1) is det(I + alpha E) with E = C_a C_b^-1 - I: a cubic in alpha, log-concave where C_a
     # and C_b are positive definite. Its slope's sign is followed to the one maximum in [0, 1].
@@ -100,7 +100,7 @@ def _min_determinant(cov_a: Array, inverse_b: Array) -> float:
     return 0.5 * (low + high)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _fuse(
     mean_a: Array,
     cov_a: Array,

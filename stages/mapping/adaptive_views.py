@@ -2,11 +2,11 @@
 
 from typing import Annotated, Literal
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.appearance.view_similarity import Shape, similarity
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.gaussians import (
@@ -234,7 +234,7 @@ def _floored(state: GaussianMixture, metres: float, radians: float) -> GaussianM
     return GaussianMixture(state.means[present], covariances, weights / weights.sum() if len(weights) else weights)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _update_weights(
     means: Array,
     covariances: Array,

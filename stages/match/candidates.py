@@ -4,11 +4,11 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs
+from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures
@@ -85,7 +85,7 @@ def within(poses: Array, places: Array, radius: float) -> npt.NDArray[np.bool_]:
     return found
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _near_cells(points: Array, numbers: Ints, height: int, radius: float) -> npt.NDArray[np.bool_]:
     # In units of cells; cell (i, j) has the number i * height + j, and `numbers` ascend.
     out, columns = np.zeros(len(points), np.bool_), numbers[-1] // height + 1

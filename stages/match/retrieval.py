@@ -3,11 +3,11 @@
 import math
 from typing import Annotated
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Stage
+from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import LANES, turned_views
 from omninav.stages.geometry.plane.se2 import wrap
@@ -23,7 +23,7 @@ Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _intersect(references: Floats, chosen: Ints, query: Floats, sums: Floats, held: Ints, out: Floats) -> None:
     # Turns of the query are the innermost axis: each loop over them is vector instructions.
     scales, segments, bins, lanes = query.shape

@@ -2,11 +2,11 @@
 
 import math
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context
+from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import MAX_COLOUR_DISTANCE, penalties, sorting_network
 from omninav.stages.geometry.plane.nearest_cells import NearestCells
@@ -21,7 +21,7 @@ from .near_references import Array, Floats, Ints, NearReferences
 
 
 # Sums over the bins may be taken in any order, which lets them be vector instructions.
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})
+@compiled(nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})
 def _similarity(
     poses: Array,
     references: Array,

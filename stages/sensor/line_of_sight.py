@@ -3,11 +3,11 @@
 import math
 from typing import Annotated, NamedTuple
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
 from omninav.stages.geometry.plane.grid_rays import cells_along
@@ -60,7 +60,7 @@ def first_occupied(cells: Cells, starts: Array, directions: Array) -> Sight:
     return Sight(found, faces)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _cast(cells: Cells, starts: Array, directions: Array) -> tuple[Ints, Ints]:
     found, faces = np.full((len(starts), 2), -1, np.int64), np.full(len(starts), -1, np.int64)
     rows, columns = cells.shape
@@ -81,7 +81,7 @@ def _cast(cells: Cells, starts: Array, directions: Array) -> tuple[Ints, Ints]:
     return found, faces
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _sees(cells: Cells, row: int, column: int, to_row: float, to_column: float) -> bool:
     # Whether the line from a cell's middle to a point crosses free cells only. The point lies in a free cell.
     last_row, last_column = math.floor(to_row), math.floor(to_column)
@@ -108,7 +108,7 @@ def grow_areas(cells: Cells, points: Array) -> tuple[Runs, npt.NDArray[np.int32]
     return _grow(cells, np.ascontiguousarray(points))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _grow(cells: Cells, points: Array) -> tuple[Runs, npt.NDArray[np.int32]]:
     rows, columns = cells.shape
     tried = np.full((rows, columns), -1, np.int32)
@@ -190,7 +190,7 @@ def covered(areas: VisibilityAreas, centres: Array, window: float) -> tuple[floa
     return float(seen.any(axis=1).mean()), float(seen.mean())
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _headings(
     starts: npt.NDArray[np.int32], runs: Runs, points: Array, where: Ints, centres: Array, window: float
 ) -> npt.NDArray[np.bool_]:

@@ -3,11 +3,11 @@
 import math
 from typing import Annotated
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.plane.nearest_cells import NearestCells, nearest_cells
 from omninav.stages.geometry.probability.evidence import best_headings, contrast_power, evidence_novelty
 from omninav.stages.values.belief import Likelihood, Particles
@@ -25,7 +25,7 @@ CUTOFF_SIGMAS = 3.0
 """Beyond this many fading distances a reference keeps less than 1.2 % of its influence."""
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _expected(
     poses: Array,
     references: Array,

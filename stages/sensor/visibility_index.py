@@ -3,10 +3,10 @@
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.values.grid import cells_of
 from omninav.stages.values.visibility import VisibilityAreas
 
@@ -72,7 +72,7 @@ def seen_from(areas: VisibilityAreas, looks: Looks, within: float = math.inf) ->
     return Cells(starts, items, areas.origin, areas.resolution, *areas.shape)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _by_cell(
     starts: Shorts, runs: npt.NDArray[np.uint16], rows: int, columns: int, target: Shorts, middle: Array, radius: float
 ) -> tuple[Ints, Numbers]:

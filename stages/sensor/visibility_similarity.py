@@ -3,9 +3,10 @@
 import math
 from typing import Any, Literal
 
-import numba
 import numpy as np
 import numpy.typing as npt
+
+from omninav.pipeline.engine.compiled import compiled
 
 from .visibility_index import Array, Cells, Ints, Looks, Numbers, Shorts
 
@@ -36,7 +37,7 @@ def sums_by_turn(looks: Looks, rows: Ints, values: Array, each: Array) -> tuple[
     return _sums(looks.starts, looks.reference, looks.turned, rows, np.ascontiguousarray(values), each)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _sums(
     starts: Ints, reference: Shorts, turned: Array, rows: Ints, values: Array, each: Array
 ) -> tuple[Floats, Floats]:
@@ -91,7 +92,7 @@ def mean_seen(
     return _seen(np.ascontiguousarray(poses), *cells, groups, sums, number, background_level, distance_sigma_m, *ahead)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _seen(
     poses: Array,
     starts: Ints,
@@ -163,7 +164,7 @@ def _seen(
     return out
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _gaussian(square: Single) -> Single:
     # exp(-square / 2) up to CUTOFF_SIGMAS standard deviations.
     t = square * np.float32(1 / 16)
@@ -174,7 +175,7 @@ def _gaussian(square: Single) -> Single:
     return power * power
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _turned_past(
     right: Floats, up: Floats, turn: Floats, number: int, headings: Single, whole: Shorts, part: Floats
 ) -> None:

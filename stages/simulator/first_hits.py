@@ -3,9 +3,10 @@
 import math
 from collections.abc import Sequence
 
-import numba
 import numpy as np
 import numpy.typing as npt
+
+from omninav.pipeline.engine.compiled import compiled
 
 from .bodies import Box, box_array
 
@@ -22,7 +23,7 @@ def first_hits(boxes: Sequence[Box], ceiling: float, eye: npt.ArrayLike, directi
     return np.asarray(_hits(box_array(boxes), float(ceiling), np.asarray(eye, np.float64), rays))
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _hits(boxes: F64, ceiling: float, eye: F64, rays: F64) -> F64:
     nearest = np.full(len(rays), math.inf)
     for i in range(len(rays)):
@@ -42,7 +43,7 @@ def _hits(boxes: F64, ceiling: float, eye: F64, rays: F64) -> F64:
     return nearest
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _slab(at: float, along: float, low: float, high: float, enter: float, leave: float) -> tuple[float, float]:
     """Clip the interval from `enter` to `leave` of a ray to the slab between two planes."""
     if along == 0.0:

@@ -9,6 +9,8 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from omninav.pipeline.engine.compiled import compiled
+
 from .config import Day, Lamp, WallPanel, WorldConfig
 from .streams import stream
 
@@ -158,7 +160,7 @@ def _blocking(boxes: F64, x: F64, y: F64, height: float) -> npt.NDArray[np.bool_
     return blocking
 
 
-@numba.njit(cache=True)
+@compiled()
 def _cover(boxes: F64, x: F64, y: F64, covered: npt.NDArray[np.bool_]) -> None:
     """Mark the points that lie in a box, or no further from it than half a step: no wall is too thin to be met."""
     step = x[1] - x[0]
@@ -176,7 +178,7 @@ def _cover(boxes: F64, x: F64, y: F64, covered: npt.NDArray[np.bool_]) -> None:
                     covered[row, column] = True
 
 
-@numba.njit(cache=True, error_model="numpy", parallel=True)
+@compiled(error_model="numpy", parallel=True)
 def _shine(
     lights: F64,
     blocking: npt.NDArray[np.bool_],
@@ -220,7 +222,7 @@ def _shine(
                         full[row, column] += fall * (lights[light, 6] + lights[light, 7] + lights[light, 8]) / 3.0
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _sees(
     blocking: npt.NDArray[np.bool_],
     x: float,
@@ -243,7 +245,7 @@ def _sees(
     return True
 
 
-@numba.njit(cache=True)
+@compiled()
 def _near(boxes: F64, corner: F64, step: float, reach: float, distance: F32) -> None:
     """Lower distances (rows, columns) to those of the boxes within `reach` m."""
     rows, columns = distance.shape

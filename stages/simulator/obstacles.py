@@ -4,10 +4,10 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.plane.grid_rays import cells_along
 
 F64 = npt.NDArray[np.float64]
@@ -65,7 +65,7 @@ def gather(bodies: Sequence[Body], size: tuple[float, float], reach: float) -> O
     return Obstacles(boxes, start, members, rows, columns, float(size[0]), float(size[1]), reach)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def nearest(obstacles: Obstacles, people: F64, x: float, y: float) -> tuple[float, float, float]:
     """Distance (m) of a point to the nearest obstacle, at most `reach`, and the direction x, y that leads away from it.
 
@@ -109,7 +109,7 @@ def nearest(obstacles: Obstacles, people: F64, x: float, y: float) -> tuple[floa
     return least, away_x, away_y
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def distances(obstacles: Obstacles, points: F64) -> F64:
     """Distances (N,) of points (N, 2) to the nearest obstacle, at most `reach`; 0 inside one or beyond the floor."""
     nobody = np.zeros((0, 3))
@@ -119,7 +119,7 @@ def distances(obstacles: Obstacles, points: F64) -> F64:
     return found
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def beam(obstacles: Obstacles, people: F64, x: float, y: float, dx: float, dy: float, farthest: float) -> float:
     """Distance (m) along a unit direction to the first box or person, infinite beyond `farthest`."""
     best = np.inf
@@ -143,7 +143,7 @@ def beam(obstacles: Obstacles, people: F64, x: float, y: float, dx: float, dy: f
     return best if best <= farthest else np.inf
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _first_box(obstacles: Obstacles, row: int, column: int, x: float, y: float, dx: float, dy: float) -> float:
     """Distance at which a ray enters the first of a cell's boxes; infinite without one."""
     best, cell = np.inf, row * obstacles.columns + column
@@ -152,7 +152,7 @@ def _first_box(obstacles: Obstacles, row: int, column: int, x: float, y: float, 
     return best
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _enter(box: F64, x: float, y: float, dx: float, dy: float) -> float:
     """Distance at which a ray enters a box; 0 inside, infinite where it misses."""
     cos, sin = box[2], box[3]

@@ -3,9 +3,10 @@
 import math
 from collections.abc import Sequence
 
-import numba
 import numpy as np
 import numpy.typing as npt
+
+from omninav.pipeline.engine.compiled import compiled
 
 from .config import Ranges
 from .obstacles import Obstacles, beam
@@ -39,7 +40,7 @@ def measure(room: Obstacles, people: F64, poses: npt.ArrayLike, ring: Ranges, rn
     return np.where(lost | (seen > ring.max_range), np.inf, seen)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _echoes(room: Obstacles, people: F64, poses: F64, readings: int, opening: float, farthest: float) -> F64:
     """The nearest hit within each cone, (N, readings)."""
     echoes = np.full((len(poses), readings), np.inf)

@@ -15,6 +15,8 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from omninav.pipeline.engine.compiled import compiled
+
 from .cameras import Rays
 from .people import Person, figures
 
@@ -119,7 +121,7 @@ def _light_on_deck(scene: Scene, x: float, y: float) -> F32:
     return here
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH, parallel=True)
+@compiled(error_model="numpy", fastmath=FAST_MATH, parallel=True)
 def _trace(
     scene: Scene,
     moving: Bodies,
@@ -144,7 +146,7 @@ def _trace(
         )  # fmt: skip
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+@compiled(error_model="numpy", fastmath=FAST_MATH)
 def _bearings(boxes: F64, x: float, y: float) -> F64:
     """Where boxes are seen from a point (B, 3): azimuth on the map, half the angle they take at most, distance."""
     seen = np.empty((len(boxes), 3))
@@ -157,7 +159,7 @@ def _bearings(boxes: F64, x: float, y: float) -> F64:
     return seen
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+@compiled(error_model="numpy", fastmath=FAST_MATH)
 def _chunk(
     scene: Scene,
     moving: Bodies,
@@ -306,7 +308,7 @@ def _chunk(
             lit[i, 2] += weight * red
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+@compiled(error_model="numpy", fastmath=FAST_MATH)
 def _boxes_in_wedge(
     boxes: F64,
     cell_start: I32,
@@ -438,7 +440,7 @@ def _boxes_in_wedge(
     return count, near, along_x
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+@compiled(error_model="numpy", fastmath=FAST_MATH)
 def _store_box(
     found: F64,
     number: int,
@@ -466,7 +468,7 @@ def _store_box(
     found[number, 9], found[number, 10] = cos, sin
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+@compiled(error_model="numpy", fastmath=FAST_MATH)
 def _first_hit(
     found: F64, fixed: int, count: int, dx: float, dy: float, dz: float, ahead: float, z: float, ceiling: float
 ) -> tuple[float, int, int]:
@@ -503,7 +505,7 @@ def _first_hit(
     return distance, which, face
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+@compiled(error_model="numpy", fastmath=FAST_MATH)
 def _first_hit_in_column(
     found: F64, fixed: int, count: int, ahead: float, dz: float, major: float, z: float, ceiling: float
 ) -> tuple[float, int, int]:
@@ -538,7 +540,7 @@ def _first_hit_in_column(
     return distance / max(ahead, 1e-9), which, face
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+@compiled(error_model="numpy", fastmath=FAST_MATH)
 def _enter(ox: float, oy: float, ux: float, uy: float, length: float, depth: float) -> tuple[float, float, int]:
     """Where a level ray from (ox, oy) along (ux, uy) enters and leaves a rectangle, and the side; 1e18 if it misses."""
     if ux == 0.0:
@@ -565,14 +567,14 @@ def _enter(ox: float, oy: float, ux: float, uy: float, length: float, depth: flo
     return enter, leave, side
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+@compiled(error_model="numpy", fastmath=FAST_MATH)
 def _half_log2(square: float) -> float:
     """Half the binary logarithm, from the parts of a 32-bit float, linear between powers of two: within 0.05."""
     bits = np.float32(square).view(np.int32)
     return 0.5 * (float(bits) * (1.0 / 8388608.0) - 127.0)
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+@compiled(error_model="numpy", fastmath=FAST_MATH)
 def _unpacked(texel: Any) -> Any:
     """The three colours of a texel, 21 bits apart: one multiplication then weighs all of them."""
     wide = np.uint64(texel)
@@ -583,7 +585,7 @@ def _unpacked(texel: Any) -> Any:
     )
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+@compiled(error_model="numpy", fastmath=FAST_MATH)
 def _sample(
     texels: U32, level_start: I64, levels: int, finest: int, texture: int, level: float, u: float, v: float
 ) -> tuple[float, float, float]:
@@ -603,7 +605,7 @@ def _sample(
     )
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+@compiled(error_model="numpy", fastmath=FAST_MATH)
 def _bilinear(texels: U32, start: int, side: int, texture: int, u: float, v: float, weight: float) -> Any:
     """The three colours at (u, v), 21 bits apart, times a weight."""
     column, row = max(u * side - 0.5, 0.0), max(v * side - 0.5, 0.0)
@@ -623,7 +625,7 @@ def _bilinear(texels: U32, start: int, side: int, texture: int, u: float, v: flo
     )
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+@compiled(error_model="numpy", fastmath=FAST_MATH)
 def _light(light: F32, side: int, column: float, row: float) -> tuple[float, float, float]:
     """Light that falls at a point of the light map on a face that looks one of five ways, linear between samples."""
     column = min(max(column, 0.0), light.shape[2] - 1.001)
@@ -648,7 +650,7 @@ def _light(light: F32, side: int, column: float, row: float) -> tuple[float, flo
     )
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+@compiled(error_model="numpy", fastmath=FAST_MATH)
 def _contact(contact: F32, column: float, row: float) -> float:
     """What bodies beside a point of the floor leave of its light, linear between samples."""
     column = min(max(column, 0.0), contact.shape[1] - 1.001)
@@ -660,7 +662,7 @@ def _contact(contact: F32, column: float, row: float) -> float:
     return float(lower + wy * (upper - lower))
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH)
+@compiled(error_model="numpy", fastmath=FAST_MATH)
 def _mixed(number: np.uint64) -> np.uint64:
     """The next number of a counter-based sequence: splitmix64's finaliser (Steele, Lea & Flood 2014)."""
     number = (number ^ (number >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -681,7 +683,7 @@ def _gaussian_quantiles(count: int) -> F32:
 QUANTILES = _gaussian_quantiles(4096)
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=FAST_MATH, parallel=True)
+@compiled(error_model="numpy", fastmath=FAST_MATH, parallel=True)
 def _expose(
     lit: F32, ray_of: I32, gain: F32, exposure: float, noise: float, key: np.uint64, quantiles: F32, image: U8
 ) -> None:

@@ -4,10 +4,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.plane.se2 import compose
 
 from .config import Kidnapping, Robot
@@ -74,13 +74,13 @@ def steer(
     _steer(state, speed, turning, robot, round(seconds / STEP_S), room, people)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _steer(state: F64, speed: float, turning: float, robot: F64, steps: int, room: Obstacles, people: F64) -> None:
     for _ in range(steps):
         _step(state, speed, turning, robot, room, people)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _step(state: F64, speed: float, turning: float, robot: F64, room: Obstacles, people: F64) -> None:
     wanted = _within(speed, robot[1])
     state[SPEED] += _within(wanted - state[SPEED], robot[3] * STEP_S)
@@ -96,7 +96,7 @@ def _step(state: F64, speed: float, turning: float, robot: F64, room: Obstacles,
     state[DISTANCE] += math.hypot(dx, dy)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _kept_off(state: F64, dx: float, dy: float, robot: F64, room: Obstacles, people: F64) -> tuple[float, float]:
     """A small motion, reduced by contact with obstacles."""
     now, away_x, away_y = nearest(room, people, state[X], state[Y])
@@ -118,7 +118,7 @@ def _kept_off(state: F64, dx: float, dy: float, robot: F64, room: Obstacles, peo
     return dx, dy
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _within(value: float, limit: float) -> float:
     return max(-limit, min(limit, value))
 
@@ -214,7 +214,7 @@ def _nearest_along(points: F64, ends: F64, at: F64, along: float = 0.0) -> float
     return float(places[chosen[int(np.argmin(off[chosen]))]])
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _point(points: F64, ends: F64, along: float) -> tuple[float, float]:
     """The point `along` metres from the start of a line."""
     if len(points) == 1:
@@ -227,12 +227,12 @@ def _point(points: F64, ends: F64, along: float) -> tuple[float, float]:
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _leg(ends: F64, along: float) -> int:
     return np.searchsorted(ends, along)  # type: ignore[return-value]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _pursue(
     points: F64,
     ends: F64,

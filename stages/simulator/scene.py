@@ -3,9 +3,10 @@
 import math
 from collections.abc import Sequence
 
-import numba
 import numpy as np
 import numpy.typing as npt
+
+from omninav.pipeline.engine.compiled import compiled
 
 from . import textures
 from .bodies import Box, Coverings, Tiling, box_array
@@ -94,7 +95,7 @@ def cells(boxes: F64, grid: F64, rows: int, columns: int) -> tuple[I32, I32]:
     return _cells(np.clip(low, 0, last), np.clip(high, 0, last), rows, columns)
 
 
-@numba.njit(cache=True)
+@compiled()
 def _cells(low: I64, high: I64, rows: int, columns: int) -> tuple[I32, I32]:
     start = np.zeros(rows * columns + 1, dtype=np.int32)
     for box in range(len(low)):

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from omninav.pipeline.engine.code_version import module_version, surroundings
 from omninav.pipeline.files import digest_file, digest_text
 from omninav.stages import camera, simulator
 from omninav.stages.geometry.plane import odometry_noise, se2
@@ -245,12 +246,13 @@ def in_order(days: int | Sequence[int]) -> list[int]:
 
 
 def simulation_digest(world: WorldConfig) -> str:
-    """sha256 over a world and the code that simulates it."""
+    """sha256 over a world and the code and libraries that simulate it."""
     folders = [Path(str(package.__file__)).parent for package in (simulator, camera)]
     code = [file for folder in folders for file in sorted(folder.glob("*.py"))]
     code += [Path(str(module.__file__)) for module in (odometry_noise, se2)]
     described = json.dumps(dataclasses.asdict(world), sort_keys=True)
-    return digest_text(described, *(digest_file(path) for path in code))
+    known = surroundings(), module_version(__name__)
+    return digest_text(described, *known, *(digest_file(path) for path in code))
 
 
 def scan_value(world: WorldConfig, metres: F64) -> Scan:

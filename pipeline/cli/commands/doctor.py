@@ -4,8 +4,8 @@ import os
 import platform
 from pathlib import Path
 
+from omninav.pipeline.engine.code_version import LIBRARIES, version
 from omninav.pipeline.graph.registry import entries
-from omninav.pipeline.run.provenance import LIBRARIES, version
 
 
 def command(arguments: list[str]) -> int:

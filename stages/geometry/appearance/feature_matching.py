@@ -2,10 +2,11 @@
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import KDTree
+
+from omninav.pipeline.engine.compiled import compiled
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float32]
@@ -32,7 +33,7 @@ class Pairs(NamedTuple):
 NO_PAIRS = Pairs(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _mutual(squares: Floats, ratio: float, first: Ints, second: Ints, distance: Array, unclear: Array) -> int:
     rows, columns = squares.shape
     nearest_row = np.zeros(columns, np.int64)

@@ -8,9 +8,10 @@ import math
 from typing import Literal, NamedTuple
 
 import cv2
-import numba
 import numpy as np
 import numpy.typing as npt
+
+from omninav.pipeline.engine.compiled import compiled
 
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
@@ -49,7 +50,7 @@ def circle_taps(radius: float, angles: int, turn: float = 0.0) -> Taps:
     )
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _row_of_taps(flat: Floats, at: int, offsets: Ints, weights: Floats, out: Floats) -> None:
     length = len(out)
     s0, s1 = flat[at + offsets[0] : at + offsets[0] + length], flat[at + offsets[1] : at + offsets[1] + length]
@@ -59,7 +60,7 @@ def _row_of_taps(flat: Floats, at: int, offsets: Ints, weights: Floats, out: Flo
         out[x] = (w0 * s0[x] + w1 * s1[x]) + (w2 * s2[x] + w3 * s3[x])
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _means(
     flat: Floats,
     stride: int,
@@ -100,7 +101,7 @@ def _means(
             out[row, x] = total[x] * share
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _means_at(
     flat: Floats,
     starts: Ints,

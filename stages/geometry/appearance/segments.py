@@ -2,9 +2,10 @@
 
 import functools
 
-import numba
 import numpy as np
 import numpy.typing as npt
+
+from omninav.pipeline.engine.compiled import compiled
 
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
@@ -60,7 +61,7 @@ def penalties(segments: int, exponent: float) -> Floats:
     return factors
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _compare(
     references: Floats,
     chosen: Ints,
@@ -161,7 +162,7 @@ def selective_similarity(expected: Floats, observed: Floats, exponent: float = 0
     return out
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _compare_many(expected: Floats, observed: Floats, network: Ints, factors: Floats, out: Floats) -> None:
     segments, bins = observed.shape
     alike = np.empty(segments, np.float32)

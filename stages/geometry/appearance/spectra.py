@@ -2,9 +2,10 @@
 
 import math
 
-import numba
 import numpy as np
 import numpy.typing as npt
+
+from omninav.pipeline.engine.compiled import compiled
 
 Array = npt.NDArray[np.float64]
 FloatArray = npt.NDArray[np.float32]
@@ -35,7 +36,7 @@ def spectral_distances(values: FloatArray, kept: FloatArray, channels: int, segm
     return _size_distances(values, np.ascontiguousarray(kept), share)
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"reassoc"})
+@compiled(nogil=True, fastmath={"reassoc"})
 def _size_distances(values: FloatArray, kept: FloatArray, share: FloatArray) -> Array:
     # One pass in single precision: five times as fast as arrays of complex numbers over a whole map.
     half = len(share)

@@ -2,9 +2,10 @@
 
 import math
 
-import numba
 import numpy as np
 import numpy.typing as npt
+
+from omninav.pipeline.engine.compiled import compiled
 
 from .se2 import compose, wrap
 
@@ -26,7 +27,7 @@ def decompose_motion(x: float, y: float, turn: float) -> Triple:
     return first, translation, float(wrap(turn - first))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def move_poses(poses: Array, motion: Triple, sigmas: Triple, noise: Array) -> Array:
     """Poses (N, 3) after rotation, translation, rotation, with `noise` (3, N) of unit variance scaled by `sigmas`."""
     out = np.empty_like(poses)

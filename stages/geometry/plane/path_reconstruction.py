@@ -1,8 +1,9 @@
 """Reconstructs a path between two known poses from the odometry, by smoothing from both ends."""
 
-import numba
 import numpy as np
 import numpy.typing as npt
+
+from omninav.pipeline.engine.compiled import compiled
 
 from .se2 import chain, compose, wrap
 
@@ -55,13 +56,13 @@ def reconstruct_path(
     return np.column_stack([at[:, :2], wrap(at[:, 2])]), covariances, missed
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _wrapped(difference: Array) -> Array:
     difference[2] -= 2 * np.pi * np.floor((difference[2] + np.pi) / (2 * np.pi))
     return difference
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _linearised(pose: Array, motion: Array, noise: Array) -> tuple[Array, Array, Array]:
     # Where a motion leads from a pose, how that changes with the pose, and its noise in the map's frame.
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
@@ -72,7 +73,7 @@ def _linearised(pose: Array, motion: Array, noise: Array) -> tuple[Array, Array,
     return end, slope, turn @ noise @ turn.T
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _forward(first: Array, first_covariance: Array, motions: Array, noise: Array, at: Array) -> tuple[Array, Array]:
     # The forward pass: each pose from the first end and the motions.
     forward, covariance = np.empty((len(at), 3)), np.empty((len(at), 3, 3))
@@ -84,7 +85,7 @@ def _forward(first: Array, first_covariance: Array, motions: Array, noise: Array
     return forward, covariance
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _backward(
     motions: Array,
     noise: Array,

@@ -2,15 +2,16 @@
 
 import math
 
-import numba
 import numpy as np
 import numpy.typing as npt
+
+from omninav.pipeline.engine.compiled import compiled
 
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def best_headings(values: Floats) -> Floats:
     """Each reference's similarity at its best heading: (references, headings) -> (references,)."""
     out = np.empty(len(values), np.float32)

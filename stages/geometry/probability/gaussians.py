@@ -6,10 +6,10 @@ the shorter turn, in [-pi, pi): a heading's spread is taken to be well below hal
 
 import math
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.plane.se2 import wrap
 
 Array = npt.NDArray[np.float64]
@@ -156,14 +156,14 @@ def _triangular(covariances: Array) -> Array:
     return np.asarray(factors, np.float64)
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@compiled(nogil=True, inline="always")
 def shorter_turn(angle: float) -> float:
     """An angle brought into [-pi, pi)."""
     turn: float = angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
     return turn
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _density(points: Array, means: Array, factors: Array, scales: Array) -> Array:
     # Distances first, in a loop without a branch: the compiler then takes several points at a time.
     number = len(points)
@@ -183,7 +183,7 @@ def _density(points: Array, means: Array, factors: Array, scales: Array) -> Arra
     return out
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def squared_distance(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array) -> float:
     """Squared Mahalanobis distance between two means with C_a + C_b, by its Cholesky factor."""
     dx, dy, turn = mean_b[0] - mean_a[0], mean_b[1] - mean_a[1], shorter_turn(mean_b[2] - mean_a[2])
@@ -199,7 +199,7 @@ def squared_distance(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array) -
     return squared
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _squared_distances(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array) -> Array:
     out = np.empty((len(mean_a), len(mean_b)))
     for a in range(len(mean_a)):
@@ -208,7 +208,7 @@ def _squared_distances(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array)
     return out
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def farther_apart(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array, limit: float) -> bool:
     """Whether x, y or heading alone shows that the squared distance is `limit` or more: a cheap test for most pairs."""
     for i in range(3):
@@ -220,7 +220,7 @@ def farther_apart(mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array, limi
     return False
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _nearest(i: int, means: Array, covariances: Array, alive: npt.NDArray[np.bool_], limit: float) -> tuple[int, float]:
     best, closest = -1, limit
     for j in range(i + 1, len(means)):
@@ -231,7 +231,7 @@ def _nearest(i: int, means: Array, covariances: Array, alive: npt.NDArray[np.boo
     return best, closest
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _merge(means: Array, covariances: Array, weights: Array, shares: Array, limit: float, spread: bool) -> Ints:
     # Works in place. Each row knows its nearest later one; a row whose nearest has changed keeps its distance as a
     # bound from below until it is looked at, so that most merges cost one pass.
@@ -269,7 +269,7 @@ def _merge(means: Array, covariances: Array, weights: Array, shares: Array, limi
     return np.flatnonzero(alive)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _merge_pair(means: Array, covariances: Array, weights: Array, shares: Array, a: int, b: int, spread: bool) -> None:
     total = weights[a] + weights[b]
     share = weights[b] / total if total > 0.0 else 0.5
@@ -294,7 +294,7 @@ def _merge_pair(means: Array, covariances: Array, weights: Array, shares: Array,
     shares[a] += shares[b]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def inverse_into(matrix: Array, out: Array) -> float:
     """The inverse of a positive definite matrix (3, 3) into `out`, and the logarithm of its determinant.
 
@@ -321,7 +321,7 @@ def inverse_into(matrix: Array, out: Array) -> float:
     return determinant
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def intersect_into(
     mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array, alpha: float, mean: Array, covariance: Array
 ) -> bool:

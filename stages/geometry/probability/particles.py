@@ -3,10 +3,11 @@
 import itertools
 from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import KDTree
+
+from omninav.pipeline.engine.compiled import compiled
 
 Array = npt.NDArray[np.float64]
 Members = npt.NDArray[np.bool_]
@@ -29,7 +30,7 @@ def weighted_mean(poses: Array, weights: Array) -> Array:
     return _mean(poses, weights, np.sin(poses[:, 2]), np.cos(poses[:, 2]), np.ones(len(poses), np.bool_))[0]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _mean(poses: Array, weights: Array, sines: Array, cosines: Array, members: Members) -> tuple[Array, float]:
     mean = np.zeros(3)
     total = sine = cosine = 0.0
@@ -45,7 +46,7 @@ def _mean(poses: Array, weights: Array, sines: Array, cosines: Array, members: M
     return mean, total
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _covariance(poses: Array, weights: Array, mean: Array, members: Members) -> Array:
     covariance = np.zeros((3, 3))
     total = 0.0
@@ -78,7 +79,7 @@ def heaviest_mode(poses: Array, weights: Array, radius: float = 1.0) -> tuple[Ar
     return mean, _covariance(poses, weights, mean, members), mass / float(weights.sum())
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _heaviest_cell(poses: Array, weights: Array, cell: float) -> Array:
     # The centre of the cell that is heaviest together with its neighbours. Only cells with a particle are kept, in a
     # table with open addresses that is never more than half full.
@@ -118,7 +119,7 @@ def _heaviest_cell(poses: Array, weights: Array, cell: float) -> Array:
     return np.array([x * cell, y * cell, heading - 2 * np.pi * (heading > np.pi)])
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _slot(slots: npt.NDArray[np.int32], cells: npt.NDArray[np.int64], number: int) -> int:
     at = (number * 40503) % len(slots)
     while slots[at] >= 0 and cells[slots[at]] != number:
@@ -126,7 +127,7 @@ def _slot(slots: npt.NDArray[np.int32], cells: npt.NDArray[np.int64], number: in
     return at
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _climb(poses: Array, weights: Array, sines: Array, cosines: Array, centre: Array, radius: float) -> Members:
     # Mean shift with a flat kernel; the particles it ends with, or all of them where it finds none.
     members = np.zeros(len(poses), np.bool_)
@@ -170,7 +171,7 @@ def systematic(weights: Array, number: int, offset: float) -> npt.NDArray[np.int
     return _comb(weights, number, offset)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _comb(weights: Array, number: int, offset: float) -> npt.NDArray[np.int64]:
     out = np.empty(number, np.int64)
     step = weights.sum() / number

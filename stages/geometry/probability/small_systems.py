@@ -2,14 +2,15 @@
 
 import math
 
-import numba
 import numpy as np
 import numpy.typing as npt
+
+from omninav.pipeline.engine.compiled import compiled
 
 Array = npt.NDArray[np.float64]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def solve(matrix: Array, right: Array) -> Array:
     """x of A x = b for a symmetric, positive definite A (n, n) and b (n,), by A = L L'; zeros where A is not definite.
 
@@ -37,7 +38,7 @@ def solve(matrix: Array, right: Array) -> Array:
     return x
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def cross(one: Array, two: Array) -> Array:
     """The vector product of two vectors (3,)."""
     out = np.empty(3)
@@ -47,7 +48,7 @@ def cross(one: Array, two: Array) -> Array:
     return out
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def unit(vector: Array) -> Array:
     """A vector (3,) at length 1."""
     length = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
@@ -57,7 +58,7 @@ def unit(vector: Array) -> Array:
     return out
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def rotated_by(rotation: Array, x: float, y: float, z: float) -> Array:
     """A rotation (3, 3) turned further by a rotation vector (rad) given in the frame that it leads to."""
     angle = math.sqrt(x * x + y * y + z * z)

@@ -8,11 +8,11 @@ Bearings may look anywhere on the sphere.
 
 import math
 
-import numba
 import numpy as np
 import numpy.typing as npt
 import poselib
 
+from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.probability.small_systems import rotated_by
 
 from .ransac import BATCH, AgreedPose, samples_needed, samples_of
@@ -94,7 +94,7 @@ def sees(
     return np.asarray((cos > math.cos(threshold) * length) & (length > 0.0))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _miss(R: Array, t: Array, bearing: Array, point: Array) -> float:
     # 1 - cosine between where a point is and where it is seen: half the squared angle.
     x, y, z = point[0] - t[0], point[1] - t[1], point[2] - t[2]
@@ -109,7 +109,7 @@ def _miss(R: Array, t: Array, bearing: Array, point: Array) -> float:
     return float(1.0 - cos / length)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _judge(
     rotations: Array, translations: Array, bearings: Array, points: Array, limit: float
 ) -> tuple[npt.NDArray[np.int64], Array]:
@@ -141,7 +141,7 @@ def refined_camera(
     return _refined(np.ascontiguousarray(rotation), translation, bearings, points, limit, freedoms, steps)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _moved(R: Array, t: Array, step: Array) -> tuple[Array, Array]:
     # Freedoms: x, y, turn about the vertical; then, unless planar, z and both other turns.
     x, y, yaw = step[0], step[1], step[2]
@@ -149,7 +149,7 @@ def _moved(R: Array, t: Array, step: Array) -> tuple[Array, Array]:
     return rotated_by(R, roll, pitch, yaw), t + np.array([x, y, z])
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _tukey(R: Array, t: Array, bearings: Array, points: Array, limit: float) -> float:
     cost = 0.0
     for n in range(len(bearings)):
@@ -158,7 +158,7 @@ def _tukey(R: Array, t: Array, bearings: Array, points: Array, limit: float) -> 
     return cost
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _normal_equations(
     R: Array, t: Array, bearings: Array, points: Array, limit: float, freedoms: int
 ) -> tuple[Array, Array]:
@@ -194,7 +194,7 @@ def _normal_equations(
 _refinement = refinement(_tukey, _normal_equations, _moved)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _refined(
     R: Array, t: Array, bearings: Array, points: Array, limit: float, freedoms: int, steps: int
 ) -> tuple[Array, Array]:

@@ -12,10 +12,11 @@ for a positive z.
 
 import math
 
-import numba
 import numpy as np
 import numpy.typing as npt
 import poselib
+
+from omninav.pipeline.engine.compiled import compiled
 
 from .triangulation import depths
 
@@ -116,7 +117,7 @@ def planar_two_points(first: npt.ArrayLike, second: npt.ArrayLike) -> Poses:
     return rotations, translations
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def planar_candidates(first: Array, second: Array, samples: Ints) -> tuple[Array, Array, Ints]:
     """`planar_two_points` of many samples (S, 2), rows of `first` and `second` (N, 3).
 
@@ -137,7 +138,7 @@ def planar_candidates(first: Array, second: Array, samples: Ints) -> tuple[Array
     return rotations[:number], translations[:number], owners[:number]
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _planar(b1: Array, c1: Array, b2: Array, c2: Array, out: Array) -> int:
     # b and c: the two points. Rows of `out`: theta, phi. With N = adj(B) A: |N u|^2 = det(B)^2 |u|^2.
     a00, a01 = -b2[2] * b1[1], b2[2] * b1[0]

@@ -8,11 +8,11 @@ by less than a threshold, meet in front of both cameras (errata 35 and 36 in doc
 import math
 from typing import Literal
 
-import numba
 import numpy as np
 import numpy.typing as npt
 from scipy.special import betainc
 
+from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.probability.small_systems import cross, rotated_by, unit
 
 from .epipolar import decompose, eight_points, five_points, planar_candidates
@@ -129,7 +129,7 @@ def agreement(
     return np.asarray(_agree(rotation, translation, first, second, math.sin(threshold) ** 2))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _agree(R: Array, t: Array, first: Array, second: Array, limit: float) -> Bools:
     agrees = np.empty(len(first), np.bool_)
     for n in range(len(first)):
@@ -137,7 +137,7 @@ def _agree(R: Array, t: Array, first: Array, second: Array, limit: float) -> Boo
     return agrees
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _residual(R: Array, t: Array, b: Array, c: Array) -> float:
     # Sine of the shared residual of `epipolar`, with its sign: b.(t x R c) over the lengths of t x R c and t x b.
     x = R[0, 0] * c[0] + R[0, 1] * c[1] + R[0, 2] * c[2]
@@ -149,7 +149,7 @@ def _residual(R: Array, t: Array, b: Array, c: Array) -> float:
     return (b[0] * nx + b[1] * ny + b[2] * nz) / math.sqrt(length) if length > 0.0 else 0.0
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _squares(R: Array, t: Array, b: Array, c: Array) -> tuple[float, float]:
     # Squared sines of the angle by which two bearings must move to meet in front of both cameras: with t, with -t.
     x = R[0, 0] * c[0] + R[0, 1] * c[1] + R[0, 2] * c[2]
@@ -166,7 +166,7 @@ def _squares(R: Array, t: Array, b: Array, c: Array) -> tuple[float, float]:
     return (behind, miss) if ahead < 0.0 and back < 0.0 else (behind, behind)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _judge(
     rotations: Array, translations: Array, first: Array, second: Array, sine: float
 ) -> tuple[Ints, Array, Array]:
@@ -202,7 +202,7 @@ def refined_pose(
     return _refined(np.ascontiguousarray(rotation), translation, first, second, limit, freedoms, steps)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _moved(R: Array, t: Array, step: Array) -> tuple[Array, Array]:
     # Freedoms: the turn about the vertical, t sideways, and, unless planar, both other turns and t upwards.
     level = math.hypot(t[0], t[1])
@@ -213,7 +213,7 @@ def _moved(R: Array, t: Array, step: Array) -> tuple[Array, Array]:
     return rotated_by(R, step[2], step[3], step[0]), unit(t + step[1] * side + step[4] * cross(t, side))
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _tukey(R: Array, t: Array, first: Array, second: Array, limit: float) -> float:
     cost = 0.0
     for n in range(len(first)):
@@ -222,7 +222,7 @@ def _tukey(R: Array, t: Array, first: Array, second: Array, limit: float) -> flo
     return cost
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _normal_equations(
     R: Array, t: Array, first: Array, second: Array, limit: float, freedoms: int
 ) -> tuple[Array, Array]:
@@ -251,7 +251,7 @@ def _normal_equations(
 _refinement = refinement(_tukey, _normal_equations, _moved)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _refined(
     R: Array, t: Array, first: Array, second: Array, limit: float, freedoms: int, steps: int
 ) -> tuple[Array, Array]:

@@ -1,10 +1,16 @@
 """Cached results are stale when code they follow from has changed, and only then."""
 
+import itertools
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from omninav.pipeline.engine import code_version
+
+ROOT = Path(__file__).resolve().parents[3]
 
 STAGE = """
 from omninav.pipeline import Context, Outputs, Stage
@@ -63,3 +69,45 @@ def test_a_change_elsewhere_in_its_package_is_not(package: Path) -> None:
     before = version(package)
     (package / "pack/other.py").write_text("w = 2\n")
     assert version(package) == before
+
+
+DIGEST = """
+from omninav.pipeline.engine.code_version import graph_digest
+from omninav.pipeline.graph.builder import build
+print(graph_digest(build({"nodes": {"source": {"_target_": "toys.Count"}}, "wires": {}}, {})))
+"""
+
+
+def of_graph(place: Path) -> str:
+    """The digest of a graph that is run by the framework in a folder."""
+    tests = str(Path(__file__).parents[2])
+    environment = {"PYTHONPATH": f"{place}:{tests}", "PATH": "/usr/bin:/bin", "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [sys.executable, "-c", DIGEST]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True, cwd=place).stdout
+
+
+def test_a_change_of_the_engine_is_another_digest_and_one_of_a_command_is_not(tmp_path: Path) -> None:
+    for name in ("pipeline", "__init__.py"):
+        origin = ROOT / "omninav" / name
+        (shutil.copytree if origin.is_dir() else shutil.copyfile)(origin, tmp_path / "omninav" / name)
+    found = [of_graph(tmp_path)]
+    for changed in ("engine/engine.py", "graph/builder.py", "cli/terminal.py"):
+        with (tmp_path / "omninav" / "pipeline" / changed).open("a") as file:
+            file.write("changed = True\n")
+        found.append(of_graph(tmp_path))
+    faked = tmp_path / "numpy-99.0.dist-info" / "METADATA"
+    faked.parent.mkdir()
+    faked.write_text("Metadata-Version: 2.1\nName: numpy\nVersion: 99.0\n")
+    found.append(of_graph(tmp_path))
+    assert [first == second for first, second in itertools.pairwise(found)] == [False, False, True, False]
+
+
+@pytest.mark.parametrize("library", code_version.LIBRARIES)
+def test_another_version_of_any_library_is_another_digest(library: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    before, version = code_version.surroundings(), code_version.version
+    monkeypatch.setattr(code_version, "version", lambda name: "99.0" if name == library else version(name))
+    code_version.surroundings.cache_clear()
+    changed = code_version.surroundings()
+    monkeypatch.undo()
+    code_version.surroundings.cache_clear()
+    assert changed != before == code_version.surroundings()

@@ -1,0 +1,57 @@
+"""Compiled functions, kept on disk for as long as nothing that they were compiled from has changed."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, TypeVar
+
+import numba
+import numpy as np
+from numba.core import caching
+
+from .code_version import module_version, version
+
+FunctionCache: Any = caching.FunctionCache
+Index: Any = caching.IndexDataCacheFile
+Function = TypeVar("Function", bound=Callable[..., Any])
+FRAMEWORK = __name__.rpartition(".engine.")[0]
+"""No compiled function calls what lies there."""
+
+
+def compiled(**options: Any) -> Callable[[Function], Function]:
+    """Compile a function as `numba.njit` with these options does, and keep the machine code on disk.
+
+    With `cache=True` numba itself compiles again when the function's own file has changed, and its code holds that of
+    the functions which it calls, and the constants that it reads. So here it is compiled again when any file has
+    changed that its module imports of its own package, directly or not.
+    """
+
+    def decorated(function: Function) -> Function:
+        dispatcher: Any = numba.njit(**options)(function)
+        with suppress(RuntimeError):  # no folder can be written to: it is compiled in every process
+            dispatcher._cache = CompiledCache(function)
+        return dispatcher  # type: ignore[no-any-return]
+
+    return decorated
+
+
+class CompiledCache(FunctionCache):  # type: ignore[misc]
+    """The machine code of one function, in the folder that numba chooses."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        stamp = (module_version(function.__module__, FRAMEWORK), np.__version__, version("llvmlite"))
+        self._cache_file = Index(self._cache_path, self._impl.filename_base, stamp)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """What was kept for a signature; None where that is nothing, or damaged."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:
+            with suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep it; where the disk is full it is compiled again the next time."""
+        with suppress(OSError):
+            super().save_overload(sig, data)
