@@ -18,7 +18,7 @@ from omninav.pipeline.report.rendering import render
 from .conditions import ConditionRun
 from .plots import plots_of, row_labels
 from .specification import Experiment, Measure, figure_of
-from .verdicts import Case, Results, Verdict, judge, key_of, pooled, samples
+from .verdicts import Case, Results, Verdict, in_words, judge, key_of, pooled, samples
 
 STYLES = {"holds": "held", "does not hold": "broken", "undecided": "quiet"}
 """The CSS class of a verdict."""
@@ -96,6 +96,13 @@ def number(value: float | None, digits: int) -> str:
     return f"{value:.1g}" if value and not float(text) else text
 
 
+def made_with(version: str, commit: str | None, words: str = "Made with") -> str:
+    """At which version and commit a page was made, or judged again: in 12 digits, and whether it had changes."""
+    known, dirty, _ = (commit or "").partition("-dirty")
+    at = f", commit {known[:12]}" + (" with changes that are not committed" if dirty else "") if known else ""
+    return f"{words} omninav {version}{at}"
+
+
 def mean_and_spread(values: Sequence[float], digits: int) -> str:
     """Mean ± standard deviation; the one value where it is alone, a dash where there is nothing."""
     if len(values) < 2:
@@ -119,13 +126,9 @@ def _verdict(experiment: Experiment, verdict: Verdict) -> dict[str, Any]:
         "claim": verdict.claim,
         "paper": verdict.paper,
         "measure": measure.title,
-        "holds": _held(verdict.holds),
+        "holds": in_words(verdict.holds),
         "rows": rows,
     }
-
-
-def _held(holds: bool | None) -> str:
-    return {True: "holds", False: "does not hold", None: "undecided"}[holds]
 
 
 def _case(case: Case, measure: Measure) -> dict[str, str]:
@@ -142,7 +145,7 @@ def _case(case: Case, measure: Measure) -> dict[str, str]:
         "against": case.against,
         "difference": difference,
         "interval": interval,
-        "holds": _held(case.holds),
+        "holds": in_words(case.holds),
     }
 
 

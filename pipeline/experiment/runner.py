@@ -26,7 +26,7 @@ from .conditions import (
     timed_groups,
 )
 from .job_progress import JobProgress
-from .page import PageContent, write_page
+from .page import PageContent, made_with, write_page
 from .process_pool import Job, run_jobs
 from .repetition import finished
 from .shared_inputs import Recording, artifacts_of, recordings_of
@@ -195,9 +195,7 @@ class ExperimentRun:
             stated = read_json(self.folder / STATE)
         except Damaged:
             return ""
-        commit, dirty, _ = str(stated.get("git_commit") or "").partition("-dirty")
-        known = f", commit {commit[:12]}" + (" with changes that are not committed" if dirty else "") if commit else ""
-        return f"Made with omninav {stated['omninav']}{known}"
+        return made_with(str(stated["omninav"]), stated.get("git_commit"))
 
 
 def plan_experiment(

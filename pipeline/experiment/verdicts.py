@@ -1,7 +1,7 @@
 """Claims against results: means, bootstrap intervals of paired differences, and whether each claim holds."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ Results = Mapping[tuple[tuple[str, str], ...], Mapping[int, Mapping[str, Any]]]
 RESAMPLES = 4999
 CONFIDENCE = 0.95
 MIN_REPETITIONS = 6
-"""With fewer an interval means nothing: no verdict is made from it."""
+"""With fewer neither an interval nor a mean says what the next repetition would do: no verdict is made from them."""
 MARGIN = 0.05
 """Share of the other side by which `not_above` may be above it: no amount of data shows that two figures are equal."""
 
@@ -72,6 +72,32 @@ class Verdict:
             "interval": {case["where"]: case["interval"] for case in cases},
             "cases": cases,
         }
+
+
+def verdict_of(plain: Mapping[str, Any]) -> Verdict:
+    """A verdict as verdicts.json holds it (`Verdict.plain`)."""
+    cases = [Case(**case | {"interval": case["interval"] and tuple(case["interval"])}) for case in plain["cases"]]
+    return Verdict(plain["claim"], plain["measure"], plain["paper"], tuple(cases))
+
+
+def judged_again(verdict: Verdict) -> Verdict:
+    """A verdict of an earlier day by today's rule, as far as its figures tell: few repetitions decide nothing."""
+    few = [replace(case, holds=None) if case.judged < MIN_REPETITIONS else case for case in verdict.cases]
+    return replace(verdict, cases=tuple(few))
+
+
+def in_words(holds: bool | None) -> str:
+    """What a claim or a case comes to."""
+    return {True: "holds", False: "does not hold", None: "undecided"}[holds]
+
+
+def headline(verdicts: Sequence[Verdict]) -> str:
+    """What the claims of a page come to together: it holds where every claim does."""
+    found = [verdict.holds for verdict in verdicts]
+    if len(set(found)) == 1 and (found[0] is not False or len(found) == 1):
+        return in_words(found[0])
+    undecided = found.count(None)
+    return f"{found.count(True)} of {len(found)} hold" + (f", {undecided} undecided" if undecided else "")
 
 
 def key_of(labels: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
@@ -217,12 +243,12 @@ def _holds(
     """Whether a comparison comes out true; None where the repetitions do not decide it."""
     low, high = interval
     holds: bool | None
-    if side == "at_most":
+    if judged < MIN_REPETITIONS:
+        holds = None
+    elif side == "at_most":
         holds = difference <= 1e-9
     elif side == "at_least":
         holds = difference >= -1e-9
-    elif judged < MIN_REPETITIONS:
-        holds = None
     elif side == "not_above":  # better or within the margin; worse; or not decided
         holds = True if high <= MARGIN * other else False if low > 0.0 else None
     elif side == "no_worse":

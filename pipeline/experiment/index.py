@@ -1,0 +1,111 @@
+"""The table of finished experiments: written from their verdict files, which are judged again by today's rule."""
+
+import json
+import re
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+from omninav.pipeline.files import write_whole
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.run.provenance import git_commit
+
+from .page import made_with
+from .verdicts import Verdict, headline, in_words, judged_again, verdict_of
+
+BEGIN, END = "<!-- table: omninav experiments -->", "<!-- end of the table -->"
+HEAD = ("page", "command", "verdict", "what does not hold, or is undecided")
+VERDICT_WORDS = "holds|does not hold|undecided"
+RULE = "a claim of fewer than six repetitions is undecided"
+
+
+def write_index(folder: Path) -> list[str]:
+    """Judge the pages of a folder again, and write the table of them into its README.md, between the two marks.
+
+    Of each `NAME.verdicts.json` and `NAME.md`: where today's rule judges a claim otherwise, both files are changed, and
+    the page says at which commit. Returns the names of those. Raises BadInput where a file is not as a page is written.
+    """
+    readme = folder / "README.md"
+    text = _read(readme)
+    before, found, rest = text.partition(BEGIN)
+    _, ended, after = rest.partition(END)
+    if not found or not ended:
+        raise BadInput(f"{readme}: needs a line {BEGIN} and below it a line {END}: the table goes between them")
+    changed = [path.name.partition(".")[0] for path in verdict_files(folder) if _judge_again(path)]
+    write_whole(readme, f"{before}{BEGIN}\n{index_table(folder)}{END}{after}")
+    return changed
+
+
+def verdict_files(folder: Path) -> list[Path]:
+    """The verdict files of a folder, by name. Raises BadInput where there are none."""
+    files = sorted(folder.glob("*.verdicts.json"))
+    if not files:
+        raise BadInput(f"{folder}: no page is in it; a page is NAME.md with NAME.verdicts.json beside it")
+    return files
+
+
+def index_table(folder: Path) -> str:
+    """The table in Markdown: a row for each page, with its command, and what its claims come to."""
+    lines = [f"| {' | '.join(HEAD)} |", "|---|---|---|---|"]
+    for path in verdict_files(folder):
+        page, verdicts = page_of(path), read_verdicts(path)
+        title, command = _title_and_command(page)
+        open_claims = [
+            f"{verdict.claim.rstrip('.')} ({in_words(verdict.holds)})" for verdict in verdicts if not verdict.holds
+        ]
+        cells = (f"[{title}]({page.name})", f"`{command}`", f"**{headline(verdicts)}**", "; ".join(open_claims))
+        lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def read_verdicts(path: Path) -> list[Verdict]:
+    """The verdicts of a file as they stand in it."""
+    try:
+        return [verdict_of(plain) for plain in json.loads(_read(path))]
+    except (ValueError, TypeError, KeyError) as error:
+        raise BadInput(f"{path}: is no list of verdicts ({type(error).__name__}: {error})") from None
+
+
+def page_of(verdicts: Path) -> Path:
+    """The page beside a verdict file."""
+    return verdicts.with_name(verdicts.name.removesuffix(".verdicts.json") + ".md")
+
+
+def _judge_again(path: Path) -> bool:
+    stated = read_verdicts(path)
+    verdicts = [judged_again(verdict) for verdict in stated]
+    if [verdict.plain() for verdict in verdicts] == [verdict.plain() for verdict in stated]:
+        return False
+    page = page_of(path)
+    again = made_with(version("omninav"), git_commit(), "Judged again with")
+    text = f"{_with_verdicts(page, verdicts).rstrip()}\n\n{again}: {RULE}. The figures are as they were made.\n"
+    write_whole(page, text)
+    write_whole(path, json.dumps([verdict.plain() for verdict in verdicts], indent=1, ensure_ascii=False) + "\n")
+    return True
+
+
+def _with_verdicts(page: Path, verdicts: Sequence[Verdict]) -> str:
+    """A page's text with other verdicts: in the last cell of each case's row, and behind the claim in its first row."""
+    lines = _read(page).split("\n")
+    rows = [number for number, line in enumerate(lines) if re.search(rf"\| ({VERDICT_WORDS}) \|$", line)]
+    cases = [(verdict, case) for verdict in verdicts for case in verdict.cases]
+    if len(rows) != len(cases):
+        raise BadInput(f"{page}: {len(rows)} rows of verdicts, but {len(cases)} in the file beside it; write it anew")
+    for number, (verdict, case) in zip(rows, cases, strict=True):
+        line = re.sub(rf"\| ({VERDICT_WORDS}) \|$", f"| {in_words(case.holds)} |", lines[number])
+        lines[number] = re.sub(rf": \*\*({VERDICT_WORDS})\*\* \|", f": **{in_words(verdict.holds)}** |", line, count=1)
+    return "\n".join(lines)
+
+
+def _title_and_command(page: Path) -> tuple[str, str]:
+    found = re.match(r"# (.+)\n.*?\n```\n(.+)\n```\n", _read(page), re.DOTALL)
+    if found is None:
+        raise BadInput(f"{page}: is not as a page is written: a title, what it is about, and its command")
+    return found[1].split("\n")[0], found[2].split("\n")[0]
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadInput(f"{path}: {getattr(error, 'strerror', None) or 'is no text'}") from None
