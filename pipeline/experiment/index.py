@@ -14,7 +14,7 @@ from .page import made_with
 from .verdicts import Verdict, headline, in_words, judged_again, verdict_of
 
 BEGIN, END = "<!-- table: omninav experiments -->", "<!-- end of the table -->"
-HEAD = ("page", "command", "verdict", "what does not hold, or is undecided")
+HEAD = ("page", "command", "verdict", "does not hold", "undecided")
 VERDICT_WORDS = "holds|does not hold|undecided"
 RULE = "a claim of fewer than six repetitions is undecided"
 
@@ -31,7 +31,8 @@ def write_index(folder: Path) -> list[str]:
     _, ended, after = rest.partition(END)
     if not found or not ended:
         raise BadInput(f"{readme}: needs a line {BEGIN} and below it a line {END}: the table goes between them")
-    changed = [path.name.partition(".")[0] for path in verdict_files(folder) if _judge_again(path)]
+    here = made_with(version("omninav"), git_commit(), "Judged again with")  # before a file of the checkout changes
+    changed = [path.name.partition(".")[0] for path in verdict_files(folder) if _judge_again(path, here)]
     write_whole(readme, f"{before}{BEGIN}\n{index_table(folder)}{END}{after}")
     return changed
 
@@ -46,14 +47,12 @@ def verdict_files(folder: Path) -> list[Path]:
 
 def index_table(folder: Path) -> str:
     """The table in Markdown: a row for each page, with its command, and what its claims come to."""
-    lines = [f"| {' | '.join(HEAD)} |", "|---|---|---|---|"]
+    lines = [f"| {' | '.join(HEAD)} |", f"|{'---|' * len(HEAD)}"]
     for path in verdict_files(folder):
         page, verdicts = page_of(path), read_verdicts(path)
         title, command = _title_and_command(page)
-        open_claims = [
-            f"{verdict.claim.rstrip('.')} ({in_words(verdict.holds)})" for verdict in verdicts if not verdict.holds
-        ]
-        cells = (f"[{title}]({page.name})", f"`{command}`", f"**{headline(verdicts)}**", "; ".join(open_claims))
+        others = ["; ".join(v.claim.rstrip(".") for v in verdicts if v.holds is held) for held in (False, None)]
+        cells = (f"[{title}]({page.name})", f"`{command}`", f"**{headline(verdicts)}**", *others)
         lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
     return "\n".join(lines) + "\n"
 
@@ -71,14 +70,13 @@ def page_of(verdicts: Path) -> Path:
     return verdicts.with_name(verdicts.name.removesuffix(".verdicts.json") + ".md")
 
 
-def _judge_again(path: Path) -> bool:
+def _judge_again(path: Path, here: str) -> bool:
     stated = read_verdicts(path)
     verdicts = [judged_again(verdict) for verdict in stated]
     if [verdict.plain() for verdict in verdicts] == [verdict.plain() for verdict in stated]:
         return False
     page = page_of(path)
-    again = made_with(version("omninav"), git_commit(), "Judged again with")
-    text = f"{_with_verdicts(page, verdicts).rstrip()}\n\n{again}: {RULE}. The figures are as they were made.\n"
+    text = f"{_with_verdicts(page, verdicts).rstrip()}\n\n{here}: {RULE}. The figures are as they were made.\n"
     write_whole(page, text)
     write_whole(path, json.dumps([verdict.plain() for verdict in verdicts], indent=1, ensure_ascii=False) + "\n")
     return True
