@@ -28,7 +28,7 @@ LIBRARIES = (
     "rosbags",
 )
 """Distributions whose versions a run states, and on which its results depend."""
-ROOMS = ("files.py", "graph", "engine", "run", "mcap")
+DECIDING = ("files.py", "graph", "engine", "run", "mcap")
 """The framework's code that results follow from; commands, experiments and reports only show them."""
 FRAMEWORK = Path(__file__).resolve().parents[1]
 
@@ -44,7 +44,7 @@ def version(distribution: str) -> str:
 @functools.cache
 def surroundings() -> str:
     """A hash over what every graph runs in: the framework's code, and the versions of Python and the libraries."""
-    files = [file for room in ROOMS for file in sorted([FRAMEWORK / room, *(FRAMEWORK / room).rglob("*.py")])]
+    files = [file for part in DECIDING for file in sorted([FRAMEWORK / part, *(FRAMEWORK / part).rglob("*.py")])]
     code = [text for file in files if file.is_file() for text in (str(file.relative_to(FRAMEWORK)), file.read_text())]
     versions = [f"{name} {version(name)}" for name in LIBRARIES]
     return digest_text(platform.python_version(), platform.machine(), *versions, *code)

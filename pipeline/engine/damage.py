@@ -4,14 +4,14 @@ import logging
 import sys
 
 _log = logging.getLogger("omninav")
-_said: set[str] = set()
+_shown: set[str] = set()
 
 
 def say_damaged(what: str) -> None:
     """Say in one line what was damaged and what is done about it."""
-    if what in _said:
+    if what in _shown:
         return
-    _said.add(what)
+    _shown.add(what)
     print(what, file=sys.stderr, flush=True)
     if _log.handlers:
         _log.warning("%s", what)

@@ -15,7 +15,7 @@ ONE, OTHER = digest_text("one"), digest_text("other")
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Cache:
-    monkeypatch.setattr(damage, "_said", set())
+    monkeypatch.setattr(damage, "_shown", set())
     return Cache(tmp_path / "cache")
 
 

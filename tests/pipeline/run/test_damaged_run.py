@@ -45,7 +45,7 @@ class Stop:
 @pytest.fixture(autouse=True)
 def in_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)  # a run goes on where it was started
-    monkeypatch.setattr(damage, "_said", set())
+    monkeypatch.setattr(damage, "_shown", set())
 
 
 def begun(place: Path) -> Run:
