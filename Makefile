@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format bench soak clean
+.PHONY: help demo test lint format bench soak kills clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -31,6 +31,10 @@ bench: $(VENV)/.benchmarks  ## measure speed, beside other libraries
 
 soak: $(VENV)/.installed  ## drive 100,000 steps and check that memory and map stop growing
 	$(BIN)/python benchmarks/soak.py
+
+kills: export KILLS := $(or $(KILLS),300)
+kills: $(VENV)/.installed  ## kill and disturb runs KILLS times (300) and compare the bytes they end at
+	$(BIN)/python tests/kills/campaign.py
 
 clean:  ## remove the virtual environment and all build and check caches
 	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis

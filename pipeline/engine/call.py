@@ -1,5 +1,6 @@
 """A node made ready to run: one call of its step each tick, from the tick's values and back into them."""
 
+import errno
 import math
 import time
 from array import array
@@ -11,6 +12,9 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.stage import Context, State
 
 from .channel import channel_key, held_key
+
+DISK = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)
+"""What a full or read-only disk answers: no fault of the stage that writes."""
 
 
 class StageFailed(Exception):
@@ -60,6 +64,8 @@ class Call:
         except BadInput:
             raise
         except Exception as error:
+            if isinstance(error, OSError) and error.errno in DISK:
+                raise BadInput(f"{self._message(error)}; make room and go on") from error
             raise StageFailed(self._message(error)) from error
         self.times.append(time.perf_counter() - start)
         for name, origin in self.outputs:

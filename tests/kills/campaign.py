@@ -89,7 +89,7 @@ def result(folder: Path) -> dict[str, str]:
         name = str(file.relative_to(folder))
         if not file.is_file() or file.is_symlink() or name.split("/")[0] in ("cache", "site", "mine"):
             continue
-        if file.name in TIMES or file.suffix in (".lock", ".log", ".html") or "/." in f"/{name}":
+        if file.name in TIMES or file.suffix in (".lock", ".log", ".html", ".part") or "/." in f"/{name}":
             continue
         if file.name.startswith("seed_"):
             content = json.dumps(json.loads(file.read_text())["metrics"], sort_keys=True).encode()
