@@ -1,0 +1,117 @@
+"""The table of finished experiments says what their verdict files say, and no more."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from omninav.pipeline.cli.main import main
+from omninav.pipeline.experiment.index import BEGIN, END, index_table, page_of, read_verdicts, verdict_files
+from omninav.pipeline.experiment.verdicts import Case, Verdict, headline, in_words, judged_again
+from omninav.pipeline.graph.problems import BadInput
+
+PAGES = Path(__file__).resolve().parents[3] / "docs" / "experiments"
+COMMIT = r"commit [0-9a-f]{12}( with changes that are not committed)?"
+MADE = re.compile(
+    rf"(Made with omninav [\d.]+, {COMMIT}|The commit at which this page was made is not recorded: [^\n]+)\.\n"
+    rf"(\nJudged again with omninav [\d.]+, {COMMIT}: [^\n]+\.\n)?\Z"
+)
+
+
+def verdict(*cases: tuple[bool | None, int]) -> Verdict:
+    plain = (Case("", 1.0, 2.0, "the limit", -1.0, (-1.5, -0.5), holds, many, many) for holds, many in cases)
+    return Verdict("it holds", "error", "", tuple(plain))
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "said"),
+    [
+        ([True], "holds"),
+        ([False], "does not hold"),
+        ([None], "undecided"),
+        ([True, True], "holds"),
+        ([None, None], "undecided"),
+        ([False, False], "0 of 2 hold"),
+        ([True, True, False], "2 of 3 hold"),
+        ([True, None, False], "1 of 3 hold, 1 undecided"),
+    ],
+)
+def test_a_page_holds_only_where_every_claim_does(verdicts: list[bool | None], said: str) -> None:
+    assert headline([verdict((holds, 12)) for holds in verdicts]) == said
+
+
+@pytest.mark.parametrize(
+    ("cases", "holds"),
+    [([(True, 5)], None), ([(False, 5)], None), ([(True, 6)], True), ([(True, 3), (False, 6)], False)],
+)
+def test_fewer_than_six_repetitions_decide_nothing_afterwards_either(
+    cases: list[tuple[bool | None, int]], holds: bool | None
+) -> None:
+    again = judged_again(verdict(*cases))
+    assert again.holds is holds
+    assert judged_again(again) == again
+    assert [case.ours for case in again.cases] == [1.0] * len(cases)
+
+
+def test_the_committed_table_is_what_the_command_writes(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(PAGES, tmp_path / "pages", ignore=shutil.ignore_patterns("*.png")))
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert main(["experiments", str(folder)]) == 0
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    assert index_table(PAGES) in (PAGES / "README.md").read_text()
+
+
+@pytest.mark.parametrize("path", verdict_files(PAGES), ids=lambda path: path.name.partition(".")[0])
+def test_a_page_says_what_its_verdict_file_does_and_which_commit_made_it(path: Path) -> None:
+    page, verdicts = page_of(path).read_text(), read_verdicts(path)
+    said = re.findall(r"\| (holds|does not hold|undecided) \|\n", page)
+    assert said == [in_words(case.holds) for verdict in verdicts for case in verdict.cases]
+    for verdict in verdicts:
+        assert f"\n| {verdict.claim} ({verdict.measure}): **{in_words(verdict.holds)}** |" in page
+    assert MADE.search(page)
+
+
+def test_a_page_of_few_repetitions_is_judged_again_and_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "README.md").write_text(f"# Ours\n\n{BEGIN}\nformer\n{END}\n\nwhat follows\n")
+    row = "| it holds (error): **holds** |  |  | 1.0 | 2.0 (the limit) | -1.0 [-1.5, -0.5] | holds |"
+    page = (
+        f"# One\n\nAbout it.\n\n```\nomninav +experiment=one\n```\n\n## Verdicts\n\n{row}\n\nMade with omninav 0.1.0.\n"
+    )
+    (tmp_path / "one.md").write_text(page)
+    (tmp_path / "one.verdicts.json").write_text(json.dumps([verdict((True, 3)).plain()]))
+    assert main(["experiments", str(tmp_path)]) == 0
+    assert "one: judged again" in capsys.readouterr().out
+    again = (tmp_path / "one.md").read_text()
+    assert row.replace("holds**", "undecided**").replace("| holds |", "| undecided |") in again
+    assert "Made with omninav 0.1.0.\n\nJudged again with omninav " in again
+    assert "fewer than six repetitions is undecided" in again
+    assert read_verdicts(tmp_path / "one.verdicts.json")[0].holds is None
+    table = "| [One](one.md) | `omninav +experiment=one` | **undecided** |  | it holds |\n"
+    readme = (tmp_path / "README.md").read_text()
+    assert readme.endswith(f"{table}{END}\n\nwhat follows\n")
+    assert "former" not in readme
+    assert main(["experiments", str(tmp_path)]) == 0
+    assert "judged again" not in capsys.readouterr().out
+    assert (tmp_path / "one.md").read_text() == again
+
+
+def test_what_is_no_page_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    readme, verdicts = tmp_path / "README.md", tmp_path / "one.verdicts.json"
+    for prepare, message in (
+        (lambda: None, "README.md: No such file"),
+        (lambda: readme.write_text("# Ours\n"), "needs a line"),
+        (lambda: readme.write_text(f"{BEGIN}\n{END}\n"), "no page is in it"),
+        (lambda: verdicts.write_text('[{"claim": 1}]'), "no list of verdicts"),
+        (lambda: verdicts.write_text("[]"), "one.md: No such file"),
+    ):
+        prepare()
+        assert main(["experiments", str(tmp_path)]) == 2
+        said = capsys.readouterr().err
+        assert message in said
+        assert said.count("\n") == 1
+    with pytest.raises(BadInput, match="name the folder"):
+        __import__("omninav.pipeline.cli.commands.experiments", fromlist=["command"]).command([])
