@@ -65,7 +65,7 @@ class Call:
             raise
         except Exception as error:
             if isinstance(error, OSError) and error.errno in DISK:
-                raise BadInput(f"{self._message(error)}; make room and go on") from error
+                raise BadInput(f"{self._message(error)}; free some of it") from error
             raise StageFailed(self._message(error)) from error
         self.times.append(time.perf_counter() - start)
         for name, origin in self.outputs:
