@@ -45,7 +45,9 @@ class Cache:
 
     @contextmanager
     def keep(self, key: str, suffix: str, notes: Any = None) -> Iterator[Path]:
-        """A path to write a result to; it is there, with its notes, when the block ends well."""
+        """A path to write a result to; it is there, with its notes, when the block ends well. Its key is held."""
+        for half_written in self.folder.glob(f"{key[:32]}*.part"):  # by a process that was killed
+            half_written.unlink(missing_ok=True)
         with whole_file(self.path(key, suffix)) as part:
             yield part
             digest = digest_file(part)

@@ -23,10 +23,10 @@ from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.value import Value
 
 from .artifacts import Execution, ProgressDisplay, companions, identity, obtain, provenance
-from .metrics_files import write_metrics
+from .metrics_files import MANIFEST, write_metrics
 from .plan import Plan
 from .results import notes_of, results_of
-from .run_folder import CONFIG, MANIFEST, Run
+from .run_folder import CONFIG, Run
 from .timing import stage_times
 
 log = logging.getLogger("omninav")

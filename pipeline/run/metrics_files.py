@@ -2,11 +2,15 @@
 
 import dataclasses
 import json
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
-from omninav.pipeline.files import write_whole
+from omninav.pipeline.files import Damaged, digest_file, read_json, write_whole
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics, Quantity
+
+MANIFEST = "manifest.json"
 
 
 def write_metrics(folder: Path, metrics: Metrics) -> None:
@@ -21,13 +25,34 @@ def write_metrics(folder: Path, metrics: Metrics) -> None:
 
 
 def read_metrics(folder: Path) -> Metrics:
-    """The metrics of a run that ended; those of an older run, without `quantities.json`, are not described."""
+    """The metrics of a run that ended; those of an older run, without `quantities.json`, are not described.
+
+    Raises `BadInput` where there are none, or not those that the run wrote.
+    """
     file, description = folder / "metrics.json", folder / "quantities.json"
     if not file.is_file():
         raise BadInput(f"{folder}: no metrics.json in it; is it a run that ended?")
-    values = json.loads(file.read_text())
+    values = _read(file)
     if not description.is_file():
         return Metrics(values)
-    described = json.loads(description.read_text())
-    quantities = {path: Quantity(**plain) for path, plain in described["quantities"].items()}
-    return Metrics(values, quantities, tuple(described["headlines"]), tuple(described["details"]))
+    described = _read(description)
+    try:
+        quantities = {path: Quantity(**plain) for path, plain in described["quantities"].items()}
+        return Metrics(values, quantities, tuple(described["headlines"]), tuple(described["details"]))
+    except (LookupError, TypeError, AttributeError, ValueError):
+        raise _damaged(description) from None
+
+
+def _read(file: Path) -> dict[str, Any]:
+    with suppress(Damaged):
+        files = read_json(file.parent / MANIFEST).get("files")
+        if isinstance(files, dict) and files.get(file.name, digest_file(file)) != digest_file(file):
+            raise _damaged(file)
+    try:
+        return dict(json.loads(file.read_bytes()))
+    except (ValueError, TypeError, RecursionError):
+        raise _damaged(file) from None
+
+
+def _damaged(file: Path) -> BadInput:
+    return BadInput(f"{file} is damaged or was changed; `omninav resume {file.parent}` makes the run again")

@@ -19,9 +19,9 @@ from omninav.pipeline.graph.results import Metrics
 
 from .artifacts import ProgressDisplay
 from .execution import execute
-from .metrics_files import read_metrics
+from .metrics_files import MANIFEST, read_metrics
 from .plan import input_digests, plan
-from .run_folder import CONFIG, MANIFEST, Run
+from .run_folder import CONFIG, Run
 
 
 @dataclass(frozen=True)

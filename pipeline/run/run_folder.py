@@ -13,14 +13,15 @@ import yaml
 
 from omninav.pipeline.engine.code_version import LIBRARIES, version
 from omninav.pipeline.engine.codec import encode, seal
-from omninav.pipeline.files import Damaged, Taken, digest_text, locked, read_json, write_json, write_whole
+from omninav.pipeline.files import Taken, digest_text, locked, write_json, write_whole
 from omninav.pipeline.graph.problems import BadInput
 
 from .inputs import refuse_missing
+from .metrics_files import MANIFEST
 from .plan import Plan, input_digests
 from .provenance import git_commit
 
-MANIFEST, CONFIG = "manifest.json", "config.yaml"
+CONFIG = "config.yaml"
 
 
 @dataclass
@@ -125,15 +126,6 @@ def start(
         run.folder = _named(beginning, root, named)
         _point_latest(run.folder)
     return run
-
-
-def status(folder: Path) -> str | None:
-    """What a run folder's manifest says of the run (`running`, `complete`, …); None where there is none, or no whole
-    one."""
-    try:
-        return str(read_json(folder / MANIFEST).get("status"))
-    except Damaged:
-        return None
 
 
 def _named(folder: Path, root: Path, name: str) -> Path:

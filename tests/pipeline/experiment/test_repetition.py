@@ -1,13 +1,16 @@
 """Results of repetitions are found again by what they are results of."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.experiment.repetition import finished
+from omninav.pipeline.experiment.runner import ExperimentRun
 from omninav.pipeline.experiment.shared_inputs import is_recorded
-from omninav.pipeline.files import digest_file, digest_text, write_json, write_whole
+from omninav.pipeline.files import digest_file, digest_text, locked, write_json, write_whole
+from omninav.pipeline.graph.problems import BadInput
 
 
 def kept(path: Path, key: str, seed: int) -> None:
@@ -48,3 +51,9 @@ def test_a_recording_is_whole_or_made_again(tmp_path: Path, capfd: pytest.Captur
     write_whole(folder / "drive.mcap", b"framex")
     assert not is_recorded(folder, "a")
     assert "it is recorded again" in capfd.readouterr().err
+
+
+def test_an_experiment_that_another_process_runs_is_refused(tmp_path: Path):
+    run = ExperimentRun(None, "paper", "", tmp_path, [], [], [])  # type: ignore[arg-type]
+    with locked(tmp_path / ".lock"), pytest.raises(BadInput, match=f"process {os.getpid()} is running it"):
+        run.run()

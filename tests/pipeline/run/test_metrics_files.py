@@ -3,6 +3,7 @@ import json
 import pytest
 
 from omninav.pipeline import BadInput, Metrics, Quantity
+from omninav.pipeline.files import digest_file, write_json
 from omninav.pipeline.run.metrics_files import read_metrics, write_metrics
 
 
@@ -24,4 +25,28 @@ def test_metrics_of_a_run_without_descriptions_are_read_undescribed(tmp_path):
 
 def test_a_folder_without_metrics_is_refused(tmp_path):
     with pytest.raises(BadInput, match="no metrics"):
+        read_metrics(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        *((name, content) for name in ("metrics.json", "quantities.json") for content in ("", "[1]", "{")),
+        ("quantities.json", '{"quantities": {"a": 1}}'),
+        ("quantities.json", '{"quantities": {"a": {"colour": 1}}}'),
+    ],
+)
+def test_metrics_that_cannot_be_read_are_refused_by_name(tmp_path, name, content):
+    write_metrics(tmp_path, Metrics({"error_m": 1.0}))
+    (tmp_path / name).write_text(content)
+    with pytest.raises(BadInput, match=f"{name} is damaged or was changed; `omninav resume"):
+        read_metrics(tmp_path)
+
+
+def test_a_figure_that_the_run_did_not_write_is_found(tmp_path):
+    write_metrics(tmp_path, Metrics({"error_m": 1.0}))
+    write_json(tmp_path / "manifest.json", {"files": {"metrics.json": digest_file(tmp_path / "metrics.json")}})
+    assert read_metrics(tmp_path).values == {"error_m": 1.0}
+    (tmp_path / "metrics.json").write_text('{"error_m": 0.1}')
+    with pytest.raises(BadInput, match=r"metrics.json is damaged or was changed"):
         read_metrics(tmp_path)
