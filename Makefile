@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format bench soak kills clean
+.PHONY: help demo test lint format bench soak kills fuzz clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -35,6 +35,12 @@ soak: $(VENV)/.installed  ## drive 100,000 steps and check that memory and map s
 kills: export KILLS := $(or $(KILLS),300)
 kills: $(VENV)/.installed  ## kill and disturb runs KILLS times (300) and compare the bytes they end at
 	$(BIN)/python tests/kills/campaign.py
+
+SECONDS ?= 60
+SEED ?= 1
+fuzz: export OPENBLAS_NUM_THREADS = 1
+fuzz: $(VENV)/.installed  ## read hostile inputs of every format on all cores (SECONDS=600 SEED=1)
+	PYTHONPATH=tests $(BIN)/python -m hostile.fuzz --seconds $(SECONDS) --seed $(SEED)
 
 clean:  ## remove the virtual environment and all build and check caches
 	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis

@@ -129,7 +129,9 @@ class LogReader:
         try:
             return self._store(msgtype).deserialize_cdr(data, msgtype)
         except Exception as error:  # damaged bytes raise whatever the generated decoder stumbles over
-            raise BadMessage(f"{self.path}: a message on {topic} is not a sound {msgtype} ({error})") from None
+            raise BadMessage(
+                f"{self.path}: a message on {topic} is not a sound {msgtype:.80} ({error!s:.160})"
+            ) from None
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[Message]:
         """Decoded messages in the order of their stamps; equal stamps in the order of the file."""
@@ -162,7 +164,7 @@ class LogReader:
                 channel = parse(Channel, content)
                 self._channels[channel.id] = channel
         except Exception as error:
-            self.drop("bad_chunk", f"{self.path}: a topic's description is damaged ({error})")
+            self.drop("bad_chunk", f"{self.path}: a topic's description is damaged ({error!s:.160})")
 
     def _scan(self, topics: Collection[str] | None) -> Iterator[Record]:
         before, seen, checksum = self.dropped.total(), set(), zlib.crc32(MAGIC)

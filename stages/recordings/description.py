@@ -164,7 +164,8 @@ def read_description(path: Path, layouts: Sequence[str] = ()) -> Description:
     description, problems = convert(content, Description, "")
     if problems:
         said = "; ".join(f"{p.where.lstrip('.')}: {p.what}" + (f" ({p.hint})" if p.hint else "") for p in problems)
-        raise UnreadableRecording(f"{path}: {said}".replace("'.", "'"))
+        said = said.replace("'.", "'")
+        raise UnreadableRecording(f"{path}: {said:.300}")
     found: Description = description
     return found
 

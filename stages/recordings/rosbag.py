@@ -1,14 +1,19 @@
 """Recordings in rosbag2 folders and ROS 1 bags, read with the library rosbags."""
 
+import bz2
 import struct
 from collections import Counter
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lz4 import frame as lz4
+
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
+from omninav.pipeline.graph.small_files import read_yaml
+from omninav.pipeline.mcap.chunks import MAX_BYTES
 from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.pipeline.mcap.message_types import standard_types
 
@@ -35,6 +40,15 @@ class Rosbag(Format):
         return record_topics(log, BagFeed(path), options, files)
 
 
+def _bz2(packed: bytes) -> bytes:
+    """A chunk of a ROS 1 bag; one that unpacks to more than any log holds is cut, and its messages cannot be read."""
+    return bz2.BZ2Decompressor().decompress(packed, max_length=MAX_BYTES)
+
+
+def _lz4(packed: bytes) -> bytes:
+    return bytes(lz4.LZ4FrameDecompressor().decompress(packed, max_length=MAX_BYTES))  # type: ignore[no-untyped-call]
+
+
 class BagFeed:
     """A bag as a feed of messages. What rosbags finds wrong on the way ends the scan and counts as `bad_chunk`."""
 
@@ -44,9 +58,11 @@ class BagFeed:
         self.details: dict[str, str] = {}
         self.attachments: dict[str, bytes] = {}
         try:
+            if (path / "metadata.yaml").is_file():
+                read_yaml(path / "metadata.yaml")  # within limits; what it means is for rosbags to say
             self._reader = self._open([path])
         except Exception as error:  # rosbags and the libraries under it raise many kinds for a damaged bag
-            said = " ".join(str(error).split()) or type(error).__name__
+            said = " ".join(str(error).split())[:160] or type(error).__name__
             try:
                 parts = sorted(path.glob("*.db3")) if path.is_dir() else []
                 self._reader = self._open(parts)  # each part can be read without the folder's metadata
@@ -59,7 +75,9 @@ class BagFeed:
 
     def _open(self, paths: list[Path]) -> "AnyReader":
         from rosbags.highlevel import AnyReader  # slow to import, and seldom needed
+        from rosbags.rosbag1.reader import decompressors
 
+        decompressors.update(bz2=_bz2, lz4=_lz4)
         reader = AnyReader(paths, default_typestore=standard_types())
         reader.open()
         return reader
@@ -77,12 +95,17 @@ class BagFeed:
         try:
             for connection, time, data in self._reader.messages(wanted) if wanted else ():
                 topic, stamp = connection.topic, time
+                if not (
+                    isinstance(time, int) and 0 <= time < 2**63 and isinstance(data, bytes | memoryview)
+                ):  # SQLite holds all
+                    self.drop("bad_message", f"{self.path}: a message on {topic:.80} is no message, or has no time")
+                    continue
                 if headers[topic] and len(data) >= 12:
                     stamp = self._stamp(data)
                 yield Record(topic, stamp, time, data, (topic, time, number[topic, time]))
                 number[topic, time] += 1
         except Exception as error:
-            self.drop("bad_chunk", f"{self.path}: reading stopped ({' '.join(str(error).split())})")
+            self.drop("bad_chunk", f"{self.path}: reading stopped ({' '.join(str(error).split()):.160})")
 
     def fetch(self, location: tuple[str, int, int]) -> bytes:
         """The bytes of a message again. Raises `BadMessage`."""
@@ -93,7 +116,7 @@ class BagFeed:
                 if passed == number:
                     return bytes(data)
         except Exception as error:
-            raise BadMessage(f"{self.path}: a message on {topic} cannot be read again ({error})") from None
+            raise BadMessage(f"{self.path}: a message on {topic} cannot be read again ({error!s:.160})") from None
         raise BadMessage(f"{self.path}: a message on {topic} cannot be found again")
 
     def decode(self, topic: str, data: bytes | memoryview) -> Any:
@@ -102,7 +125,7 @@ class BagFeed:
         try:
             return self._reader.deserialize(bytes(data), msgtype)
         except Exception as error:
-            raise BadMessage(f"{self.path}: a message on {topic} is not a sound {msgtype} ({error})") from None
+            raise BadMessage(f"{self.path}: a message on {topic} is not a sound {msgtype} ({error!s:.160})") from None
 
     def drop(self, kind: str, detail: str) -> None:
         """Count something lost."""

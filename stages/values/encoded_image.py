@@ -33,7 +33,7 @@ def decode_image(data: bytes, colour: bool = True, max_pixels: int = MAX_PIXELS)
         raise Undecodable("a JPEG without its end")
     if data.startswith(b"\xff\xd8") and data.count(b"\xff\xda") > MAX_SCANS:
         raise Undecodable(f"a JPEG of more than {MAX_SCANS} scans")
-    if data.startswith(b"\x89PNG") and b"IEND" not in data[-4096:]:
+    if data.startswith(b"\x89PNG") and not _png_is_whole(data):
         raise Undecodable("a PNG without its end")
     flags = (cv2.IMREAD_COLOR if colour else cv2.IMREAD_GRAYSCALE) | cv2.IMREAD_IGNORE_ORIENTATION
     try:
@@ -61,6 +61,16 @@ def _png(data: bytes) -> tuple[int, int]:
     return width, height
 
 
+def _png_is_whole(data: bytes) -> bool:
+    """Whether every chunk up to the end is there: OpenCV makes room for as many bytes as a chunk says it has."""
+    at = 8
+    while at + 12 <= len(data):
+        if data[at + 4 : at + 8] == b"IEND":
+            return True
+        at += 12 + int.from_bytes(data[at : at + 4], "big")
+    return False
+
+
 def _jpeg(data: bytes) -> tuple[int, int]:
     return next(_jpeg_frames(data))
 
@@ -68,9 +78,9 @@ def _jpeg(data: bytes) -> tuple[int, int]:
 def _jpeg_frames(data: bytes) -> Iterator[tuple[int, int]]:
     at = 2
     while at + 4 <= len(data):
-        if data[at] != 0xFF:
-            at += 1  # OpenCV, too, looks for the next marker
-            continue
+        at = data.find(b"\xff", at)  # OpenCV, too, looks for the next marker
+        if not 0 <= at <= len(data) - 4:
+            return
         marker, (length,) = data[at + 1], struct.unpack_from(">H", data, at + 2)
         if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
             height, width = struct.unpack_from(">HH", data, at + 5)

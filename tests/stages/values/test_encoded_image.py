@@ -51,6 +51,13 @@ def test_a_jpeg_of_very_many_scans_is_not_decoded():
         decode_image(data[:scan] + data[scan:-2] * 100 + b"\xff\xd9")
 
 
+def test_a_png_whose_chunk_says_it_is_larger_than_the_file_is_not_decoded():
+    data = bytearray(encoded(".png"))
+    data[data.index(b"IDAT") - 4] = 0x7F
+    with pytest.raises(Undecodable, match="a PNG without its end"):
+        decode_image(bytes(data))
+
+
 @pytest.mark.parametrize("data", [b"", b"\xff\xd8\xff", b"BM", b"P5 9", b"MM\x00*\xff\xff\xff\xff", b"GIF89a" * 9])
 def test_what_is_no_image_is_refused(data: bytes):
     with pytest.raises(Undecodable, match="bytes"):

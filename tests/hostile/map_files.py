@@ -1,0 +1,195 @@
+"""Saved maps: damaged bytes, and files whose sums are right over content that is not."""
+
+import functools
+import hashlib
+import io
+import json
+import tempfile
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+from made_values import made_values
+
+from omninav.pipeline.engine.artifact import read_artifact, read_header, write_artifact
+from omninav.pipeline.engine.codec import encode
+
+from .harness import Format
+from .mutations import BINARY, REALS, SIZES, TEXT, Files, on
+
+MAP = "known.omap"
+_SUM = "sha256:"
+
+
+@functools.cache
+def samples() -> Sequence[Files]:
+    """A map of every kind, and what is saved beside maps."""
+    with tempfile.TemporaryDirectory() as scratch:
+        found = []
+        for value in made_values():
+            write_artifact(Path(scratch, MAP), value, {"variant": "made", "stages": {}})
+            found.append({MAP: Path(scratch, MAP).read_bytes()})
+        return found
+
+
+def read(folder: Path, files: Files) -> Any:
+    """Header and value."""
+    return read_header(folder / MAP)["facts"], read_artifact(folder / MAP)
+
+
+def entries_of(data: bytes) -> dict[str, bytes]:
+    """The files in a map."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def sealed(entries: dict[str, bytes], level: int = 1) -> bytes:
+    """A map of some files, all sums right where there is something to sum."""
+    header = _plain(entries.get("header.json", b""))
+    if isinstance(header, dict) and isinstance(header.get("arrays"), dict):
+        for name in list(header["arrays"]):
+            try:
+                array = np.load(io.BytesIO(entries[f"{name}.npy"]), allow_pickle=False)
+                header["arrays"][name] = hashlib.sha256(array.tobytes()).hexdigest()
+            except Exception:
+                continue
+        entries = entries | {"header.json": json.dumps(header).encode()}
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=level) as archive:
+        for name, content in entries.items():
+            archive.writestr(name, content)
+        archive.comment = b" " * (len(_SUM) + 64)
+    return summed(buffer.getvalue()[: -len(_SUM) - 64])
+
+
+def summed(whole: bytes) -> bytes:
+    """Bytes with their sum behind them."""
+    return whole + _SUM.encode() + hashlib.sha256(whole).hexdigest().encode()
+
+
+def _plain(data: bytes) -> Any:
+    try:
+        return json.loads(data)
+    except (ValueError, RecursionError):
+        return None
+
+
+def zip_bytes(random: Random, files: Files) -> Files:
+    """Damage to the zip, its sum right."""
+    return files | {MAP: summed(random.choice(BINARY)(random, files[MAP][: -len(_SUM) - 64]))}
+
+
+def arrays(random: Random, files: Files) -> Files:
+    """An array of another shape, type or content."""
+    entries = _entries(files)
+    names = [name for name in entries if name.endswith(".npy") and name != "rest.npy"]
+    if not names:
+        return files
+    name = random.choice(names)
+    try:
+        array = np.load(io.BytesIO(entries[name]), allow_pickle=False)
+    except Exception:
+        return files
+    kind = random.randrange(8)
+    if kind == 0:
+        array = array.reshape(-1)
+    elif kind == 1:
+        array = array[: random.randrange(len(array) + 1)] if array.ndim else array
+    elif kind == 2:
+        array = array[None]
+    elif kind == 3:
+        array = array.astype(random.choice(("f4", "f8", "i8", "u1", "?", "U3", "c16", "M8[ns]", ">f8", "V3")))
+    elif kind == 4 and array.size:
+        array = np.array(array, copy=True)
+        value = random.choice(REALS) if array.dtype.kind == "f" else random.choice((-1, 0, 1, 2**15, 2**31, 2**62))
+        with np.errstate(all="ignore"):
+            array.reshape(-1)[random.randrange(array.size)] = np.array([value]).astype(array.dtype)[0]
+    elif kind == 5:
+        array = np.repeat(array, 2, axis=0) if array.ndim else array
+    elif kind == 6:
+        array = np.empty((random.choice((0, 3)),) * random.randrange(4), array.dtype)
+        array[...] = np.zeros((), array.dtype)
+    else:
+        array = array.T
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, np.asarray(array), allow_pickle=False)
+    return files | {MAP: sealed(entries | {name: buffer.getvalue()})}
+
+
+def members(random: Random, files: Files) -> Files:
+    """A file of the zip damaged, left out, added or many times as large unpacked."""
+    entries = _entries(files)
+    name = random.choice(sorted(entries) or ["header.json"])
+    kind = random.randrange(5)
+    if kind == 0:
+        entries.pop(name, None)
+    elif kind == 1:
+        entries[name] = random.choice(BINARY)(random, entries.get(name, b""))
+    elif kind == 2:
+        entries["header.json"] = random.choice(TEXT)(random, entries.get("header.json", b"{}"))
+    elif kind == 3:
+        entries[name] = entries.get(name, b"") + bytes(random.choice((10, 10**6, 5 * 10**7)))
+    else:
+        shape = "(" + ", ".join(str(random.choice(SIZES)) for _ in range(random.randrange(4))) + ",)"
+        head = (
+            f"{{'descr': '{random.choice(('<f8', '|O', '<U9999', '|V0'))}', 'fortran_order': False, 'shape': {shape}}}"
+        )
+        packed = head.encode().ljust(118) + b"\n"
+        entries[name] = b"\x93NUMPY\x01\x00" + len(packed).to_bytes(2, "little") + packed
+    return files | {MAP: sealed(entries)}
+
+
+def rest(random: Random, files: Files) -> Files:
+    """Other values in the fields that are no arrays."""
+    values: tuple[Any, ...] = (None, -1, 2**70, "x" * 9, float("nan"), [], {}, (1, 2), True, b"", "", 1e308)
+    entries = _entries(files)
+    try:
+        from omninav.pipeline.engine.codec import decode
+
+        fields = decode(np.load(io.BytesIO(entries["rest.npy"]), allow_pickle=False).tobytes())
+    except Exception:
+        return files
+    if not isinstance(fields, dict):
+        return files
+    if fields and random.random() < 0.8:
+        fields[random.choice(sorted(fields))] = random.choice(values)
+    else:
+        fields[random.choice(("poses", "kind", "surplus", "features"))] = random.choice(values)
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, np.frombuffer(encode(fields), np.uint8), allow_pickle=False)
+    return files | {MAP: sealed(entries | {"rest.npy": buffer.getvalue()})}
+
+
+def header(random: Random, files: Files) -> Files:
+    """A header that names other types, arrays or formats."""
+    entries = _entries(files)
+    head = _plain(entries.get("header.json", b""))
+    if not isinstance(head, dict):
+        return files
+    things: tuple[Any, ...] = (
+        None,
+        [],
+        {},
+        1,
+        -1.5,
+        "x",
+        "os.system",
+        "omninav.stages.values.maps.ReferenceGraph",
+        [1],
+    )
+    head[random.choice((*sorted(head), "surplus"))] = random.choice(things)
+    return files | {MAP: sealed(entries | {"header.json": json.dumps(head).encode()})}
+
+
+def _entries(files: Files) -> dict[str, bytes]:
+    try:
+        return entries_of(files[MAP])
+    except Exception:
+        return {}
+
+
+BYTES = Format("map bytes", samples, [on(BINARY), zip_bytes, zip_bytes], read, cases=200)
+CONTENT = Format("map content", samples, [arrays, arrays, arrays, members, rest, header], read, cases=400)
