@@ -50,10 +50,10 @@ class Covariances:
 
 def misfit(value: Value) -> str | None:
     """What is wrong with the first field that does not hold what it states; None where each does."""
-    return next(_misfits(value), None)
+    return next(_wrong_fields(value), None)
 
 
-def _misfits(value: Value) -> Iterator[str]:
+def _wrong_fields(value: Value) -> Iterator[str]:
     sizes: dict[str, int] = {}
     fields = []
     for name, annotation in _annotations(type(value)).items():
@@ -67,7 +67,7 @@ def _misfits(value: Value) -> Iterator[str]:
             if isinstance(mark, Shape) and thing is not None:
                 yield from _wrong_shape(name, thing, mark, sizes)
         if isinstance(thing, Value):
-            yield from (f"'{name}': {wrong}" for wrong in _misfits(thing))
+            yield from (f"'{name}': {wrong}" for wrong in _wrong_fields(thing))
     for name, _, marks, thing in fields:
         if thing is not None and any(isinstance(mark, Shape | Bounds) for mark in marks):
             yield from _wrong_numbers(name, thing, marks, sizes)

@@ -16,7 +16,7 @@ RECORD_HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQII")
 _LENGTH = struct.Struct("<Q")
 MAX_BYTES = 1 << 27
-"""Of a record, and of an unpacked chunk: a raw image of 40 megapixels in colour fits."""
+"""Of a record, and of an unpacked chunk: a raw frame of 40 megapixels in colour fits."""
 MAX_RATIO = 256
 """How many times as long as packed a chunk of more than 4 MB may be unpacked."""
 

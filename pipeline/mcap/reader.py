@@ -26,7 +26,7 @@ _BYTES_IN_MEMORY = 32_000_000
 
 
 _BYTES_OF_ATTACHMENTS = 32_000_000
-"""That are kept: a camera or a robot is described in less."""
+"""That are kept: descriptions of sensors are far shorter."""
 _LAST_TIME = 2**63
 """Times are kept as signed numbers of 64 bits, as ROS has them."""
 
