@@ -1,0 +1,99 @@
+"""Files that once made a reader fail, and files of their kinds: each is used as far as it is good, or refused."""
+
+from pathlib import Path
+
+import made_logs
+import made_values
+import numpy as np
+import pytest
+from conftest import DATA, needs_data
+
+from hostile.map_files import MAP, entries_of, sealed
+from omninav.pipeline import BadInput, Context
+from omninav.pipeline.engine.artifact import artifact_bytes, read_artifact
+from omninav.stages.recordings.opening import open_recording
+from omninav.stages.source.log import LogSource
+from omninav.stages.values.maps import ReferenceGraph
+
+HOSTILE = DATA / "hostile"
+
+
+def poses_like(poses: np.ndarray) -> bytes:
+    """A map with these poses, its sums right."""
+    map = made_values.made_values()[0]
+    assert isinstance(map, ReferenceGraph)
+    map.put(poses=poses)
+    return artifact_bytes(map)
+
+
+def without(name: str) -> bytes:
+    """A map without one of its files."""
+    entries = entries_of(artifact_bytes(made_values.made_values()[0]))
+    return sealed({other: content for other, content in entries.items() if other != name})
+
+
+def replaced(name: str, content: bytes) -> bytes:
+    """A map with another content for one of its files."""
+    return sealed(entries_of(artifact_bytes(made_values.made_values()[0])) | {name: content})
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (poses_like(np.zeros(6)), "'poses' has the shape (6,), expected (R, 3)"),
+        (poses_like(np.full((6, 3), np.nan)), "'poses' holds a number that is not finite"),
+        (poses_like(np.zeros((5, 3))), "'features' has the shape (6, 10, 20), expected (R, segments, bins), R = 5"),
+        (without("header.json"), "no sound artifact"),
+        (replaced("header.json", b"[1]"), "written in format None"),
+        (replaced("edges.npy", b""), "no sound artifact"),
+        (replaced("edges.npy", bytes(10**9)), "would unpack"),
+    ],
+)
+def test_a_map_whose_sum_is_right_and_whose_content_is_not_is_refused_by_name(
+    tmp_path: Path, content: bytes, said: str
+):
+    (tmp_path / MAP).write_bytes(content)
+    with pytest.raises(BadInput) as refused:
+        read_artifact(tmp_path / MAP)
+    assert said in str(refused.value)
+    assert str(refused.value).startswith(str(tmp_path / MAP))
+
+
+@needs_data
+@pytest.mark.parametrize("name", ["1d_poses", "nan_poses", "empty_array", "header_list", "no_header"])
+def test_a_map_among_the_examples_is_refused_by_name(name: str):
+    file = HOSTILE / f"map_{name}.omap"
+    with pytest.raises(BadInput, match=f"{file}: ") as refused:
+        read_artifact(file)
+    assert "\n" not in str(refused.value)
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("name", "counted", "least_frames"),
+    [
+        ("one_chunk_removed", "missing_message", 11),
+        ("image_short_and_logtime_2e64", "bad_message", 11),
+        ("bomb_zstd_chunk", "bad_chunk", 12),
+        ("chunk_index_offset_2e63", "bad_chunk", 10),
+    ],
+)
+def test_of_a_log_among_the_examples_the_good_part_is_used_and_the_rest_counted(
+    tmp_path: Path, name: str, counted: str, least_frames: int
+):
+    camera = tmp_path / "camera.yaml"  # one of them has lost its own
+    camera.write_text("projection: cylindrical\nimage: {width: 160, height: 120}\ncolumn_of_forward: 80\n")
+    recording = open_recording(str(HOSTILE / f"{name}.mcap"), camera=str(camera))
+    assert sum(recording.image(frame) is not None for frame in range(len(recording.stamps))) >= least_frames
+    assert recording.dropped[counted]
+
+
+def test_a_run_counts_the_messages_that_its_log_misses(tmp_path: Path):
+    log = made_logs.write_mcap(tmp_path / "log.mcap")
+    data = log.read_bytes()
+    middle = len(data) // 2
+    log.write_bytes(data[:middle] + bytes([data[middle] ^ 1]) + data[middle + 1 :])
+    ctx = Context("source")
+    LogSource(log=str(log)).setup(ctx)
+    assert ctx.counts["missing_message"] > 0
+    assert " on /" in ctx.details["missing_message"]
