@@ -25,6 +25,8 @@ _BYTES_IN_MEMORY = 32_000_000
 """Of unpacked chunks, beside the last one used: logs up to that size are unpacked once."""
 
 
+_BYTES_IN_ALL, _RATIO_IN_ALL = 1 << 26, 128
+"""All chunks of a file unpack to at most so many bytes, and so many times its own."""
 _BYTES_OF_ATTACHMENTS = 32_000_000
 """That are kept: descriptions of sensors are far shorter."""
 _LAST_TIME = 2**63
@@ -169,6 +171,7 @@ class LogReader:
     def _scan(self, topics: Collection[str] | None) -> Iterator[Record]:
         before, seen, checksum = self.dropped.total(), set(), zlib.crc32(MAGIC)
         self._found: Counter[int] = Counter()
+        self._spent = 0
         expected = Counter(self._summary.counts or {})
         opcode, unbroken = 0, True
         with self.path.open("rb") as file:
@@ -231,6 +234,9 @@ class LogReader:
         self._chunks.append((place, whole))
         try:
             data = unpack(content, whole)
+            self._spent += len(data)
+            if self._spent > _BYTES_IN_ALL + _RATIO_IN_ALL * self._size:
+                raise ValueError(f"all chunks so far unpack to {self._spent} bytes, far more than a log holds")
         except Exception as error:
             if whole:
                 self.drop("bad_chunk", f"{self.path}: chunk at byte {place.start}: {' '.join(str(error).split()):.160}")

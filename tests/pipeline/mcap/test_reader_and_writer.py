@@ -389,3 +389,13 @@ def test_a_chunk_that_unpacks_to_far_more_than_a_log_holds_is_not_unpacked(tmp_p
     assert set(found) < set(whole)
     assert reader.dropped["bad_chunk"]
     assert peak < 50_000_000
+
+
+def test_very_many_chunks_that_unpack_to_far_more_than_a_log_holds_are_not_read(tmp_path: Path) -> None:
+    packed = zstandard.compress(struct.pack("<BQ", 0x80, 4_000_000) + bytes(4_000_000))
+    content = struct.pack("<QQQII", 0, 0, 4_000_009, 0, 4) + b"zstd" + struct.pack("<Q", len(packed)) + packed
+    chunk = struct.pack("<BQ", 0x06, len(content)) + content
+    (tmp_path / "log.mcap").write_bytes(MAGIC + 40 * chunk + struct.pack("<BQI", 0x0F, 4, 0))
+    reader = LogReader(tmp_path / "log.mcap")
+    assert keys(reader) == []
+    assert "all chunks so far unpack to" in reader.details["bad_chunk"]
