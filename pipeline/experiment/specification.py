@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from omninav.pipeline.graph.ports import convert_fields
+from omninav.pipeline.graph.ports import convert, convert_fields
 from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 
 from .series import Aggregate, figure_at
@@ -213,7 +213,9 @@ def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
     A profile changes entries of the file: mappings key by key, the labels of a factor and everything else as a whole.
     A file that stands on another (its `defaults`) takes a label or a measure of that one out by setting it to null.
     """
-    profiles = plain.get("profiles") or {}
+    profiles, problems = convert(plain.get("profiles") or {}, dict[str, dict | None], "profiles")  # type: ignore[type-arg]
+    if problems:
+        raise ProblemsFound(problems)
     if profile not in {"paper", *profiles}:
         hint = suggest(profile, {"paper", *map(str, profiles)}, "profiles", prefix="profile=")
         raise ProblemsFound([Problem("profile", f"this experiment has no profile '{profile}'", hint)])
@@ -221,7 +223,9 @@ def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
     for key, value in (profiles.get(profile) or {}).items():
         both = isinstance(value, Mapping) and isinstance(scaled.get(key), Mapping)
         scaled[key] = {**scaled[key], **value} if both else value
-    scaled["sweep"] = {factor: _without_null(labels) for factor, labels in (scaled.get("sweep") or {}).items()}
+    sweep = scaled.get("sweep") or {}
+    if isinstance(sweep, Mapping):
+        scaled["sweep"] = {factor: _without_null(labels) for factor, labels in sweep.items()}
     for key in ("measures", "scenarios"):
         scaled[key] = _without_null(scaled.get(key) or {})
     arguments, problems = convert_fields(scaled, Experiment, "experiment")

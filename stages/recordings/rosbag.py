@@ -4,6 +4,7 @@ import bz2
 import struct
 from collections import Counter
 from collections.abc import Collection, Iterator
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -72,6 +73,10 @@ class BagFeed:
                     f"{path}: not a readable bag ({said}); if it was cut off, repair it with {repair}"
                 ) from None
             self.drop("bad_metadata", f"{path}: metadata.yaml cannot be used ({said})")
+        named = [isinstance(c.topic, str) and isinstance(c.msgtype, str) for c in self._reader.connections]
+        self._connections = list(compress(self._reader.connections, named))
+        if not all(named):  # a column of SQLite holds anything
+            self.drop("bad_chunk", f"{path}: a topic has no name, or no type", named.count(False))
 
     def _open(self, paths: list[Path]) -> "AnyReader":
         from rosbags.highlevel import AnyReader  # slow to import, and seldom needed
@@ -85,11 +90,11 @@ class BagFeed:
     @property
     def topics(self) -> dict[str, str]:
         """Topics and their types."""
-        return dict(sorted((connection.topic, connection.msgtype) for connection in self._reader.connections))
+        return dict(sorted((connection.topic, connection.msgtype) for connection in self._connections))
 
     def scan(self, topics: Collection[str] | None = None) -> Iterator[Record]:
         """Messages in the order of the bag's times."""
-        wanted = [c for c in self._reader.connections if topics is None or c.topic in topics]
+        wanted = [c for c in self._connections if topics is None or c.topic in topics]
         headers = {c.topic: self._has_header(c.msgtype) for c in wanted}
         number: Counter[tuple[str, int]] = Counter()
         try:
@@ -110,7 +115,7 @@ class BagFeed:
     def fetch(self, location: tuple[str, int, int]) -> bytes:
         """The bytes of a message again. Raises `BadMessage`."""
         topic, time, number = location
-        wanted = [c for c in self._reader.connections if c.topic == topic]
+        wanted = [c for c in self._connections if c.topic == topic]
         try:
             for passed, (_, _, data) in enumerate(self._reader.messages(wanted, start=time, stop=time + 1)):
                 if passed == number:
@@ -127,9 +132,9 @@ class BagFeed:
         except Exception as error:
             raise BadMessage(f"{self.path}: a message on {topic} is not a sound {msgtype} ({error!s:.160})") from None
 
-    def drop(self, kind: str, detail: str) -> None:
+    def drop(self, kind: str, detail: str, number: int = 1) -> None:
         """Count something lost."""
-        self.dropped[kind] += 1
+        self.dropped[kind] += number
         self.details.setdefault(kind, detail)
 
     def _has_header(self, msgtype: str) -> bool:

@@ -91,8 +91,9 @@ class CsvTable:
             return column
         if column not in self.names:
             near = nearest(column, self.names)
-            hint = f"did you mean '{near}'? " if near else ""
-            raise UnreadableRecording(f"{self.path}: no column '{column}'; {hint}columns: {', '.join(self.names)}")
+            hint = f"did you mean '{near:.60}'? " if near else ""
+            known = ", ".join(f"{name:.60}" for name in self.names)
+            raise UnreadableRecording(f"{self.path}: no column '{column:.60}'; {hint}columns: {known:.300}")
         return self.names.index(column)
 
     def texts(self, column: str | int) -> list[str]:
