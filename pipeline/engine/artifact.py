@@ -26,6 +26,7 @@ OWN_PACKAGE = __name__.partition(".")[0]
 _HEADER, _REST, _SUM = "header.json", "rest.npy", "sha256:"
 UNPACKED_BYTES, UNPACKED_RATIO = 1 << 26, 64
 """How many bytes a file may unpack to: that many, or that many times its own."""
+_NPY_HEAD, _STEP = 1 << 16, 1 << 20
 
 
 def write_artifact(path: Path, value: Value, facts: dict[str, Any] | None = None) -> None:
@@ -83,8 +84,8 @@ def read_artifact(path: Path) -> Value:
         header = _header(archive)
         cls, fields = _type(header), {}
         for name, digest in header["arrays"].items():
-            fields[name] = _array(archive.read(f"{name}.npy"))
-            if hashlib.sha256(fields[name].tobytes()).hexdigest() != digest:
+            fields[name], found = _array(archive, f"{name}.npy")
+            if found != digest:
                 raise _Unfit(f"the array '{name:.40}' is damaged (sha256 differs)")
         try:
             value = cls(**fields | decode(fields.pop("rest").tobytes()))
@@ -125,21 +126,22 @@ def _type(header: Mapping[str, Any]) -> type[Value]:
     return VALUE_TYPES[name]
 
 
-def _array(content: bytes) -> npt.NDArray[Any]:
-    """The array in a `.npy` file whose content is as long as its header says: nothing is made larger than it is."""
-    file = io.BytesIO(content)
-    if np.lib.format.read_magic(file) != (1, 0):
+def _array(archive: zipfile.ZipFile, name: str) -> tuple[npt.NDArray[Any], str]:
+    """An array and the sha256 of its bytes. Its content is in memory once, and is as long as its header says."""
+    content = memoryview(bytearray(archive.getinfo(name).file_size))
+    with archive.open(name) as file:
+        read = 0
+        while number := file.readinto(content[read : read + _STEP]):  # type: ignore[attr-defined]
+            read += number
+    head = io.BytesIO(content[:_NPY_HEAD])
+    if np.lib.format.read_magic(head) != (1, 0):
         raise _Unfit("an array is in another format than 1.0")
-    shape, by_column, dtype = np.lib.format.read_array_header_1_0(file)
-    count = math.prod(shape)
-    if (
-        dtype.hasobject
-        or by_column
-        or min(shape, default=0) < 0
-        or count * dtype.itemsize != len(content) - file.tell()
-    ):
+    shape, by_column, dtype = np.lib.format.read_array_header_1_0(head)
+    data, count = content[head.tell() : read], math.prod(shape)
+    if dtype.hasobject or by_column or min(shape, default=0) < 0 or count * dtype.itemsize != len(data):
         raise _Unfit("an array is not as long as it says")
-    return np.frombuffer(content, dtype, count, file.tell()).reshape(shape).copy() if count else np.empty(shape, dtype)
+    array = np.frombuffer(data, dtype, count).reshape(shape) if count else np.empty(shape, dtype)
+    return array, hashlib.sha256(data).hexdigest()
 
 
 @contextmanager

@@ -1,7 +1,7 @@
 """ROS 2 message types: those that come with ROS, those that a file defines, and messages made from mappings."""
 
 from collections.abc import Collection, Mapping
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 _DEFINITION_ENCODINGS = ("ros2msg", "ros2idl")
+MAX_DEFINITION = 100_000
+"""Bytes of a message's definition with all that it is made of; those of ROS have some 5000."""
 
 
 @cache
@@ -24,12 +26,12 @@ def standard_types() -> "Typestore":
     return get_typestore(Stores.ROS2_HUMBLE)
 
 
-@cache
+@lru_cache(maxsize=64)
 def types_of(msgtype: str, encoding: str, definition: bytes) -> "Typestore":
     """The message types in a definition; the standard ones where it is not whole or not readable."""
     from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
-    if encoding not in _DEFINITION_ENCODINGS:
+    if encoding not in _DEFINITION_ENCODINGS or len(definition) > MAX_DEFINITION:
         return standard_types()
     store = get_typestore(Stores.EMPTY)
     try:

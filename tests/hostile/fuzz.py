@@ -25,6 +25,8 @@ FOUND = Path(__file__).parent / "found"
 ADDRESS_SPACE = 4_000_000_000
 """Bytes of a worker: an input that asks for more ends in a MemoryError, and the machine lives."""
 ENDINGS = ("accepted", "refused", "failed")
+LIFE_S = 240
+"""Seconds of a worker: libraries lose some memory over images that they cannot read."""
 KEPT = 200
 """Failing inputs that are written down."""
 
@@ -73,9 +75,9 @@ def fuzz(
                 if process.exitcode:
                     message = f"the process ended with {process.exitcode}"
                     failures.setdefault(f"{message} in {last}", last or ("?", Case(0, ())))
-                    if time.monotonic() < end:
-                        starts += 1
-                        workers[number] = _started(formats, f"{seed} {starts}", end)
+                if time.monotonic() < end:
+                    starts += 1
+                    workers[number] = _started(formats, f"{seed} {starts}", end)
     return counts, failures
 
 
@@ -107,11 +109,14 @@ def _work(names: list[str], seed: str, end: float, pipe: Connection) -> None:
     formats = [format for format in FORMATS if format.name in names]
     spent = dict.fromkeys(names, 0.0)
     tried: Counter[str] = Counter()
+    for format in formats:
+        format.samples()  # made once, in no format's time
     known: set[str] = set()
     with tempfile.TemporaryDirectory(dir="/dev/shm" if os.access("/dev/shm", os.W_OK) else None) as scratch:
         folder = Path(scratch, "input")
         os.chdir(scratch)
-        while time.monotonic() < end:
+        retired = min(end, time.monotonic() + LIFE_S)
+        while time.monotonic() < retired:
             format = min(formats, key=lambda format: spent[format.name])
             counts: Counter[tuple[str, str]] = Counter()
             started = time.monotonic()
