@@ -56,11 +56,10 @@ def fuzz(
     FOUND.mkdir(exist_ok=True)
     for number in range(os.cpu_count() or 1):
         workers[number] = _started(formats, f"{seed} {number}", end)
-    starts = len(workers)
+    starts, latest = len(workers), dict.fromkeys(workers, ("?", Case(0, ())))
     while workers:
         multiprocessing.connection.wait([pipe for _, pipe in workers.values()], timeout=1)
         for number, (process, pipe) in list(workers.items()):
-            last: tuple[str, Case] | None = None
             try:
                 while pipe.poll():
                     kind, *content = pipe.recv()
@@ -68,13 +67,13 @@ def fuzz(
                         counts.update(content[0])
                     elif kind == "failure":
                         failures.setdefault(content[2], (content[0], Case(*content[1])))
-                    last = (content[0], Case(*content[1])) if kind == "now" else None
+                    latest[number] = (content[0], Case(*content[1])) if kind == "now" else ("?", Case(0, ()))
             except EOFError:
                 process.join()
                 del workers[number]
                 if process.exitcode:
                     message = f"the process ended with {process.exitcode}"
-                    failures.setdefault(f"{message} in {last}", last or ("?", Case(0, ())))
+                    failures.setdefault(f"{message} in {latest[number]}", latest[number])
                 if time.monotonic() < end:
                     starts += 1
                     workers[number] = _started(formats, f"{seed} {starts}", end)
