@@ -2,14 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Annotated, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds
-from omninav.stages.geometry.plane.se2 import between, compose, wrap
+from omninav.stages.geometry.plane.se2 import between, chain, compose, wrap
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -79,12 +78,12 @@ def without_jumps(stamps: Stamps, poses: Array, jumps: Rows) -> Array:
 
     Of `believed`: before each jump lie two poses or more.
     """
-    joined = poses.copy()
-    for row, end in pairwise([*jumps.tolist(), len(poses)]):
-        share = float(stamps[row] - stamps[row - 1]) / float(stamps[row - 1] - stamps[row - 2])
-        step = between(joined[row - 2], joined[row - 1]) * min(share, 1.0)
-        joined[row:end] = compose(compose(joined[row - 1], step), between(poses[row], poses[row:end]))
-    return joined
+    if not len(jumps):
+        return poses
+    steps = between(poses[:-1], poses[1:])
+    shares = (stamps[jumps] - stamps[jumps - 1]) / (stamps[jumps - 1] - stamps[jumps - 2])
+    steps[jumps - 1] = steps[jumps - 2] * np.minimum(shares, 1.0)[:, None]
+    return np.concatenate([poses[:1], compose(poses[0], chain(steps))])
 
 
 def seconds_within(gaps: Stamps, stamps: Stamps) -> Array:
@@ -102,10 +101,13 @@ def _resumes(
     if back > len(chains):
         return False
     last = chains[-back][-1][1] - 1
-    if stamps[row] - stamps[last] > EXCURSION_S * 1e9:
+    seconds = float(stamps[row] - stamps[last]) / 1e9
+    if seconds > EXCURSION_S:
         return False
-    ends = slice(last, last + 1), slice(row, row + 1)
-    return bool(_possible(stamps[ends[0]], poses[ends[0]], stamps[ends[1]], poses[ends[1]], limits)[0])
+    (x, y, heading), (x_then, y_then, heading_then) = poses[row].tolist(), poses[last].tolist()
+    if not math.hypot(x - x_then, y - y_then) <= limits.speed * max(seconds, MIN_INTERVAL_S):  # nor is NaN
+        return False
+    return abs(math.remainder(heading - heading_then, 2 * math.pi)) <= limits.turn * max(seconds, MIN_INTERVAL_S)
 
 
 def _possible(before: Stamps, start: Array, after: Stamps, end: Array, limits: MotionLimits) -> npt.NDArray[np.bool_]:

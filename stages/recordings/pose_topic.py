@@ -12,6 +12,8 @@ from .topic_recording import Feed
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
+MAX_STAMP = 2**63 - 1
+"""In ns: the year 2262. What comes later is out of order in any log."""
 NOWHERE = (float("nan"),) * 3
 
 
@@ -28,12 +30,12 @@ class PoseTopic:
 
     def __init__(self, topic: str) -> None:
         self.topic = topic
-        self._stamps, self._log_times, self._poses = array("q"), array("Q"), array("d")
+        self._stamps, self._log_times, self._poses = array("q"), array("q"), array("d")
 
     def add(self, stamp: int, log_time: int, pose: tuple[float, float, float]) -> None:
         """One message; `NOWHERE` for one whose pose cannot be."""
-        self._stamps.append(stamp)
-        self._log_times.append(log_time)
+        self._stamps.append(min(stamp, MAX_STAMP))
+        self._log_times.append(min(log_time, MAX_STAMP))
         self._poses.extend(pose)
 
     def track(self, feed: Feed, name: str, limits: MotionLimits, jumps: bool) -> Track | None:

@@ -59,10 +59,10 @@ class ReferenceGraph(GrowableArrays, Value):
 
     def join(self, one: int, other: int) -> bool:
         """Add the edge between two references; False where it was there."""
-        pair = np.array(sorted((one, other)), np.int64)
-        if one == other or bool((self.edges == pair).all(axis=1).any()):
+        low, high = sorted((one, other))
+        if low == high or bool(((self.edges[:, 0] == low) & (self.edges[:, 1] == high)).any()):
             return False
-        self.append("edges", pair)
+        self.append("edges", np.array([low, high], np.int64))
         return True
 
     def take_poses_from(self, source: PoseSource) -> None:
