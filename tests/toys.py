@@ -204,6 +204,16 @@ class Fail(Stage):
         return self.Out(number=number)
 
 
+class Latest(Stage):
+    """A result of every tick; the last one is that of the run."""
+
+    class Out(Outputs):
+        metrics: Metrics
+
+    def step(self, ctx: Context, number: Number) -> Out:
+        return self.Out(metrics=Metrics({"latest": number.value}))
+
+
 class Collected(Stage):
     """All numbers, after the loop, as text in a file and as a metric."""
 

@@ -95,7 +95,7 @@ class Engine:
         self.held = {
             w.origin for w in graph.wires if w.from_node in ticking and (w.hold or w.to_node in after) and not w.collect
         }
-        self.held |= {origin for origin in wanted if origin.partition(".")[0] in ticking}
+        self.held |= {origin for origin in wanted if origin.partition(".")[0] in ticking} | graph.reported(ticking)
         self.recorded = {name: tuple(origins) for name, origins in (recorded or {}).items()}
         self.sequences: dict[str, DiskSequence] = {}
         if options.memory is not None:

@@ -70,9 +70,9 @@ def prefix_nodes(graph: Graph, artifacts: bool = False, without: Collection[str]
 
 
 def frontier_of(graph: Graph, nodes: frozenset[str], wanted: Collection[str] = ()) -> list[str]:
-    """What other nodes read of a prefix, what is `wanted` of it, and the source's tick."""
+    """What other nodes read of a prefix, what is `wanted` or reported of it, and the source's tick."""
     read = {wire.origin for wire in graph.wires if wire.from_node in nodes and wire.to_node not in nodes}
-    read |= {origin for origin in wanted if origin.partition(".")[0] in nodes}
+    read |= {origin for origin in wanted if origin.partition(".")[0] in nodes} | graph.reported(nodes)
     return sorted(read | ({f"{graph.source.name}.tick"} if graph.source else set()))
 
 

@@ -227,7 +227,7 @@ def _recordable(graph: Graph, known: CachedPrefix | None) -> list[str]:
     """
     nodes = prefix_nodes(graph, artifacts=True)
     inside = known.nodes if known is not None and known.replay is not None else frozenset()
-    read = {wire.origin for wire in graph.wires if wire.from_node in nodes - inside}
+    read = {wire.origin for wire in graph.wires if wire.from_node in nodes - inside} | graph.reported(nodes - inside)
     small = {origin for origin in read if not graph.is_marked(origin, "bulky")}
     tick = {f"{graph.source.name}.tick"} if graph.source is not None else set()
     return sorted(small | tick | set(known.frontier if known is not None and inside else ()))

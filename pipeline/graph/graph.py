@@ -76,10 +76,15 @@ class Graph:
             return Port(name, self.artifact_types[name]) if name in self.artifact_types else None
         return self.nodes[node].signature.outputs.get(name) if node in self.nodes else None
 
-    def is_marked(self, origin: str, mark: Literal["in_place", "bulky", "is_truth"]) -> bool:
+    def is_marked(self, origin: str, mark: Literal["in_place", "bulky", "is_truth", "reported"]) -> bool:
         """Whether the values of an output are of a type that is marked so (see `Value`)."""
         port = self.port(origin)
         return port is not None and bool(getattr(port.type, mark, False))
+
+    def reported(self, names: Iterable[str]) -> set[str]:
+        """The outputs of some nodes that are results of a run, though no other node reads them."""
+        ports = {f"{name}.{port}" for name in names for port in self.nodes[name].signature.outputs}
+        return {origin for origin in ports if self.is_marked(origin, "reported")}
 
     def inputs_of(self, name: str) -> list[Wire]:
         """The wires that enter a node."""

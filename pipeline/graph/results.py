@@ -38,6 +38,7 @@ class Metrics(Value):
         return self.Out(metrics=Metrics(values, QUANTITIES, headlines=("position_error_m.median", "success.at_end")))
     """
 
+    reported = True
     values: dict[str, Any]
     """Nested mappings of numbers, texts, None and lists."""
     quantities: dict[str, Quantity] = field(default_factory=dict)
@@ -79,6 +80,7 @@ class Figure(Value):
     one too (`media_type` video/mp4): `per_second`, its frames in a second, lets the reader step through it.
     """
 
+    reported = True
     name: str
     title: str
     caption: str
@@ -91,6 +93,7 @@ class Figure(Value):
 class Table(Value):
     """A table for the report: column heads (with units), and rows of texts or numbers."""
 
+    reported = True
     name: str
     title: str
     caption: str

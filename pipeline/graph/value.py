@@ -15,12 +15,14 @@ class Value:
     Fields are arrays, numbers, strings, other values, and tuples, lists and string-keyed dicts of these: what
     `codec.py` can write. `in_place` marks a large value that one stage updates in place; it is then not
     frozen, and the engine sees to it that nobody reads it too late. `bulky` marks what is too large to be kept over
-    a whole log: it is never cached. `is_truth` marks what cannot be measured in the field.
+    a whole log: it is never cached. `is_truth` marks what cannot be measured in the field. `reported` marks a result of
+    the run, though no other stage reads it.
     """
 
     in_place: ClassVar[bool] = False
     bulky: ClassVar[bool] = False
     is_truth: ClassVar[bool] = False
+    reported: ClassVar[bool] = False
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)

@@ -267,3 +267,17 @@ def test_a_prefix_whose_frontier_is_bulky_is_not_cached_and_says_why(tmp_path: P
         assert prefix is not None
         assert prefix.reason == "not cached: source.big is too large to keep and is read by enter"
         assert not prefix.recorded()
+
+
+@pytest.mark.parametrize("again", ["after its loop", "from a cached prefix"])
+def test_a_result_that_is_given_every_tick_is_there_though_no_tick_runs_again(tmp_path: Path, again: str):
+    graph = graph_of({"source": "Count", "latest": "Latest"}, {"latest": {"number": "source.number"}})
+    cache, found = Cache(tmp_path / "cache"), []
+    for place in (tmp_path / "first", tmp_path / ("first" if again == "after its loop" else "second")):
+        with cached_prefix(graph, cache if again == "from a cached prefix" else None, 0) as prefix:
+            replay, recorded = (prefix.replay, prefix.recorded()) if prefix is not None else (None, {})
+            engine = Engine(graph, {}, EngineOptions(0, place, place / "memory"), replay=replay, recorded=recorded)
+            engine.run()
+            keep_prefix(engine, prefix, cache)
+        found.append(engine.last("latest.metrics").values)
+    assert found == [{"latest": 9.0}, {"latest": 9.0}]
