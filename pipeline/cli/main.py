@@ -29,22 +29,25 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _unknown_command(arguments[0])
     else:
         name = "run"
-    from omninav.pipeline.graph.problems import BadInput, ProblemsFound, unreadable_yaml
-
-    from .config_groups import refuse_null_groups
-
     try:
+        from omninav.pipeline.graph.problems import BadInput, ProblemsFound, unreadable_yaml
+
+        from .config_groups import refuse_null_groups
+
         refuse_null_groups(arguments)
         command = importlib.import_module(f"omninav.pipeline.cli.commands.{name}").command
         return int(command(arguments))
+    except KeyboardInterrupt:  # it may come before anything is imported, so it stands first
+        print("stopped; `omninav resume runs/latest` goes on", file=sys.stderr)
+        return 130
     except (ProblemsFound, BadInput) as error:
         print(error, file=sys.stderr)
         return 2
     except BrokenPipeError:
         return 0
-    except KeyboardInterrupt:
-        print("stopped; `omninav resume runs/latest` goes on", file=sys.stderr)
-        return 130
+    except OSError as error:  # a full disk, a folder that cannot be written to, a link in place of a file
+        print(f"{error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
+        return 2
     except Exception as error:
         bad = unreadable_yaml(error)
         if bad is None:

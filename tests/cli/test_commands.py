@@ -284,6 +284,16 @@ def test_resume_of_what_is_no_run_or_has_ended_says_so(omninav, demo: Path):
     assert "report.html" in said
 
 
+def test_a_link_in_place_of_a_lock_is_refused_in_one_line(omninav, tmp_path: Path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "manifest.json").write_text("{}")
+    (tmp_path / "run" / ".lock").symlink_to(tmp_path / "mine")
+    ended = omninav("resume", "run")
+    assert ended.returncode == 2
+    assert ended.stderr == f"{tmp_path / 'run' / '.lock'}: is a link, which is not followed; delete it\n"
+    assert not (tmp_path / "mine").exists()
+
+
 @pytest.mark.parametrize("word", ["nodes.match.headings=0", "nodes.match.headings=thirty", "nodes.fusion=null"])
 def test_wrong_parameters_are_refused_before_anything_runs(omninav, tmp_path: Path, word: str):
     ended = omninav(word)
