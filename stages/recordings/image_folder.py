@@ -209,9 +209,9 @@ class ImageFolder:
 
 
 def _is_file(path: Path) -> bool:
-    """Whether there is a file of that name; also of a name that no file can have."""
+    """Whether there is a file of that name that may be an image; also of a name that no file can have."""
     try:
-        return path.is_file()
+        return path.is_file() and 0 < path.stat().st_size <= MAX_FILE_BYTES  # as nothing in /proc is
     except OSError:
         return False
 
