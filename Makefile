@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format bench soak kills fuzz clean
+.PHONY: help demo test lint format bench soak scale kills fuzz clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -31,6 +31,11 @@ bench: $(VENV)/.benchmarks  ## measure speed, beside other libraries
 
 soak: $(VENV)/.installed  ## drive 100,000 steps and check that memory and map stop growing
 	$(BIN)/python benchmarks/soak.py
+
+scale: $(VENV)/.installed  ## run 100,000 images, a million odometry messages, a map of 100,000 references
+	$(BIN)/python benchmarks/scale.py images
+	$(BIN)/python benchmarks/scale.py odometry
+	$(BIN)/python benchmarks/scale.py references
 
 kills: export KILLS := $(or $(KILLS),300)
 kills: $(VENV)/.installed  ## kill and disturb runs KILLS times (300) and compare the bytes they end at

@@ -8,6 +8,7 @@ to a temporary folder, panoramas of 48 x 16 pixels of a drive on a circle; every
 
 import json
 import math
+import os
 import resource
 import subprocess
 import sys
@@ -97,12 +98,12 @@ def measured(words: list[str]) -> Iterator[tuple[int, float, float]]:
             continue
         pages = int(Path(f"/proc/{process.pid}/statm").read_text().split()[1])
         yield int(state.get("frames", 0)), time.perf_counter() - began, pages * resource.getpagesize() / 1e6
-    if process.wait():
-        raise SystemExit(
-            f"{' '.join(words)}: exit status {process.returncode}\n{''.join(lines[-5:])}{process.stdout.read()}"
-        )
-    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e3
-    yield -1, time.perf_counter() - began, peak
+    said = process.stdout.read()
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise SystemExit(f"{' '.join(words)}: exit status {process.returncode}\n{''.join(lines[-5:])}{said}")
+    yield -1, time.perf_counter() - began, used.ru_maxrss / 1e3
 
 
 def table(words: list[str], every: int = EVERY) -> None:

@@ -1,5 +1,6 @@
 """The poses on one topic: gathered as they are read, then put in order, and what no robot does left out."""
 
+import math
 from array import array
 from typing import NamedTuple
 
@@ -12,6 +13,7 @@ from .topic_recording import Feed
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
+Rows = npt.NDArray[np.int64]
 MAX_STAMP = 2**63 - 1
 """In ns: the year 2262. What comes later is out of order in any log."""
 NOWHERE = (float("nan"),) * 3
@@ -49,18 +51,34 @@ class PoseTopic:
         stamps, poses = stamps[order[kept]], poses[order[kept]]
         rows, begun, gaps = believed(stamps, poses, limits)
         unlikely = np.setdiff1d(np.flatnonzero(np.isfinite(poses).all(axis=1)), rows)
-        for row in unlikely:
-            feed.drop("impossible_motion", f"{self._at(name, stamps, row)}: {_step(stamps, poses, row, limits)}")
-        stamps, poses = stamps[rows], poses[rows]
+        self._drop(feed, name, "impossible_motion", stamps, poses, unlikely, limits)
         if not len(rows):
             return None
+        stamps, poses = stamps[rows], poses[rows]
         if not jumps:
-            for row in begun:
-                feed.drop("odometry_jump", f"{self._at(name, stamps, row)}: {_step(stamps, poses, row, limits)}")
+            self._drop(feed, name, "odometry_jump", stamps, poses, begun, limits)
             poses = without_jumps(stamps, poses, begun)
         return Track(stamps, poses, gaps)
 
-    def _in_order(self, feed: Feed, name: str, stamps: Stamps) -> npt.NDArray[np.int64]:
+    def _drop(
+        self, feed: Feed, name: str, kind: str, stamps: Stamps, poses: Array, rows: Rows, limits: MotionLimits
+    ) -> None:
+        """Count some rows of a track, and say of the first what it would need of the robot, by its neighbour."""
+        if not len(rows):
+            return
+        row = int(rows[0])
+        other = row - 1 if row else min(1, len(poses) - 1)
+        metres = math.hypot(*(poses[row, :2] - poses[other, :2]).tolist())
+        seconds = abs(float(stamps[row] - stamps[other])) / 1e9
+        where = f"{name}: {self.topic} at {stamps[row] / 1e9:.3f} s"
+        detail = (
+            f"{where}: {metres:.3g} m from its neighbour {seconds:.3g} s away; "
+            f"believed are {limits.speed:g} m/s and {limits.turn:.3g} rad/s (nodes.source.limits)"
+        )
+        for _ in rows:
+            feed.drop(kind, detail)
+
+    def _in_order(self, feed: Feed, name: str, stamps: Stamps) -> Rows:
         """Which messages to keep so that stamps ascend."""
         kept = np.arange(len(stamps))
         if (np.diff(stamps) <= 0).any():
@@ -74,17 +92,3 @@ class PoseTopic:
         for stamp in stamps[kept[apart]]:
             feed.drop("lone_stamp", f"{name}: {self.topic} has a stamp hours from all others, {stamp} ns")
         return kept[~apart]
-
-    def _at(self, name: str, stamps: Stamps, row: int) -> str:
-        return f"{name}: {self.topic} at {stamps[row] / 1e9:.3f} s"
-
-
-def _step(stamps: Stamps, poses: Array, row: int, limits: MotionLimits) -> str:
-    """What a pose would need of the robot, by its neighbour."""
-    other = row - 1 if row else min(1, len(poses) - 1)
-    metres = float(np.hypot(*(poses[row, :2] - poses[other, :2])))
-    seconds = abs(float(stamps[row] - stamps[other])) / 1e9
-    return (
-        f"{metres:.3g} m from its neighbour {seconds:.3g} s away; no robot is believed to be faster than "
-        f"{limits.speed:g} m/s and {limits.turn:.3g} rad/s (nodes.source.limits)"
-    )
