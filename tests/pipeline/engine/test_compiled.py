@@ -80,3 +80,10 @@ def test_code_that_is_damaged_on_disk_is_compiled_again(package: Path) -> None:
         for file in (package / "pack" / "__pycache__").glob(f"caller*.{suffix}"):
             file.write_bytes(file.read_bytes()[:60])
         assert run(package) == [6.5, 0, 1], suffix
+
+
+def test_no_stage_leaves_its_code_to_numbas_own_cache() -> None:
+    stages = Path(__file__).resolve().parents[3] / "stages"
+    files = {file.name: file.read_text() for file in stages.rglob("*.py")}
+    assert sum("@compiled(" in text for text in files.values()) > 30
+    assert [name for name, text in files.items() if "njit(cache" in text or "jit(cache" in text] == []
