@@ -6,23 +6,27 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from hydra import compose, initialize_config_module
-from hydra._internal.utils import get_args_parser
+from hydra import compose
 from hydra.core.config_store import ConfigStore
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
+from omninav.pipeline.graph.ports import convert_fields
+from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import plugins
+from omninav.pipeline.graph.stage import Bounds
 from omninav.pipeline.run.artifact_specification import ArtifactSpecification, read_specifications, without_absent
 from omninav.pipeline.run.inputs import not_taken, read_inputs
 
-from .config_groups import CONF, settings_left_open
-from .overrides import invalid_overrides, search, with_unlisted_parameters
+from .config_groups import settings_left_open
+from .hydra_session import hydra_started
+from .overrides import invalid_overrides, with_unlisted_parameters
+from .words import read_flags
 
 OF_THE_VARIANT = ("variant", "inputs", "nodes", "wires", "artifacts", "saves")
 """What a variant's file says of itself; everything else in a configuration is a setting."""
@@ -44,11 +48,7 @@ OmegaConf.register_new_resolver("unless", _unless, replace=True)
 
 def read_words(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     """The overrides among arguments that may hold Hydra's flags, and the folders of `--config-dir`."""
-    read = get_args_parser().parse_args(list(arguments))
-    if read.config_dir and not Path(read.config_dir).is_dir():
-        raise BadInput(
-            f"--config-dir: there is no folder {read.config_dir}; it holds groups, as FOLDER/match/mine.yaml"
-        )
+    read = read_flags(arguments)
     return read.overrides, [read.config_dir] if read.config_dir else []
 
 
@@ -58,9 +58,9 @@ def composed(arguments: Sequence[str], offer: bool = True) -> Iterator[Any]:
     words, folders = read_words(arguments)
     if offer:
         offer_plugins()
-    with initialize_config_module(CONF, version_base="1.3"):
+    with hydra_started(folders):
         try:
-            config = compose("config", overrides=[*search(folders), *with_unlisted_parameters(words, folders)])
+            config = compose("config", overrides=with_unlisted_parameters(words, folders))
         except HydraException as error:
             raise ProblemsFound(invalid_overrides(words, folders, str(error))) from None
         yield config
@@ -76,15 +76,12 @@ def offer_plugins() -> None:
         ConfigStore.instance().store(name, {"_target_": entry.target}, group=entry.role, package=f"nodes.{entry.role}")
 
 
-def configured_variants(place: Sequence[str] = ()) -> Variants:
-    """Gives the configuration of a variant as its file has it, composed once.
-
-    `place` says where configurations are looked for, where Hydra was not started with `--config-dir`.
-    """
+def configured_variants() -> Variants:
+    """Gives the configuration of a variant as its file has it, composed once."""
 
     @functools.cache
     def of(variant: str) -> Any:
-        return compose("config", overrides=[*place, f"variant={variant}"])
+        return compose("config", overrides=[f"variant={variant}"])
 
     return lambda variant: copy.deepcopy(of(variant))
 
@@ -96,11 +93,11 @@ def complete(config: Any, variants: Variants | None = None) -> dict[str, Any]:
     nodes that it inherits. Settings that nothing reads are left out. `variants` gives the variants' configurations.
     """
     variants = variants or configured_variants()
-    _name_past_links(config)
     try:
+        _name_past_links(config)
         plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
         specs = read_specifications(plain)
-        problems = list(not_taken(plain, settings_left_open()))
+        problems = [*not_taken(plain, settings_left_open()), *_unfit_settings(plain)]
         for name, spec in specs.items():
             problems += _given_twice(config, name, spec)
         if problems:
@@ -120,6 +117,20 @@ def complete(config: Any, variants: Variants | None = None) -> dict[str, Any]:
         raise ProblemsFound([Problem(str(where), str(error).split("\n")[0])]) from None
     read = {*OF_THE_VARIANT, *OF_THE_RUN, *read_inputs(plain), *settings_read(config)}
     return _without_unset({name: value for name, value in plain.items() if name in read})
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """What every run reads beside its seed."""
+
+    runs: str
+    cache: str | None
+    checkpoint_s: Annotated[float, Bounds(ge=0, le=1e6)]
+
+
+def _unfit_settings(plain: Mapping[str, Any]) -> list[Problem]:
+    settings = {name: plain[name] for name in RunSettings.__dataclass_fields__ if name in plain}
+    return [Problem(p.where.lstrip("."), p.what, p.hint) for p in convert_fields(settings, RunSettings, "")[1]]
 
 
 def _graph_of(config: Any, name: str, spec: ArtifactSpecification, variants: Variants) -> dict[str, Any]:

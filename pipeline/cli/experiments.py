@@ -33,18 +33,15 @@ def run_experiment(config: Any, arguments: Sequence[str]) -> int:
     return 0 if well else 1
 
 
-def planned_experiment(config: Any, arguments: Sequence[str], place: Sequence[str] = ()) -> ExperimentRun:
-    """The experiment of a composed configuration, with every condition checked. Raises `ProblemsFound`.
-
-    `place` says where configurations are looked for, where Hydra was not started with `--config-dir`.
-    """
+def planned_experiment(config: Any, arguments: Sequence[str]) -> ExperimentRun:
+    """The experiment of a composed configuration, with every condition checked. Raises `ProblemsFound`."""
     plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
     typed, folders = read_words(arguments)
-    variants = configured_variants(place)
+    variants = configured_variants()
 
     def composed(words: Sequence[str]) -> dict[str, Any]:
         try:
-            config = compose("config", overrides=[*place, *with_unlisted_parameters(words, folders)])
+            config = compose("config", overrides=with_unlisted_parameters(words, folders))
         except HydraException as error:
             raise ProblemsFound(invalid_overrides(words, folders, str(error))) from None
         return complete(config, variants)

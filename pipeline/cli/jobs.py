@@ -15,7 +15,7 @@ from omegaconf import OmegaConf
 
 from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.files import locked, write_json
-from omninav.pipeline.graph.problems import BadInput, ProblemsFound, unreadable_yaml
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import plan
 from omninav.pipeline.run.run_folder import start
@@ -54,20 +54,22 @@ def run_job(config: Any, arguments: Sequence[str], run_experiment: Callable[[Any
     except (ProblemsFound, BadInput) as wrong:
         code, error = 2, str(wrong)
     except StageFailed as failed:
-        code, error = 1, str(failed)
+        of_a_file = as_bad_input(failed.__cause__) if failed.__cause__ is not None else None
+        code, error = (1, str(failed)) if of_a_file is None else (2, f"{of_a_file} ({failed})")
     except KeyboardInterrupt:
         on = "the same command" if of_experiment else f"`omninav resume {shown(folder or Path('runs/latest'))}`"
         code, error = 130, f"stopped; {on} goes on"
     except Exception as unknown:  # a defect of ours: one line here, the trace in run.log
-        no_yaml = unreadable_yaml(unknown)
-        code, error = (2, str(no_yaml)) if no_yaml else (1, f"{type(unknown).__name__}: {unknown}")
-        if no_yaml is None and sweep is None and not isinstance(unknown, OSError):
+        known = as_bad_input(unknown)
+        code, error = (2, str(known)) if known else (1, f"{type(unknown).__name__}: {unknown}")
+        if known is None and sweep is None:
             traceback.print_exc()
     if error:
         print(f"job {sweep.number}: {error}" if sweep else error, file=sys.stderr, flush=True)
     if error and code == 1:
         log = (folder or Path(str(config.get("runs", "runs"))) / "latest") / "run.log"
-        print(f"the traceback is in {shown(log)}", file=sys.stderr, flush=True)
+        if log.is_file():
+            print(f"the traceback is in {shown(log)}", file=sys.stderr, flush=True)
     if sweep is not None:
         _note_job(sweep, code, error)
     elif folder is not None and folder.is_dir() and not any(folder.iterdir()):

@@ -21,8 +21,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         print("omninav", version("omninav"))
         return 0
-    if os.getcwd() not in sys.path:
-        sys.path.append(os.getcwd())  # so that `_target_: my_stages.MyMatch` finds my_stages.py here
+    os.environ.setdefault("PYTHONSAFEPATH", "1")  # processes of ours do not import what lies in the working directory
     if arguments and arguments[0] in COMMANDS:
         name, arguments = arguments[0], arguments[1:]
     elif arguments and arguments[0].isidentifier():
@@ -30,10 +29,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     else:
         name = "run"
     try:
-        from omninav.pipeline.graph.problems import BadInput, ProblemsFound, unreadable_yaml
+        from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input
 
         from .config_groups import refuse_null_groups
+        from .words import refuse_unreadable
 
+        refuse_unreadable(arguments)
+        _refuse_lost_folder()
         refuse_null_groups(arguments)
         command = importlib.import_module(f"omninav.pipeline.cli.commands.{name}").command
         return int(command(arguments))
@@ -45,15 +47,24 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except BrokenPipeError:
         return 0
-    except OSError as error:  # a full disk, a folder that cannot be written to, a link in place of a file
-        print(f"{error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
-        return 2
     except Exception as error:
-        bad = unreadable_yaml(error)
-        if bad is None:
+        from omninav.pipeline.engine.call import StageFailed
+
+        cause = error.__cause__ if isinstance(error, StageFailed) else error
+        bad = as_bad_input(cause) if cause is not None else None
+        if bad is None and not isinstance(error, StageFailed):
             raise
-        print(bad, file=sys.stderr)
-        return 2
+        print(bad or error, file=sys.stderr)
+        return 1 if bad is None else 2
+
+
+def _refuse_lost_folder() -> None:
+    from omninav.pipeline.graph.problems import BadInput
+
+    try:
+        os.getcwd()
+    except OSError:
+        raise BadInput("the folder that you are in is gone; change to another: cd FOLDER") from None
 
 
 def _unknown_command(name: str) -> int:

@@ -4,6 +4,7 @@ Hydra stops at the first word that it cannot use and names nothing that is like 
 the configuration that the fitting ones give. Everything here is called where Hydra is initialised.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,14 +12,18 @@ from typing import Any
 from hydra import compose
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import Override, ValueType
+from hydra.core.override_parser.types import ChoiceSweep, Override, RangeSweep, ValueType
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
-from omninav.pipeline.graph.problems import Problem, nearest, suggest
+from omninav.pipeline.graph.problems import BadInput, Problem, nearest, shown, suggest
 from omninav.pipeline.graph.registry import UnknownStage, resolve
 from omninav.pipeline.graph.signature import BadStage, signature
 
+from .hydra_session import not_settable
+
+MAX_JOBS = 100_000
+"""Of a sweep."""
 WITHIN_GRAPH = ("nodes.", "wires.", "artifacts.", "saves.")
 
 
@@ -64,17 +69,41 @@ def _parsed(words: Sequence[str]) -> tuple[list[Problem], list[Override]]:
     parsed: list[Override] = []
     for text in words:
         try:
-            parsed += OverridesParser.create().parse_overrides([text])
+            parsed += _parse(text)
         except HydraException:
             hint = "write name=value, and quotes within quotes around odd characters: \"name='a=b.yaml'\""
             problems.append(Problem(text, "cannot be read", hint))
     return problems, parsed
 
 
+def _parse(word: str) -> list[Override]:
+    """A word as Hydra reads it. Raises Hydra's errors, and `BadInput` for a sweep of very many values."""
+    try:
+        parsed: list[Override] = OverridesParser.create().parse_overrides([word])
+    except (ValueError, ArithmeticError, RecursionError, AssertionError) as error:
+        raise HydraException(str(error)) from None
+    for one in parsed:
+        _number_of_values(one)
+    return parsed
+
+
+def _number_of_values(word: Override) -> int:
+    """How many values a word stands for, counted without listing them. Raises `BadInput` where they are too many."""
+    value, number = word.value(), 1.0
+    if isinstance(value, RangeSweep):
+        start, stop, step = (float(edge or 0) for edge in (value.start, value.stop, value.step))
+        number = max(1.0, (stop - start) / step) if step else math.inf
+    elif isinstance(value, ChoiceSweep):
+        number = len(value.list)
+    if not number <= MAX_JOBS:
+        raise BadInput(f"{word.key_or_group}: {shown(word.input_line)} is a sweep of more than {MAX_JOBS:,} values")
+    return int(number)
+
+
 def _plain(swaps: Sequence[Override], folders: Sequence[str]) -> dict[str, Any]:
     """The configuration with these options of groups alone, the first of each that is swept; {} where there is none."""
     try:
-        config = compose("config", overrides=[*search(folders), *(text for word in swaps for text in _texts(word)[:1])])
+        config = compose("config", overrides=[text for word in swaps for text in _texts(word)[:1]])
         plain: Any = OmegaConf.to_container(config, resolve=False)
     except HydraException:
         plain = {}
@@ -85,26 +114,24 @@ def jobs_to_try(words: Sequence[str], folders: Sequence[str]) -> Iterator[list[s
     """Jobs of a sweep of which one is misspelled if any job is: the first choices, and each other option of a group."""
     groups = set(_groups(folders))
     choices = []
+    jobs = 1
     for word in words:
         try:
-            parsed = OverridesParser.create().parse_overrides([word])[0]
+            parsed = _parse(word)[0]
         except HydraException:
             choices.append([word])
             continue
+        jobs *= _number_of_values(parsed)
         texts = _texts(parsed)
         choices.append(texts if parsed.key_or_group in groups else texts[:1])
+    if jobs > MAX_JOBS and not any(word.startswith("hydra/sweeper=") for word in words):
+        raise BadInput(f"-m: a sweep of {jobs:,} jobs, expected at most {MAX_JOBS:,}; leave some values out")
     choices = [texts for texts in choices if texts]
     firsts = [texts[0] for texts in choices]
     yield firsts
     for number, texts in enumerate(choices):
         for other in texts[1:]:
             yield [*firsts[:number], other, *firsts[number + 1 :]]
-
-
-def search(folders: Sequence[str]) -> list[str]:
-    """The override that lets Hydra find configuration in folders."""
-    paths = ",".join(f"file://{Path(folder).resolve()}" for folder in folders)
-    return [f"hydra.searchpath=[{paths}]"] if folders else []
 
 
 def _texts(word: Override) -> list[str]:
@@ -147,6 +174,9 @@ def _unknown_option(word: Override, options: Sequence[str]) -> Iterator[Problem]
 
 def _unknown_setting(word: Override, config: Mapping[str, Any], groups: list[str]) -> Iterator[Problem]:
     path = word.key_or_group
+    if path.partition(".")[0].partition("/")[0] == "hydra":
+        yield not_settable(path)
+        return
     value = str(word.input_line).partition("=")[2]
     parents, name, inside = _deepest(config, path)
     if word.is_add():

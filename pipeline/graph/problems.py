@@ -1,6 +1,7 @@
 """What is wrong with a configuration: where, what, and what to type. All of it at once."""
 
 import difflib
+import errno
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -63,9 +64,33 @@ def cut(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}…"
 
 
-def unreadable_yaml(error: BaseException) -> BadInput | None:
-    """What is wrong with a YAML file that could not be parsed, in one line; None where the error is another one."""
-    yaml = sys.modules.get("yaml")  # who met a YAML error has imported it
+HINTS = {
+    errno.ENOSPC: "free some space; `omninav resume` goes on with a run that has begun",
+    errno.EDQUOT: "free some space; `omninav resume` goes on with a run that has begun",
+    errno.EROFS: "nothing can be written there; give other folders: runs=FOLDER cache=FOLDER/.cache",
+    errno.EACCES: "it cannot be read or written by you; name another, or give other folders: runs=FOLDER cache=null",
+    errno.EPERM: "it cannot be read or written by you; name another, or give other folders: runs=FOLDER cache=null",
+    errno.ENAMETOOLONG: "a name has at most 255 characters, and a path 4095",
+    errno.ELOOP: "these links lead to each other; name a file",
+    errno.ENOENT: "is its folder there?",
+    errno.ENOTDIR: "a part of its path is a file; name another",
+    errno.EISDIR: "name a file",
+    errno.EIO: "the disk cannot be read or written; name another place",
+    errno.EMFILE: "too many files are open; close other programs, or raise the limit (`ulimit -n`)",
+    errno.ENXIO: "name a file",
+    errno.ESTALE: "the folder is gone; change to another",
+}
+"""What to do where a file or folder cannot be used, by the system's number of the error."""
+
+
+def as_bad_input(error: BaseException) -> BadInput | None:
+    """What a user can do about an error that no reader has put into words; None where it is a defect of ours."""
+    if isinstance(error, OSError):
+        where = error.filename if error.filename is not None else "a file"
+        return BadInput(f"{where}: {error.strerror or error}; {HINTS.get(error.errno or 0, 'name another')}")
+    yaml, omegaconf = sys.modules.get("yaml"), sys.modules.get("omegaconf.errors")  # who met their errors has them
+    if omegaconf is not None and isinstance(error, omegaconf.OmegaConfBaseException):
+        return BadInput(f"{getattr(error, 'full_key', None) or 'configuration'}: {str(error).splitlines()[0]}")
     if yaml is None or not isinstance(error, yaml.YAMLError):
         return None
     mark, message = getattr(error, "problem_mark", None), getattr(error, "problem", None) or str(error).split("\n")[0]

@@ -6,6 +6,9 @@ A third party's stage is named `role.name`, as `match.gradient`:
 * not installed: `OMNINAV_STAGES="match.gradient=path/to/gradient.py:GradientMatch"` (several with commas);
 * in a config file or on the command line: `_target_: package.module.GradientMatch`, or
   `path/to/gradient.py:GradientMatch`.
+
+The working directory is on Python's path only while such a name is resolved that is not installed. What a run's folder
+names is resolved only where the stage is listed, or its name was typed (see `only_listed`).
 """
 
 import functools
@@ -16,14 +19,17 @@ import inspect
 import os
 import pkgutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from omninav.pipeline.files import digest_text
+from omninav.pipeline.files import digest_text, user_path
 
+from .problems import BadInput, cut
 from .signature import first_line
 from .stage import Source, Stage
 
@@ -59,13 +65,17 @@ def resolve(target: str) -> type[Stage]:
     """The stage class behind a `_target_`.
 
     Raises `UnknownStage` where the module cannot be imported, the name is not in it, or it is not a stage. Whatever
-    the name leads to is looked at, never called.
+    the name leads to is looked at, never called. Raises `BadInput` for what is not to be imported (`only_listed`).
     """
     named = {entry.name: entry.target for entry in plugins()}
     target = named.get(target, target)
     module_name, _, class_name = target.rpartition(":") if ":" in target else target.rpartition(".")
     if not module_name:
         raise UnknownStage(f"'{target}' is no full name; write package.module.Class or path/to/file.py:Class")
+    typed = _TYPED.get()
+    if typed is not None and not {target, module_name} & {*typed} and not is_listed(target):
+        again = f"if you trust it, type its name again: omninav resume FOLDER {module_name}"
+        raise BadInput(f"{cut(target)} is code that `omninav stages` does not list, and is not run unasked; {again}")
     module = _load(module_name)
     thing = getattr(module, class_name, None)
     if thing is None:
@@ -76,6 +86,28 @@ def resolve(target: str) -> type[Stage]:
     return thing  # type: ignore[no-any-return]
 
 
+_TYPED: ContextVar[Collection[str] | None] = ContextVar("typed", default=None)
+
+
+@contextmanager
+def only_listed(typed: Collection[str]) -> Iterator[None]:
+    """Resolve only names of stages that are listed (`is_listed`), and those whose module or file the user `typed`.
+
+    For configurations from elsewhere, as in a run's folder: their code is not imported unasked.
+    """
+    token = _TYPED.set(typed)
+    try:
+        yield
+    finally:
+        _TYPED.reset(token)
+
+
+def is_listed(target: str) -> bool:
+    """Whether a target is of omninav itself, or one that an entry point or the environment offers."""
+    own = target.startswith(f"{BUILT_IN}.") and all(part.isidentifier() for part in target.replace(":", ".").split("."))
+    return own or any(target in (entry.name, entry.target) for entry in plugins() if not entry.problem)
+
+
 def _is_stage(thing: Any) -> bool:
     return inspect.isclass(thing) and issubclass(thing, Stage) and thing not in (Stage, Source)
 
@@ -83,8 +115,12 @@ def _is_stage(thing: Any) -> bool:
 def _load(module_name: str) -> ModuleType:
     try:
         if module_name.endswith(".py"):
-            return _load_file(Path(module_name))
-        return importlib.import_module(module_name)
+            with _here_on_the_path():
+                return _load_file(Path(module_name))
+        if module_name in sys.modules or importlib.util.find_spec(module_name.partition(".")[0]) is not None:
+            return importlib.import_module(module_name)
+        with _here_on_the_path():
+            return importlib.import_module(module_name)
     except UnknownStage:
         raise
     except BaseException as error:  # a plugin may raise anything while it is imported
@@ -93,8 +129,23 @@ def _load(module_name: str) -> ModuleType:
         raise UnknownStage(f"module '{module_name}' cannot be imported: {type(error).__name__}: {error}") from None
 
 
+@contextmanager
+def _here_on_the_path() -> Iterator[None]:
+    """The working directory as the last place where modules are found."""
+    here = os.getcwd()
+    if here in sys.path:
+        yield
+        return
+    sys.path.append(here)
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        sys.path.remove(here)
+
+
 def _load_file(path: Path) -> ModuleType:
-    path = path.expanduser().resolve()
+    path = user_path(path).resolve()
     if not path.is_file():
         raise UnknownStage(f"there is no file {path}")
     name = f"omninav_plugin_{path.stem}_{digest_text(str(path))[:8]}"

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from omninav.pipeline.engine.codec import BadEncoding, decode, unseal
 from omninav.pipeline.engine.damage import say_damaged
 from omninav.pipeline.files import Damaged, digest_file, digest_text, read_json
 from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline.graph.small_files import parse_yaml
 
 from .artifacts import ProgressDisplay
 from .execution import execute
@@ -67,7 +66,7 @@ def _resume(run: Run, folder: Path, display: ProgressDisplay | None) -> tuple[Ru
         os.chdir(began.cwd)  # its paths are relative to where it was started
     again = shlex.join(began.argv)
     try:
-        planned = plan(yaml.safe_load(config))
+        planned = plan(parse_yaml(config, str(folder / CONFIG)))
     except ProblemsFound as found:
         if all(problem.where.startswith(("nodes.", "wires.", "artifacts.")) for problem in found.problems):
             message = f"{folder}: made with an older omninav, whose stages are no longer known; start it again: {again}"

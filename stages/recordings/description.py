@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from omninav.pipeline import Bounds
+from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.problems import nearest, shown
 from omninav.pipeline.graph.small_files import read_yaml
@@ -175,7 +176,7 @@ def find_layout(name: str, layouts: Sequence[str] = ()) -> Path:
     known = known_layouts(layouts)
     if name in known:
         return known[name]
-    path = Path(name).expanduser()
+    path = user_path(name)
     if path.suffix in (".yaml", ".yml"):
         if path.is_file():
             return path

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline.files import digest_file
+from omninav.pipeline.files import digest_file, user_path
 from omninav.pipeline.graph.problems import BadInput, shown
 from omninav.pipeline.graph.small_files import read_small
 from omninav.stages.camera.model import Camera
@@ -223,7 +223,7 @@ class DescribedFolder(Format):
 
     def opens(self, log: str) -> bool:
         """Where a description is named, or lies in the folder."""
-        path = Path(log).expanduser()
+        path = user_path(log)
         if path.is_dir():
             return (path / "recording.yaml").is_file()
         return (path.suffix in (".yaml", ".yml") and path.is_file()) or (":" in log and not path.exists())
@@ -232,14 +232,14 @@ class DescribedFolder(Format):
         """`LAYOUT:FOLDER` or `LAYOUT:FOLDER:WHICH`: LAYOUT is a built-in one, one in the options' folders, or a path to
         a .yaml; WHICH stands for `{which}` in its file names. A description alone has a `folder` relative to its file.
         """
-        path = Path(log).expanduser()
+        path = user_path(log)
         if path.exists():
             return self._described(log, path / "recording.yaml" if path.is_dir() else path, options)
         layout, _, rest = log.partition(":")
-        folder, which = Path(rest).expanduser(), ""
+        folder, which = user_path(rest), ""
         if not folder.exists() and ":" in rest:
             rest, _, which = rest.rpartition(":")
-            folder = Path(rest).expanduser()
+            folder = user_path(rest)
         file = find_layout(layout, options.layout_folders)
         description = read_description(file, options.layout_folders)
         if which:
@@ -255,5 +255,5 @@ class DescribedFolder(Format):
         description = read_description(file, options.layout_folders)
         if description.folder is None and file.name != "recording.yaml":
             raise UnreadableRecording(f"{file}: folder is missing; type log={file}:FOLDER, or write folder: … into it")
-        folder = file.parent / Path(description.folder or "").expanduser()
+        folder = file.parent / user_path(description.folder or "")
         return ImageFolder(log, folder, description, str(file), options)

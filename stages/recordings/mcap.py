@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.mcap.message import Location, Record
@@ -26,11 +27,11 @@ class Mcap(Format):
 
     def opens(self, log: str) -> bool:
         """A .mcap file, or a folder that holds some."""
-        return super().opens(log) or any(Path(log).expanduser().glob("*.mcap"))
+        return super().opens(log) or any(user_path(log).glob("*.mcap"))
 
     def open(self, log: str, options: OpenOptions) -> TopicRecording:
         """The files of a folder in the order of its metadata. Raises `UnreadableRecording` or `LogError`."""
-        path = Path(log).expanduser()
+        path = user_path(log)
         if not path.is_dir():
             return record_topics(log, LogReader(path), options, [path])
         parts = sorted(path.glob("*.mcap"))

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds
-from omninav.pipeline.files import digest_file, digest_text
+from omninav.pipeline.files import digest_file, digest_text, user_path
 from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.signature import read_parameters
@@ -42,7 +42,7 @@ class MapServer:
 
 def grid_beside(logs: str | Sequence[str] | None) -> Path | None:
     """The occupancy grid beside the first log that has one: `drive.grid/map.yaml` beside drive.mcap, or `map.yaml`."""
-    for path in (Path(log).expanduser() for log in ((logs,) if isinstance(logs, str) else logs or ())):
+    for path in (user_path(log) for log in ((logs,) if isinstance(logs, str) else logs or ())):
         for grid in (path.parent / f"{path.stem}.grid" / "map.yaml", path.parent / "map.yaml"):
             if path.exists() and grid.is_file():
                 return grid

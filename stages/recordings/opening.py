@@ -4,6 +4,8 @@ import importlib
 from collections.abc import Sequence
 from pathlib import Path
 
+from omninav.pipeline.files import user_path
+
 from .plausibility import MotionLimits
 from .recording import FORMATS, Format, OpenOptions, Recording, Topics, UnreadableRecording
 
@@ -21,9 +23,9 @@ def open_recording(
     images lie; `limits`: what the robot can do. Raises `UnreadableRecording` (or another `BadInput`) with one line:
     file, what is wrong, what to type.
     """
-    named = None if camera is None else Path(camera).expanduser()
+    named = None if camera is None else user_path(camera)
     options = OpenOptions(topics or Topics(), named, tuple(layout_folders), limits or MotionLimits())
-    formats, path = log_formats(), Path(log).expanduser()
+    formats, path = log_formats(), user_path(log)
     meant = next((one for one in formats if one.opens(log)), None)
     if meant is not None and (path.exists() or path.suffix not in meant.suffixes):
         return meant.open(log, options)

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.camera.model import Camera
 from omninav.stages.values.image import Pixels
@@ -106,7 +107,7 @@ class Format(ABC):
 
     def opens(self, log: str) -> bool:
         """Whether a name is one of this format, there or not: by default a file with one of the suffixes."""
-        return Path(log).suffix in self.suffixes and not Path(log).expanduser().is_dir()
+        return Path(log).suffix in self.suffixes and not user_path(log).is_dir()
 
     @abstractmethod
     def open(self, log: str, options: OpenOptions) -> Recording:

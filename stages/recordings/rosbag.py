@@ -13,6 +13,7 @@ from lz4 import frame as lz4
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
+from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.mcap.chunks import MAX_BYTES
 from omninav.pipeline.mcap.message import BadMessage, Record
@@ -31,12 +32,12 @@ class Rosbag(Format):
 
     def opens(self, log: str) -> bool:
         """Such a file, or a rosbag2 folder."""
-        path = Path(log).expanduser()
+        path = user_path(log)
         return super().opens(log) or (path / "metadata.yaml").is_file() or any(path.glob("*.db3"))
 
     def open(self, log: str, options: OpenOptions) -> TopicRecording:
         """With the library rosbags. Raises `UnreadableRecording`."""
-        path = Path(log).expanduser()
+        path = user_path(log)
         files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
         return record_topics(log, BagFeed(path), options, files)
 

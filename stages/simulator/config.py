@@ -10,9 +10,12 @@ from typing import Annotated, Any, Literal
 
 from omninav.pipeline import Bounds
 
-Point = tuple[float, float]
-Positive = Annotated[float, Bounds(gt=0)]
-Spread = Annotated[float, Bounds(ge=0)]
+FAR = 1e5
+"""Metres or seconds that nothing in a world exceeds."""
+Coordinate = Annotated[float, Bounds(ge=-FAR, le=FAR)]
+Point = tuple[Coordinate, Coordinate]
+Positive = Annotated[float, Bounds(gt=0, le=FAR)]
+Spread = Annotated[float, Bounds(ge=0, le=FAR)]
 Share = Annotated[float, Bounds(ge=0, le=1)]
 Material = Literal[
     "wall",

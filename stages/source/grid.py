@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.spatial import KDTree
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.occupancy_grid import MAX_CELLS, coarser, grid_beside, grid_digest, read_occupancy
 from omninav.stages.simulator.config import WorldConfig
@@ -79,6 +80,8 @@ class PlaceGrid(Stage):
             grid = self._read(file)
             ctx.fact("grid", file.name)
         else:
+            if math.prod(self.world.size) > MAX_CELLS * self.resolution_m**2:
+                raise BadInput(f"grid: {self.world.name} has more than {MAX_CELLS:,} cells; use a larger resolution_m")
             cells, origin = occupancy(World(self.world, 0), self.resolution_m)
             grid = OccupancyGrid(np.where(cells, OCCUPIED, FREE).astype(np.uint8), self.resolution_m, origin, "world")
             ctx.fact("grid", f"of the built-in world {self.world.name}")
@@ -96,7 +99,7 @@ class PlaceGrid(Stage):
         grid = coarser(read_occupancy(file), self.resolution_m)
         if free_space(grid, self.clearance_m, None) is None:
             raise BadInput(
-                f"{file}: no cell is free and {self.clearance_m:g} m from obstacles; type nodes.grid.clearance_m=0"
+                f"{file}: no cell is free and {self.clearance_m:g} m from obstacles; use a smaller clearance_m"
             )
         return grid
 
@@ -104,7 +107,7 @@ class PlaceGrid(Stage):
         if self.grid == FROM_TOUR:
             return None
         if self.grid is not None:
-            file = Path(self.grid).expanduser()
+            file = user_path(self.grid)
             if file.is_dir():
                 file = file / "map.yaml"
             if not file.is_file():
@@ -155,8 +158,8 @@ def along_path(poses: Array, edges: npt.NDArray[np.int64], reach: float, resolut
     columns, rows = (int(n) for n in np.ceil((places.max(axis=0) + margin - origin) / resolution))
     if rows * columns > MAX_CELLS:
         raise BadInput(
-            f"grid: a stand-in of {columns} x {rows} cells along the map's path, expected at most {MAX_CELLS:,}; type "
-            "nodes.grid.resolution_m=1, or give grid=FOLDER/map.yaml"
+            f"grid: a stand-in of {columns} x {rows} cells along the map's path, expected at most {MAX_CELLS:,}; use "
+            "a larger resolution_m, or give grid=FOLDER/map.yaml"
         )
     grid = OccupancyGrid(
         np.full((rows, columns), UNKNOWN, np.uint8), resolution, (float(origin[0]), float(origin[1])), "tour"

@@ -256,7 +256,7 @@ def test_a_page_with_verdicts_and_what_repetitions_share_computed_once(dice: Fin
 
 def test_a_finished_experiment_is_found_and_its_folder_can_be_resumed(dice: Finished):
     before = dice.computed()
-    assert dice.go("resume", "runs/dice_paper").split("\n")[1:] == dice.said.split("\n")
+    assert dice.go("resume", "runs/dice_paper", "my_stages").split("\n")[1:] == dice.said.split("\n")
     assert dice.computed() == before
 
 
@@ -313,7 +313,7 @@ def test_a_killed_experiment_goes_on_where_it_was(dice: Finished):
     kill(process)
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("seed_*.json")}
     assert 5 <= len(before) < 12
-    dice.go("resume", "killed/dice_paper")
+    dice.go("resume", "killed/dice_paper", "my_stages")
     assert {path: path.stat().st_mtime_ns for path in before} == before
     assert len(results(folder)) == 12
     assert results(folder).items() <= results(dice.place / "runs/dice_paper").items()

@@ -3,14 +3,14 @@
 from collections.abc import Iterator
 
 import pytest
-from hydra import initialize_config_module
 
+from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
 
 
 @pytest.fixture(autouse=True)
 def _configured() -> Iterator[None]:
-    with initialize_config_module("omninav.conf", version_base="1.3"):
+    with hydra_started():
         yield
 
 

@@ -1,26 +1,36 @@
 """`omninav check`: everything that is wrong with a configuration; nothing is run."""
 
-from omninav.pipeline.cli.composition import complete, composed, configured_variants, read_words
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from omninav.pipeline.cli.composition import complete, composed, read_words
 from omninav.pipeline.cli.experiments import condition_words, planned_experiment
-from omninav.pipeline.cli.overrides import search
+from omninav.pipeline.engine.artifact import read_artifact
 from omninav.pipeline.experiment.conditions import open_inputs
 from omninav.pipeline.experiment.runner import ExperimentRun
 from omninav.pipeline.graph.graph import LIFETIMES
 from omninav.pipeline.graph.ground_truth import truth_readers
+from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.run.inputs import refuse_missing
 from omninav.pipeline.run.plan import input_digests, plan
 
 
 def command(arguments: list[str]) -> int:
     """Compose and check a configuration, open its inputs, and print what would run."""
-    words, folders = read_words(arguments)
+    words, _ = read_words(arguments)
     of_conditions = condition_words(words)
     with composed([word for word in arguments if word not in of_conditions]) as config:
         if config.get("experiment") is not None:
-            return _check_experiment(planned_experiment(config, arguments, search(folders)))
-        planned = plan(complete(config, configured_variants(search(folders))))
+            return _check_experiment(planned_experiment(config, arguments))
+        planned = plan(complete(config))
     refuse_missing(planned.config)
     input_digests(planned)  # opens every file that the run reads
+    for artifact in planned.artifacts:
+        if artifact.file is not None:
+            read_artifact(artifact.file)  # whole: what is in it may not fit its header
+    _refuse_unwritable(planned.config)
     graph = planned.graph
     before, tick, after = (len(graph.of_lifetime(kind)) for kind in LIFETIMES)
     print(f"{planned.variant}: nothing wrong with it. {len(graph.nodes)} nodes, {len(graph.wires)} wires")
@@ -29,10 +39,28 @@ def command(arguments: list[str]) -> int:
     return 0
 
 
+def _refuse_unwritable(config: Mapping[str, Any]) -> None:
+    """Raise `BadInput` where runs or what is cached cannot be written."""
+    for setting in ("runs", "cache"):
+        folder = config.get(setting)
+        if folder is None:
+            continue
+        place = Path(str(folder)).absolute()
+        try:
+            while not place.exists():
+                place = place.parent
+            with tempfile.TemporaryFile(dir=place) as trial:
+                trial.write(bytes(4096))
+        except OSError as error:
+            what = f"{place}: nothing can be written there ({error.strerror})"
+            raise BadInput(f"{setting}={folder}: {what}; type {setting}=FOLDER") from None
+
+
 def _check_experiment(run: ExperimentRun) -> int:
     """What an experiment would run. Its conditions are composed and checked by now."""
     experiment = run.experiment
     open_inputs(run.all_runs)
+    _refuse_unwritable(run.all_runs[0].config)
     factors = ", ".join(f"{len(experiment.labels(factor))} {factor}" for factor in experiment.sweep)
     runs = sum(len(each.seeds) for each in run.all_runs)
     print(f"{experiment.name}, profile {run.profile}: nothing wrong with it")

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from omninav.pipeline.cli.composition import complete, composed, configured_variants, read_words
-from omninav.pipeline.cli.overrides import search
+from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.report.graph_svg import svg
 from omninav.pipeline.report.mermaid import mermaid
@@ -15,7 +14,7 @@ def command(arguments: list[str]) -> int:
     out = next((Path(word.partition("=")[2]) for word in arguments if word.startswith("out=")), Path("."))
     arguments = [word for word in arguments if not word.startswith("out=")]
     with composed(arguments) as config:
-        planned = plan(complete(config, configured_variants(search(read_words(arguments)[1]))))
+        planned = plan(complete(config))
     drawn = {planned.variant: planned.graph} | {
         f"{planned.variant}.{made.name}": made.graph for made in planned.artifacts if made.graph
     }

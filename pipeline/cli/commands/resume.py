@@ -3,24 +3,47 @@
 import os
 import shlex
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 from omninav.pipeline.cli.terminal import show, shown
+from omninav.pipeline.cli.words import refuse_unreadable
 from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.files import Damaged, read_json
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.ports import convert_fields
+from omninav.pipeline.graph.problems import BadInput, one_line
+from omninav.pipeline.graph.registry import only_listed
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.report.terminal_tables import results_table
 from omninav.pipeline.run.resume import resume
 
 
+@dataclass(frozen=True)
+class ExperimentState:
+    """How an experiment was started."""
+
+    argv: tuple[str, ...]
+    cwd: str
+
+
 def command(arguments: list[str]) -> int:
-    """Go on with the run in a folder, from where it was stopped."""
-    if len(arguments) != 1:
+    """Go on with the run in a folder, from where it was stopped.
+
+    Of the stages that the folder names, those that `omninav stages` lists are run; others only where their module or
+    file is typed after the folder.
+    """
+    if not arguments:
         raise BadInput("resume: give one run folder: omninav resume runs/latest")
-    here, folder = Path.cwd(), Path(arguments[0]).resolve()
-    if (folder / "experiment.json").is_file():
-        return _resume_experiment(folder)
+    given, *typed = arguments
+    if any(Path(word).is_dir() for word in typed):
+        raise BadInput("resume: give one run folder: omninav resume runs/latest")
+    here, folder = Path.cwd(), Path(given).resolve()
+    with only_listed(typed):
+        return _resume_experiment(folder) if (folder / "experiment.json").is_file() else _resume_run(given, here)
+
+
+def _resume_run(given: str, here: Path) -> int:
+    folder = Path(given).resolve()
     try:
         with Progress() as progress:
             run, metrics = resume(folder, progress)
@@ -30,7 +53,7 @@ def command(arguments: list[str]) -> int:
     finally:
         os.chdir(here)  # a run goes on where it was started
     if run.complete:
-        print(f"{arguments[0]} was complete: there was nothing to go on with. Its results:")
+        print(f"{given} was complete: there was nothing to go on with. Its results:")
     show(results_table(metrics))
     print(f"report: {shown(run.folder / 'report.html')}")
     return 0
@@ -40,11 +63,17 @@ def _resume_experiment(folder: Path) -> int:
     """An experiment goes on when its command is typed again, where it was typed."""
     from .run import command as run
 
+    file = folder / "experiment.json"
     try:
-        manifest = read_json(folder / "experiment.json")
+        manifest = read_json(file)
     except Damaged as damaged:
         raise BadInput(f"{damaged}; type the experiment's command again: what it has done is found again") from None
-    words, place = manifest["argv"][1:], Path(manifest["cwd"])
-    print(f"{shlex.join(['omninav', *words])}   (in {place})", flush=True)
+    known = {name: manifest.get(name) for name in ("argv", "cwd")}
+    state, problems = convert_fields(known, ExperimentState, "experiment")
+    if problems or not state["argv"]:
+        raise BadInput(f"{file}: it does not say how the experiment was started; type its command again")
+    words, place = list(state["argv"][1:]), Path(state["cwd"])
+    refuse_unreadable(words)
+    print(f"{one_line(shlex.join(['omninav', *words]))}   (in {place})", flush=True)
     os.chdir(place)
     return run(words)

@@ -3,59 +3,74 @@
 import os
 import sys
 import tempfile
-from collections.abc import Sequence
+from argparse import Namespace
+from collections.abc import Callable, Sequence
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import hydra
-from hydra import initialize_config_module
+from hydra._internal.hydra import Hydra
+from hydra._internal.utils import get_args_parser
 from hydra.errors import HydraException
 
-from omninav.pipeline.cli.composition import composed, offer_plugins, read_words
-from omninav.pipeline.cli.config_groups import CONF
+from omninav.pipeline.cli.composition import composed, offer_plugins
 from omninav.pipeline.cli.experiments import condition_words, run_experiment
+from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.jobs import OUTCOMES, run_job
 from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
+from omninav.pipeline.cli.words import read_flags
 from omninav.pipeline.graph.problems import ProblemsFound
 
 
 def command(arguments: list[str]) -> int:
     """Run one job, or all of a sweep. Hydra composes the configurations."""
-    words, folders = read_words(arguments)
+    flags = read_flags(arguments)
+    if flags.help:
+        print(files("omninav.conf").joinpath("help.txt").read_text(encoding="utf-8"), end="")
+        return 0
+    words, folders = flags.overrides, [flags.config_dir] if flags.config_dir else []
     offer_plugins()  # which parameters there are depends on the stages that are offered
-    if any(word.startswith("nodes.") for word in words):
-        with initialize_config_module(CONF, version_base="1.3"):
-            listed = with_unlisted_parameters(words, folders)
+    with hydra_started(folders) as hydra:
+        listed = with_unlisted_parameters(words, folders)
         arguments = [listed[words.index(word)] if word in words else word for word in arguments]
-        words = listed
+        if flags.multirun:
+            _refuse_misspelled_sweep(listed, folders)
 
-    def job(config: Any) -> None:
-        run_job(config, arguments, run_experiment)
+        def job(config: Any) -> None:
+            run_job(config, arguments, run_experiment)
 
-    if {"-m", "--multirun"} & set(arguments):
-        _refuse_misspelled_sweep(words, folders)
-    of_conditions = condition_words(words)
-    with tempfile.TemporaryDirectory() as place:
-        outcomes = Path(place) / "outcomes"
-        os.environ[OUTCOMES] = str(outcomes)
-        os.environ["HYDRA_FULL_ERROR"] = "1"  # what Hydra does not understand is raised, and reported by us
+        of_conditions = condition_words(listed)
+        typed = [word for word in listed if word not in of_conditions]
         sys.argv = ["omninav", *(word for word in arguments if word not in of_conditions)]
         try:
-            hydra.main(config_path=f"pkg://{CONF}", config_name="config", version_base="1.3")(job)()
-        except SystemExit as stop:  # a flag that Hydra does not know
-            if stop.code:
-                return 2
+            return _handed_over(hydra, flags, typed, job)
         except HydraException as error:
-            with initialize_config_module(CONF, version_base="1.3"):
-                raise ProblemsFound(invalid_overrides(words, folders, str(error))) from None
-        codes = [int(line) for line in outcomes.read_text().split()] if outcomes.exists() else []
-    return max(codes, default=0)
+            raise ProblemsFound(invalid_overrides(listed, folders, str(error))) from None
+
+
+def _handed_over(hydra: Hydra, flags: Namespace, words: list[str], job: Callable[[Any], None]) -> int:
+    """What the flags ask Hydra for: a job, a sweep, or something to print. The worst exit code of the jobs."""
+    if flags.hydra_help:
+        hydra.hydra_help("config", get_args_parser(), flags)
+    elif flags.cfg:
+        hydra.show_cfg("config", words, flags.cfg, flags.package, flags.resolve)
+    elif flags.info:
+        hydra.show_info(flags.info, "config", words)
+    else:
+        with tempfile.TemporaryDirectory() as place:
+            outcomes = Path(place) / "outcomes"
+            os.environ[OUTCOMES] = str(outcomes)
+            if flags.multirun:
+                hydra.multirun("config", job, [*words, "hydra.mode=MULTIRUN"])
+            else:
+                hydra.run("config", job, [*words, "hydra.mode=RUN"])
+            codes = [int(line) for line in outcomes.read_text().split()] if outcomes.exists() else []
+        return max(codes, default=0)
+    return 0
 
 
 def _refuse_misspelled_sweep(words: Sequence[str], folders: Sequence[str]) -> None:
     """Hydra makes a sweep's folder before it reads the words; so they are read before."""
-    with initialize_config_module(CONF, version_base="1.3"):
-        jobs = list(jobs_to_try(words, folders))
-    for job in jobs:
+    for job in list(jobs_to_try(words, folders)):
         with composed([*job, *(f"--config-dir={folder}" for folder in folders)], offer=False):
             pass

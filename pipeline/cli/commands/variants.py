@@ -1,15 +1,16 @@
 """`omninav variants`: what `variant=` can be, and what each takes."""
 
-from hydra import compose, initialize_config_module
+from hydra import compose
 from omegaconf import OmegaConf
 
-from omninav.pipeline.cli.config_groups import CONF, group_files
+from omninav.pipeline.cli.config_groups import group_files
+from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.run.inputs import read_inputs
 
 
 def command(arguments: list[str]) -> int:
     """Print a line for each variant, and one for each of its inputs."""
-    with initialize_config_module(CONF, version_base="1.3"):
+    with hydra_started():
         for file in group_files("variant"):
             name = file.name.removesuffix(".yaml")
             comments = (

@@ -1,0 +1,167 @@
+"""Hydra as omninav starts it: it composes configurations and launches jobs, and calls nothing else that they name."""
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from hydra import version
+from hydra._internal.config_loader_impl import ConfigLoaderImpl
+from hydra._internal.core_plugins.file_config_source import FileConfigSource
+from hydra._internal.hydra import Hydra
+from hydra._internal.sources_registry import SourcesRegistry
+from hydra._internal.utils import create_config_search_path
+from hydra.core.config_search_path import SearchPathQuery
+from hydra.core.config_store import ConfigStore
+from hydra.core.global_hydra import GlobalHydra
+from hydra.errors import ConfigCompositionException, HydraException
+from hydra.plugins.config_source import ConfigResult
+from omegaconf import OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, shown
+from omninav.pipeline.graph.small_files import read_yaml
+
+from .config_groups import CONF
+
+FOLDERS_OF_JOBS = ("run", "sweep")
+LAUNCHING = ("launcher", "sweeper")
+"""Parts of `hydra.` whose classes are called, with parameters: those that installed packages registered."""
+OF_HYDRA = ("mode", "overrides", "runtime")
+"""Parts of `hydra.` that Hydra fills in itself."""
+OF_A_JOB = ("name", "override_dirname", "id", "num", "config_name")
+"""Parts of `hydra.job.` that Hydra fills in itself."""
+CALLED_BY_NAME = ("custom_search_space",)
+"""Parameters of a sweeper that name a function to call."""
+
+
+@contextmanager
+def hydra_started(folders: Sequence[str] = ()) -> Iterator[Hydra]:
+    """Hydra, which finds configurations among omninav's own and in `folders` (of `--config-dir`)."""
+    session, version_base = GlobalHydra.instance(), "1.3"
+    before, session.hydra = session.hydra, None
+    version.setbase(version_base)
+    search_path = create_config_search_path(f"pkg://{CONF}")
+    SourcesRegistry.instance().register(CheckedFolder)
+    for folder in folders:
+        place = f"{CheckedFolder.scheme()}://{Path(folder).absolute()}"
+        search_path.prepend("command-line", place, SearchPathQuery(provider="schema"))
+    session.hydra = Hydra(task_name="omninav", config_loader=CheckedLoader(search_path))
+    try:
+        yield session.hydra
+    finally:
+        session.hydra = before
+
+
+class CheckedFolder(FileConfigSource):
+    """A folder of configurations, whose files are read within limits."""
+
+    @staticmethod
+    def scheme() -> str:
+        """What stands before its path."""
+        return "checked"
+
+    def load_config(self, config_path: str) -> ConfigResult:
+        """A file's content. Raises `BadInput`."""
+        file = Path(self.path) / self._normalize_file_name(config_path)
+        if os.path.lexists(file):
+            content = read_yaml(file)
+            if content is not None and not isinstance(content, dict):
+                raise BadInput(f"{file}: {shown(content)}, expected names and their values (name: value)")
+        return super().load_config(config_path)
+
+
+class CheckedLoader(ConfigLoaderImpl):
+    """Refuses whatever stands under `hydra.` beyond the folders of jobs, launcher and sweeper, whoever composes it."""
+
+    _own: Any = None
+
+    def load_configuration(self, config_name: str | None, overrides: list[str], *args: Any, **kwargs: Any) -> Any:
+        """A composed configuration. Raises `ProblemsFound`, or Hydra's own errors."""
+        if any(word.lstrip("+~").startswith("hydra.searchpath") for word in overrides):
+            raise ProblemsFound([not_settable("hydra.searchpath")])  # Hydra imports a package that it names
+        try:
+            config = super().load_configuration(config_name, overrides, *args, **kwargs)
+        except (HydraException, OmegaConfBaseException, BadInput):
+            raise
+        except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
+            raise ConfigCompositionException(f"{type(error).__name__}: {error}") from None
+        if overrides and config_name is not None:
+            if self._own is None:
+                self._own = super().load_configuration(config_name, [], *args, **kwargs).hydra
+            problems = list(_foreign(config.hydra, self._own))
+            if problems:
+                raise ProblemsFound(dict.fromkeys(problems))
+        return config
+
+
+def _foreign(given: Any, own: Any) -> Iterator[Problem]:
+    """What stands under `hydra.` and is neither omninav's `own` nor of its flags."""
+    free = (*FOLDERS_OF_JOBS, *LAUNCHING, *OF_HYDRA)
+    for key in sorted({*map(str, given), *map(str, own)} - {*free}):
+        skip = OF_A_JOB if key == "job" else ()
+        if _plain(given, key, skip) != _plain(own, key, skip):
+            yield not_settable(f"hydra.{key}")
+    for key in LAUNCHING:
+        for resolve in (False, True):
+            try:
+                part = OmegaConf.to_container(given[key], resolve=resolve) if OmegaConf.is_config(given[key]) else None
+            except OmegaConfBaseException as error:
+                yield Problem(f"hydra.{key}", str(error).split("\n")[0])
+                continue
+            if part is None and OmegaConf.is_missing(given, key):
+                continue
+            yield from _foreign_classes(part, f"hydra.{key}")
+
+
+def _plain(config: Any, key: str, skip: Sequence[str]) -> Any:
+    if key not in config or OmegaConf.is_missing(config, key):
+        return None
+    value = config._get_node(key)
+    if not OmegaConf.is_dict(value):
+        return OmegaConf.to_container(value, resolve=False) if OmegaConf.is_config(value) else value._value()
+    plain: Any = OmegaConf.to_container(value, resolve=False)
+    return {name: part for name, part in plain.items() if name not in skip} if isinstance(plain, dict) else plain
+
+
+def not_settable(where: str) -> Problem:
+    """What to say of a name under `hydra.`."""
+    return Problem(where, "a configuration cannot set this", f"under hydra. one can set: {', '.join(SETTABLE)}")
+
+
+SETTABLE = ("hydra.run.dir", "hydra.sweep.dir", "hydra.sweep.subdir", "hydra/launcher", "hydra/sweeper")
+
+
+def _foreign_classes(part: Any, where: str) -> Iterator[Problem]:
+    """Classes in a launcher or a sweeper that no installed package has registered, and functions called by name."""
+    for name, value in part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ():
+        path = f"{where}.{name}"
+        if name == "_target_":
+            if not isinstance(value, str) or value not in _registered():
+                yield Problem(path, f"{shown(value)} is no launcher or sweeper of an installed package")
+        elif name in CALLED_BY_NAME and value is not None:
+            yield not_settable(path)
+        else:
+            yield from _foreign_classes(value, path)
+
+
+def _registered() -> set[str]:
+    """The classes that installed packages have registered for `hydra/launcher`, `hydra/sweeper` and parts of them."""
+    found: set[str] = set()
+    waiting: list[Any] = [ConfigStore.instance().repo.get("hydra", {}).get(key, {}) for key in LAUNCHING]
+    while waiting:
+        for value in waiting.pop().values():
+            if isinstance(value, dict):
+                waiting.append(value)
+            else:
+                found |= set(_targets(OmegaConf.to_container(value.node, resolve=False)))
+    return found
+
+
+def _targets(part: Any) -> Iterator[str]:
+    for name, value in part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ():
+        if name == "_target_":
+            yield str(value)
+        else:
+            yield from _targets(value)

@@ -1,0 +1,67 @@
+"""The words of a command line, before anything reads them as a configuration: flags, and what no word may hold."""
+
+import re
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from omninav.pipeline.graph.problems import BadInput, shown
+
+MAX_WORD = 10_000
+"""Characters of a word."""
+MAX_NESTING = 20
+"""Brackets within each other in a word."""
+_LONG_NUMBER = re.compile(r"(?<![\w.])[-+]?\d{100,}")
+NOT_TAKEN = ("experimental_rerun", "config_path", "config_name", "shell_completion")
+"""Flags of Hydra that would read pickles, replace omninav's own configuration or write to a shell's start files."""
+
+
+def read_flags(arguments: Sequence[str]) -> Namespace:
+    """Hydra's flags among arguments, and the `overrides`. Raises `BadInput` where one is not taken."""
+    from hydra._internal.utils import get_args_parser  # the words themselves are looked at without it
+
+    parser = get_args_parser()
+    parser.error = _refuse  # type: ignore[method-assign]
+    read = parser.parse_intermixed_args(list(arguments))  # flags may stand between words
+    for name in NOT_TAKEN:
+        if getattr(read, name, None):
+            raise BadInput(f"--{name.replace('_', '-')}: omninav does not take this flag; `omninav --help` lists them")
+    if read.config_dir and not Path(read.config_dir).is_dir():
+        raise BadInput(
+            f"--config-dir: there is no folder {read.config_dir}; it holds groups, as FOLDER/match/mine.yaml"
+        )
+    return read
+
+
+def _refuse(message: str) -> NoReturn:
+    raise BadInput(f"{message}; `omninav --help` shows what to type")
+
+
+def refuse_unreadable(arguments: Sequence[str]) -> None:
+    """Raise `BadInput` for a word that is no text, or so long or nested that reading it would take for ever."""
+    for word in arguments:
+        what = _unreadable(word)
+        if what:
+            raise BadInput(f"{shown(word)}: this word cannot be read: {what}")
+
+
+def _unreadable(word: str) -> str:
+    what = ""
+    if len(word) > MAX_WORD:
+        what = f"it has {len(word):,} characters, expected at most {MAX_WORD:,}"
+    elif "\0" in word or any("\ud800" <= character <= "\udfff" for character in word):
+        what = "it is not text (UTF-8 without NUL)"
+    elif _depth(word) > MAX_NESTING:
+        what = f"it has more than {MAX_NESTING} brackets within each other"
+    elif _LONG_NUMBER.search(word):
+        what = "it holds a number of more than 100 digits"
+    return what
+
+
+def _depth(word: str) -> int:
+    depth = deepest = 0
+    for character in word:
+        depth += (character in "([{") - (character in ")]}")
+        deepest = max(deepest, depth)
+    return deepest

@@ -1,0 +1,56 @@
+"""Every promise of docs/security.md has a test."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs/security.md").read_text()
+TRUST = "tests/cli/test_trust.py"
+TESTS = {
+    "Installed packages": (
+        "tests/pipeline/graph/test_registry.py",
+        "test_an_installed_package_offers_a_stage_by_entry_point",
+    ),
+    "Stages that you type": (TRUST, "test_a_stage_of_ones_own_is_found_here_and_the_path_is_as_before"),
+    "Launchers and sweepers": (TRUST, "test_launchers_and_sweepers_of_installed_packages_take_their_parameters"),
+    "Configurations": (TRUST, "test_what_a_configuration_says_of_hydra_is_refused_before_anything_is_called"),
+    "Words of the command line": (TRUST, "test_hostile_words_are_refused_in_a_few_short_lines"),
+    "The working directory": (TRUST, "test_a_folder_of_data_runs_no_code"),
+    "Run folders": (TRUST, "test_resume_runs_only_stages_that_are_listed_or_typed_again"),
+    "YAML files": (
+        "tests/pipeline/graph/test_small_files.py",
+        "test_what_breaks_a_limit_is_one_short_line_with_its_place",
+    ),
+    "Camera files": (
+        "tests/stages/recordings/test_camera_yaml.py",
+        "test_a_hostile_file_is_refused_in_one_short_line",
+    ),
+    "Occupancy grids": (
+        "tests/stages/recordings/test_occupancy_grid.py",
+        "test_values_without_bounds_are_refused_by_name",
+    ),
+    "Tables and layouts": (
+        "tests/stages/recordings/test_image_folder.py",
+        "test_a_hostile_description_is_one_line_that_names_the_place",
+    ),
+    "What is no file": (
+        "tests/pipeline/graph/test_small_files.py",
+        "test_what_is_no_file_is_named_without_waiting_for_it",
+    ),
+    "Folders that cannot be written": (TRUST, "test_a_folder_that_cannot_be_used_is_one_line"),
+}
+"""The beginning of an item of the page -> file and name of its test."""
+
+
+def test_every_item_of_the_page_has_a_test_and_every_test_its_item() -> None:
+    assert re.findall(r"^\* \*\*([^*]+)\*\*", PAGE, re.MULTILINE) == list(TESTS)
+
+
+@pytest.mark.parametrize("item", TESTS)
+def test_the_test_of_an_item_exists(item: str) -> None:
+    file, name = TESTS[item]
+    tree = ast.parse((ROOT / file).read_text())
+    assert name in {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
