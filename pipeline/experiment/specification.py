@@ -4,6 +4,7 @@ Every combination of the sweep's labels is a condition, and each condition is ru
 """
 
 import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -13,6 +14,8 @@ from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 
 from .series import Aggregate, figure_at
 
+MAX_RUNS = 100_000
+"""Conditions of an experiment, and repetitions of each."""
 Labels = dict[str, str]
 """A condition's label in each factor, or in some of them: `{filter: median, data: first}`."""
 
@@ -248,8 +251,11 @@ def _without_null(entries: Any) -> Any:
 def _contradictions(experiment: Experiment) -> "list[Problem]":
     problems = []
     factors = list(experiment.sweep)
-    if experiment.repetitions < 1:
-        problems.append(Problem("experiment.repetitions", "expected at least 1"))
+    if not 1 <= experiment.repetitions <= MAX_RUNS:
+        problems.append(Problem("experiment.repetitions", f"expected at least 1, and at most {MAX_RUNS:,}"))
+    conditions = math.prod(len(labels) for labels in experiment.sweep.values())
+    if conditions > MAX_RUNS:
+        problems.append(Problem("experiment.sweep", f"{conditions:,} conditions, expected at most {MAX_RUNS:,}"))
     page = experiment.page
     shown = [("page.rows", f) for f in page.rows] + [("page.columns", page.columns)]
     shown += [("page." + k, f) for k, f in (("along", page.along), ("panels", page.panels)) if f]

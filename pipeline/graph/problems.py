@@ -2,6 +2,7 @@
 
 import difflib
 import errno
+import os
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -87,7 +88,10 @@ def as_bad_input(error: BaseException) -> BadInput | None:
     """What a user can do about an error that no reader has put into words; None where it is a defect of ours."""
     if isinstance(error, OSError):
         where = error.filename if error.filename is not None else "a file"
-        return BadInput(f"{where}: {error.strerror or error}; {HINTS.get(error.errno or 0, 'name another')}")
+        number = error.errno or 0
+        if error.strerror != os.strerror(number):  # words of ours, which say what to do
+            return BadInput(f"{where}: {error.strerror or error}")
+        return BadInput(f"{where}: {error.strerror}; {HINTS.get(number, 'name another')}")
     yaml, omegaconf = sys.modules.get("yaml"), sys.modules.get("omegaconf.errors")  # who met their errors has them
     if omegaconf is not None and isinstance(error, omegaconf.OmegaConfBaseException):
         return BadInput(f"{getattr(error, 'full_key', None) or 'configuration'}: {str(error).splitlines()[0]}")
