@@ -13,12 +13,15 @@ from omninav.stages.geometry.plane.se2 import between, chain, compose, wrap
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
 Rows = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
 MIN_INTERVAL_S = 0.05
 """Stamps of a busy computer come in bunches: of two that are closer, this interval is judged."""
 EXCURSION_S = 1.0
 """A track that is back after this time was never away; one that stays away longer has begun anew."""
-LOOK_BACK = 8
+LOOK_BACK = 16
 """Stretches to which a track may be back."""
+MIN_STRETCH = 1.5
+"""Poses that a stretch needs to be one: a pose alone tells of no motion."""
 
 
 @dataclass(frozen=True)
@@ -47,30 +50,54 @@ class BelievedTrack(NamedTuple):
 def believed(stamps: Stamps, poses: Array, limits: MotionLimits) -> BelievedTrack:
     """The part of a track (N,), (N, 3), in the order of its stamps, that a robot within `limits` can have driven.
 
-    Where two poses in a row need a faster motion the track is split. A stretch that can go on where an earlier one
-    ended up to `EXCURSION_S` ago does so, and what lies between is left out; other stretches begin anew, as a counter
-    does that was reset. A pose alone that leads nowhere is left out, and so are poses of NaN.
+    Where two poses in a row need a faster motion the track is split. Of its stretches those are kept that hold the most
+    poses together: one follows another within `EXCURSION_S` where the robot can have come from its end, or it begins
+    anew, as a counter does that was reset, at the cost of as many poses as `EXCURSION_S` has. NaN is left out.
     """
-    splits = np.flatnonzero(~_possible(stamps[:-1], poses[:-1], stamps[1:], poses[1:], limits)) + 1
-    none = np.empty((0, 2), np.int64)
-    if not len(splits):
-        return BelievedTrack(np.arange(len(stamps)), none[:, 0], none)
-    ends = np.append(splits, len(stamps))
-    chains: list[list[tuple[int, int]]] = []
-    for first, end in zip(np.append(0, splits).tolist(), ends.tolist(), strict=True):
-        back = next((n for n in range(1, LOOK_BACK + 1) if _resumes(chains, n, first, stamps, poses, limits)), 0)
-        if back:
-            del chains[len(chains) - back + 1 :]
-            chains[-1].append((first, end))
-        else:
-            chains.append([(first, end)])
-    chains = [chain for chain in chains if sum(end - first for first, end in chain) > 1]
-    whole = [np.concatenate([np.arange(*stretch) for stretch in chain]) for chain in chains]
-    rows = np.concatenate([np.empty(0, np.int64), *whole])
-    jumps = np.cumsum([len(each) for each in whole], dtype=np.int64)[:-1]
+    known = np.flatnonzero(np.isfinite(poses).all(axis=1))
+    rows, jumps = _kept(stamps[known], poses[known], np.diff(known) > 1, limits)
+    rows = known[rows]
     torn = np.diff(rows) > 1
     torn[jumps - 1] = True
     return BelievedTrack(rows, jumps, np.column_stack([stamps[rows[:-1][torn]], stamps[rows[1:][torn]]]))
+
+
+def _kept(stamps: Stamps, poses: Array, torn: Mask, limits: MotionLimits) -> tuple[Rows, Rows]:
+    """The longest chain of stretches by dynamic programming: its rows, and which of these begin anew.
+
+    `torn` (N - 1,): where a pose between two is missing. There a stretch ends too, since more is possible.
+    """
+    splits = np.flatnonzero(torn | ~_possible(stamps[:-1], poses[:-1], stamps[1:], poses[1:], limits)) + 1
+    nothing = np.empty(0, np.int64)
+    if not len(splits):
+        return np.arange(len(stamps)), nothing
+    firsts, ends = [0, *splits.tolist()], [*splits.tolist(), len(stamps)]
+    cost = max(MIN_STRETCH, EXCURSION_S * 1e9 / float(np.median(np.diff(stamps))))
+    score: list[float] = []
+    before: list[tuple[int, bool]] = []
+    best = 0
+    for number, (first, end) in enumerate(zip(firsts, ends, strict=True)):
+        most, link = 0.0, (-1, False)
+        if number and score[best] > cost:
+            most, link = score[best] - cost, (best, True)
+        for earlier in range(number - 1, max(-1, number - 1 - LOOK_BACK), -1):
+            soon = earlier == number - 1 or stamps[first] - stamps[ends[earlier] - 1] <= EXCURSION_S * 1e9
+            if score[earlier] > most and soon and _resumes(ends[earlier] - 1, first, stamps, poses, limits):
+                most, link = score[earlier], (earlier, False)
+        score.append(most + end - first)
+        before.append(link)
+        best = number if score[number] > score[best] else best
+    if score[best] < MIN_STRETCH:
+        return nothing, nothing
+    rows: list[Rows] = []
+    begun: list[int] = []
+    while best >= 0:
+        rows.append(np.arange(firsts[best], ends[best]))
+        first = firsts[best]
+        best, jumped = before[best]
+        begun += [first] if jumped else []
+    kept = np.concatenate(rows[::-1])
+    return kept, np.searchsorted(kept, np.array(begun[::-1], np.int64))
 
 
 def without_jumps(stamps: Stamps, poses: Array, jumps: Rows) -> Array:
@@ -95,15 +122,9 @@ def seconds_within(gaps: Stamps, stamps: Stamps) -> Array:
     return inside
 
 
-def _resumes(
-    chains: list[list[tuple[int, int]]], back: int, row: int, stamps: Stamps, poses: Array, limits: MotionLimits
-) -> bool:
-    if back > len(chains):
-        return False
-    last = chains[-back][-1][1] - 1
+def _resumes(last: int, row: int, stamps: Stamps, poses: Array, limits: MotionLimits) -> bool:
+    """Whether a track that was at pose `last` can be at pose `row`: `_possible` of one pair, many times faster."""
     seconds = float(stamps[row] - stamps[last]) / 1e9
-    if seconds > EXCURSION_S:
-        return False
     (x, y, heading), (x_then, y_then, heading_then) = poses[row].tolist(), poses[last].tolist()
     if not math.hypot(x - x_then, y - y_then) <= limits.speed * max(seconds, MIN_INTERVAL_S):  # nor is NaN
         return False

@@ -170,19 +170,31 @@ def test_a_stamp_hours_from_all_others_is_dropped(topic: str, kept: int, tmp_pat
 
 
 def test_stretches_are_told_apart_by_hand() -> None:
-    seconds = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 3.0, 3.1, 6.0, 6.1])
-    x = np.array([0.0, 0.1, 50.0, 0.3, np.nan, 0.5, 90.0, 90.1, 3.0, 3.1])
+    seconds = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 5.0, 5.5, 6.0, 9.0, 9.5, 10.0])
+    x = np.array([0.0, 0.5, 50.0, 1.5, np.nan, 2.5, 90.0, 90.5, 91.0, 3.0, 3.5, 4.0])
     stamps = np.round(seconds * 1e9).astype(np.int64)
-    poses = np.column_stack([x, np.zeros(10), np.zeros(10)])
+    poses = np.column_stack([x, np.zeros(12), np.zeros(12)])
     track = believed(stamps, poses, MotionLimits())
-    assert track.rows.tolist() == [0, 1, 3, 5, 6, 7, 8, 9]
-    assert track.jumps.tolist() == [4, 6]
-    assert (track.gaps / 1e8).round().astype(int).tolist() == [[1, 3], [3, 5], [5, 30], [31, 60]]
+    assert track.rows.tolist() == [0, 1, 3, 5, 6, 7, 8, 9, 10, 11]
+    assert track.jumps.tolist() == [4, 7]
+    assert (track.gaps / 5e8).round().astype(int).tolist() == [[1, 3], [3, 5], [5, 10], [12, 18]]
     rows = track.rows
     joined = without_jumps(stamps[rows], poses[rows], track.jumps)
-    np.testing.assert_allclose(joined[:, 0], [0.0, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 1.0])
-    at = np.array([0, 2, 4, 30, 45, 61], np.int64) * 10**8
-    np.testing.assert_allclose(seconds_within(track.gaps, at), [0.0, 0.1, 0.3, 2.9, 4.3, 5.8])
+    np.testing.assert_allclose(joined[:, 0], [0.0, 0.5, 1.5, 2.5, 3.5, 4.0, 4.5, 5.0, 5.5, 6.0])
+    at = np.array([0, 2, 4, 10, 15, 21], np.int64) * 5 * 10**8
+    np.testing.assert_allclose(seconds_within(track.gaps, at), [0.0, 0.5, 1.5, 4.5, 6.0, 7.5])
+
+
+def test_a_pose_that_only_one_lost_message_makes_possible_costs_no_other() -> None:
+    stamps = np.arange(200) * 50_000_000
+    poses = np.column_stack([0.02 * np.arange(200), np.full(200, 6.0), np.zeros(200)])
+    damaged = poses.copy()
+    damaged[90:93] = np.nan
+    damaged[93, 1] = 4.6  # 1.4 m aside: near enough to where the robot was 0.2 s ago, and to nothing else
+    damaged[140:180] = np.nan  # two seconds, after which it goes on from where it has come to
+    rows, jumps, _ = believed(stamps, damaged, MotionLimits())
+    assert np.setdiff1d(np.arange(200), rows).tolist() == [90, 91, 92, 93, *range(140, 180)]
+    assert not len(jumps)
 
 
 def test_a_track_of_noise_ends_with_what_can_have_been_driven() -> None:
