@@ -36,6 +36,18 @@ TESTS = {
         "tests/stages/recordings/test_image_folder.py",
         "test_a_hostile_description_is_one_line_that_names_the_place",
     ),
+    "Logs": (
+        "tests/pipeline/mcap/test_reader_and_writer.py",
+        "test_a_chunk_that_unpacks_to_far_more_than_a_log_holds_is_not_unpacked",
+    ),
+    "Maps": (
+        "tests/hostile/test_examples.py",
+        "test_a_map_whose_sum_is_right_over_wrong_content_is_refused_by_name",
+    ),
+    "Images": (
+        "tests/stages/values/test_encoded_image.py",
+        "test_an_image_that_says_it_is_too_large_is_not_decoded",
+    ),
     "What is no file": (
         "tests/pipeline/graph/test_small_files.py",
         "test_what_is_no_file_is_named_without_waiting_for_it",

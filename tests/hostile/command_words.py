@@ -89,6 +89,6 @@ def _check(folder: Path, typed: Sequence[str]) -> None:
         raise Wrong(f"exit {code}: {said.getvalue()[:200]!r}")
 
 
-WORDS = Format("overrides", words, [on((word, word, line))], checked, cases=12, cpu_s=8)
-CONFIG = Format("configuration", variants, [on(TEXT)], checked_variant, cases=12, cpu_s=8)
+WORDS = Format("overrides", words, [on((word, word, line))], checked, cases=8, cpu_s=8)
+CONFIG = Format("configuration", variants, [on(TEXT)], checked_variant, cases=8, cpu_s=8)
 EXPERIMENT = Format("experiment", experiments, [on(TEXT)], experiment)

@@ -16,4 +16,6 @@ FORMATS = [
     run_folders.RUN,
     run_folders.CACHE,
     command_words.EXPERIMENT,
+    command_words.CONFIG,
+    command_words.WORDS,
 ]

@@ -215,4 +215,4 @@ FOLDER = Format("image folder", folders, [on(BINARY), on(BINARY, ".jpg"), anothe
 IMAGE = Format(
     "image and goal", images, [on(BINARY), on(BINARY), another_size, more_scans], image_of, cases=400, may_crash=True
 )
-BAG = Format("rosbag", bags, [on(BINARY), on(BINARY), on(TEXT, ".yaml", ".bag"), sqlite_rows], recording_of, cases=100)
+BAG = Format("rosbag", bags, [on(BINARY), on(BINARY), on(TEXT, ".yaml", ".bag"), sqlite_rows], recording_of, cases=60)

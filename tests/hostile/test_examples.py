@@ -49,9 +49,7 @@ def replaced(name: str, content: bytes) -> bytes:
         (replaced("edges.npy", bytes(10**9)), "would unpack"),
     ],
 )
-def test_a_map_whose_sum_is_right_and_whose_content_is_not_is_refused_by_name(
-    tmp_path: Path, content: bytes, said: str
-):
+def test_a_map_whose_sum_is_right_over_wrong_content_is_refused_by_name(tmp_path: Path, content: bytes, said: str):
     (tmp_path / MAP).write_bytes(content)
     with pytest.raises(BadInput) as refused:
         read_artifact(tmp_path / MAP)
