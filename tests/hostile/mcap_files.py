@@ -23,6 +23,8 @@ from .mutations import BINARY, REALS, SIZES, TEXT, Files, on
 LOG = "log.mcap"
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK, MESSAGE, ATTACHMENT, FOOTER, DATA_END = 0x06, 0x05, 0x09, 0x02, 0x0F
+MAX_PIECES = 5000
+"""Of a file that is mutated further."""
 _CHUNK_HEAD = struct.Struct("<QQQII")
 
 
@@ -79,7 +81,7 @@ def read_all_or_count(folder: Path, files: Files) -> Any:
 def pieces_of(data: bytes) -> list[Piece]:
     """The records of a log, or of a chunk's content, as far as they are whole."""
     at, found = len(MAGIC) if data.startswith(MAGIC) else 0, []
-    while at + 9 <= len(data):
+    while at + 9 <= len(data) and len(found) < MAX_PIECES:
         opcode, length = struct.unpack_from("<BQ", data, at)
         if at + 9 + length > len(data):
             break
@@ -194,7 +196,7 @@ def _some_chunk(random: Random, pieces: Sequence[Piece]) -> tuple[int, list[Piec
         try:
             content = pieces[number].content
             (named,) = struct.unpack_from("<I", content, 28)
-            data = zstandard.ZstdDecompressor().decompress(content[40 + named :], max_output_size=1 << 24)
+            data = zstandard.ZstdDecompressor().decompress(content[40 + named :], max_output_size=1 << 20)
             return number, pieces_of(data) or [Piece(0, b"")]
         except (zstandard.ZstdError, struct.error, MemoryError):
             continue
