@@ -40,7 +40,7 @@ class BadInput(Exception):
         super().__init__(one_line(message))
 
 
-MAX_WORD, MAX_LINE = 300, 4000
+MAX_WORD, MAX_LINE = 300, 990
 """Characters of a word and of a line in a message."""
 
 

@@ -60,7 +60,7 @@ def parse_yaml(content: bytes | str, where: str) -> Any:
         raise BadInput(f"{where}: byte {error.start} is not UTF-8, expected YAML as UTF-8 text") from None
     except yaml.YAMLError as error:
         mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None) or str(error)
-        line = f", line {mark.line + 1}" if mark else ""
+        line = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
         raise BadInput(
             f"{where}{line}: this is no YAML: {problem}; mind indentation, colons, quotes, brackets"
         ) from None

@@ -331,8 +331,7 @@ def test_a_failing_job_is_named_on_the_page_and_the_others_finish(omninav, place
     assert "the third is too many" in (folder / "dice.html").read_text()
     assert len(results(folder)) == 4
     better, published, _ = json.loads((folder / "verdicts.json").read_text())
-    assert better["holds"] is None
-    assert published["holds"] is False
+    assert (better["holds"], published["holds"]) == (None, None)  # of fewer than six repetitions nothing is said
     assert "Traceback" in (folder / "conditions/method_loaded_tour_TT1/run.log").read_text()
 
 

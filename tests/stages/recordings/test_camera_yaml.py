@@ -98,7 +98,7 @@ def test_a_wrong_key_is_named_with_what_to_write(old: str, new: str, said: str) 
     ],
 )
 def test_a_hostile_file_is_refused_in_one_short_line(text: str | bytes) -> None:
-    with pytest.raises(BadInput, match=r"^camera\.yaml(, line \d+)?: ") as caught:
+    with pytest.raises(BadInput, match=r"^camera\.yaml(, line \d+(, column \d+)?)?: ") as caught:
         parse_camera(text, "camera.yaml")
     assert len(str(caught.value).splitlines()) == 1
     assert len(str(caught.value)) < 300
