@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -12,6 +13,8 @@ import yaml
 from conftest import DATA, ROOT
 
 from omninav.pipeline.cli.main import main
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.recordings.opening import open_recording
 
 MARK = "open('EXECUTED', 'w')\n"
 STAGE = """
@@ -141,7 +144,6 @@ def test_a_stage_of_ones_own_is_found_here_and_the_path_is_as_before() -> None:
 def test_resume_runs_only_stages_that_are_listed_or_typed_again(
     target: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from omninav.pipeline.graph.problems import BadInput
     from omninav.pipeline.graph.registry import UnknownStage, only_listed, resolve
 
     Path("evil_here.py").write_text(MARK + STAGE)
@@ -275,4 +277,14 @@ def test_the_shared_examples_are_refused_in_one_line(
         said = capsys.readouterr().err
         assert f"{grid.name}/map.yaml" in said
         assert len(said.splitlines()) == 1
+    for layout in sorted(hostile.glob("layout_*.yaml")):
+        with pytest.raises(BadInput, match=rf"{layout.name}: frames\."):
+            open_recording(f"{layout}:{hostile}")
+    for table in sorted(hostile.glob("csv_*.csv")):
+        folder = tmp_path / table.stem
+        folder.mkdir()
+        shutil.copy(table, folder)
+        with pytest.raises(BadInput, match=rf"{table.name}, line \d+: "):
+            open_recording(f"antworld:{folder}")
+        shutil.rmtree(folder)
     assert not list(tmp_path.iterdir())
