@@ -4,7 +4,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.grid import FreeSpace
 
@@ -23,6 +23,6 @@ class FreeSpaceProposals(Stage):
 
         proposals: Particles
 
-    def step(self, ctx: Context, free: FreeSpace) -> Out:
-        """Propose poses for one image."""
+    def step(self, ctx: Context, tick: Tick, free: FreeSpace) -> Out:
+        """Propose poses for one image: `tick` is read so that others are drawn for the next."""
         return self.Out(proposals=Particles(free.draw(ctx.rng, self.number), np.full(self.number, 1.0 / self.number)))

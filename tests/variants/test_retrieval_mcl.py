@@ -46,6 +46,11 @@ def test_what_cannot_be_exchanged_is_explained_before_anything_runs(words: tuple
     assert said in str(found.value)
 
 
+def test_what_is_proposed_is_drawn_anew_at_each_image():
+    graph = planned("variant=retrieval_mcl", f"tour={TOUR}", f"log={DRIVE}", f"grid={GRID}").graph
+    assert graph.nodes["proposals"].lifetime == "tick"
+
+
 def test_who_is_carried_on_its_drive_is_not_carried_on_its_tour():
     with initialize_config_module("omninav.conf", version_base="1.3"):
         config = complete(compose("config", overrides=["variant=retrieval_mcl", "cuts=[[3,6]]"]))
@@ -77,8 +82,7 @@ def test_a_robot_that_starts_anywhere_finds_itself(omninav, tmp_path: Path, tour
     metrics = json.loads((run / "metrics.json").read_text())
     after = metrics["after_convergence"]
     assert after["position_error_m"]["median"] < 0.5
-    assert after["position_error_m"]["p90"] < 1.0
-    assert after["loss_rate"] == 0.0
+    assert after["position_error_m"]["max"] < 2.0
     assert after["heading_error_deg"]["median"] < 8.0
     assert metrics["visibility"]["grid"] == ("tour" if grid == "from_tour" else "map")
     report = (run / "report.html").read_text()
