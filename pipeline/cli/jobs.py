@@ -24,7 +24,7 @@ from .composition import complete
 from .terminal import show, shown
 
 OUTCOMES = "OMNINAV_OUTCOMES"
-"""Names the file in which the jobs of a sweep, also those in other processes, leave their exit codes."""
+"""Names the file in which jobs, also those in other processes, leave their exit codes and their sweep's page."""
 NO_FOLDER = "."
 """Hydra's `run.dir` where nobody has set it: then a run's folder is made from the date and the variant."""
 
@@ -70,13 +70,14 @@ def run_job(config: Any, arguments: Sequence[str], run_experiment: Callable[[Any
         log = (folder or Path(str(config.get("runs", "runs"))) / "latest") / "run.log"
         if log.is_file():
             print(f"the traceback is in {shown(log)}", file=sys.stderr, flush=True)
+    page = None
     if sweep is not None:
-        _note_job(sweep, code, error)
+        page = _note_job(sweep, code, error)
     elif folder is not None and folder.is_dir() and not any(folder.iterdir()):
         folder.rmdir()  # Hydra has made it, and nothing has run
     if OUTCOMES in os.environ:
         with open(os.environ[OUTCOMES], "a") as file:
-            file.write(f"{code}\n")
+            file.write(f"{code} {page or ''}\n")
 
 
 def _run(config: Any, sweep: SweepJob | None, folder: Path | None) -> None:
@@ -124,8 +125,11 @@ def _sweep_job() -> SweepJob | None:
     return SweepJob(sweep, own, str(settings.job.num), " ".join(settings.overrides.task))
 
 
-def _note_job(job: SweepJob, code: int, error: str) -> None:
-    """Put a job's end on the sweep's page at once. Jobs in other processes wait for each other here."""
+def _note_job(job: SweepJob, code: int, error: str) -> Path:
+    """Put a job's end on the sweep's page at once, and return that page.
+
+    Jobs in other processes wait for each other here.
+    """
     from omninav.pipeline.report.sweep_page import write_sweep_page
 
     file = job.folder / "manifest.json"
@@ -133,7 +137,7 @@ def _note_job(job: SweepJob, code: int, error: str) -> None:
     manifest |= {"job": job.number, "overrides": job.overrides} | ({"error": error} if error else {})
     write_json(file, manifest)
     with locked(job.sweep / ".page.lock"):
-        write_sweep_page(job.sweep, sorted(_sweep_rows(job.sweep), key=lambda row: int(row["job"])))
+        return write_sweep_page(job.sweep, sorted(_sweep_rows(job.sweep), key=lambda row: int(row["job"])))
 
 
 def _sweep_rows(sweep: Path) -> Iterator[dict[str, Any]]:

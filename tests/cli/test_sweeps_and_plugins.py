@@ -11,8 +11,9 @@ SHORT = "nodes.source.stop=12"  # of tour and drive, where a result is not looke
 
 
 def test_a_sweep_runs_every_combination_and_has_one_page(omninav, shared_cache: Path, tmp_path: Path):
-    omninav("-m", "match=selective,l2", "seed=0,1", SHORT, f"cache={shared_cache}", check=True)
+    ended = omninav("-m", "match=selective,l2", "seed=0,1", SHORT, f"cache={shared_cache}", check=True)
     (sweep,) = (tmp_path / "runs").glob("*_sweep")
+    assert ended.stdout.splitlines()[-1] == f"sweep: runs/{sweep.name}/sweep.html"
     manifests = [json.loads((sweep / str(n) / "manifest.json").read_text()) for n in range(4)]
     assert [m["status"] for m in manifests] == ["complete"] * 4
     assert manifests[0]["overrides"].startswith("match=selective seed=0")

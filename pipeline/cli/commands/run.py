@@ -18,6 +18,7 @@ from omninav.pipeline.cli.experiments import condition_words, run_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.jobs import OUTCOMES, run_job
 from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
+from omninav.pipeline.cli.terminal import shown
 from omninav.pipeline.cli.words import read_flags
 from omninav.pipeline.graph.problems import ProblemsFound
 
@@ -64,8 +65,10 @@ def _handed_over(hydra: Hydra, flags: Namespace, words: list[str], job: Callable
                 hydra.multirun("config", job, [*words, "hydra.mode=MULTIRUN"])
             else:
                 hydra.run("config", job, [*words, "hydra.mode=RUN"])
-            codes = [int(line) for line in outcomes.read_text().split()] if outcomes.exists() else []
-        return max(codes, default=0)
+            ends = [line.partition(" ") for line in outcomes.read_text().splitlines()] if outcomes.exists() else []
+        for page in {page for _, _, page in ends if page}:
+            print(f"sweep: {shown(Path(page))}", flush=True)
+        return max((int(code) for code, _, _ in ends), default=0)
     return 0
 
 
