@@ -21,6 +21,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -104,6 +105,16 @@ def result(folder: Path) -> dict[str, str]:
     return found
 
 
+def manifests(folder: Path) -> dict[Path, int]:
+    """When each manifest was written (ns). A run may move its folder meanwhile."""
+    found = {}
+    for place, _, files in os.walk(folder / "runs"):
+        if "manifest.json" in files:
+            with suppress(FileNotFoundError):
+                found[Path(place)] = (Path(place) / "manifest.json").stat().st_mtime_ns
+    return found
+
+
 class Campaign:
     """Disturbs one case in folders of its own."""
 
@@ -148,10 +159,9 @@ class Campaign:
 
         def wait(process: subprocess.Popen[str]) -> None:
             deadline = time.monotonic() + (self.chance.uniform(0.0, 3.0) if self.chance.random() < 0.2 else 300.0)
-            known = {path: path.stat().st_mtime_ns for path in workplace.folder.glob("runs/**/manifest.json")}
+            known = manifests(workplace.folder)
             while process.poll() is None and time.monotonic() < deadline:
-                changed = {path: path.stat().st_mtime_ns for path in workplace.folder.glob("runs/**/manifest.json")}
-                if changed != known or (not self.case.resumes and self.begun(workplace)):
+                if manifests(workplace.folder) != known or (not self.case.resumes and self.begun(workplace)):
                     time.sleep(self.chance.uniform(0.0, self.case.seconds))
                     return
                 time.sleep(0.02)
