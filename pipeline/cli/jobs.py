@@ -59,6 +59,8 @@ def run_job(config: Any, arguments: Sequence[str], run_experiment: Callable[[Any
     except KeyboardInterrupt:
         on = "the same command" if of_experiment else f"`omninav resume {shown(folder or Path('runs/latest'))}`"
         code, error = 130, f"stopped; {on} goes on"
+    except BrokenPipeError:
+        pass  # whoever read what is printed has gone
     except Exception as unknown:  # a defect of ours: one line here, the trace in run.log
         known = as_bad_input(unknown)
         code, error = (2, str(known)) if known else (1, f"{type(unknown).__name__}: {unknown}")

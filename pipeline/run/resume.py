@@ -44,7 +44,7 @@ def resume(folder: Path, display: ProgressDisplay | None = None) -> tuple[Run, M
     What is damaged in its folder is made again, from the start where need be. Raises `BadInput` where another process
     runs it, and where too much is damaged to know what the run was.
     """
-    run = Run(folder.resolve())
+    run = Run(Path(os.path.realpath(folder)))
     if not (folder / MANIFEST).is_file() and not run.beginning.is_file():
         raise BadInput(f"{folder}: not a run folder (no manifest.json and config.yaml); `ls runs` shows what there is")
     with run.owned():

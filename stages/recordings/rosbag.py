@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
 from omninav.pipeline.files import user_path
+from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.mcap.chunks import MAX_BYTES
 from omninav.pipeline.mcap.message import BadMessage, Record
@@ -51,6 +52,17 @@ def _lz4(packed: bytes) -> bytes:
     return bytes(lz4.LZ4FrameDecompressor().decompress(packed, max_length=MAX_BYTES))  # type: ignore[no-untyped-call]
 
 
+def _stated_counts(path: Path) -> dict[str, int]:
+    """How many messages of each topic a folder's metadata states. Raises `BadInput` where it names other files."""
+    found = read_yaml(path / "metadata.yaml")
+    stated = found["rosbag2_bagfile_information"]
+    for name in stated["relative_file_paths"]:
+        if Path(name).name != name or not (path / name).is_file():
+            raise BadInput(f"{path}: metadata.yaml names {name!s:.80}, which is no file of this folder")
+    topics = stated["topics_with_message_count"]
+    return {str(each["topic_metadata"]["name"]): int(each["message_count"]) for each in topics}
+
+
 class BagFeed:
     """A bag as a feed of messages. What rosbags finds wrong on the way ends the scan and counts as `bad_chunk`."""
 
@@ -59,9 +71,13 @@ class BagFeed:
         self.dropped: Counter[str] = Counter()
         self.details: dict[str, str] = {}
         self.attachments: dict[str, bytes] = {}
+        for part in (path / "metadata.yaml", *path.glob("*.db3")) if path.is_dir() else (path,):
+            if part.exists() and not part.is_file():
+                raise UnreadableRecording(f"{part}: this is a folder, a pipe or a device, expected a file")
+        self._stated: dict[str, int] = {}
         try:
             if (path / "metadata.yaml").is_file():
-                read_yaml(path / "metadata.yaml")  # within limits; what it means is for rosbags to say
+                self._stated = _stated_counts(path)
             self._reader = self._open([path])
         except Exception as error:  # rosbags and the libraries under it raise many kinds for a damaged bag
             said = " ".join(str(error).split())[:160] or type(error).__name__
@@ -112,6 +128,14 @@ class BagFeed:
                 number[topic, time] += 1
         except Exception as error:
             self.drop("bad_chunk", f"{self.path}: reading stopped ({' '.join(str(error).split()):.160})")
+        found: Counter[str] = Counter()
+        for (topic, _), messages in number.items():
+            found[topic] += messages
+        for topic in {connection.topic for connection in wanted}:
+            stated = self._stated.pop(topic, 0)  # said once, however often it is read
+            if stated > found[topic]:
+                lost = stated - found[topic]
+                self.drop("missing_message", f"{self.path}: messages are missing: {lost} of {stated} on {topic}", lost)
 
     def fetch(self, location: tuple[str, int, int]) -> bytes:
         """The bytes of a message again. Raises `BadMessage`."""

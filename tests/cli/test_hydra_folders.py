@@ -68,3 +68,13 @@ def test_the_jobs_of_a_sweep_lie_where_hydra_sweep_dir_and_subdir_say(toy, tmp_p
     page = (tmp_path / "swept" / "sweep.html").read_text()
     assert "2 jobs: 2 complete" in page
     assert not list(tmp_path.glob("runs/[!.]*"))
+
+
+def test_another_sweep_does_not_take_the_folder_of_a_finished_one(toy, tmp_path: Path):
+    where = ("--config-dir=mine", "-m", "hydra.sweep.dir=out")
+    toy(*where, "seed=0", check=True)
+    toy(*where, "seed=0", check=True)  # the same again goes on with it
+    refused = toy(*where, "seed=5")
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("out: another sweep is in it (seed=0 variant=toy)")
+    assert json.loads((tmp_path / "out" / "0" / "manifest.json").read_text())["seed"] == 0

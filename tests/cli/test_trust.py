@@ -288,3 +288,16 @@ def test_the_shared_examples_are_refused_in_one_line(
             open_recording(f"antworld:{folder}")
         shutil.rmtree(folder)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_link_to_itself_in_place_of_a_run_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("runs").mkdir()
+    Path("runs/latest").symlink_to("latest")
+    assert main(["resume", "runs/latest"]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("closed", ["stdout", "stderr"])
+def test_where_output_is_closed_nothing_is_said(monkeypatch: pytest.MonkeyPatch, closed: str) -> None:
+    monkeypatch.setattr(sys, closed, None)
+    assert main(["stages"]) == 0

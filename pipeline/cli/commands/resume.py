@@ -37,13 +37,13 @@ def command(arguments: list[str]) -> int:
     given, *typed = arguments
     if any(Path(word).is_dir() for word in typed):
         raise BadInput("resume: give one run folder: omninav resume runs/latest")
-    here, folder = Path.cwd(), Path(given).resolve()
+    here, folder = Path.cwd(), Path(os.path.realpath(given))
     with only_listed(typed):
         return _resume_experiment(folder) if (folder / "experiment.json").is_file() else _resume_run(given, here)
 
 
 def _resume_run(given: str, here: Path) -> int:
-    folder = Path(given).resolve()
+    folder = Path(os.path.realpath(given))
     try:
         with Progress() as progress:
             run, metrics = resume(folder, progress)

@@ -12,6 +12,7 @@ from typing import Any
 from hydra._internal.hydra import Hydra
 from hydra._internal.utils import get_args_parser
 from hydra.errors import HydraException
+from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import composed, offer_plugins
 from omninav.pipeline.cli.experiments import condition_words, run_experiment
@@ -20,7 +21,8 @@ from omninav.pipeline.cli.jobs import OUTCOMES, run_job
 from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
 from omninav.pipeline.cli.terminal import shown
 from omninav.pipeline.cli.words import read_flags
-from omninav.pipeline.graph.problems import ProblemsFound
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound
+from omninav.pipeline.graph.small_files import read_yaml
 
 
 def command(arguments: list[str]) -> int:
@@ -36,6 +38,7 @@ def command(arguments: list[str]) -> int:
         arguments = [listed[words.index(word)] if word in words else word for word in arguments]
         if flags.multirun:
             _refuse_misspelled_sweep(listed, folders)
+            _refuse_other_sweep(listed)
 
         def job(config: Any) -> None:
             run_job(config, arguments, run_experiment)
@@ -77,3 +80,17 @@ def _refuse_misspelled_sweep(words: Sequence[str], folders: Sequence[str]) -> No
     for job in list(jobs_to_try(words, folders)):
         with composed([*job, *(f"--config-dir={folder}" for folder in folders)], offer=False):
             pass
+
+
+def _refuse_other_sweep(words: Sequence[str]) -> None:
+    """A sweep that was stopped goes on when it is typed again; another one does not take its folder."""
+    for folder in (word.partition("=")[2].strip("'\"") for word in words if word.startswith("hydra.sweep.dir=")):
+        file = Path(folder) / "multirun.yaml"
+        if not file.is_file():
+            continue
+        settings = read_yaml(file)
+        before = [str(word) for word in OmegaConf.select(OmegaConf.create(settings), "hydra.overrides.task") or ()]
+        if sorted(before) != sorted(word for word in words if not word.startswith(("hydra.", "hydra/"))):
+            raise BadInput(
+                f"{folder}: another sweep is in it ({' '.join(before):.200}); name another: hydra.sweep.dir=…"
+            )

@@ -1,7 +1,10 @@
 """Recordings out of ROS topics: what is read, and what becomes of each kind of damage."""
 
+import os
 import random
 import shutil
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -341,3 +344,22 @@ def test_a_rosbag2_folder_is_read_without_its_metadata(tmp_path: Path) -> None:
     assert recording.dropped == {"bad_metadata": 1}
     (folder / "metadata.yaml").unlink()
     assert len(open_recording(str(folder)).stamps) == FRAMES
+
+
+def test_messages_that_a_bags_metadata_states_and_that_are_not_there_are_counted(tmp_path: Path) -> None:
+    write_rosbag2(tmp_path / "bag")
+    with closing(sqlite3.connect(next((tmp_path / "bag").glob("*.db3")))) as bag, bag:
+        some = "SELECT messages.id FROM messages JOIN topics ON topic_id = topics.id WHERE name = ? LIMIT 3"
+        bag.execute(f"DELETE FROM messages WHERE id IN ({some})", (ODOMETRY,))
+    recording = open_recording(str(tmp_path / "bag"))
+    assert recording.dropped["missing_message"] == 3
+    assert "3 of " in recording.details["missing_message"]
+
+
+@pytest.mark.parametrize("name", ["x.db3", "metadata.yaml"])
+def test_a_pipe_in_a_bags_folder_is_refused_without_being_read(tmp_path: Path, name: str) -> None:
+    write_rosbag2(tmp_path / "bag")
+    (tmp_path / "bag" / name).unlink(missing_ok=True)
+    os.mkfifo(tmp_path / "bag" / name)
+    with pytest.raises(UnreadableRecording, match="pipe"):
+        open_recording(str(tmp_path / "bag"))
