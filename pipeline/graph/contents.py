@@ -12,7 +12,7 @@ from .ports import type_name
 from .stage import Bounds
 from .value import Value
 
-LARGEST = 1e15
+MAX_MAGNITUDE = 1e15
 """No number of a field with a `Shape` or `Bounds` is larger: sums of its squares stay finite in single precision."""
 
 
@@ -143,8 +143,8 @@ def _wrong_shape(name: str, thing: Any, shape: Shape, sizes: dict[str, int]) -> 
 def _wrong_numbers(name: str, thing: Any, marks: Sequence[Any], sizes: Mapping[str, int]) -> Iterator[str]:
     numbers = np.asarray(thing) if isinstance(thing, np.ndarray | int | float | np.number) else np.empty(0)
     low, high = (float(numbers.min()), float(numbers.max())) if numbers.size else (0.0, 0.0)
-    if numbers.dtype.kind in "fO" and not (low >= -LARGEST and high <= LARGEST):
-        yield f"'{name}' holds a number that is not finite, or beyond {LARGEST:g}"
+    if numbers.dtype.kind in "fO" and not (low >= -MAX_MAGNITUDE and high <= MAX_MAGNITUDE):
+        yield f"'{name}' holds a number that is not finite, or beyond {MAX_MAGNITUDE:g}"
         return
     for mark in marks:
         if isinstance(mark, Bounds) and numbers.size:

@@ -78,13 +78,14 @@ def _zstd(packed: memoryview, size: int) -> bytes:
         return stream.read(size + 1)
 
 
-def _lz4(packed: memoryview, size: int) -> bytes:
+def unpack_lz4(packed: memoryview | bytes, size: int) -> bytes:
+    """At most one byte more than `size`, so that more is noticed."""
     return bytes(lz4.LZ4FrameDecompressor().decompress(bytes(packed), max_length=size + 1))  # type: ignore[no-untyped-call]
 
 
 _UNPACK: dict[str, Callable[[memoryview, int], bytes]] = {
     "zstd": _zstd,
-    "lz4": _lz4,
+    "lz4": unpack_lz4,
     "": lambda packed, size: bytes(packed[: size + 1]),
 }
 """By compression: up to one byte more than the given size."""

@@ -8,15 +8,13 @@ from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lz4 import frame as lz4
-
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
 from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.small_files import read_yaml
-from omninav.pipeline.mcap.chunks import MAX_BYTES
+from omninav.pipeline.mcap.chunks import MAX_BYTES, unpack_lz4
 from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.pipeline.mcap.message_types import standard_types
 
@@ -49,7 +47,7 @@ def _bz2(packed: bytes) -> bytes:
 
 
 def _lz4(packed: bytes) -> bytes:
-    return bytes(lz4.LZ4FrameDecompressor().decompress(packed, max_length=MAX_BYTES))  # type: ignore[no-untyped-call]
+    return unpack_lz4(packed, MAX_BYTES)
 
 
 def _stated_counts(path: Path) -> dict[str, int]:

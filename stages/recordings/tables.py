@@ -33,7 +33,7 @@ MAX_CELL = 100
 """Characters of a number in a cell, with its unit; what is longer is no number."""
 MAX_EXPONENT = 40
 """Powers of ten of a number in a cell."""
-_LARGEST = {"m": Decimal(10**9), "ns": Decimal(2**62), "rad": Decimal(10**6)}
+_MAX_MAGNITUDE = {"m": Decimal(10**9), "ns": Decimal(2**62), "rad": Decimal(10**6)}
 """Of a family, by its base unit: a million kilometres, the year 2116 as ROS counts, many turns."""
 Delimiter = Literal[",", ";", "\t", " ", "|", ":"]
 _CELL = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s]*)\s*$")
@@ -153,6 +153,8 @@ def _in_base_unit(text: str, unit: str) -> Decimal | None:
     if written not in family:
         raise UnreadableRecording(f"{cut(text)} is not in {' or '.join(family)}")
     value, base = number * family[written], next(name for name in family if family[name] == 1)
-    if abs(value) > _LARGEST[base]:
-        raise UnreadableRecording(f"{cut(text)} is out of all proportion, expected at most {_LARGEST[base]:.0e} {base}")
+    if abs(value) > _MAX_MAGNITUDE[base]:
+        raise UnreadableRecording(
+            f"{cut(text)} is out of all proportion, expected at most {_MAX_MAGNITUDE[base]:.0e} {base}"
+        )
     return value

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from conftest import DATA, ROOT
+from conftest import DATA, ROOT, needs_data
 
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.graph.problems import BadInput
@@ -258,7 +258,7 @@ def test_files_in_a_folder_of_configurations_are_read_within_limits(capsys: pyte
     assert not Path("EXECUTED").exists()
 
 
-@pytest.mark.skipif(not (DATA / "hostile").exists(), reason="the shared examples are not here")
+@needs_data
 def test_the_shared_examples_are_refused_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

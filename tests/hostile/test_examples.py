@@ -68,7 +68,7 @@ def test_a_map_among_the_examples_is_refused_by_name(name: str):
 
 @needs_data
 @pytest.mark.parametrize(
-    ("name", "counted", "least_frames"),
+    ("name", "counted", "min_frames"),
     [
         ("one_chunk_removed", "missing_message", 11),
         ("image_short_and_logtime_2e64", "bad_message", 11),
@@ -77,12 +77,12 @@ def test_a_map_among_the_examples_is_refused_by_name(name: str):
     ],
 )
 def test_of_a_log_among_the_examples_the_good_part_is_used_and_the_rest_counted(
-    tmp_path: Path, name: str, counted: str, least_frames: int
+    tmp_path: Path, name: str, counted: str, min_frames: int
 ):
     camera = tmp_path / "camera.yaml"  # one of them has lost its own
     camera.write_text("projection: cylindrical\nimage: {width: 160, height: 120}\ncolumn_of_forward: 80\n")
     recording = open_recording(str(HOSTILE / f"{name}.mcap"), camera=str(camera))
-    assert sum(recording.image(frame) is not None for frame in range(len(recording.stamps))) >= least_frames
+    assert sum(recording.image(frame) is not None for frame in range(len(recording.stamps))) >= min_frames
     assert recording.dropped[counted]
 
 

@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 
 from omninav.pipeline import Bounds, Value
-from omninav.pipeline.graph.contents import LARGEST, Covariances, RowsOf, Shape, Starts, misfit
+from omninav.pipeline.graph.contents import MAX_MAGNITUDE, Covariances, RowsOf, Shape, Starts, misfit
 
 Reals = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -54,7 +54,7 @@ def test_a_value_that_holds_what_it_states_is_sound():
         ({"points": np.zeros(6)}, "'points' has the shape (6,), expected (N, 2)"),
         ({"names": ("a", "b")}, "'names' has the shape (2,), expected (N,), N = 3"),
         ({"points": np.full((3, 2), np.nan)}, "'points' holds a number that is not finite"),
-        ({"points": np.full((3, 2), 10 * LARGEST)}, "beyond 1e+15"),
+        ({"points": np.full((3, 2), 10 * MAX_MAGNITUDE)}, "beyond 1e+15"),
         ({"points": np.zeros((3, 2), np.float32)}, "'points' is an array of float32"),
         ({"points": np.zeros((3, 2), ">f8")}, "'points' is an array of >f8"),
         ({"pairs": np.array([[0, 3]])}, "'pairs' names a row that does not exist, expected 0 to 2"),
