@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format bench soak scale kills fuzz clean
+.PHONY: help demo test lint format docs bench soak scale kills fuzz clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -25,6 +25,10 @@ lint: $(VENV)/.installed  ## check style, types and the layers of the code
 format: $(VENV)/.installed  ## format the code and mend what can be mended automatically
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+docs: export NO_MKDOCS_2_WARNING = 1
+docs: $(VENV)/.installed  ## build the documentation site: build/site/index.html
+	$(BIN)/mkdocs build --quiet
 
 bench: $(VENV)/.benchmarks  ## measure speed, beside other libraries
 	$(BIN)/python benchmarks/run.py

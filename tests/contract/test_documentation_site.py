@@ -1,0 +1,57 @@
+"""The documentation site builds, and every link and picture on it leads somewhere."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from urllib.parse import unquote, urldefrag
+
+import pytest
+
+from omninav.pipeline.graph.registry import entries
+
+ROOT = Path(__file__).parents[2]
+LINK = re.compile(r"""(?:href|src)="([^"]+)\"""")
+ELSEWHERE = re.compile(r"^(https?:|data:|mailto:|javascript:|//)")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    built = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--quiet", "--strict", "--site-dir", str(built)]
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "NO_MKDOCS_2_WARNING": "1"}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr + done.stdout
+    return built
+
+
+def test_every_link_and_picture_leads_somewhere(site: Path) -> None:
+    pages = {page: page.read_text(encoding="utf-8") for page in site.rglob("*.html") if page.name != "404.html"}
+    anchors = {page: set(re.findall(r"""\b(?:id|name)="([^"]+)\"""", text)) for page, text in pages.items()}
+    links, missing = 0, set()
+    for page, text in pages.items():
+        for link in LINK.findall(text):
+            if ELSEWHERE.match(link):
+                continue
+            links += 1
+            path, anchor = urldefrag(link)
+            target = (page.parent / unquote(path)).resolve() if path else page
+            if not target.exists() or (anchor and target in anchors and unquote(anchor) not in anchors[target]):
+                missing.add(f"{page.relative_to(site)}: {link}")
+    assert links > 1000
+    assert not missing
+
+
+def test_a_page_fetches_nothing_from_a_network(site: Path) -> None:
+    fetched = re.compile(
+        r"""<(?:script|img|iframe)[^>]*src="(?:https?:)?//|<link[^>]*rel="stylesheet"[^>]*href="https?:"""
+    )
+    assert not [page.name for page in site.rglob("*.html") if fetched.search(page.read_text(encoding="utf-8"))]
+
+
+def test_every_stage_has_its_place(site: Path) -> None:
+    listed = (site / "stages/index.html").read_text(encoding="utf-8")
+    names = [entry.name for entry in entries() if entry.origin == "built in"]
+    assert len(names) > 100
+    assert not [name for name in names if f"{name.partition('.')[0]}.html#{name.replace('.', '-')}" not in listed]
