@@ -1,0 +1,139 @@
+"""ROS 2 messages through rclpy: a sourced ROS 2, or its wheels."""
+
+import importlib
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from .transport import Arrival, Transport, TransportError
+
+DEPTH, NEWEST_DEPTH = 1000, 16
+"""Messages of a topic that ROS keeps until our thread takes them: all of them, or only the newest are wanted."""
+
+
+def open_transport(domain: int) -> Transport:
+    """A node in a domain. Raises `TransportError` where rclpy is missing."""
+    try:
+        import rclpy  # noqa: F401
+    except ImportError:
+        raise TransportError(
+            "transport=rclpy needs ROS 2: source its setup.bash, or pip install 'omninav[ros2]' with Python 3.11"
+        ) from None
+    return RclpyTransport(domain)
+
+
+class RclpyTransport(Transport):
+    """The node `omninav`, spun in a thread; messages pass as CDR."""
+
+    def __init__(self, domain: int) -> None:
+        super().__init__()
+        import rclpy
+        from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context, domain_id=domain)
+        self._node = rclpy.create_node("omninav", context=self._context, enable_rosout=False)
+        self._lock = threading.RLock()
+        self._subscriptions: dict[str, Any] = {}
+        self._publishers: dict[str, Any] = {}
+        self._mismatched: dict[str, str] = {}
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+
+        def spin() -> None:
+            with suppress(ExternalShutdownException):
+                self._executor.spin()
+
+        self._thread = threading.Thread(target=spin, name="rclpy", daemon=True)
+        self._thread.start()
+
+    def subscribe(self, topic: str, msgtype: str, newest: bool = False) -> None:
+        """Receive a topic from now on."""
+        from rclpy.event_handler import SubscriptionEventCallbacks
+        from rclpy.qos import QoSProfile, QoSReliabilityPolicy
+
+        qos = QoSProfile(depth=NEWEST_DEPTH if newest else DEPTH, reliability=QoSReliabilityPolicy.BEST_EFFORT)
+        self.inbox.open(topic, newest)
+
+        def receive(data: bytes) -> None:
+            self.inbox.put(Arrival(topic, msgtype, time.time_ns(), bytes(data)))
+
+        events = SubscriptionEventCallbacks(incompatible_qos=lambda event: self._note_mismatch(topic, event))
+        with self._lock:
+            self._subscriptions[topic] = self._node.create_subscription(
+                _resolve(msgtype, topic), topic, receive, qos, raw=True, event_callbacks=events
+            )
+        self._executor.wake()
+
+    def publish(self, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
+        """Send a message in CDR."""
+        with self._lock:
+            if topic not in self._publishers:
+                self._publishers[topic] = self._publisher(topic, msgtype, latched)
+        self._publishers[topic].publish(data)
+
+    def matched(self, topic: str) -> int:
+        """How many are at the other end of a topic."""
+        with self._lock:
+            subscribed, published = topic in self._subscriptions, self._publishers.get(topic)
+        there = self._node.count_publishers(topic) if subscribed else 0
+        return there + (published.get_subscription_count() if published is not None else 0)
+
+    def offered(self) -> dict[str, str]:
+        """Topics that are published now, with their types."""
+        return {topic: types[0] for topic, types in self._node.get_topic_names_and_types() if types}
+
+    def mismatched(self) -> dict[str, str]:
+        """Topics of ours whose other end asks for or offers another QoS."""
+        with self._lock:
+            return dict(self._mismatched)
+
+    def serve(self, service: str, srvtype: str, answer: Callable[[bytes], bytes]) -> bool:
+        """Answer a service."""
+        from rclpy.serialization import deserialize_message, serialize_message
+
+        kind = _resolve(srvtype, service)
+
+        def reply(request: Any, _: Any) -> Any:
+            return deserialize_message(answer(serialize_message(request)), kind.Response)
+
+        with self._lock:
+            self._node.create_service(kind, service, reply)
+        self._executor.wake()
+        return True
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self._executor.shutdown(timeout_sec=2.0)
+        self._thread.join(timeout=2.0)
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def _publisher(self, topic: str, msgtype: str, latched: bool) -> Any:
+        from rclpy.event_handler import PublisherEventCallbacks
+        from rclpy.qos import QoSDurabilityPolicy, QoSProfile
+
+        qos = QoSProfile(
+            depth=1 if latched else 16,
+            durability=QoSDurabilityPolicy.TRANSIENT_LOCAL if latched else QoSDurabilityPolicy.VOLATILE,
+        )
+        events = PublisherEventCallbacks(incompatible_qos=lambda event: self._note_mismatch(topic, event))
+        return self._node.create_publisher(_resolve(msgtype, topic), topic, qos, event_callbacks=events)
+
+    def _note_mismatch(self, topic: str, event: Any) -> None:
+        policy = getattr(event.last_policy_kind, "name", str(event.last_policy_kind))
+        with self._lock:
+            self._mismatched[topic] = policy.lower().replace("_", " ")
+
+
+def _resolve(name: str, topic: str) -> Any:
+    """The class of a message or service type by its ROS name."""
+    package, kind, name_in_it = name.split("/")
+    try:
+        return getattr(importlib.import_module(f"{package}.{kind}"), name_in_it)
+    except (ImportError, AttributeError):
+        raise TransportError(
+            f"transport=rclpy: {topic}: the type {name} is not installed; install ros-…-{package.replace('_', '-')}"
+        ) from None

@@ -1,0 +1,140 @@
+"""What carries ROS 2 messages to and from a robot: bytes in, bytes out, and who is at the other end."""
+
+import importlib
+import os
+import threading
+from abc import ABC, abstractmethod
+from collections import Counter, deque
+from collections.abc import Callable
+from typing import Literal, NamedTuple
+
+from omninav.pipeline.graph.problems import BadInput
+
+TransportName = Literal["dds", "rclpy"]
+"""`dds`: CycloneDDS, no ROS needed (`pip install 'omninav[live]'`). `rclpy`: a sourced ROS 2, or `omninav[ros2]`."""
+MAX_WAITING = 10_000
+"""Messages of one topic that wait to be taken; of more the oldest is overtaken. A minute of odometry at 150 Hz."""
+
+
+class TransportError(BadInput):
+    """A transport that cannot be opened or used. The message is one line: what, and what to type."""
+
+
+class Arrival(NamedTuple):
+    """A message as it came: `received` in ns since 1970 by this computer's clock, `data` in CDR with its header."""
+
+    topic: str
+    msgtype: str
+    received: int
+    data: bytes
+
+
+class Inbox:
+    """Arrivals between the transport's thread and the one that takes them: bounded, whatever the taker does."""
+
+    def __init__(self) -> None:
+        self.overtaken: Counter[str] = Counter()
+        self._changed = threading.Condition()
+        self._arrivals: dict[str, deque[Arrival]] = {}
+
+    def open(self, topic: str, newest: bool) -> None:
+        """Make room for a topic: for its newest message alone, or for all up to `MAX_WAITING`."""
+        self._arrivals[topic] = deque(maxlen=1 if newest else MAX_WAITING)
+
+    def put(self, arrival: Arrival) -> None:
+        """Keep a message; where there is no room the oldest of its topic is overtaken."""
+        with self._changed:
+            waiting = self._arrivals[arrival.topic]
+            if len(waiting) == waiting.maxlen:
+                self.overtaken[arrival.topic] += 1
+            waiting.append(arrival)
+            self._changed.notify()
+
+    def take(self, timeout_s: float) -> Arrival | None:
+        """The message that was received first of those that wait; None where none comes in time."""
+        with self._changed:
+            self._changed.wait_for(lambda: any(self._arrivals.values()), timeout_s)
+            waiting = [arrivals for arrivals in self._arrivals.values() if arrivals]
+            return min(waiting, key=lambda arrivals: arrivals[0].received).popleft() if waiting else None
+
+
+class Transport(ABC):
+    """A connection to the messages of a ROS 2 domain. Types are ROS names (`nav_msgs/msg/Odometry`).
+
+    Messages are received in a thread of the transport's own. All methods may be called from any thread.
+    """
+
+    def __init__(self) -> None:
+        self.inbox = Inbox()
+
+    @abstractmethod
+    def subscribe(self, topic: str, msgtype: str, newest: bool = False) -> None:
+        """Receive a topic from now on. `newest`: only its last message waits, and overtaken ones are counted.
+
+        Best effort and volatile, which every publisher's QoS fits. Raises `TransportError` for an unknown type.
+        """
+
+    @abstractmethod
+    def publish(self, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
+        """Send a message in CDR. `latched`: whoever comes later gets the last one too (transient local).
+
+        Reliable. The first message of a topic announces it; peers match only then (see `matched`).
+        """
+
+    @abstractmethod
+    def matched(self, topic: str) -> int:
+        """How many are at the other end of a topic that is subscribed to or published."""
+
+    @abstractmethod
+    def offered(self) -> dict[str, str]:
+        """Topics that are published now, with their types."""
+
+    @abstractmethod
+    def mismatched(self) -> dict[str, str]:
+        """Topics of ours whose other end asks for or offers another QoS: topic -> which policy."""
+
+    def serve(self, service: str, srvtype: str, answer: Callable[[bytes], bytes]) -> bool:
+        """Answer a service, with requests and answers in CDR; False where the transport has no services."""
+        return False
+
+    def take(self, timeout_s: float = 0.0) -> Arrival | None:
+        """The message that was received first of those that wait; None where none comes in time."""
+        return self.inbox.take(timeout_s)
+
+    @property
+    def overtaken(self) -> Counter[str]:
+        """How many messages of each topic were overtaken by later ones before they were taken."""
+        return self.inbox.overtaken
+
+    @abstractmethod
+    def close(self) -> None:
+        """Leave the domain. Nothing can be received or sent any more."""
+
+
+_OPEN: dict[tuple[str, int], Transport] = {}
+
+
+def connect(transport: TransportName, domain: int | None = None) -> Transport:
+    """The transport of this process: one for each domain, opened when it is first asked for.
+
+    `domain`: the ROS domain; None: `ROS_DOMAIN_ID`, else 0. Raises `TransportError` where its library is missing.
+    """
+    number = _domain() if domain is None else domain
+    key = (transport, number)
+    if key not in _OPEN:
+        module = importlib.import_module(f"{__package__}.{transport}_transport")
+        _OPEN[key] = module.open_transport(number)
+    return _OPEN[key]
+
+
+def disconnect() -> None:
+    """Close all transports of this process."""
+    while _OPEN:
+        _OPEN.popitem()[1].close()
+
+
+def _domain() -> int:
+    text = os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
+    if not text.isdecimal() or int(text) > 232:
+        raise TransportError(f"ROS_DOMAIN_ID={text:.20}: expected a whole number from 0 to 232")
+    return int(text)

@@ -1,0 +1,117 @@
+"""Real rclpy at the other end, in an environment of its own."""
+
+import base64
+import itertools
+import json
+import os
+import queue
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from omninav.pipeline.mcap.message_types import make_message, standard_types
+from omninav.stages.live.transport import disconnect
+
+ROOT = Path(__file__).parents[3]
+ROS2_PYTHON = Path(os.environ.get("OMNINAV_ROS2_PYTHON", ROOT / ".venv-ros2/bin/python"))
+WAIT_S = 20.0
+_DOMAINS = itertools.count(10 + (os.getpid() * 7) % 80)
+"""A domain for each test, so that neither tests nor a robot in the room hear each other."""
+
+
+def encode(msgtype: str, fields: dict[str, Any], stamp: int | None = None) -> bytes:
+    """A message's CDR."""
+    return bytes(standard_types().serialize_cdr(make_message(msgtype, fields, stamp), msgtype))
+
+
+def decode(msgtype: str, data: bytes) -> Any:
+    """A message of its CDR."""
+    return standard_types().deserialize_cdr(data, msgtype)
+
+
+class OtherEnd:
+    """A ROS 2 node in a process of its own."""
+
+    def __init__(self, domain: int) -> None:
+        environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+        command = [str(ROS2_PYTHON), str(Path(__file__).parent / "rclpy_end.py")]
+        self.process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=environment | {"ROS_DOMAIN_ID": str(domain)},
+        )
+        self._heard: queue.Queue[dict[str, Any]] = queue.Queue()
+        threading.Thread(target=self._read, daemon=True).start()
+        self.wait("ready")
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self._heard.put(json.loads(line))
+
+    def order(self, do: str, topic: str = "", **rest: Any) -> None:
+        """Have it do something."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(json.dumps({"do": do, "topic": topic, **rest}) + "\n")
+        self.process.stdin.flush()
+
+    def publish(self, topic: str, data: bytes) -> None:
+        """Have it publish CDR on a topic that it has advertised."""
+        self.order("publish", topic, data=base64.b64encode(data).decode())
+
+    def wait(self, key: str, timeout_s: float = WAIT_S) -> Any:
+        """The next thing that it says with that key."""
+        until = time.monotonic() + timeout_s
+        while True:
+            said = self._heard.get(timeout=max(0.01, until - time.monotonic()))
+            if key in said:
+                return said[key]
+
+    def hear(self, topic: str, timeout_s: float = WAIT_S) -> bytes:
+        """The next message that it hears on a topic."""
+        until = time.monotonic() + timeout_s
+        while True:
+            said = self._heard.get(timeout=max(0.01, until - time.monotonic()))
+            if said.get("topic") == topic:
+                return base64.b64decode(said["data"])
+
+    def close(self) -> None:
+        """End it."""
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        self.process.kill()
+        self.process.wait(timeout=10)
+
+
+@pytest.fixture
+def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A ROS domain of the test's own; whatever was opened in it is closed."""
+    number = next(_DOMAINS)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
+    yield number
+    disconnect()
+
+
+@pytest.fixture
+def other_end(domain: int) -> Iterator[OtherEnd]:
+    """A node of real rclpy."""
+    if not ROS2_PYTHON.exists():
+        pytest.skip(f"no rclpy at {ROS2_PYTHON}: type `make ros2` (Python 3.11), or set OMNINAV_ROS2_PYTHON")
+    end = OtherEnd(domain)
+    yield end
+    end.close()
+
+
+def until(true: Any, timeout_s: float = WAIT_S) -> None:
+    """Wait until something is so."""
+    end = time.monotonic() + timeout_s
+    while not true():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.02)

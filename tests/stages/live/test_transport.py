@@ -1,0 +1,69 @@
+import pytest
+
+from omninav.stages.live.transport import Arrival, Inbox, TransportError, connect
+
+from .conftest import OtherEnd, decode, encode, until
+
+ODOMETRY, POSE = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseWithCovarianceStamped"
+
+
+def arrival(topic: str, received: int) -> Arrival:
+    return Arrival(topic, ODOMETRY, received, b"")
+
+
+def test_of_a_topic_whose_newest_is_wanted_older_ones_are_overtaken_and_counted():
+    inbox = Inbox()
+    inbox.open("/image", newest=True)
+    inbox.open("/odom", newest=False)
+    for received in range(4):
+        inbox.put(arrival("/image", received))
+        inbox.put(arrival("/odom", received))
+    taken = [inbox.take(0.0) for _ in range(6)]
+    assert [(one.topic, one.received) for one in taken if one] == [
+        ("/odom", 0),
+        ("/odom", 1),
+        ("/odom", 2),
+        ("/image", 3),
+        ("/odom", 3),
+    ]
+    assert inbox.overtaken == {"/image": 3}
+
+
+def test_an_empty_inbox_gives_none_in_time():
+    inbox = Inbox()
+    inbox.open("/odom", newest=False)
+    assert inbox.take(0.01) is None
+
+
+@pytest.mark.parametrize("value", ["robots", "233", "-1"])
+def test_a_domain_that_is_none_is_refused(monkeypatch: pytest.MonkeyPatch, value: str):
+    monkeypatch.setenv("ROS_DOMAIN_ID", value)
+    with pytest.raises(TransportError, match=r"ROS_DOMAIN_ID=.* expected a whole number"):
+        connect("dds")
+
+
+def test_messages_pass_both_ways_between_dds_and_rclpy(other_end: OtherEnd):
+    transport = connect("dds")
+    transport.subscribe("/odom", ODOMETRY)
+    other_end.order("advertise", "/odom", type=ODOMETRY)
+    until(lambda: transport.matched("/odom") == 1)
+    until(lambda: other_end.order("matched", "/odom") or other_end.wait("matched") == 1)
+    sent = encode(ODOMETRY, {"pose": {"pose": {"position": {"x": 1.25}}}, "child_frame_id": "base_link"}, 7_000_000_001)
+    other_end.publish("/odom", sent)
+    got = transport.take(10.0)
+    assert got is not None
+    assert (got.topic, got.msgtype) == ("/odom", ODOMETRY)
+    assert str(decode(ODOMETRY, got.data)) == str(decode(ODOMETRY, sent))
+    assert transport.offered()["/odom"] == ODOMETRY
+
+    pose = encode(POSE, {"pose": {"pose": {"position": {"y": -2.5}}}, "header": {"frame_id": "map"}}, 9)
+    transport.publish("/amcl_pose", POSE, pose, latched=True)
+    other_end.order("subscribe", "/amcl_pose", type=POSE, durability="TRANSIENT_LOCAL")  # it comes too late
+    assert str(decode(POSE, other_end.hear("/amcl_pose"))) == str(decode(POSE, pose))
+
+
+def test_a_qos_that_does_not_fit_is_named(other_end: OtherEnd):
+    transport = connect("dds")
+    transport.publish("/pose", POSE, encode(POSE, {}, 1))
+    other_end.order("subscribe", "/pose", type=POSE, durability="TRANSIENT_LOCAL")  # ours is volatile
+    until(lambda: transport.mismatched() == {"/pose": "durability"})
