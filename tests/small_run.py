@@ -12,6 +12,7 @@ from omninav.stages.values.drive import Drive
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.similarity import BestMatch
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 
 
@@ -40,10 +41,11 @@ def collected(
     motion: list[Motion | None] | None = None,
     estimates: list[PoseEstimate | None] | None = None,
     tallies: list[DriveTally | None] | None = None,
+    matches: list[BestMatch | None] | None = None,
 ) -> Drive:
     """Sequences as a graph would collect them."""
     still = [None] * len(ticks)
-    return CollectDrive().step(Context("drive"), ticks, truth, motion or still, estimates, tallies).drive
+    return CollectDrive().step(Context("drive"), ticks, truth, motion or still, estimates, tallies, matches).drive
 
 
 def eight(frames: int) -> np.ndarray:

@@ -10,10 +10,11 @@ from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.drive import Drive, pose_row
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.similarity import BestMatch
 
 
 class CollectDrive(Stage):
-    """Collects ticks, estimates, ground truth and odometry of a whole run into one value, a row for every tick."""
+    """Collects ticks, estimates, ground truth, odometry and matches of a whole run into one value, a row per tick."""
 
     class Out(Outputs):
         """`drive`: for metrics and plots."""
@@ -28,15 +29,18 @@ class CollectDrive(Stage):
         motion: Sequence[Motion | None],
         estimates: Sequence[PoseEstimate | None] | None = None,
         tallies: Sequence[DriveTally | None] | None = None,
+        matches: Sequence[BestMatch | None] | None = None,
     ) -> Out:
         """The whole run at once. Each sequence is read once, in order."""
         rows: list[tuple[Any, ...]] = []
-        for tick, estimate, true, moved, tally in zip(
+        absent = [None] * len(ticks)
+        for tick, estimate, true, moved, tally, match in zip(
             ticks,
-            [None] * len(ticks) if estimates is None else estimates,
+            absent if estimates is None else estimates,
             truth,
             motion,
-            [None] * len(ticks) if tallies is None else tallies,
+            absent if tallies is None else tallies,
+            absent if matches is None else matches,
             strict=True,
         ):
             rows.append(
@@ -48,14 +52,21 @@ class CollectDrive(Stage):
                     pose_row(estimate.mean if estimate else None),
                     pose_row(true),
                     (np.nan,) * 3 if moved is None else (moved.x, moved.y, moved.turn),
-                    0 if tally is None else tally.collisions,
+                    (
+                        0 if tally is None else tally.collisions,
+                        -1 if estimate is None or estimate.place is None else estimate.place,
+                        -1 if match is None else match.reference,
+                    ),
                     np.nan if tally is None else tally.distance,
+                    (np.nan,) * 3 if match is None else (match.similarity, match.distance, match.turn),
                 )
             )
-        numbers, estimated, covariance, share, mean, true_pose, motions, collisions, distance = (
-            zip(*rows, strict=True) if rows else [()] * 9
+        numbers, estimated, covariance, share, mean, true_pose, motions, counted, distance, looks = (
+            zip(*rows, strict=True) if rows else [()] * 10
         )
         row, log, frames, stamps = np.array(numbers, dtype=np.int64).reshape(-1, 4).T
+        collisions, place, reference = np.array(counted, dtype=np.int64).reshape(-1, 3).T
+        similarity, visual_distance, turn = np.array(looks, dtype=np.float64).reshape(-1, 3).T
         return self.Out(
             drive=Drive(
                 row=row,
@@ -68,7 +79,12 @@ class CollectDrive(Stage):
                 mean=np.array(mean, dtype=np.float64).reshape(-1, 3),
                 truth=np.array(true_pose, dtype=np.float64).reshape(-1, 3),
                 motion=np.array(motions, dtype=np.float64).reshape(-1, 3),
-                collisions=np.array(collisions, dtype=np.int64),
+                collisions=collisions,
                 distance=np.array(distance, dtype=np.float64),
+                place=place,
+                reference=reference,
+                similarity=similarity,
+                visual_distance=visual_distance,
+                reference_turn=turn,
             )
         )

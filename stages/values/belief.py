@@ -17,13 +17,15 @@ class PoseEstimate(Value):
     """A pose to act upon: the belief's heaviest mode, with the whole belief's mean beside it.
 
     `covariance` (3, 3) is the mode's own, over (x, y, heading) in m, m, rad; `mode_weight` is its share of the
-    belief in [0, 1]; `mean` is the mean pose of the whole belief (circular in heading).
+    belief in [0, 1]; `mean` is the mean pose of the whole belief (circular in heading). `place`: which place of a
+    topological map that mode is; None where the map has no places.
     """
 
     pose: Pose
     covariance: Array
     mode_weight: float
     mean: Pose
+    place: int | None = None
 
 
 class Belief(Value):
@@ -95,7 +97,8 @@ class PlaceBelief(Belief):
         place = int(np.argmax(self.probabilities))
         mean = weighted_mean(self.poses, self.probabilities)
         pose = Pose(*map(float, self.poses[place]))
-        return PoseEstimate(pose, np.zeros((3, 3)), float(self.probabilities[place]), Pose(*map(float, mean)))
+        share = float(self.probabilities[place])
+        return PoseEstimate(pose, np.zeros((3, 3)), share, Pose(*map(float, mean)), place)
 
 
 class Likelihood(Value):

@@ -45,6 +45,16 @@ class Drive(Value):
     """Contacts of a simulated robot so far."""
     distance: Array
     """Metres that a simulated robot has driven so far; NaN in a recorded log."""
+    place: Ints
+    """The believed place of a topological map; -1 where there is none."""
+    reference: Ints
+    """The reference, view or place of the map that looked most like the image; -1 where there is none."""
+    similarity: Array
+    """Its similarity to the image in [0, 1], 1 is equal; NaN where there is none."""
+    visual_distance: Array
+    """Its distance to the image in the unit of the comparison, 0 is equal; NaN where there is none."""
+    reference_turn: Array
+    """How far the robot stood turned against it (rad, counter-clockwise); NaN where there is none."""
 
     def __len__(self) -> int:
         return len(self.row)

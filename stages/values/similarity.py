@@ -63,3 +63,17 @@ class Answers(Value):
     references: npt.NDArray[np.int64]
     similarities: npt.NDArray[np.float32]
     turns: npt.NDArray[np.float64]
+
+
+class BestMatch(Value):
+    """What of a map looks most like the current view.
+
+    `reference`: its number in the map; of a map that forgets views the view's lasting number, of a topological map the
+    place. `turn`: how far the robot stands turned against it (radians, counter-clockwise). `similarity` in [0, 1], 1 is
+    equal; `distance` in the unit of the comparison, 0 is equal; each None where the comparison does not give it.
+    """
+
+    reference: int
+    turn: float
+    similarity: float | None = None
+    distance: float | None = None

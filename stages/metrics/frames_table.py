@@ -1,0 +1,76 @@
+"""A run frame by frame, as a table."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Context, Outputs, Stage
+from omninav.pipeline.tables import write_table
+from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
+from omninav.stages.values.drive import Array, Drive, known
+
+Columns = dict[str, npt.NDArray[Any]]
+PLANE = (("xx", 0, 0), ("xy", 0, 1), ("xh", 0, 2), ("yy", 1, 1), ("yh", 1, 2), ("hh", 2, 2))
+"""Entries of a symmetric covariance over x, y and heading."""
+
+
+class FramesTable(Stage):
+    """Writes `frames.csv` and `frames.parquet`: a row for every frame, with estimate, truth, odometry and best match.
+
+    Poses are in metres and radians in the map frame. What there is none of is an empty cell.
+
+    | column | meaning |
+    |---|---|
+    | `log`, `frame` | number of the log, and of the frame within it, from 0 |
+    | `stamp_ns`, `time_s` | the image's header stamp (ns), and the time since the log's first frame (s) |
+    | `estimate_x`, `_y`, `_heading` | the belief's heaviest mode |
+    | `covariance_xx`, `_xy`, `_xh`, `_yy`, `_yh`, `_hh` | its covariance over x, y and heading (m², m rad, rad²) |
+    | `estimate_weight` | its share of the belief, from 0 to 1: how sure the estimate is |
+    | `mean_x`, `_y`, `_heading` | the mean of the whole belief |
+    | `truth_x`, `_y`, `_heading` | the ground truth |
+    | `position_error_m`, `heading_error_deg` | the estimate against the ground truth |
+    | `motion_x`, `_y`, `_turn` | odometry's motion since the frame before, in the robot's frame |
+    | `odometry_x`, `_y`, `_heading` | odometry alone, from the first true pose on |
+    | `reference` | number of the map's reference, view or place that looked most like the image |
+    | `similarity`, `visual_distance` | how much: 1 and 0 are equal; which of them, depends on the comparison |
+    | `reference_turn` | how far the robot stood turned against it (rad, counter-clockwise) |
+    | `place` | the most probable place of a topological map |
+    """
+
+    class Out(Outputs):
+        """Nothing: the files are the result."""
+
+    def step(self, ctx: Context, drive: Drive) -> Out:
+        """The whole run at once."""
+        if ctx.folder is not None:
+            logs = [columns_of(log) for log in drive.by_log] or [columns_of(drive)]
+            table = {name: np.concatenate([log[name] for log in logs]) for name in logs[0]}
+            for name in ("reference", "place"):
+                table[name] = np.ma.masked_less(table[name], 0)
+            write_table(ctx.folder / "frames", table)
+        return self.Out()
+
+
+def columns_of(drive: Drive) -> Columns:
+    """The columns of one log; -1 where there is no reference or place."""
+    columns: Columns = {"log": drive.log, "frame": drive.frames, "stamp_ns": drive.stamps, "time_s": drive.seconds}
+    both = known(drive.estimate) & known(drive.truth)
+    odometry = drive.odometry_alone() if len(drive) else None
+    columns |= _poses("estimate", drive.estimate)
+    columns |= {f"covariance_{name}": drive.covariance[:, row, column] for name, row, column in PLANE}
+    columns["estimate_weight"] = np.where(known(drive.estimate), drive.mode_weight, np.nan)
+    columns |= _poses("mean", drive.mean) | _poses("truth", drive.truth)
+    columns["position_error_m"] = np.where(both, position_errors(drive.estimate, drive.truth), np.nan)
+    columns["heading_error_deg"] = np.where(both, heading_errors_deg(drive.estimate, drive.truth), np.nan)
+    columns |= _poses("motion", drive.motion, "turn")
+    columns |= _poses("odometry", np.full_like(drive.motion, np.nan) if odometry is None else odometry)
+    columns["reference"] = drive.reference
+    columns |= {"similarity": drive.similarity, "visual_distance": drive.visual_distance}
+    columns["reference_turn"] = drive.reference_turn
+    columns["place"] = drive.place
+    return columns
+
+
+def _poses(name: str, poses: Array, angle: str = "heading") -> Columns:
+    return {f"{name}_{axis}": poses[:, column] for column, axis in enumerate(("x", "y", angle))}
