@@ -1,12 +1,13 @@
 """The engine: what runs before the loop, every tick, and after it.
 
-`Engine.run` is the whole story on one screen. Everything a stage gave this tick lies in `values` under `node.port`;
+`Engine.run` is the whole story: `begin`, `tick` until the source has ended, `finish`; who has the frames one at a time
+calls these three. Everything a stage gave this tick lies in `values` under `node.port`;
 delayed values wait in `channels`; what "after" stages collect goes to sequences on disk.
 """
 
 import time
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -77,8 +78,9 @@ class Engine:
         wanted: Sequence[str] = (),
         replay: PrefixReplay | None = None,
         recorded: Mapping[str, Sequence[str]] | None = None,
+        kept: Sequence[str] = (),
     ) -> None:
-        self.graph, self.wanted, self.replay = graph, wanted, replay
+        self.graph, self.wanted, self.kept, self.replay = graph, wanted, kept, replay
         self.options = options = options or EngineOptions()
         self.values: dict[str, Any] = {f"{ARTIFACTS}.{name}": value for name, value in (artifacts or {}).items()}
         self.static = set(self.values) | {
@@ -100,22 +102,36 @@ class Engine:
         self.sequences: dict[str, DiskSequence] = {}
         if options.memory is not None:
             collected = {wire.origin for wire in graph.wires if wire.collect and wire.from_node in ticking}
-            names = [*sorted(collected), *self.recorded]
+            names = [*sorted(collected.union(kept)), *self.recorded]
             self.sequences = {name: DiskSequence(options.memory / f"{name}.sequence") for name in names}
         self.ticks = 0
         self.ended = False
+        self._ticking: list[Call] = []
+        self._total: int | None = None
+        self._saved = 0.0
 
     def _call(self, node: Node) -> Call:
         rng = np.random.default_rng([self.options.seed, zlib.crc32(node.name.encode())])
         ctx = Context(node.name, rng, self.options.folder)
         ctx.progress, ctx.doing = self.options.on_tick, self.options.on_doing
-        origins = [*self.wanted, *(o for wire in self.graph.wires for o in (wire.origin, wire.initial) if o)]
+        origins = [
+            *self.wanted,
+            *self.kept,
+            *(o for wire in self.graph.wires for o in (wire.origin, wire.initial) if o),
+        ]
         ctx.read = frozenset(port for name, _, port in (o.partition(".") for o in origins) if name == node.name)
         wires = [wire for wire in self.graph.inputs_of(node.name) if not wire.collect]
         return Call(node, wires, ctx, self.static)
 
     def run(self) -> dict[str, Any]:
         """Before, every tick, after. Returns the last value of each wanted output (None where it was never present)."""
+        self.begin()
+        while self.tick():
+            pass
+        return self.finish()
+
+    def begin(self) -> None:
+        """Set up what runs, run what comes before the loop, and go back to the last checkpoint where there is one."""
         replayed = self.replay.nodes if self.replay is not None else frozenset()
         for name, call in self.calls.items():
             if name not in replayed:
@@ -130,10 +146,41 @@ class Engine:
         if self.replay is not None:
             for name in replayed:
                 self.calls[name].ctx.restore_notes(dict(self.replay.notes[name]))
+        self._ticking = [self.calls[node.name] for node in self.graph.of_lifetime("tick") if node.name not in replayed]
+        self._total = self._ticks_in_all()
+        self._saved = time.monotonic()
+
+    def tick(self) -> bool:
+        """One turn of the loop. False where there is none: the source has ended."""
+        if self.ended or self.graph.source is None:
+            return False
+        values, calls = self.values, self._ticking
+        for key, channel in self.channels.items():
+            values[key] = channel.waiting[0] if channel.waiting else None
+        if self.replay is not None:
+            if self.ticks >= len(self.replay.ticks):
+                return False
+            values.update(self.replay.ticks[self.ticks])
+        elif calls[0].run(values):
+            calls, source = calls[1:], calls[0]
+            source.ctx.tick = values[f"{source.node.name}.tick"]
+        else:
+            return False
+        tick = values[f"{self.graph.source.name}.tick"]
+        for call in calls:
+            call.ctx.tick = tick
+            call.run(values)
+        self._end_tick()
+        self.options.on_tick(self.ticks, self._total)
+        if time.monotonic() - self._saved >= self.options.checkpoint_s:
+            self.save()
+        return True
+
+    def finish(self) -> dict[str, Any]:
+        """What comes after the loop. Returns the last value of each wanted output."""
         if not self.ended:
-            self._loop(replayed)
             self.ended = True
-            self._save()
+            self.save()
         self._verify_sequences()
         for node in self.graph.of_lifetime("after"):
             self._run_after(node)
@@ -143,45 +190,11 @@ class Engine:
         """The last present value of an output that is wanted or read after the loop; else that of the last tick."""
         return self.values.get(held_key(origin), self.values.get(origin))
 
-    def _loop(self, replayed: frozenset[str]) -> None:
-        calls = [self.calls[node.name] for node in self.graph.of_lifetime("tick") if node.name not in replayed]
+    def _ticks_in_all(self) -> int | None:
+        if self.replay is not None:
+            return len(self.replay.ticks)
         source = self.graph.source
-        if source is None:
-            return
-        total = len(self.replay.ticks) if self.replay is not None else None
-        if total is None and isinstance(source.stage, Source):
-            total = source.stage.length()
-        records = self._records()
-        saved = time.monotonic()
-        values, tick_key = self.values, f"{source.name}.tick"
-        while True:
-            for key, channel in self.channels.items():
-                values[key] = channel.waiting[0] if channel.waiting else None
-            if records is not None:
-                record = next(records, None)
-                if record is None:
-                    return
-                values.update(record)
-                tick = values[tick_key]
-            elif calls[0].run(values):
-                tick = values[tick_key]
-                calls[0].ctx.tick = tick
-            else:
-                return
-            for call in calls if records is not None else calls[1:]:
-                call.ctx.tick = tick
-                call.run(values)
-            self._end_tick()
-            self.options.on_tick(self.ticks, total)
-            if time.monotonic() - saved >= self.options.checkpoint_s:
-                self._save()
-                saved = time.monotonic()
-
-    def _records(self) -> Iterator[Mapping[str, Any]] | None:
-        if self.replay is None:
-            return None
-        ticks = self.replay.ticks
-        return (ticks[number] for number in range(self.ticks, len(ticks)))
+        return source.stage.length() if source is not None and isinstance(source.stage, Source) else None
 
     def _end_tick(self) -> None:
         values = self.values
@@ -226,9 +239,11 @@ class Engine:
 
     # checkpoints
 
-    def _save(self) -> None:
+    def save(self) -> None:
+        """Write a checkpoint, where there is a place for it."""
         if self.options.memory is None:
             return
+        self._saved = time.monotonic()
         held = {origin: held_key(origin) for origin in sorted(self.held)}
         present = Checkpoint(
             identity=self.options.identity,

@@ -16,17 +16,17 @@ class BestReference(Stage):
     """
 
     class Out(Outputs):
-        """`best`: absent where the image resembles nothing in the map."""
+        """`best_match`: absent where the image resembles nothing in the map."""
 
-        best: BestMatch | None = None
+        best_match: BestMatch | None = None
 
     def step(
         self, ctx: Context, match: Similarities | Neighbours | VisualDistances, map: ViewMixtures | None = None
     ) -> Out:
         """One image. `map`: the one that was searched, where its views come and go."""
         if isinstance(match, VisualDistances):
-            return self.Out(best=nearest_place(match))
-        return self.Out(best=nearest_view(match, map) if isinstance(match, Neighbours) else peak_of(match))
+            return self.Out(best_match=nearest_place(match))
+        return self.Out(best_match=nearest_view(match, map) if isinstance(match, Neighbours) else peak_of(match))
 
 
 def peak_of(similarities: Similarities) -> BestMatch | None:

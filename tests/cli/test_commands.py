@@ -216,6 +216,8 @@ def test_the_embedded_default_leaves_everything_a_run_should(demo: Path):
         ".hydra",
         ".lock",
         "config.yaml",
+        "frames.csv",
+        "frames.parquet",
         "graph.mmd",
         "graph.svg",
         "manifest.json",

@@ -10,7 +10,7 @@ from omninav.stages.values.visual_distance import VisualDistances
 
 
 def best(match, map=None):
-    return BestReference().step(Context("best"), match, map).best
+    return BestReference().step(Context("best"), match, map).best_match
 
 
 def test_the_most_similar_reference_is_named_as_the_map_numbers_it():
