@@ -43,6 +43,19 @@ def types_of(msgtype: str, encoding: str, definition: bytes) -> "Typestore":
     return store
 
 
+def encode_message(msgtype: str, content: Any, stamp: int | None = None) -> bytes:
+    """CDR bytes of a message: a rosbags message object, or a mapping as `make_message` takes it.
+
+    Raises `LogError` for an unknown type or field, and for what does not fit its field.
+    """
+    if isinstance(content, Mapping):
+        content = make_message(msgtype, content, stamp)
+    try:
+        return bytes(standard_types().serialize_cdr(content, msgtype))
+    except Exception as error:
+        raise LogError(f"not a valid {msgtype} ({error})") from None
+
+
 def make_message(msgtype: str, fields: Mapping[str, Any], stamp: int | None = None) -> Any:
     """A rosbags message from nested mappings; fields left out are zero or empty, `stamp` (ns) fills the header.
 

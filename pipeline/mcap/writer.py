@@ -5,7 +5,6 @@ It opens with Foxglove, `mcap` and `ros2 bag play -s mcap FILE` as it is, and wi
 """
 
 from collections import Counter
-from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -16,7 +15,7 @@ from mcap.writer import CompressionType, Writer
 from omninav.pipeline.files import whole_file
 
 from .message import LogError
-from .message_types import make_message, standard_types
+from .message_types import encode_message, standard_types
 
 
 class LogWriter:
@@ -63,12 +62,10 @@ class LogWriter:
         `content`: a rosbags message object, or a mapping of fields; fields left out are zero or empty.
         Raises `LogError` for an unknown type or field, and where a topic would change its type.
         """
-        if isinstance(content, Mapping):
-            content = make_message(msgtype, content, stamp)
-        try:
-            data = bytes(standard_types().serialize_cdr(content, msgtype))
-        except Exception as error:
-            raise LogError(f"{self.path}: {topic}: not a valid {msgtype} ({error})") from None
+        self.append(topic, msgtype, stamp, encode_message(msgtype, content, stamp), log_time)
+
+    def append(self, topic: str, msgtype: str, stamp: int, data: bytes, log_time: int | None = None) -> None:
+        """Append a message that is encoded already (CDR)."""
         channel, known = self._channels.get(topic, (0, msgtype))
         if known != msgtype:
             raise LogError(f"{self.path}: {topic} carries {known}, not {msgtype}; use another topic")

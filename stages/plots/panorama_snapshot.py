@@ -34,15 +34,20 @@ class PanoramaSnapshot(Stage):
         """One frame."""
         if not is_snapshot_frame(tick.frame):
             return self.Out()
-        headings: tuple[float, ...] = ()
-        pixels: cv2.typing.MatLike = panorama.pixels
-        if isinstance(panorama, Windows):
-            # From just right of straight behind around to straight behind, as a panorama is cut open.
-            order = np.argsort(np.mod(math.pi - panorama.headings, 2 * math.pi), kind="stable")
-            headings = tuple(float(panorama.headings[n]) for n in order)
-            pixels = np.concatenate([panorama.pixels[n] for n in order], axis=1)
-        if pixels.shape[1] > 720:
-            size = (720, max(1, round(pixels.shape[0] * 720 / pixels.shape[1])))
-            pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
-        _, jpeg = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 90])
-        return self.Out(snapshot=EncodedPanorama(jpeg.tobytes(), headings))
+        return self.Out(snapshot=EncodedPanorama(*small_jpeg(panorama, 720, 90)))
+
+
+def small_jpeg(panorama: Panorama | Windows, max_columns: int, quality: int) -> tuple[bytes, tuple[float, ...]]:
+    """JPEG bytes of a panorama, or of windows side by side, in at most so many columns; and where the windows look."""
+    headings: tuple[float, ...] = ()
+    pixels: cv2.typing.MatLike = panorama.pixels
+    if isinstance(panorama, Windows):
+        # From just right of straight behind around to straight behind, as a panorama is cut open.
+        order = np.argsort(np.mod(math.pi - panorama.headings, 2 * math.pi), kind="stable")
+        headings = tuple(float(panorama.headings[n]) for n in order)
+        pixels = np.concatenate([panorama.pixels[n] for n in order], axis=1)
+    if pixels.shape[1] > max_columns:
+        size = (max_columns, max(1, round(pixels.shape[0] * max_columns / pixels.shape[1])))
+        pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    _, jpeg = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return jpeg.tobytes(), headings

@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from result_of import write_result
 from rosbags.highlevel import AnyReader
 from small_run import mixture_run, small_run
 
@@ -12,7 +13,6 @@ from omninav.stages.plots.changed_mixtures import ChangedMixtures
 from omninav.stages.plots.map_ellipses import MapEllipses
 from omninav.stages.plots.map_growth import MapGrowth
 from omninav.stages.plots.reference_life import ReferenceLife, farthest_moved, lives_of
-from omninav.stages.plots.result_log import ResultLog
 from omninav.stages.plots.thin_belief import ThinBelief, heaviest
 from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap
 from omninav.stages.values.belief import GaussianMixture
@@ -123,8 +123,7 @@ def test_a_mixture_is_kept_as_it_is_or_in_its_heaviest_gaussians():
 @pytest.fixture(scope="module")
 def result(run, learned, tmp_path_factory):
     folder = tmp_path_factory.mktemp("result")
-    ResultLog().step(Context("log", folder=folder), run.drive, learned[1], learned[0])
-    return folder / "result.mcap"
+    return write_result(folder, run, learned[1], learned[0])
 
 
 def test_a_log_of_mixtures_opens_with_mcaps_own_ros2_decoder(run, learned, result):
@@ -134,21 +133,22 @@ def test_a_log_of_mixtures_opens_with_mcaps_own_ros2_decoder(run, learned, resul
             found.setdefault(channel.topic, []).append(content)
     assert {topic: len(messages) for topic, messages in found.items()} == {
         "/belief": 60,
-        "/belief/gaussians": 60,
-        "/estimate/path": 2,
+        "/belief/markers": 60,
+        "/estimate/path": 4,
         "/estimate/pose": 60,
         "/ground_truth/pose": 60,
-        "/map": 1,
+        "/map": 3,
         "/odom": 60,
-        "/tf": 2,
+        "/odometry/path": 2,
+        "/tf": 60,
     }
     assert len(found["/belief"][7].poses) == 2
-    lines = found["/belief/gaussians"][7].markers[0]
+    lines = found["/belief/markers"][7].markers[0]
     assert len(lines.points) == len(lines.colors) == 8  # two Gaussians, two axes each, two ends each
     ends = np.array([[point.x, point.y] for point in lines.points[:4]])
     lengths = np.linalg.norm(ends[1::2] - ends[::2], axis=1)
     np.testing.assert_allclose(sorted(lengths / 2), np.sqrt([0.05, 0.2]))  # one standard deviation to either side
-    places, ellipses = found["/map"][0].markers
+    places, ellipses = found["/map"][-1].markers
     assert len(places.points) == len(learned[0].weights)
     assert len(ellipses.points) == 4 * len(learned[0].weights)
 
@@ -158,4 +158,4 @@ def test_a_log_of_mixtures_opens_with_rosbags(learned, result):
         read = [(c.topic, reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages()]
     beliefs = [message for topic, message in read if topic == "/belief"]
     assert [message.poses[0].position.x for message in beliefs] == [belief.means[0, 0] for belief in learned[1]]
-    assert sum(topic == "/map" for topic, _ in read) == 1
+    assert sum(topic == "/map" for topic, _ in read) == 3  # at the first frame of each log, and at the end

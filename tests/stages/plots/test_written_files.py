@@ -1,13 +1,15 @@
 import numpy as np
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from result_of import write_result
 from rosbags.highlevel import AnyReader
 from small_run import collected, small_run
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.plots.result_log import ResultLog, covariance_6x6
+from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.plots.thin_belief import ThinBelief, thin
 from omninav.stages.plots.trajectory_file import TrajectoryFile
+from omninav.stages.recordings.pose_messages import covariance_6x6
 from omninav.stages.values.belief import Particles, PoseEstimate, SinglePose
 from omninav.stages.values.pose import Pose
 
@@ -42,15 +44,9 @@ def test_frames_without_an_estimate_are_counted(tmp_path):
     assert len((tmp_path / "trajectory.tum").read_text().splitlines()) == 1
 
 
-def write_result(folder, run, **parameters):
-    stage = ResultLog(**parameters)
-    stage.step(Context("log", folder=folder), run.drive, run.beliefs, run.map)
-    return folder / "result.mcap"
-
-
 def test_the_result_log_opens_with_mcaps_own_ros2_decoder(tmp_path):
     run = small_run(frames=12, logs=2)
-    with write_result(tmp_path, run, particles=30).open("rb") as file:
+    with write_result(tmp_path, run).open("rb") as file:
         found = {}
         for _, channel, message, content in make_reader(
             file, decoder_factories=[DecoderFactory()]
@@ -63,7 +59,8 @@ def test_the_result_log_opens_with_mcaps_own_ros2_decoder(tmp_path):
         "/ground_truth/pose": 24,
         "/map": 2,
         "/odom": 24,
-        "/tf": 2,
+        "/odometry/path": 2,
+        "/tf": 24,
     }
     stamp, pose = found["/estimate/pose"][3]
     assert stamp == run.ticks[3].stamp
@@ -72,6 +69,14 @@ def test_the_result_log_opens_with_mcaps_own_ros2_decoder(tmp_path):
     assert len(found["/belief"][0][1].poses) == 30
     assert len(found["/estimate/path"][0][1].poses) == 12
     assert len(found["/map"][0][1].markers[0].points) == len(run.map)
+    map_to_odom, odom_to_base = (placed(transform.transform) for transform in found["/tf"][20][1].transforms)
+    at = run.estimates[20].pose
+    np.testing.assert_allclose(compose(map_to_odom, odom_to_base), [at.x, at.y, at.heading], atol=1e-9)
+
+
+def placed(transform):
+    heading = 2 * np.arctan2(transform.rotation.z, transform.rotation.w)
+    return np.array([transform.translation.x, transform.translation.y, heading])
 
 
 def test_the_result_log_opens_with_rosbags(tmp_path):

@@ -1,0 +1,104 @@
+"""A run, watched while it goes on: a WebSocket server that Foxglove connects to."""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from omninav.pipeline import BadInput, Context, Outputs, Stage
+from omninav.pipeline.mcap.message_types import standard_types
+from omninav.stages.values.ros_messages import RosMessages
+
+if TYPE_CHECKING:
+    import foxglove
+
+PORT = 8765
+"""Foxglove's own default."""
+
+
+class FoxgloveServer(Stage):
+    """Sends every tick's messages to whoever watches: in Foxglove, open connection, ws://localhost:8765.
+
+    The topics are those of `result.mcap` (see `ResultMessages`), and `foxglove_layout.json` of any run shows them. Who
+    connects late gets the last message of each topic. Nothing that a run writes depends on it. A later run of the same
+    process goes on with the same server. Raises `BadInput` where foxglove-sdk is missing or the port is taken.
+    """
+
+    port: bool | int = False
+    """Port to listen on; true: 8765; false: nothing is served."""
+    host: str = "127.0.0.1"
+    """Address to listen on: this machine alone; 0.0.0.0: every machine that reaches this one may watch."""
+
+    class Out(Outputs):
+        """Nothing: it is watched."""
+
+    def setup(self, ctx: Context) -> None:
+        """Start the server, or clear what it showed of an earlier run."""
+        if self.port is not False:
+            self._server = _server(self.host, PORT if self.port is True else int(self.port))
+            self._server.clear()
+
+    def step(self, ctx: Context, messages: RosMessages) -> Out:
+        """One tick."""
+        if self.port is not False:
+            self._server.send(messages)
+        return self.Out()
+
+
+@dataclass
+class _Server:
+    """A running server, its channels and the last message on each."""
+
+    context: Any
+    channels: "dict[str, foxglove.Channel]" = field(default_factory=dict)
+    last: dict[int, tuple["foxglove.Channel", int, bytes]] = field(default_factory=dict)
+    server: Any = None
+
+    def clear(self) -> None:
+        self.last.clear()
+        self.server.clear_session()
+
+    def send(self, messages: RosMessages) -> None:
+        for topic, msgtype, data in zip(messages.topics, messages.types, messages.data, strict=True):
+            channel = self.channels.get(topic) or self._open(topic, msgtype)
+            self.last[channel.id()] = channel, messages.stamp, data
+            channel.log(data, log_time=messages.stamp)
+        self.server.broadcast_time(messages.stamp)
+
+    def _open(self, topic: str, msgtype: str) -> "foxglove.Channel":
+        import foxglove
+
+        definition, _ = standard_types().generate_msgdef(msgtype, ros_version=2)
+        schema = foxglove.Schema(name=msgtype, encoding="ros2msg", data=definition.encode())
+        channel = foxglove.Channel(topic, schema=schema, message_encoding="cdr", context=self.context)
+        self.channels[topic] = channel
+        return channel
+
+    def on_subscribe(self, client: Any, channel: Any) -> None:
+        """Called by the server where a client begins to watch a topic."""
+        if channel.id in self.last:
+            known, stamp, data = self.last[channel.id]
+            known.log(data, log_time=stamp)
+
+
+_servers: dict[tuple[str, int], _Server] = {}
+
+
+def _server(host: str, port: int) -> _Server:
+    if (host, port) in _servers:
+        return _servers[host, port]
+    try:
+        import foxglove
+    except ImportError:
+        raise BadInput("watch: foxglove-sdk is not installed: pip install 'omninav[live]'") from None
+    made = _Server(foxglove.Context())
+    try:
+        made.server = foxglove.start_server(
+            name="omninav",
+            host=host,
+            port=port,
+            context=made.context,
+            server_listener=made,  # type: ignore[arg-type]
+            capabilities=[foxglove.Capability.Time],
+        )
+    except (RuntimeError, OSError, OverflowError) as error:
+        raise BadInput(f"watch: {host}:{port} cannot be listened on ({error}); type watch=PORT for another") from None
+    return _servers.setdefault((host, port), made)

@@ -1,0 +1,17 @@
+"""ROS 2 messages as they lie in a log."""
+
+from omninav.pipeline import Value
+
+
+class RosMessages(Value):
+    """The ROS 2 messages that a tick gave, N of them, in their order.
+
+    `topics`, `types` (N,): as text (`nav_msgs/msg/Path`). `data` (N,): their CDR bytes. `stamp`: of the tick (ns).
+    """
+
+    bulky = True
+
+    stamp: int
+    topics: tuple[str, ...]
+    types: tuple[str, ...]
+    data: tuple[bytes, ...]

@@ -1,0 +1,26 @@
+"""The messages of a run made by hand, tick by tick, and the log that they become."""
+
+from pathlib import Path
+
+from small_run import SmallRun
+
+from omninav.pipeline import Context
+from omninav.stages.plots.result_log import ResultLog
+from omninav.stages.plots.result_messages import ResultMessages, ResultMessagesState
+from omninav.stages.values.ros_messages import RosMessages
+
+
+def messages_of(run: SmallRun, beliefs=None, map=None, **inputs) -> list[RosMessages]:
+    """What `ResultMessages` gives for a small run; `inputs` are the same for every tick."""
+    stage, shown = ResultMessages(particles=30), ResultMessagesState()
+    rows = zip(run.ticks, run.motion, run.truth, run.estimates, beliefs or run.beliefs, strict=True)
+    return [
+        stage.step(Context("messages"), shown, *row, map=run.map if map is None else map, **inputs).messages
+        for row in rows
+    ]
+
+
+def write_result(folder: Path, run: SmallRun, beliefs=None, map=None, **inputs) -> Path:
+    """Write `result.mcap` of a small run."""
+    ResultLog().step(Context("log", folder=folder), run.drive, messages_of(run, beliefs, map, **inputs), map)
+    return folder / "result.mcap"
