@@ -97,6 +97,8 @@ def _run(config: Any, sweep: SweepJob | None, folder: Path | None) -> None:
         metrics = execute(run, planned, progress)
     if sweep is None:
         show(results_table(metrics))
+        for sentence in run.manifest["warnings"]:
+            print(f"mind: {sentence}", file=sys.stderr, flush=True)
     print(f"report: {shown(run.folder / 'report.html')}", flush=True)
 
 

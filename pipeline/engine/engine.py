@@ -121,6 +121,8 @@ class Engine:
         ]
         ctx.read = frozenset(port for name, _, port in (o.partition(".") for o in origins) if name == node.name)
         wires = [wire for wire in self.graph.inputs_of(node.name) if not wire.collect]
+        given = [wire for wire in self.graph.wires if wire.from_node == node.name and not wire.collect]
+        ctx.readers = {w.from_port: tuple(o.to_node for o in given if o.from_port == w.from_port) for w in given}
         return Call(node, wires, ctx, self.static)
 
     def run(self) -> dict[str, Any]:

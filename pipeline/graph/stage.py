@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform
 
@@ -72,7 +72,8 @@ class Context:
 
     `rng` is the only source of randomness, seeded by the run's seed and the node's name. `tick` is the current
     turn of the loop. `folder` is the run's folder, where an "after" stage may put files (through `files.write_whole`).
-    `count` and `fact` go into the manifest: things dropped, by kind, and things worth knowing about the run.
+    `count`, `fact` and `warn` go into the manifest: things dropped, by kind, things worth knowing about the run, and
+    what one has to know to judge its results, which is also said at the end and at the head of its page.
     `progress` (done, total or None) and `doing` (in words) are for a stage whose one step takes long: they are shown.
     """
 
@@ -83,8 +84,11 @@ class Context:
         self.counts: Counter[str] = Counter()
         self.details: dict[str, str] = {}
         self.facts: dict[str, Any] = {}
+        self.warnings: list[str] = []
         self.drew = False
         self.read: frozenset[str] | None = None
+        self.readers: Mapping[str, tuple[str, ...]] = {}
+        """By output, the nodes that read it tick by tick."""
         self.progress: Callable[[int, int | None], None] = lambda done, total: None
         self.doing: Callable[[str], None] = lambda words: None
         self._rng = rng
@@ -113,6 +117,11 @@ class Context:
         """Put a fact about the run into the manifest (`noise: synthetic`)."""
         self.facts[name] = value
 
+    def warn(self, sentence: str) -> None:
+        """Say once what one has to know to judge the run's results."""
+        if sentence not in self.warnings:
+            self.warnings.append(sentence)
+
     def generator_state(self) -> dict[str, Any]:
         """The bit generator's state as plain data."""
         return dict(self.rng_unmarked().bit_generator.state)
@@ -130,6 +139,7 @@ class Context:
             "counts": dict(self.counts),
             "details": dict(self.details),
             "facts": dict(self.facts),
+            "warnings": list(self.warnings),
             "drew": self.drew,
         }
 
@@ -142,6 +152,7 @@ class Context:
         """Put back what `notes` gave."""
         self.counts, self.details = Counter(notes["counts"]), dict(notes["details"])
         self.facts, self.drew = dict(notes["facts"]), notes["drew"]
+        self.warnings = list(notes.get("warnings", ()))
 
 
 @dataclass_transform(kw_only_default=True)

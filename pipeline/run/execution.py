@@ -94,11 +94,18 @@ def _finish(run: Run, engine: Engine, prefix_reason: str) -> Metrics:
         for name, artifact in run.manifest["artifacts"].items()
         for key, value in (artifact.get("facts") or {}).items()
     }
+    warnings = [
+        f"{name}: {sentence!s:.300}"
+        for name, artifact in run.manifest["artifacts"].items()
+        if isinstance(artifact.get("warnings"), list)  # of a file, which may hold anything
+        for sentence in artifact["warnings"]
+    ]
     run.manifest |= {
         "ended": datetime.now().isoformat(timespec="seconds"),
         "ticks": engine.ticks,
         "dropped": notes["dropped"],
         "facts": facts | notes["facts"],
+        "warnings": warnings + notes["warnings"],
         "prefix": prefix_reason,
     }
     for kind, entry in notes["dropped"].items():

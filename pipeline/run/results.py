@@ -33,9 +33,10 @@ def _flat(value: Any) -> Iterator[Any]:
 
 
 def notes_of(engine: Engine, only: Container[str] | None = None) -> dict[str, Any]:
-    """What the stages, or only these, counted and stated, as the manifest holds it."""
+    """What the stages, or only these, counted, stated and warned of, as the manifest holds it."""
     dropped: dict[str, Any] = {}
     facts: dict[str, Any] = {}
+    warnings: list[str] = []
     for name, call in engine.calls.items():
         if only is not None and name not in only:
             continue
@@ -43,4 +44,5 @@ def notes_of(engine: Engine, only: Container[str] | None = None) -> dict[str, An
             first = call.ctx.details.get(kind, "")
             dropped[kind if "." in kind else f"{name}.{kind}"] = {"count": number, "first": first}
         facts |= call.ctx.facts
-    return {"dropped": dropped, "facts": facts}
+        warnings += call.ctx.warnings
+    return {"dropped": dropped, "facts": facts, "warnings": warnings}

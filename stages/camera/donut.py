@@ -1,6 +1,6 @@
 """A mirror image with nothing known of the mirror: a ring, one azimuth per radius."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 
@@ -24,6 +24,11 @@ class Donut(Camera, projection="donut"):
     inner_radius_px: Annotated[float | None, Key("mask", "inner_radius_px")] = None
     outer_radius_px: Annotated[float | None, Key("mask", "outer_radius_px")] = None
     sense: Sense = "clockwise"
+
+    @classmethod
+    def of_size(cls, width: int, height: int) -> Self:
+        """A ring that `unwarp=donut` has to find."""
+        return cls(width, height)
 
     @property
     def ring(self) -> Ring | None:

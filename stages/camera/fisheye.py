@@ -1,7 +1,7 @@
 """An equidistant fisheye lens that looks up."""
 
 import math
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 
@@ -30,6 +30,12 @@ class Fisheye(Camera, projection="fisheye"):
     def ring(self) -> Ring:
         """Between the two radii."""
         return Ring(self.centre_x, self.centre_y, self.inner_radius_px, self.outer_radius_px)
+
+    @classmethod
+    def of_size(cls, width: int, height: int) -> Self:
+        """A circle of 180 degrees that fills the image."""
+        radius = min(width, height) / 2
+        return cls(width, height, 2 * radius / math.pi, (width - 1) / 2, (height - 1) / 2, radius)
 
     def project(self, rays: Array) -> tuple[Array, Bools]:
         """Radius = focal_px x angle from the zenith."""

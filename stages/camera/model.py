@@ -160,6 +160,11 @@ class Camera(Value, ABC):
         return {}
 
     @classmethod
+    def of_size(cls, width: int, height: int) -> Self | None:
+        """The usual camera of this kind whose images are of a size (pixels); None where a size says too little."""
+        return None
+
+    @classmethod
     def from_camera_info(cls, model: str, size: tuple[int, int], k: Sequence[float], d: Sequence[float]) -> Self | None:
         """The camera of a CameraInfo's `distortion_model`, (width, height), K and D; None where that is another one."""
         return None

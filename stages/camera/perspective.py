@@ -1,5 +1,6 @@
 """An ordinary camera that looks ahead."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, Self
 
@@ -35,6 +36,12 @@ class Perspective(Camera, projection="perspective"):
         right = (pixels[..., 0] - self.centre_x - self.skew * down) / self.focal_x
         rays = np.stack([np.ones_like(down), -right, -down], axis=-1)
         return turned(normalised(rays), self.yaw), np.ones(down.shape, np.bool_)
+
+    @classmethod
+    def of_size(cls, width: int, height: int) -> Self:
+        """A field of view of 60 degrees, as webcams have."""
+        focal = width / (2.0 * math.tan(math.radians(30.0)))
+        return cls(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
 
     def camera_info(self) -> dict[str, Any]:
         """K."""

@@ -7,7 +7,7 @@ from typing import Annotated
 from omninav.pipeline import Bounds
 from omninav.stages.geometry.plane.odometry_motion import decompose_motion
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.values.pose import BridgedMotion, Motion, UncertainMotion
+from omninav.stages.values.pose import BridgedMotion, GuessedMotion, Motion, UncertainMotion
 
 
 @dataclass(kw_only=True, eq=False)
@@ -18,8 +18,8 @@ class OdometryNoiseModel:
     the camera's rate. Each rotation has sigma^2 = (rotation_per_rotation^2 |turn| + rotation_per_metre^2 distance +
     rotation_floor^2) / 2 (rad^2); the translation has sigma^2 = translation_per_metre^2 distance +
     translation_per_rotation^2 |turn| + translation_floor^2 (m^2). Seconds that odometry says nothing of add
-    (unmeasured_turn t)^2 / 2 and (unmeasured_speed t)^2. `turn` is the sum of both rotations, so that wheel
-    jitter sideways is no turn.
+    (unmeasured_turn t)^2 / 2 and (unmeasured_speed t)^2, and a guessed motion its own. `turn` is the sum of both
+    rotations, so that wheel jitter sideways is no turn.
     """
 
     rotation_per_rotation: Annotated[float, Bounds(ge=0)] = 0.05
@@ -42,21 +42,33 @@ class OdometryNoiseModel:
     def model(self, motion: Motion) -> UncertainMotion:
         """A motion as rotation, translation, rotation, with the standard deviation of each."""
         steps = decompose_motion(motion.x, motion.y, motion.turn)
-        unmeasured_s = motion.unmeasured_s if isinstance(motion, BridgedMotion) else 0.0
-        return UncertainMotion(steps, self.sigmas(steps, unmeasured_s))
+        more_turn, more_way = 0.0, 0.0
+        if isinstance(motion, BridgedMotion):
+            more_turn, more_way = (
+                self.unmeasured_turn * motion.unmeasured_s,
+                self.unmeasured_speed * motion.unmeasured_s,
+            )
+        elif isinstance(motion, GuessedMotion):
+            more_turn, more_way = motion.sigma_turn, motion.sigma_m
+        return UncertainMotion(steps, self.sigmas(steps, more_turn, more_way))
 
-    def sigmas(self, steps: tuple[float, float, float], unmeasured_s: float = 0.0) -> tuple[float, float, float]:
-        """Standard deviations of the first rotation (rad), the translation (m) and the second rotation (rad)."""
+    def sigmas(
+        self, steps: tuple[float, float, float], more_turn: float = 0.0, more_way: float = 0.0
+    ) -> tuple[float, float, float]:
+        """Standard deviations of the first rotation (rad), the translation (m) and the second rotation (rad).
+
+        `more_turn` (rad) and `more_way` (m): standard deviations of what was not measured.
+        """
         distance, turn = abs(steps[1]), abs(float(wrap(steps[0] + steps[2])))
         rotation = math.sqrt(
             0.5
             * (self.rotation_per_rotation**2 * turn + self.rotation_per_metre**2 * distance + self.rotation_floor**2)
-            + 0.5 * (self.unmeasured_turn * unmeasured_s) ** 2
+            + 0.5 * more_turn**2
         )
         translation = math.sqrt(
             self.translation_per_metre**2 * distance
             + self.translation_per_rotation**2 * turn
             + self.translation_floor**2
-            + (self.unmeasured_speed * unmeasured_s) ** 2
+            + more_way**2
         )
         return rotation, translation, rotation

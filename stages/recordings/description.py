@@ -138,11 +138,12 @@ class Tangent:
 class Description:
     """A folder of images, described. `which` fills `{which}` in file names; by default it stands for anything.
 
-    `camera`: what a camera.yaml holds (the image's size may be left out); null: the folder's camera.yaml.
+    `positions` null: the images are all there is. `camera`: what a camera.yaml holds (the image's size may be left
+    out); null: the folder's camera.yaml.
     """
 
     frames: Frames
-    positions: Positions
+    positions: Positions | None = None
     folder: str | None = None
     which: str = "*"
     heading: Heading | None = None

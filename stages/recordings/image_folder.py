@@ -20,6 +20,7 @@ from omninav.stages.values.image import Pixels
 from .camera_yaml import camera_from, read_camera
 from .description import MAX_PATTERN, Description, find_layout, known_layouts, read_description
 from .messages import is_blank
+from .named_camera import assumed_camera, named_camera
 from .positions import frame_poses
 from .recording import Format, OpenOptions, UnreadableRecording
 from .stamps import ascending, lone
@@ -32,7 +33,7 @@ MAX_STARS = 8
 
 
 class ImageFolder:
-    """A described folder of images as a `Recording`. It has positions (as truth) and no odometry.
+    """A described folder of images as a `Recording`. It may have positions (as truth), and has no odometry.
 
     Counted in `dropped`: `missing_image`, `impossible_motion`, `no_position`, `no_time`, `duplicate_frame`,
     `backward_stamp`, `lone_stamp`, and when images are read `undecodable_image`, `blank_image`, `wrong_size`.
@@ -41,6 +42,7 @@ class ImageFolder:
 
     odometry: None = None
     unmeasured_s: None = None
+    assumed: tuple[str, ...] = ()
 
     def __init__(self, name: str, folder: Path, description: Description, where: str, options: OpenOptions) -> None:
         self.name = name
@@ -54,15 +56,16 @@ class ImageFolder:
         frames = self._table(description.frames.csv, description.frames.header, description.frames.delimiter)
         paths = self._paths(frames)
         times = self._times(frames, len(paths))
-        positions = description.positions
-        own = self._table(positions.csv, positions.header, positions.delimiter)
-        truth, unlikely = frame_poses(description, where, frames, own, times, options.limits)
-        for what in unlikely:
-            self._drop("impossible_motion", what)
+        truth, positions = None, description.positions
+        if positions is not None:
+            own = self._table(positions.csv, positions.header, positions.delimiter)
+            truth, unlikely = frame_poses(description, where, frames, own, times, options.limits)
+            for what in unlikely:
+                self._drop("impossible_motion", what)
         keep = self._usable(paths, times, truth)
         self._paths_kept = [paths[row] for row in keep]
         self.stamps: Stamps = np.array([times[row] for row in keep], dtype=np.int64)
-        self.truth: Array | None = truth[keep]
+        self.truth: Array | None = None if truth is None else truth[keep]
         self.camera = self._find_camera(options.camera)
 
     def image(self, frame: int) -> Pixels | None:
@@ -164,14 +167,14 @@ class ImageFolder:
             raise UnreadableRecording(f"{self._where}: frames need a time column or a period (frames.period: seconds)")
         return [round(number * frames.period * 1e9) for number in range(count)]
 
-    def _usable(self, paths: list[Path], times: list[int | None], truth: Array) -> npt.NDArray[np.int64]:
+    def _usable(self, paths: list[Path], times: list[int | None], truth: Array | None) -> npt.NDArray[np.int64]:
         rows = []
         for row, path in enumerate(paths):
             if times[row] is None:
                 self._drop("no_time", f"{self._rows[row]}: no time")
             elif not _is_file(path):
                 self._drop("missing_image", f"{self._rows[row]}: no file {path}")
-            elif not np.isfinite(truth[row]).all():
+            elif truth is not None and not np.isfinite(truth[row]).all():
                 self._drop("no_position", f"{self._rows[row]} ({path.name}): no position")
             else:
                 rows.append(row)
@@ -190,21 +193,26 @@ class ImageFolder:
             raise UnreadableRecording(f"{self._folder}: no frame can be used ({lost}; first: {first})")
         return np.array([rows[number] for number in kept], dtype=np.int64)
 
-    def _find_camera(self, named: Path | None) -> Camera:
+    def _find_camera(self, named: str | None) -> Camera:
+        if named is not None:
+            camera, files = named_camera(named, lambda: self._first_picture().shape[1::-1])
+            self._sources += files
+            return camera
         beside = self._folder / "camera.yaml"
-        path = named or (beside if self._description.camera is None and beside.is_file() else None)
-        if path is not None:
-            self._sources.append(path)
-            return read_camera(path)
+        if self._description.camera is None and beside.is_file():
+            self._sources.append(beside)
+            return read_camera(beside)
+        first = self._first_picture()
         if self._description.camera is None:
-            raise UnreadableRecording(f"{self._where}: camera is missing, and {beside} does not exist")
-        return camera_from(self._description.camera, f"{self._where}: camera", self._picture_size())
+            camera, sentence = assumed_camera(self.name, first)
+            self.assumed += (sentence,)
+            return camera
+        return camera_from(self._description.camera, f"{self._where}: camera", first.shape[1::-1])
 
-    def _picture_size(self) -> tuple[int, int]:
+    def _first_picture(self) -> Pixels:
         for path in self._paths_kept:
             with suppress(Undecodable, BadInput):
-                height, width = decode_image(read_small(path, MAX_FILE_BYTES)).shape[:2]
-                return width, height
+                return decode_image(read_small(path, MAX_FILE_BYTES))
         raise UnreadableRecording(f"{self._folder}: not one of its {len(self._paths_kept)} images can be decoded")
 
 

@@ -16,15 +16,16 @@ def open_recording(
     camera: str | None = None,
     layout_folders: Sequence[str] = (),
     limits: MotionLimits | None = None,
+    rate: float | None = None,
 ) -> Recording:
     """Open what `log` names: a file, a folder, or a layout and a folder (see each format's `open`).
 
-    `camera`: a camera.yaml that replaces the recording's own; `layout_folders`: where else descriptions of folders of
-    images lie; `limits`: what the robot can do. Raises `UnreadableRecording` (or another `BadInput`) with one line:
-    file, what is wrong, what to type.
+    `camera`: a camera.yaml that replaces the recording's own, or a projection (equirectangular, …) of which the size of
+    an image says enough; `layout_folders`: where else descriptions of folders of images lie; `limits`: what the robot
+    can do; `rate`: images per second of a folder of images that says no times. Raises
+    `UnreadableRecording` (or another `BadInput`) with one line: file, what is wrong, what to type.
     """
-    named = None if camera is None else user_path(camera)
-    options = OpenOptions(topics or Topics(), named, tuple(layout_folders), limits or MotionLimits())
+    options = OpenOptions(topics or Topics(), camera, tuple(layout_folders), limits or MotionLimits(), rate)
     formats, path = log_formats(), user_path(log)
     meant = next((one for one in formats if one.opens(log)), None)
     if meant is not None and (path.exists() or path.suffix not in meant.suffixes):

@@ -31,6 +31,7 @@ def frame_poses(
     `UnreadableRecording`, naming `where` the description stands.
     """
     positions = description.positions
+    assert positions is not None
     table = own or frames
     if table is None:
         raise UnreadableRecording(f"{where}: positions.csv is missing: the table with positions")

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
@@ -32,7 +33,7 @@ class Recording(Protocol):
     `odometry`: (N, 3) odometry pose at each stamp in the odometry's own frame, or None. `truth`: (N, 3) true pose in
     the map frame, rows of NaN where it is not known, or None. `dropped`: how many records were left out, by kind, and
     `details`: the first case of each kind in words. `unmeasured_s`: (N,) seconds of the way to each frame about which
-    no odometry is believed, or None where there are none.
+    no odometry is believed, or None where there are none. `assumed`: what nothing in it says and was taken for granted.
     """
 
     @property
@@ -51,6 +52,8 @@ class Recording(Protocol):
     def dropped(self) -> Counter[str]: ...
     @property
     def details(self) -> dict[str, str]: ...
+    @property
+    def assumed(self) -> Sequence[str]: ...
 
     def image(self, frame: int) -> Pixels | None:
         """The image of a frame, (height, width, 3) uint8 blue-green-red; None where it cannot be decoded or is blank.
@@ -81,12 +84,14 @@ class OpenOptions:
     """What a user says besides the recording's name."""
 
     topics: Topics = Topics()
-    camera: Path | None = None
-    """A camera.yaml in place of the recording's own."""
+    camera: str | None = None
+    """A camera.yaml in place of the recording's own, or a projection that the size of an image describes."""
     layout_folders: tuple[str, ...] = ()
     """Folders with further descriptions of folders of images."""
     limits: MotionLimits = field(default_factory=MotionLimits)
     """What the robot can do."""
+    rate: float | None = None
+    """Images per second of a folder of images that says no times."""
 
 
 FORMATS: list[type["Format"]] = []

@@ -44,6 +44,8 @@ class Feed(Protocol):
 class TopicRecording:
     """Frames from an image topic with poses from pose topics; a `Recording`. Images are read when asked for."""
 
+    assumed: Sequence[str] = ()
+
     def __init__(
         self,
         name: str,

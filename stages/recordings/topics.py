@@ -1,6 +1,7 @@
 """A recording out of ROS topics, whatever file they came from: frames, odometry and truth at the frames' stamps."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from_info, parse_camera, read_camera
 from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, ImpossiblePose, pixels_of, pose_of
+from .named_camera import named_camera
 from .plausibility import MotionLimits, seconds_within
 from .pose_topic import NOWHERE, PoseTopic, Track
 from .recording import OpenOptions, Topics, UnreadableRecording
@@ -73,7 +75,13 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     def read_image(frame: int) -> Pixels:
         return pixels_of(feed.decode(image_topic, feed.fetch(frames[frame].location)))
 
-    view, camera_files = find_camera(name, feed, options.camera, files, infos)
+    def size() -> tuple[int, int]:
+        for frame in range(len(frames)):
+            with suppress(Undecodable, BadMessage):
+                return (pixels := read_image(frame)).shape[1], pixels.shape[0]
+        raise UnreadableRecording(f"{name}: not one of its {len(frames)} images can be decoded")
+
+    view, camera_files = find_camera(name, feed, options.camera, size, files, infos)
     recording = TopicRecording(
         name=name,
         camera=view,
@@ -91,15 +99,21 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
 
 
 def find_camera(
-    name: str, feed: Feed, named: Path | None, files: Sequence[Path], infos: Sequence[Any]
+    name: str,
+    feed: Feed,
+    named: str | None,
+    size: Callable[[], tuple[int, int]],
+    files: Sequence[Path],
+    infos: Sequence[Any],
 ) -> tuple[Camera, list[Path]]:
     """The camera, and the files beside the recording that describe it."""
     beside = next((f for path in files for f in (path.parent / "camera.yaml",) if f.is_file()), None)
-    if named is None and "camera.yaml" in feed.attachments:
+    if named is not None:
+        return named_camera(named, size)
+    if "camera.yaml" in feed.attachments:
         return parse_camera(feed.attachments["camera.yaml"], f"{name}: attachment camera.yaml"), []
-    path = named or beside
-    if path is not None:
-        return read_camera(path), [path]
+    if beside is not None:
+        return read_camera(beside), [beside]
     if infos:
         return camera_from_info(infos[0], f"{name}: camera_info"), []
     raise UnreadableRecording(

@@ -9,6 +9,7 @@ from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.recording import UnreadableRecording
 
 Array = npt.NDArray[np.float64]
+Frames = npt.NDArray[np.int64]
 Cut = tuple[int, int]
 
 
@@ -30,6 +31,17 @@ def remaining_frames(cuts: Sequence[Cut], frames: int) -> npt.NDArray[np.int64]:
     for after, to in cuts:
         kept[after:to] = False
     return np.flatnonzero(kept)
+
+
+def thinned(frames: Frames, stamps: Frames, rate_hz: float | None) -> Frames:
+    """Of some frames the first in each period of 1 / `rate_hz` seconds, by the `stamps` (ns) of all; None: all.
+
+    A tenth of a period early is on time, since clocks jitter.
+    """
+    if rate_hz is None:
+        return frames
+    periods = np.floor((stamps[frames] - stamps[frames[:1]]) * (rate_hz / 1e9) + 0.1)
+    return frames[np.unique(periods, return_index=True)[1]]
 
 
 def crossed(cuts: Sequence[Cut], frames: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:

@@ -4,7 +4,7 @@ import hashlib
 import math
 from collections import Counter
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +22,8 @@ from omninav.stages.values.image import Image
 from omninav.stages.values.pose import BridgedMotion, Motion, Pose
 from omninav.stages.values.scan import Scan
 
-from .cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames
+from .cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames, thinned
+from .guessed_motion import VisualCompass, guessed_motion, settled_speed
 
 Array = npt.NDArray[np.float64]
 DRIVE = "drive.mcap"
@@ -31,7 +32,8 @@ DRIVE = "drive.mcap"
 
 class LogSourceState(State):
     """Where in the logs the source is: log, next frame and last used frame (-1: none) as positions in the selection,
-    ticks made, and the synthetic odometry so far (x, y in metres, heading in radians)."""
+    ticks made, the synthetic or guessed odometry so far (x, y in metres, heading in radians), and what the compass
+    keeps of the last image."""
 
     log: int = 0
     next: int = 0
@@ -40,6 +42,7 @@ class LogSourceState(State):
     x: float = 0.0
     y: float = 0.0
     heading: float = 0.0
+    view: npt.NDArray[np.float32] | None = None
 
 
 class LogSource(Source):
@@ -51,6 +54,10 @@ class LogSource(Source):
     A recording without odometry but with positions gets a synthetic one (`odometry: synthetic` in the manifest): the
     true increment with the noise of `add_odometry_noise`, drawn frame by frame from the run's seed. Raises
     `UnreadableRecording` for a log that cannot be read.
+
+    A log without odometry and positions (a video, images alone) is driven by a guess: `speed_m_s` straight ahead, and
+    the turns that a visual compass finds (`odometry: guessed`). A graph that reads its motion tick by tick is refused
+    (`UnreadableRecording`) until somebody states that speed.
     """
 
     log: str | tuple[str, ...] | None = None
@@ -81,6 +88,11 @@ class LogSource(Source):
     cuts: tuple[Cut, ...] = ()
     """A kidnapping made of a log that has none: [[60, 300]] goes on with frame 300 of each log once the first 60 are
     through, and odometry has not noticed."""
+    rate_hz: Annotated[float, Bounds(gt=0, le=1e6)] | None = None
+    """Images per second that are used at most; of a folder of images without times, how many were taken. Null: all."""
+    speed_m_s: Annotated[float, Bounds(ge=0, le=100)] | None = None
+    """The guessed speed of a log without odometry; it may be off by as much, or by 0.5 m/s where that is more. 0: only
+    the compass's turns are known. Null: noisy positions where the log has some, else a nominal one, for drawing."""
     new_log_after_s: Annotated[float, Bounds(gt=0)] = 3600.0
     """A longer pause begins another log: several days may lie in one file."""
     synthetic_distance_noise: Annotated[float, Bounds(ge=0.10)] = 0.10
@@ -105,8 +117,16 @@ class LogSource(Source):
         for recording, lost in zip(self._opened, self._lost, strict=True):
             for kind, number in sorted(lost.items()):
                 ctx.count(kind, number, recording.details.get(kind, ""))
-        kinds = [_odometry_kind(recording) for recording in self._opened]
+        kinds = [self._odometry_kind(recording) for recording in self._opened]
         ctx.fact("odometry", ", ".join(dict.fromkeys(kinds)))
+        assumed = [sentence for recording in self._opened for sentence in recording.assumed]
+        if assumed:
+            ctx.fact("assumed", "; ".join(assumed))
+        for recording, kind in zip(self._opened, kinds, strict=True):
+            if kind == "synthetic":
+                ctx.warn(f"{recording.name} has no odometry: it was made of its true positions, with noise")
+            elif kind == "guessed":
+                self._speed = settled_speed(ctx, recording.name, self.speed_m_s)
 
     def inputs_digest(self) -> str | None:
         """sha256 over the content of all logs, in their order."""
@@ -183,12 +203,14 @@ class LogSource(Source):
             if last is not None:
                 gap = 0.0 if recording.unmeasured_s is None else float(np.ptp(recording.unmeasured_s[[last, frame]]))
                 motion = _motion(between(measured[last], odometry), gap)
-        elif recording.truth is not None:
-            if last is not None:
-                increment = self._synthetic(ctx, between(measured[last], measured[frame]))
-                moved = compose((position.x, position.y, position.heading), increment)
+        else:
+            if self._odometry_kind(recording) == "guessed":
+                motion = self._guessed(position, recording, image, last, frame)
+            elif last is not None:
+                motion = _motion(self._synthetic(ctx, between(measured[last], measured[frame])))
+            if motion is not None:
+                moved = compose((position.x, position.y, position.heading), (motion.x, motion.y, motion.turn))
                 position.x, position.y, position.heading = (float(value) for value in moved)
-                motion = _motion(increment)
             odometry = np.array([position.x, position.y, position.heading])
         position.last, position.next, position.ticks = position.next, position.next + 1, position.ticks + 1
         return self.Out(
@@ -200,6 +222,20 @@ class LogSource(Source):
             truth=_pose(truth),
             scan=recording.scan(frame) if ctx.is_read("scan") else None,
         )
+
+    def _guessed(
+        self, position: LogSourceState, recording: Recording, image: Image, last: int | None, frame: int
+    ) -> Motion | None:
+        before, position.view = position.view, self._compass.view(image, recording.camera)
+        if last is None:
+            return None
+        seconds = float(recording.stamps[frame] - recording.stamps[last]) / 1e9
+        return guessed_motion(before, position.view, seconds, self._speed)
+
+    def _odometry_kind(self, recording: Recording) -> Literal["measured", "synthetic", "guessed"]:
+        if recording.odometry is not None:
+            return "measured"
+        return "synthetic" if self.speed_m_s is None and recording.truth is not None else "guessed"
 
     def _synthetic(self, ctx: Context, increment: Array) -> Array:
         return add_odometry_noise(
@@ -227,12 +263,15 @@ class LogSource(Source):
             raise UnreadableRecording("no recording is named; type log=PATH")
         else:
             recordings = [
-                open_recording(str(name), self.topics, self.camera, self.layout_folders, self.limits) for name in names
+                open_recording(str(name), self.topics, self.camera, self.layout_folders, self.limits, self.rate_hz)
+                for name in names
             ]
         self._recordings, self._frames, self._odometry = [], [], []
+        self._compass = VisualCompass()
         for recording in recordings:
             check_cuts(self.cuts, len(recording.stamps), recording.name)
             frames = remaining_frames(self.cuts, len(recording.stamps))[self.first : self.stop : self.stride]
+            frames = thinned(frames, recording.stamps, self.rate_hz)
             if not len(frames):
                 raise UnreadableRecording(
                     f"{recording.name}: first={self.first}, stop={self.stop} leaves none of its frames; "
@@ -269,12 +308,6 @@ def add_odometry_noise(
     cos, sin = math.cos(error / 2) * scale, math.sin(error / 2) * scale
     x, y = float(increment[0]), float(increment[1])
     return np.array([cos * x - sin * y, sin * x + cos * y, float(increment[2]) + error])
-
-
-def _odometry_kind(recording: Recording) -> str:
-    if recording.odometry is not None:
-        return "measured"
-    return "missing" if recording.truth is None else "synthetic"
 
 
 def _motion(increment: Array, unmeasured_s: float = 0.0) -> Motion:

@@ -40,6 +40,16 @@ class BridgedMotion(Motion):
     unmeasured_s: float
 
 
+class GuessedMotion(Motion):
+    """A motion that no odometry measured: far less certain than a measured one.
+
+    `sigma_m`: standard deviation of its length. `sigma_turn`: of its turn (rad).
+    """
+
+    sigma_m: float
+    sigma_turn: float
+
+
 class UncertainMotion(Value):
     """A motion as rotation (rad), translation (m, negative: backwards) and rotation (rad), with their uncertainty.
 

@@ -275,3 +275,20 @@ def test_sussex_images_turn_with_the_tangent_of_the_track() -> None:
     moved_right = (np.argmax(match, axis=1) + 600) % 1200 - 600
     turn = np.angle(np.exp(1j * (recording.truth[3:, 2] - recording.truth[:-3, 2])))
     assert np.corrcoef(turn, moved_right)[0, 1] < -0.6  # counter-clockwise columns: a turn to the left moves them left
+
+
+def test_a_folder_of_images_alone_is_taken_in_the_order_of_its_numbers(tmp_path: Path) -> None:
+    for number in (10, 9, 1):
+        pixels = np.random.default_rng(number).integers(0, 256, (8, 16, 3), dtype=np.uint8)
+        cv2.imwrite(str(tmp_path / f"img{number}.png"), pixels)
+    (tmp_path / "thumbnail.JPG").write_bytes(b"")
+    (tmp_path / "notes.txt").write_text("of a walk")
+    recording = open_recording(str(tmp_path), rate=4.0)
+    assert recording.stamps.tolist() == [0, 250_000_000, 500_000_000]
+    first = np.random.default_rng(1).integers(0, 256, (8, 16, 3), dtype=np.uint8)
+    np.testing.assert_array_equal(recording.image(0), first)
+    assert recording.odometry is recording.truth is None
+    assert recording.camera.projection == "equirectangular"
+    slow = open_recording(str(tmp_path))
+    assert slow.stamps.tolist() == [0, 10**9, 2 * 10**9]
+    assert "1 image per second (rate=" in " ".join(slow.assumed)

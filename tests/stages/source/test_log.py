@@ -15,6 +15,7 @@ from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.source.log import LogSource, LogSourceState, add_odometry_noise
+from omninav.stages.values.pose import GuessedMotion
 
 
 def context(seed: int = 0) -> Context:
@@ -118,12 +119,14 @@ def test_without_odometry_it_is_made_up_from_the_truth_and_said(tmp_path: Path) 
     assert row(other[-1].odometry)[0] != row(outs[-1].odometry)[0]
 
 
-def test_without_odometry_and_truth_there_is_no_motion(tmp_path: Path) -> None:
+def test_without_odometry_and_truth_a_path_is_guessed_for_drawing(tmp_path: Path) -> None:
     ctx = context()
     outs = drive(LogSource(log=str(write_mcap(tmp_path / "log.mcap", without(ODOMETRY, TRUTH)))), ctx)
     assert len(outs) == FRAMES
-    assert all(out.motion is out.odometry is out.truth is None for out in outs)
-    assert ctx.facts["odometry"] == "missing"
+    assert all(isinstance(out.motion, GuessedMotion) for out in outs[1:])
+    assert all(out.truth is None for out in outs)
+    assert ctx.facts["odometry"] == "guessed"
+    assert "has no odometry" in ctx.warnings[0]
 
 
 @pytest.mark.parametrize("cuts", [1, 5, 50])

@@ -1,0 +1,186 @@
+"""Videos as logs: any container that OpenCV reads, frame by frame, at the times that the container states."""
+
+import hashlib
+import os
+import re
+from collections import Counter
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline.files import digest_file, user_path
+from omninav.stages.camera.model import Camera
+from omninav.stages.values.encoded_image import MAX_PIXELS
+from omninav.stages.values.image import Pixels
+
+from .camera_yaml import read_camera, write_camera
+from .messages import is_blank
+from .named_camera import assumed_camera, named_camera
+from .recording import Format, OpenOptions, UnreadableRecording
+from .stamps import ascending
+
+Stamps = npt.NDArray[np.int64]
+MAX_FRAMES = 2_000_000
+"""Of a video: nine hours at 60 a second."""
+TOLERANCE_NS = 1_000_000
+"""Between a frame's time as the container states it, and as the decoder does."""
+CONTAINERS = re.compile(
+    rb"....(?:ftyp|moov|mdat|wide|free|skip|pnot)|RIFF....AVI |\x1aE\xdf\xa3|\x47.{187}\x47"
+    rb"|\x00\x00\x01\xba|OggS|FLV\x01",
+    re.DOTALL,
+)
+"""How MP4 and MOV, AVI, Matroska and WebM, MPEG-TS and -PS, Ogg and FLV begin: FFmpeg would also follow playlists."""
+
+
+class VideoRecording:
+    """The frames of a video as a `Recording`; it has neither odometry nor positions. Stamps count from its beginning.
+
+    Images are decoded one after another; one before the last that was asked for is reached from the beginning, so that
+    the same number always gives the same image. Rotation metadata is obeyed. Counted in `dropped`: `missing_frame`
+    (fewer than the container states), `duplicate_frame`, `backward_stamp`, and when images are read
+    `undecodable_image`, `blank_image`. Raises `UnreadableRecording`.
+    """
+
+    odometry: None = None
+    unmeasured_s: None = None
+    truth: None = None
+
+    def __init__(self, name: str, path: Path, options: OpenOptions) -> None:
+        self.name, self._path = name, path
+        self.dropped: Counter[str] = Counter()
+        self.details: dict[str, str] = {}
+        self.assumed: tuple[str, ...] = ()
+        self._capture = _opened(path)
+        width, height = (int(self._capture.get(cv2.CAP_PROP_FRAME_WIDTH + axis)) for axis in (0, 1))
+        if not 0 < width * height <= MAX_PIXELS:
+            raise UnreadableRecording(f"{name}: {width} x {height} pixels, at most {MAX_PIXELS:,} are read")
+        stated = self._capture.get(cv2.CAP_PROP_FRAME_COUNT)
+        self.stamps = self._in_order(_presentation_times(path))
+        if stated > len(self.stamps) and stated < MAX_FRAMES and not self.dropped:
+            self._drop(
+                "missing_frame",
+                f"{int(stated)} frames are stated, {len(self.stamps)} found",
+                int(stated) - len(self.stamps),
+            )
+        if not len(self.stamps):
+            raise UnreadableRecording(f"{name}: no frame can be read; is the file whole? {_repair(path)}")
+        self._next = 0
+        self._ahead: int | None = None
+        self.camera = self._camera(options.camera)
+        self._shape = (self.camera.height_px, self.camera.width)
+
+    def image(self, frame: int) -> Pixels | None:
+        """The image of a frame; None (and counted) where it cannot be decoded or is blank."""
+        where = f"frame {frame} at {self.stamps[frame] / 1e9:.3f} s"
+        pixels = self._decoded(frame)
+        if pixels is None:
+            self._drop("undecodable_image", f"{where} cannot be decoded")
+        elif pixels.shape[:2] != self._shape:
+            height, width = pixels.shape[:2]
+            self._drop("wrong_size", f"{where} is {width} x {height}, the camera {self._shape[1]} x {self._shape[0]}")
+        elif is_blank(pixels):
+            self._drop("blank_image", f"{where} is blank")
+        else:
+            return pixels
+        return None
+
+    def scan(self, frame: int) -> None:
+        """A video holds no range readings."""
+
+    def digest(self) -> str:
+        """sha256 over the file and the camera."""
+        return hashlib.sha256((digest_file(self._path) + write_camera(self.camera)).encode()).hexdigest()
+
+    def _decoded(self, frame: int) -> Pixels | None:
+        """The frame at a stamp, by going on until the decoder is there; None where it passes over it."""
+        target = int(self.stamps[frame])
+        if frame < self._next:
+            self._capture, self._ahead = _opened(self._path), None
+        self._next = frame + 1
+        while self._ahead is None or self._ahead < target - TOLERANCE_NS:
+            if not self._capture.grab():
+                return None
+            self._ahead = _position(self._capture)
+        if self._ahead > target + TOLERANCE_NS:
+            return None
+        _, pixels = self._capture.retrieve()
+        return None if pixels is None else np.asarray(pixels, np.uint8)
+
+    def _in_order(self, times: list[int]) -> Stamps:
+        kept, repeated, _ = ascending(sorted(times))  # packets come in the order of decoding
+        for number in repeated:
+            self._drop("duplicate_frame", f"two frames at {sorted(times)[number] / 1e9:.3f} s")
+        return np.array(sorted(times), np.int64)[kept]
+
+    def _camera(self, named: str | None) -> Camera:
+        first = self._decoded(0)
+        if first is None:
+            raise UnreadableRecording(f"{self.name}: its first frame cannot be decoded; {_repair(self._path)}")
+        height, width = first.shape[:2]
+        if named is not None:
+            return named_camera(named, lambda: (width, height))[0]
+        beside = self._path.parent / "camera.yaml"
+        if beside.is_file():
+            return read_camera(beside)
+        camera, sentence = assumed_camera(self.name, first)
+        self.assumed = (sentence,)
+        return camera
+
+    def _drop(self, kind: str, detail: str, number: int = 1) -> None:
+        self.dropped[kind] += number
+        self.details.setdefault(kind, f"{self.name}: {detail}")
+
+
+class Video(Format):
+    """A video file."""
+
+    names = "a video (.mp4, .mov, .avi, .mkv, .webm)"
+    suffixes = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".insv", ".mts", ".ts", ".ogv")
+
+    def opens(self, log: str) -> bool:
+        """A file with one of the suffixes, in small letters or capitals."""
+        return Path(log).suffix.lower() in self.suffixes and not user_path(log).is_dir()
+
+    def open(self, log: str, options: OpenOptions) -> VideoRecording:
+        """With OpenCV's FFmpeg. Raises `UnreadableRecording`."""
+        return VideoRecording(log, user_path(log), options)
+
+
+def _opened(path: Path, packets: bool = False) -> cv2.VideoCapture:
+    """A video at its beginning; `packets`: as it is stored, nothing is decoded."""
+    if not path.is_file():
+        raise UnreadableRecording(f"{path}: this is a folder, a pipe or a device, expected a video")
+    try:
+        with path.open("rb") as file:
+            head = file.read(189)
+    except OSError as error:
+        raise UnreadableRecording(f"{path}: {error.strerror}; name a video that can be read") from None
+    if not CONTAINERS.match(head):
+        raise UnreadableRecording(f"{path}: this is no video, expected MP4, MOV, AVI, MKV, WebM, MPEG or Ogg")
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what it says of each broken packet is counted here
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    capture = cv2.VideoCapture(str(path.absolute()), cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1] if packets else [])
+    if not capture.isOpened():
+        raise UnreadableRecording(f"{path}: no video can be read from it; is the file whole? {_repair(path)}")
+    return capture
+
+
+def _presentation_times(path: Path) -> list[int]:
+    """Times (ns) at which the packets of a video are to be shown, in the order in which they are stored."""
+    capture = _opened(path, packets=True)
+    times: list[int] = []
+    while capture.grab():
+        times.append(_position(capture))
+        if len(times) > MAX_FRAMES:
+            raise UnreadableRecording(f"{path}: more than {MAX_FRAMES:,} frames; cut it into several videos")
+    return times
+
+
+def _position(capture: cv2.VideoCapture) -> int:
+    return round(capture.get(cv2.CAP_PROP_POS_MSEC) * 1e6)
+
+
+def _repair(path: Path) -> str:
+    return f"`ffmpeg -i {path.name} -c copy repaired.mp4` mends some"

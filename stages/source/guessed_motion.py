@@ -1,0 +1,106 @@
+"""Motion where nothing measured it: turns by a visual compass, and a guessed speed."""
+
+import math
+from collections.abc import Iterable
+
+import cv2
+import numpy as np
+
+from omninav.pipeline import BadInput, Context
+from omninav.stages.camera.model import Camera
+from omninav.stages.camera.rays import unit_vectors
+from omninav.stages.geometry.appearance.visual_compass import Strip, turn_between
+from omninav.stages.recordings.recording import UnreadableRecording
+from omninav.stages.unwarp.table import RemapTable, remap_table
+from omninav.stages.values.image import Image, column_azimuths
+from omninav.stages.values.pose import GuessedMotion
+
+COLUMNS, ROWS = 360, 24
+"""Of the panoramas that the compass compares."""
+BAND = math.radians(30.0)
+"""Elevation (rad) above and below the horizon that they reach: what stands around turns, floor and sky are alike."""
+BLUR_PX = 1.0
+"""Standard deviation of the blur of their columns: between images, leaves and noise change."""
+NOMINAL_SPEED = 0.5
+"""Metres per second of a path that is only drawn."""
+MIN_SPEED_SIGMA = 0.5
+"""Metres per second by which any guessed speed may be off."""
+COMPASS_SIGMA = math.radians(3.0)
+"""Standard deviation of a turn that the compass finds between two images (rad), near walls that pass by."""
+BLIND_SIGMA = 0.5
+"""Radians per second that a robot may turn where a camera sees too little of the circle for a compass."""
+
+
+class VisualCompass:
+    """Keeps of each image a small panorama, and tells turns from two of them."""
+
+    def __init__(self) -> None:
+        self._camera: Camera | None = None
+        self._table: RemapTable | None = None
+
+    def view(self, image: Image, camera: Camera) -> Strip | None:
+        """What is kept of an image: (rows, columns) grey levels about the horizon; None without the full circle."""
+        if camera is not self._camera:
+            self._camera, self._table = camera, _table(camera)
+        if self._table is None:
+            return None
+        grey = cv2.cvtColor(self._table.remap(image.pixels), cv2.COLOR_BGR2GRAY).astype(np.float32)
+        ends = int(4 * BLUR_PX)
+        around = np.concatenate([grey[:, -ends:], grey, grey[:, :ends]], axis=1)
+        return np.asarray(cv2.GaussianBlur(around, (0, 0), BLUR_PX)[:, ends:-ends], np.float32)
+
+
+def guessed_motion(before: Strip | None, after: Strip | None, seconds: float, speed: float) -> GuessedMotion:
+    """Straight on by a guessed speed (m/s) for some seconds, with half of the turn before and half of it after."""
+    turn, sigma_turn = 0.0, BLIND_SIGMA * seconds
+    if before is not None and after is not None:
+        turn, sigma_turn = turn_between(before, after), COMPASS_SIGMA
+    way = speed * seconds
+    sigma_m = max(speed, MIN_SPEED_SIGMA) * seconds
+    return GuessedMotion(way * math.cos(turn / 2), way * math.sin(turn / 2), turn, sigma_m, sigma_turn)
+
+
+def settled_speed(ctx: Context, name: str, speed: float | None) -> float:
+    """The speed (m/s) by which a log without odometry and positions is driven, with a warning that says so.
+
+    Where none is given, a nominal one, for drawing. Raises `UnreadableRecording` where a node reads motion tick by
+    tick and none is given, or one makes a map of positions and the speed is 0, naming it and what to type.
+    """
+    maps = ctx.readers.get("odometry", ())
+    readers = tuple(dict.fromkeys((*ctx.readers.get("motion", ()), *maps)))
+    if speed is None and readers:
+        raise UnreadableRecording(
+            f"{name}: it has neither odometry nor positions, which {_listed(readers)} of this variant needs; type "
+            "speed=0.5 to guess it (m/s, turns are seen in the images), or take a variant that needs none, such as "
+            "topological_localisation"
+        )
+    if maps and not speed:
+        raise UnreadableRecording(
+            f"{name}: with speed=0 all its images were taken at one place, and {_listed(maps)} makes a map of "
+            "positions; type speed=0.5 (m/s)"
+        )
+    if speed is None:
+        ctx.warn(f"{name} has no odometry: its path is drawn as if driven at {NOMINAL_SPEED:g} m/s (speed=… sets it)")
+        return NOMINAL_SPEED
+    path = f", and {_listed(maps)} places its references along that path" if maps else ""
+    ctx.warn(f"{name} has no odometry: {speed:g} m/s are guessed, turns are seen in the images{path}")
+    return speed
+
+
+def _listed(nodes: Iterable[str]) -> str:
+    return " and ".join(f"'{node}'" for node in nodes)
+
+
+def _table(camera: Camera) -> RemapTable | None:
+    """The panorama about the horizon of a camera, or of the middle of what it sees; None without the full circle."""
+    try:
+        seen = camera.elevations
+    except BadInput:
+        return None
+    if seen is None:
+        return None
+    top, bottom = min(seen[0], BAND), max(seen[1], -BAND)
+    if top <= bottom:
+        top, bottom = seen
+    elevations = top + (bottom - top) * (np.arange(ROWS) + 0.5) / ROWS
+    return remap_table(camera, unit_vectors(column_azimuths(COLUMNS), elevations[:, None]))[0]

@@ -1,0 +1,92 @@
+"""Videos as logs: every frame at its own time, and what a video does not say."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.recording import UnreadableRecording
+
+LEVELS = tuple(range(20, 240, 20))
+
+
+def pictures(width: int = 128, height: int = 64) -> list[np.ndarray]:
+    """Frames that tell themselves apart: a checkered ground, brighter from one to the next."""
+    ground = np.random.default_rng(0).integers(-15, 16, (height // 8, width // 8, 1)).repeat(8, 0).repeat(8, 1)
+    return [np.clip(ground + level, 0, 255).astype(np.uint8).repeat(3, 2) for level in LEVELS]
+
+
+def video(path: Path, frames: list[np.ndarray], code: str = "mp4v", rate: float = 12.5) -> str:
+    height, width = frames[0].shape[:2]
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*code), rate, (width, height))
+    for frame in frames:
+        writer.write(frame)
+    writer.release()
+    return str(path)
+
+
+@pytest.mark.parametrize(("name", "code"), [("drive.mp4", "mp4v"), ("drive.AVI", "MJPG"), ("drive.mkv", "mp4v")])
+def test_frames_come_in_any_order_at_the_containers_times(tmp_path: Path, name: str, code: str) -> None:
+    recording = open_recording(video(tmp_path / name, pictures(), code))
+    assert recording.stamps.tolist() == [number * 80_000_000 for number in range(len(LEVELS))]
+    for frame in (0, 3, 4, 10, 2, 3):
+        image = recording.image(frame)
+        assert image is not None
+        assert abs(image.mean() - LEVELS[frame]) < 6
+    assert not recording.dropped
+    assert recording.odometry is recording.truth is None
+
+
+def test_an_image_twice_as_wide_as_high_is_a_whole_sphere_and_said_to_be_assumed(tmp_path: Path) -> None:
+    recording = open_recording(video(tmp_path / "drive.mp4", pictures()))
+    assert recording.camera.projection == "equirectangular"
+    assert recording.camera.elevations == pytest.approx((np.pi / 2, -np.pi / 2))
+    assert "equirectangular" in recording.assumed[0]
+
+
+def test_two_circles_side_by_side_are_no_panorama(tmp_path: Path) -> None:
+    rows, columns = np.mgrid[0:64, 0:128]
+    circles = np.hypot(columns % 64 - 31.5, rows - 31.5) < 32
+    frames = [frame * circles[..., None].astype(np.uint8) for frame in pictures()[4:]]
+    with pytest.raises(UnreadableRecording, match="type camera=dual_fisheye"):
+        open_recording(video(tmp_path / "drive.mp4", frames))
+
+
+def test_other_images_need_a_camera(tmp_path: Path) -> None:
+    path = video(tmp_path / "drive.mp4", pictures(80, 64))
+    with pytest.raises(
+        UnreadableRecording, match="nothing says how its images of 80 x 64 are to be read; type camera="
+    ):
+        open_recording(path)
+    camera = open_recording(path, camera="perspective").camera
+    assert (camera.projection, camera.width, camera.height_px) == ("perspective", 80, 64)
+    with pytest.raises(UnreadableRecording, match=r"camera=hyperbolic: needs its numbers; .*camera.yaml"):
+        open_recording(path, camera="hyperbolic")
+    with pytest.raises(UnreadableRecording, match="camera=perspektive: is no camera; did you mean 'perspective'"):
+        open_recording(path, camera="perspektive")
+
+
+def test_a_cut_video_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+    whole = Path(video(tmp_path / "whole.mkv", pictures(), "MJPG")).read_bytes()
+    (tmp_path / "cut.mkv").write_bytes(whole[: len(whole) // 2])
+    recording = open_recording(str(tmp_path / "cut.mkv"))
+    assert 2 < len(recording.stamps) < len(LEVELS)
+    images = [recording.image(frame) for frame in range(len(recording.stamps))]
+    assert sum(image is None for image in images) == recording.dropped["undecodable_image"]
+    assert recording.dropped["missing_frame"] == len(LEVELS) - len(recording.stamps)
+
+
+def test_what_is_no_video_is_refused_before_anything_is_decoded(tmp_path: Path) -> None:
+    (tmp_path / "list.mp4").write_text("#EXTM3U\n#EXTINF:1,\nfile:///etc/passwd\n")
+    (tmp_path / "cut.mp4").write_bytes(Path(video(tmp_path / "whole.mp4", pictures())).read_bytes()[:2000])
+    (tmp_path / "folder.mp4").mkdir()
+    for name, what in (("list.mp4", "this is no video"), ("cut.mp4", "is the file whole")):
+        with pytest.raises(UnreadableRecording, match=what):
+            open_recording(str(tmp_path / name))
+    with pytest.raises(BadInput, match="no recording is in this folder"):
+        open_recording(str(tmp_path / "folder.mp4"))
+    with pytest.raises(UnreadableRecording, match="no such file"):
+        open_recording(str(tmp_path / "missing.mp4"))
