@@ -21,6 +21,10 @@ class Whole(Number):
     """A Number of a narrower kind."""
 
 
+class Certainty(Value):
+    share: Annotated[float, Bounds(ge=0, le=1)]
+
+
 class Word(Value):
     text: str
 
@@ -103,6 +107,19 @@ class Scale(Stage):
 
     def step(self, ctx: Context, number: Number) -> Out:
         return self.Out(number=Number(number.value * self.factor * (-1 if self.mode == "negative" else 1)))
+
+
+class Doubt(Stage):
+    """Gives what no share can be, from a tick on."""
+
+    since: int = 0
+    """The tick."""
+
+    class Out(Outputs):
+        certainty: Certainty
+
+    def step(self, ctx: Context, number: Number) -> Out:
+        return self.Out(certainty=Certainty(float("nan") if ctx.tick.index >= self.since else 0.5))
 
 
 class Noise(Stage):

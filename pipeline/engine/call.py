@@ -7,8 +7,9 @@ from array import array
 from collections.abc import Callable
 from typing import Any
 
+from omninav.pipeline.graph.contents import wrong_output
 from omninav.pipeline.graph.graph import Node, Wire
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput, one_line
 from omninav.pipeline.graph.stage import Context, State
 
 from .channel import channel_key, held_key
@@ -16,16 +17,21 @@ from .channel import channel_key, held_key
 DISK = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)
 """What a full or read-only disk answers: no fault of the stage that writes."""
 
+CHECKED_TICKS = 10
+"""Of so many first calls of a stage every output is checked against what its type states: enough for a mistake in the
+stage itself, and without a price later."""
+
 
 class StageFailed(Exception):
-    """A stage raised: which node, at which tick, and what. The cause is chained."""
+    """A stage raised, or gave what its output is not: which node, at which tick, and what. A cause is chained."""
 
 
 class Call:
     """A node made ready to run: where its inputs lie and where its outputs go."""
 
-    def __init__(self, node: Node, wires: list[Wire], ctx: Context, static: set[str]) -> None:
+    def __init__(self, node: Node, wires: list[Wire], ctx: Context, static: set[str], validate: bool = False) -> None:
         self.node, self.ctx = node, ctx
+        self.to_check = math.inf if validate else CHECKED_TICKS
         self.step: Callable[..., Any] = node.stage.step
         self.state: State | None = node.signature.state[1]() if node.signature.state else None
         self.fixed: dict[str, Any] = {node.signature.state[0]: self.state} if node.signature.state else {}
@@ -70,10 +76,22 @@ class Call:
         self.times.append(time.perf_counter() - start)
         for name, origin in self.outputs:
             values[origin] = getattr(out, name) if out is not None else None
+        if self.to_check > 0 and out is not None:
+            self.to_check -= 1
+            self._check(out)
         return out is not None
 
+    def _check(self, out: Any) -> None:
+        """Raise `StageFailed` for the first output that is not what its type states."""
+        for name, port in self.node.signature.outputs.items():
+            wrong = wrong_output(getattr(out, name), port.type, port.optional)
+            if wrong is not None:
+                raise StageFailed(one_line(f"{self._place()}: its output '{name}' {wrong}"))
+
     def _message(self, error: Exception) -> str:
+        return f"{self._place()}: {type(error).__name__}: {error}"
+
+    def _place(self) -> str:
         tick = self.ctx.tick
-        where = f"stage '{self.node.name}' ({self.node.target})"
         when = f" at tick {tick.index} (log {tick.log}, frame {tick.frame})" if self.node.lifetime == "tick" else ""
-        return f"{where} failed{when}: {type(error).__name__}: {error}"
+        return f"stage '{self.node.name}' ({self.node.target}) failed{when}"

@@ -45,6 +45,8 @@ class EngineOptions:
     """Called after every tick, and by stages whose one step takes long."""
     on_doing: Callable[[str], None] = lambda words: None
     """Called with what such a stage does meanwhile, in words."""
+    validate: bool = False
+    """Whether every output of every tick is checked against what its type states, and not the first ones alone."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ class Engine:
         wires = [wire for wire in self.graph.inputs_of(node.name) if not wire.collect]
         given = [wire for wire in self.graph.wires if wire.from_node == node.name and not wire.collect]
         ctx.readers = {w.from_port: tuple(o.to_node for o in given if o.from_port == w.from_port) for w in given}
-        return Call(node, wires, ctx, self.static)
+        return Call(node, wires, ctx, self.static, self.options.validate)
 
     def run(self) -> dict[str, Any]:
         """Before, every tick, after. Returns the last value of each wanted output (None where it was never present)."""

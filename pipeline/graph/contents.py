@@ -1,6 +1,10 @@
-"""What the fields of a value hold (shape, range, what they count), stated at each field and checked when it is read."""
+"""What the fields of a value hold (shape, range, what they count), stated at each field.
+
+It is checked where a value is read from a file, and where a stage gives it (see `engine.call`).
+"""
 
 import dataclasses
+import functools
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,16 +19,19 @@ from .value import Value
 MAX_MAGNITUDE = 1e15
 """No number of a field with a `Shape` or `Bounds` is larger: sums of its squares stay finite in single precision."""
 
+MAX_SUM_ERROR = 1e-4
+"""By how much the sum of shares may differ from 1: many in single precision."""
+
 
 class Shape:
     """The sizes of an array, or the length of a sequence or value: `Annotated[Array, Shape("rows", 3)]`.
 
     A name is one size wherever it stands among the fields of a value; "rows+1" is one more. The numbers of an array
-    with a shape are finite.
+    with a shape are finite, unless it says `finite=False`.
     """
 
-    def __init__(self, *sizes: int | str) -> None:
-        self.sizes = sizes
+    def __init__(self, *sizes: int | str, finite: bool = True) -> None:
+        self.sizes, self.finite = sizes, finite
 
     def __str__(self) -> str:
         return f"({', '.join(map(str, self.sizes))}{',' if len(self.sizes) == 1 else ''})"
@@ -44,6 +51,10 @@ class Starts:
     size: str
 
 
+class Shares:
+    """Weights or probabilities: not negative, and their sum is 1; of none, nothing is asked."""
+
+
 class Covariances:
     """Matrices (…, n, n) that are symmetric, with variances above zero and no negative eigenvalue."""
 
@@ -53,10 +64,21 @@ def misfit(value: Value) -> str | None:
     return next(_wrong_fields(value), None)
 
 
+def wrong_output(thing: Any, kind: Any, optional: bool) -> str | None:
+    """What is wrong with what a stage gave at an output of this type; None where it is as stated."""
+    if thing is None:
+        return None if optional else f"is missing, expected {type_name(kind)}; write `{type_name(kind)} | None`"
+    if not _is(thing, kind):
+        return f"is {_shown(thing)}, expected {type_name(kind)}"
+    wrong = misfit(thing) if isinstance(thing, Value) else None
+    return None if wrong is None else f"is no sound {type(thing).__name__}: {wrong}"
+
+
 def _wrong_fields(value: Value) -> Iterator[str]:
     sizes: dict[str, int] = {}
     fields = []
-    for name, annotation in _annotations(type(value)).items():
+    cls: Any = type(value)
+    for name, annotation in _annotations(cls).items():
         kind, marks = _split(annotation)
         fields.append((name, kind, marks, getattr(value, name)))
     for name, kind, marks, thing in fields:
@@ -73,12 +95,13 @@ def _wrong_fields(value: Value) -> Iterator[str]:
             yield from _wrong_numbers(name, thing, marks, sizes)
 
 
-def _annotations(cls: type[Value]) -> dict[str, Any]:
+@functools.cache
+def _annotations(cls: type[Any]) -> dict[str, Any]:
     try:
         hints = typing.get_type_hints(cls, include_extras=True)
     except NameError:  # imported for type checkers only
         return {}
-    return {field.name: hints[field.name] for field in dataclasses.fields(cls)}  # type: ignore[arg-type]
+    return {field.name: hints[field.name] for field in dataclasses.fields(cls)}
 
 
 def _split(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
@@ -109,8 +132,8 @@ def _is(thing: Any, kind: Any) -> bool:
         return isinstance(thing, int | float | np.integer | np.floating) and not isinstance(thing, bool)
     if kind is int:
         return isinstance(thing, int | np.integer) and not isinstance(thing, bool)
-    if kind is None:
-        return thing is None
+    if kind is None or kind is Any:
+        return thing is None or kind is Any
     return isinstance(thing, kind) if isinstance(kind, type) else True
 
 
@@ -142,21 +165,27 @@ def _wrong_shape(name: str, thing: Any, shape: Shape, sizes: dict[str, int]) -> 
 
 def _wrong_numbers(name: str, thing: Any, marks: Sequence[Any], sizes: Mapping[str, int]) -> Iterator[str]:
     numbers = np.asarray(thing) if isinstance(thing, np.ndarray | int | float | np.number) else np.empty(0)
+    if numbers.dtype.kind not in "fO" and all(isinstance(mark, Shape) for mark in marks):
+        return  # pixels, descriptors: as they are
     low, high = (float(numbers.min()), float(numbers.max())) if numbers.size else (0.0, 0.0)
-    if numbers.dtype.kind in "fO" and not (low >= -MAX_MAGNITUDE and high <= MAX_MAGNITUDE):
-        yield f"'{name}' holds a number that is not finite, or beyond {MAX_MAGNITUDE:g}"
+    finite = all(mark.finite for mark in marks if isinstance(mark, Shape))
+    if finite and numbers.dtype.kind in "fO" and not (low >= -MAX_MAGNITUDE and high <= MAX_MAGNITUDE):
+        worst = high if low >= -MAX_MAGNITUDE else low
+        yield f"'{name}' holds {worst:g}, expected finite numbers up to {MAX_MAGNITUDE:g}"
         return
     for mark in marks:
         if isinstance(mark, Bounds) and numbers.size:
-            broken = mark.violated_by(low) or mark.violated_by(high)
-            if broken:
-                yield f"'{name}' holds a number that is not {broken}"
+            if mark.violated_by(low) or mark.violated_by(high):
+                yield f"'{name}' holds {low if mark.violated_by(low) else high:g}, expected {mark}"
         elif isinstance(mark, RowsOf) and numbers.size and not (low >= 0 and high < sizes[mark.size]):
             yield f"'{name}' names a row that does not exist, expected 0 to {sizes[mark.size] - 1}"
         elif isinstance(mark, Starts):
             ends = numbers.size and numbers[0] == 0 and numbers[-1] == sizes[mark.size]
             if not ends or (np.diff(numbers) < 0).any():
                 yield f"'{name}' does not ascend from 0 to {sizes[mark.size]}"
+        elif isinstance(mark, Shares) and numbers.size:
+            if low < 0 or abs(float(numbers.sum()) - 1.0) > MAX_SUM_ERROR:
+                yield f"'{name}' holds {low:g} and sums to {float(numbers.sum()):g}, expected shares of 1"
         elif isinstance(mark, Covariances) and numbers.size:
             yield from _wrong_covariances(name, numbers)
 

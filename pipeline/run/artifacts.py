@@ -37,6 +37,7 @@ class Execution:
     cache: Cache | None = None
     checkpoint_s: float = 5.0
     display: ProgressDisplay | None = None
+    validate: bool = False
 
     def options(self, name: str, memory: Path, identity: str, folder: Path | None = None) -> EngineOptions:
         """The engine's options for the graph that is shown as `name`."""
@@ -45,7 +46,7 @@ class Execution:
             if self.display is not None:
                 self.display.update(name, done, total)
 
-        return EngineOptions(self.seed, folder, memory, identity, self.checkpoint_s, on_tick)
+        return EngineOptions(self.seed, folder, memory, identity, self.checkpoint_s, on_tick, validate=self.validate)
 
 
 def identity(graph: Graph, seed: int, *more: str) -> str:

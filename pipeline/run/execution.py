@@ -55,7 +55,9 @@ def execute(run: Run, planned: Plan, display: ProgressDisplay | None = None) -> 
 def _execute(run: Run, planned: Plan, display: ProgressDisplay | None) -> Metrics:
     config = planned.config
     cache = Cache(Path(str(config["cache"]))) if config.get("cache") else None
-    execution = Execution(run, planned.seed, cache, float(config.get("checkpoint_s", 5.0)), display)
+    execution = Execution(
+        run, planned.seed, cache, float(config.get("checkpoint_s", 5.0)), display, bool(config.get("validate", False))
+    )
     artifacts: dict[str, Value] = {}
     made: dict[str, Any] = {}
     for artifact in planned.artifacts:

@@ -1,11 +1,13 @@
 """Beliefs about the robot's pose. Every belief answers `estimate()`."""
 
 from abc import abstractmethod
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Covariances, Shape, Shares
 from omninav.stages.geometry.probability.particles import heaviest_mode, weighted_mean
 
 from .pose import Pose
@@ -22,8 +24,8 @@ class PoseEstimate(Value):
     """
 
     pose: Pose
-    covariance: Array
-    mode_weight: float
+    covariance: Annotated[Array, Shape(3, 3)]
+    mode_weight: Annotated[float, Bounds(ge=0, le=1 + 1e-6)]
     mean: Pose
     place: int | None = None
 
@@ -43,9 +45,9 @@ class Particles(Belief):
     weights, until enough evidence for them has accumulated.
     """
 
-    poses: Array
-    weights: Array
-    recovery_particles: int = 0
+    poses: Annotated[Array, Shape("N", 3)]
+    weights: Annotated[Array, Shape("N"), Shares()]
+    recovery_particles: Annotated[int, Bounds(ge=0)] = 0
 
     def estimate(self) -> PoseEstimate:
         mode, covariance, share = heaviest_mode(self.poses, self.weights)
@@ -58,9 +60,9 @@ class GaussianMixture(Belief):
     in m, m, rad. `weights`: (K,), not negative; a belief's sum to 1, a hypothesis's need not. K may be 0.
     """
 
-    means: Array
-    covariances: Array
-    weights: Array
+    means: Annotated[Array, Shape("K", 3)]
+    covariances: Annotated[Array, Shape("K", 3, 3), Covariances()]
+    weights: Annotated[Array, Shape("K"), Bounds(ge=0)]
 
     def __len__(self) -> int:
         return len(self.weights)
@@ -90,8 +92,8 @@ class PlaceBelief(Belief):
     includes the turn between the two views. Places have no size in metres: the covariance is zero.
     """
 
-    probabilities: Array
-    poses: Array
+    probabilities: Annotated[Array, Shape("P"), Shares()]
+    poses: Annotated[Array, Shape("P", 3)]
 
     def estimate(self) -> PoseEstimate:
         place = int(np.argmax(self.probabilities))
@@ -109,6 +111,6 @@ class Likelihood(Value):
     robot has hardly moved since the previous image.
     """
 
-    values: Array
-    mean_likelihood: float | None = None
-    novelty: float = 1.0
+    values: Annotated[Array, Shape("N"), Bounds(ge=0)]
+    mean_likelihood: Annotated[float | None, Bounds(ge=0)] = None
+    novelty: Annotated[float, Bounds(ge=0, le=1)] = 1.0

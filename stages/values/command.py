@@ -1,10 +1,12 @@
 """Commands to the wheels."""
 
-from omninav.pipeline import Value
+from typing import Annotated
+
+from omninav.pipeline import Bounds, Value
 
 
 class Command(Value):
     """A command to a differential drive: `speed` forward (m/s) and `turning` (rad/s, counter-clockwise)."""
 
-    speed: float
-    turning: float
+    speed: Annotated[float, Bounds(ge=-1e3, le=1e3)]
+    turning: Annotated[float, Bounds(ge=-1e3, le=1e3)]

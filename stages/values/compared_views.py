@@ -1,9 +1,12 @@
 """The views of a tour, each two compared: what places are made of."""
 
+from typing import Annotated
+
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, ViewFeatures
 
 from .local_features import GlobalDescriptor, LocalFeatures, VerticalSegments, view_features
@@ -26,17 +29,17 @@ class ComparedViews(Value):
     matches and the smallest mean angle (rad) by which they were compared.
     """
 
-    features: tuple[LocalFeatures, ...]
-    segments: tuple[VerticalSegments | None, ...]
-    descriptors: tuple[GlobalDescriptor, ...]
-    poses: Array
+    features: Annotated[tuple[LocalFeatures, ...], Shape("N")]
+    segments: Annotated[tuple[VerticalSegments | None, ...], Shape("N")]
+    descriptors: Annotated[tuple[GlobalDescriptor, ...], Shape("N")]
+    poses: Annotated[Array, Shape("N", 3)]
     pose_source: PoseSource
-    frames: Ints
-    orders: Ints
-    tours: Ints
-    owners: Ints
-    distances: Array
-    shares: Array
+    frames: Annotated[Ints, Shape("N")]
+    orders: Annotated[Ints, Shape("N")]
+    tours: Annotated[Ints, Shape("N")]
+    owners: Annotated[Ints, Shape("N")]
+    distances: Annotated[Array, Shape("N", "N", finite=False), Bounds(ge=0)]
+    shares: Annotated[Array, Shape("N", "N"), Bounds(ge=0)]
     options: tuple[float, float, float, int, float]
 
     def __len__(self) -> int:

@@ -1,9 +1,12 @@
 """What in one view is what in another."""
 
+from typing import Annotated
+
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape
 
 Ints = npt.NDArray[np.int64]
 
@@ -16,9 +19,9 @@ class Correspondences(Value):
     the current one and the second the target.
     """
 
-    first: Ints
-    second: Ints
-    distance: npt.NDArray[np.float64]
+    first: Annotated[Ints, Shape("M"), Bounds(ge=0)]
+    second: Annotated[Ints, Shape("M"), Bounds(ge=0)]
+    distance: Annotated[npt.NDArray[np.float64], Shape("M"), Bounds(ge=0)]
 
     def __len__(self) -> int:
         return len(self.first)

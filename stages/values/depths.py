@@ -1,9 +1,12 @@
 """How far away the things are that features show."""
 
+from typing import Annotated
+
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
+from omninav.pipeline.graph.contents import Shape
 
 Array = npt.NDArray[np.float64]
 
@@ -13,5 +16,5 @@ class Depths(Value):
 
     is_truth = True
 
-    patches: Array
-    ends: Array
+    patches: Annotated[Array, Shape("N", finite=False)]
+    ends: Annotated[Array, Shape("M", 2, finite=False)]

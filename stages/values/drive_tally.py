@@ -1,11 +1,13 @@
 """What became of a robot that drives by itself."""
 
-from omninav.pipeline import Value
+from typing import Annotated
+
+from omninav.pipeline import Bounds, Value
 
 
 class DriveTally(Value):
     """How often a simulated robot came into contact with something so far, and how far it drove (m): truth."""
 
     is_truth = True
-    collisions: int
-    distance: float
+    collisions: Annotated[int, Bounds(ge=0)]
+    distance: Annotated[float, Bounds(ge=0)]

@@ -1,9 +1,12 @@
 """Descriptions of a view, segment by segment around the robot."""
 
+from typing import Annotated
+
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape
 
 FloatArray = npt.NDArray[np.float32]
 
@@ -14,7 +17,7 @@ class SegmentFeatures(Value):
     Segment j covers the columns from j/segments to (j+1)/segments of the panorama, clockwise from straight behind.
     """
 
-    values: FloatArray
+    values: Annotated[FloatArray, Shape("segments", "bins")]
 
 
 class SegmentHistograms(SegmentFeatures):
@@ -27,8 +30,8 @@ class SegmentHistograms(SegmentFeatures):
     length one after the other, of one image by the same kernels at growing size, each of which sums to at most 1.
     """
 
-    directions: npt.NDArray[np.float64] | None = None
-    scales: int = 1
+    directions: Annotated[npt.NDArray[np.float64] | None, Shape("segments")] = None
+    scales: Annotated[int, Bounds(ge=1)] = 1
 
 
 class SegmentColours(SegmentFeatures):

@@ -1,9 +1,12 @@
 """A world from above."""
 
+from typing import Annotated
+
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape
 
 
 class FloorPlan(Value):
@@ -13,6 +16,6 @@ class FloorPlan(Value):
     """
 
     is_truth = True
-    outlines: npt.NDArray[np.float64]
-    width: float
-    depth: float
+    outlines: Annotated[npt.NDArray[np.float64], Shape("B", 4, 2)]
+    width: Annotated[float, Bounds(gt=0)]
+    depth: Annotated[float, Bounds(gt=0)]

@@ -1,11 +1,12 @@
 """Occupancy grids and free space."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -25,8 +26,8 @@ class OccupancyGrid(Value):
     frame) of the lower left corner of cell (0, 0). `made_from`: what it is.
     """
 
-    cells: Cells
-    resolution: float
+    cells: Annotated[Cells, Shape("rows", "columns"), Bounds(ge=FREE, le=UNKNOWN)]
+    resolution: Annotated[float, Bounds(gt=0)]
     origin: tuple[float, float]
     made_from: GridSource = "map"
 
@@ -58,8 +59,8 @@ class FreeSpace(Value):
     """The positions where the robot may be. `centres`: (N, 2) x, y (m, map frame) of square cells; `cell`: their width
     (m)."""
 
-    centres: Array
-    cell: float
+    centres: Annotated[Array, Shape("N", 2)]
+    cell: Annotated[float, Bounds(gt=0)]
 
     def draw(self, rng: np.random.Generator, number: int) -> Array:
         """Draw poses uniformly over the cells and headings: (number, 3) m, m, rad."""

@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import field, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 
@@ -16,6 +17,7 @@ from .pose import Motion
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+Finite = Annotated[float, Bounds(ge=-1e15, le=1e15)]
 
 
 class ImagePath(Value):
@@ -52,13 +54,13 @@ class HomingVector(Value):
     """
 
     number: int
-    direction: float
-    turn: float
-    distance: float
-    ratio: float
-    nearness: float
-    metres: float | None
-    inliers: int
+    direction: Finite
+    turn: Finite
+    distance: Finite
+    ratio: Finite
+    nearness: Finite
+    metres: Annotated[float | None, Bounds(ge=0)]
+    inliers: Annotated[int, Bounds(ge=0)]
     state: Literal["new", "tracking", "lost"]
     why: str = ""
 
@@ -78,11 +80,11 @@ class TrackedFeatures(Value):
     """
 
     number: int
-    rows: Ints
-    kinds: Ints
-    points: Array
-    bearings: Array
-    places: Array
+    rows: Annotated[Ints, Shape("N"), Bounds(ge=0)]
+    kinds: Annotated[Ints, Shape("N")]
+    points: Annotated[Array, Shape("N", 2, finite=False)]
+    bearings: Annotated[Array, Shape("N", 3, finite=False)]
+    places: Annotated[Array, Shape("N", 3, finite=False)]
 
 
 class LocalMap(Value):
@@ -105,18 +107,18 @@ class LocalMap(Value):
     state: Literal["new", "tracking", "lost"]
     inliers: int = 0
     why: str = ""
-    rows: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    places: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    kinds: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    points: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    rotation: Array = field(default_factory=lambda: np.eye(3))
-    translation: Array = field(default_factory=lambda: np.zeros(3))
-    goal_rotation: Array = field(default_factory=lambda: np.eye(3))
-    goal_translation: Array = field(default_factory=lambda: np.zeros(3))
+    rows: Annotated[Ints, Shape("N"), Bounds(ge=0)] = field(default_factory=lambda: np.zeros(0, np.int64))
+    places: Annotated[Array, Shape("N", 3)] = field(default_factory=lambda: np.zeros((0, 3)))
+    kinds: Annotated[Ints, Shape("N")] = field(default_factory=lambda: np.zeros(0, np.int64))
+    points: Annotated[Array, Shape("N", 2, finite=False)] = field(default_factory=lambda: np.zeros((0, 2)))
+    rotation: Annotated[Array, Shape(3, 3)] = field(default_factory=lambda: np.eye(3))
+    translation: Annotated[Array, Shape(3)] = field(default_factory=lambda: np.zeros(3))
+    goal_rotation: Annotated[Array, Shape(3, 3)] = field(default_factory=lambda: np.eye(3))
+    goal_translation: Annotated[Array, Shape(3)] = field(default_factory=lambda: np.zeros(3))
     first_inliers: int = 0
     unit: float = 1.0
     metres: float = 0.0
-    odometry: Array = field(default_factory=lambda: np.zeros(3))
+    odometry: Annotated[Array, Shape(3)] = field(default_factory=lambda: np.zeros(3))
 
     def __len__(self) -> int:
         return len(self.rows)

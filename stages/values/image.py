@@ -1,20 +1,24 @@
 """Images: as the camera gave them, as panoramas in one common form, and as perspective windows."""
 
 import math
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape
 
 Pixels = npt.NDArray[np.uint8]
+Elevation = Bounds(ge=-math.pi / 2 - 1e-6, le=math.pi / 2 + 1e-6)
+"""Radians above the horizon."""
 
 
 class Image(Value):
     """An image as the camera gave it. `pixels`: (height, width, 3) uint8, blue-green-red as in OpenCV."""
 
     bulky = True
-    pixels: Pixels
+    pixels: Annotated[Pixels, Shape("height", "width", 3)]
 
 
 class Panorama(Value):
@@ -27,9 +31,9 @@ class Panorama(Value):
     """
 
     bulky = True
-    pixels: Pixels
-    elevation_top: float | None = None
-    elevation_bottom: float | None = None
+    pixels: Annotated[Pixels, Shape("rows", "columns", 3)]
+    elevation_top: Annotated[float | None, Elevation] = None
+    elevation_bottom: Annotated[float | None, Elevation] = None
 
 
 class Windows(Value):
@@ -42,10 +46,10 @@ class Windows(Value):
     """
 
     bulky = True
-    pixels: Pixels
-    headings: npt.NDArray[np.float64]
-    field: float
-    seen: npt.NDArray[np.bool_] | None = None
+    pixels: Annotated[Pixels, Shape("W", "rows", "columns", 3)]
+    headings: Annotated[npt.NDArray[np.float64], Shape("W")]
+    field: Annotated[float, Bounds(gt=0, le=2 * math.pi)]
+    seen: Annotated[npt.NDArray[np.bool_] | None, Shape("W", "rows", "columns")] = None
 
 
 def column_azimuths(columns: int) -> npt.NDArray[np.float64]:

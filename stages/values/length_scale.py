@@ -1,6 +1,8 @@
 """The appearance length scale."""
 
-from omninav.pipeline import Value
+from typing import Annotated
+
+from omninav.pipeline import Bounds, Value
 
 
 class LengthScale(Value):
@@ -10,4 +12,4 @@ class LengthScale(Value):
     this unit, so that one configuration serves all places.
     """
 
-    metres: float
+    metres: Annotated[float, Bounds(gt=0)]

@@ -4,10 +4,13 @@ They are three values: homing needs the local features alone, each can be replac
 wired is absent.
 """
 
+from typing import Annotated
+
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape
 from omninav.stages.geometry.appearance.visual_distance import Patches, Segments, ViewFeatures, patches
 
 Array = npt.NDArray[np.float64]
@@ -25,11 +28,11 @@ class LocalFeatures(Value):
     (pixels).
     """
 
-    bearings: Array
-    points: Array
-    descriptors: Bytes
-    colours: Floats
-    sizes: Floats
+    bearings: Annotated[Array, Shape("N", 3), Bounds(ge=-1.001, le=1.001)]
+    points: Annotated[Array, Shape("N", 2, finite=False)]
+    descriptors: Annotated[Bytes, Shape("N", "D")]
+    colours: Annotated[Floats, Shape("N", 3), Bounds(ge=-1.001, le=1.001)]
+    sizes: Annotated[Floats, Shape("N"), Bounds(ge=0)]
 
     def __len__(self) -> int:
         return len(self.bearings)
@@ -54,11 +57,11 @@ class VerticalSegments(Value):
     `points` (N, 2, 2): columns and rows of both ends (pixels) in the image they were found in.
     """
 
-    azimuths: Array
-    elevations: Array
-    descriptors: Floats
-    weights: Floats
-    points: Array
+    azimuths: Annotated[Array, Shape("N")]
+    elevations: Annotated[Array, Shape("N", 2)]
+    descriptors: Annotated[Floats, Shape("N", 10)]
+    weights: Annotated[Floats, Shape("N"), Bounds(ge=0)]
+    points: Annotated[Array, Shape("N", 2, 2, finite=False)]
 
     def __len__(self) -> int:
         return len(self.azimuths)
@@ -79,7 +82,7 @@ class VerticalSegments(Value):
 class GlobalDescriptor(Value):
     """The colours of a whole view. `values` (3,) float32: correlations as in `LocalFeatures`, over all of it."""
 
-    values: Floats
+    values: Annotated[Floats, Shape(3)]
 
 
 def view_features(features: LocalFeatures | None, segments: VerticalSegments | None) -> ViewFeatures:

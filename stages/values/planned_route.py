@@ -1,11 +1,12 @@
 """The way to a goal through the places of a map."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape
 
 
 class PlannedRoute(Value):
@@ -15,7 +16,7 @@ class PlannedRoute(Value):
     would ask. `number`: another way has another, from 0; -1 before the first.
     """
 
-    places: npt.NDArray[np.int64]
+    places: Annotated[npt.NDArray[np.int64], Shape("K"), Bounds(ge=0)]
     state: Literal["locating", "under way", "arrived", "gave up"]
-    number: int
+    number: Annotated[int, Bounds(ge=-1)]
     why: str = ""

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from omninav.pipeline import Bounds, Value
 
 Coordinate = Annotated[float, Bounds(ge=-1e8, le=1e8)]
-"""Metres: no map is larger than the Earth."""
+"""Metres, or radians: no map is larger than the Earth."""
 Spread = Annotated[float, Bounds(ge=0, le=1e8)]
 """A standard deviation, in metres or radians."""
 StartPose = tuple[Coordinate, Coordinate, Coordinate, Spread, Spread]
@@ -15,9 +15,9 @@ StartPose = tuple[Coordinate, Coordinate, Coordinate, Spread, Spread]
 class Pose(Value):
     """A pose (x, y in metres, heading in radians) in the map frame, or in the odometry's own where so said."""
 
-    x: float
-    y: float
-    heading: float
+    x: Coordinate
+    y: Coordinate
+    heading: Coordinate
 
 
 class Motion(Value):
@@ -26,9 +26,9 @@ class Motion(Value):
     `x` forward, `y` left (metres), `turn` (radians, counter-clockwise).
     """
 
-    x: float
-    y: float
-    turn: float
+    x: Coordinate
+    y: Coordinate
+    turn: Coordinate
 
 
 class BridgedMotion(Motion):
@@ -37,7 +37,7 @@ class BridgedMotion(Motion):
     `unmeasured_s`: how long the gap is, in seconds.
     """
 
-    unmeasured_s: float
+    unmeasured_s: Annotated[float, Bounds(ge=0)]
 
 
 class GuessedMotion(Motion):

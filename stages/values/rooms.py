@@ -1,9 +1,12 @@
 """What people call the parts of a place."""
 
+from typing import Annotated
+
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Value
+from omninav.pipeline.graph.contents import Shape
 
 
 class Rooms(Value):
@@ -13,8 +16,8 @@ class Rooms(Value):
     """
 
     is_truth = True
-    names: tuple[str, ...]
-    corners: npt.NDArray[np.float64]
+    names: Annotated[tuple[str, ...], Shape("R")]
+    corners: Annotated[npt.NDArray[np.float64], Shape("R", 4)]
 
     def at(self, x: float, y: float) -> str:
         """The room at a point, the smallest of several; "" where there is none."""

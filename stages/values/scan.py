@@ -1,9 +1,12 @@
 """Ranges to what stands around the robot."""
 
+from typing import Annotated
+
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape
 
 Array = npt.NDArray[np.float64]
 
@@ -15,11 +18,11 @@ class Scan(Value):
     `first + k step` (radians, counter-clockwise from the robot's forward). Echoes come from `nearest` to `farthest` m.
     """
 
-    ranges: Array
+    ranges: Annotated[Array, Shape("N", finite=False), Bounds(ge=0)]
     first: float
     step: float
-    nearest: float
-    farthest: float
+    nearest: Annotated[float, Bounds(ge=0)]
+    farthest: Annotated[float, Bounds(ge=0)]
 
     def azimuths(self) -> Array:
         """Where the readings look: (N,) radians."""

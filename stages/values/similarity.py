@@ -1,9 +1,12 @@
 """Similarities of the current view to the views of the map."""
 
+from typing import Annotated
+
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape
 
 
 class Similarities(Value):
@@ -20,9 +23,9 @@ class Similarities(Value):
     s_j = 1 - |difference| / `colour_scale`.
     """
 
-    values: npt.NDArray[np.float32]
-    candidates: npt.NDArray[np.int64] | None = None
-    sampling_weight: npt.NDArray[np.float64] | None = None
+    values: Annotated[npt.NDArray[np.float32], Shape("references", "headings"), Bounds(ge=0, le=1)]
+    candidates: Annotated[npt.NDArray[np.int64] | None, Shape("references"), Bounds(ge=0)] = None
+    sampling_weight: Annotated[npt.NDArray[np.float64] | None, Shape("references"), Bounds(gt=0)] = None
     exponent: float | None = None
     colour_scale: float | None = None
 
@@ -43,14 +46,14 @@ class SimilarityField(Value):
     weight over the map.
     """
 
-    values: npt.NDArray[np.float32]
-    candidates: npt.NDArray[np.int64] | None
-    floor: float
-    above: npt.NDArray[np.int64]
-    weights: npt.NDArray[np.float64]
-    floor_cells: npt.NDArray[np.float64]
-    floor_weight: float
-    mean: float
+    values: Annotated[npt.NDArray[np.float32], Shape("references", "headings"), Bounds(ge=0, le=1)]
+    candidates: Annotated[npt.NDArray[np.int64] | None, Shape("references"), Bounds(ge=0)]
+    floor: Annotated[float, Bounds(ge=0)]
+    above: Annotated[npt.NDArray[np.int64], Shape("A"), Bounds(ge=0)]
+    weights: Annotated[npt.NDArray[np.float64], Shape("A"), Bounds(ge=0)]
+    floor_cells: Annotated[npt.NDArray[np.float64], Shape("references"), Bounds(ge=0)]
+    floor_weight: Annotated[float, Bounds(ge=0)]
+    mean: Annotated[float, Bounds(ge=0)]
 
 
 class Answers(Value):
@@ -60,9 +63,9 @@ class Answers(Value):
     heading, and how far the robot is then turned from the reference's own (radians, counter-clockwise).
     """
 
-    references: npt.NDArray[np.int64]
-    similarities: npt.NDArray[np.float32]
-    turns: npt.NDArray[np.float64]
+    references: Annotated[npt.NDArray[np.int64], Shape("k"), Bounds(ge=0)]
+    similarities: Annotated[npt.NDArray[np.float32], Shape("k"), Bounds(ge=0, le=1)]
+    turns: Annotated[npt.NDArray[np.float64], Shape("k")]
 
 
 class BestMatch(Value):
@@ -73,7 +76,7 @@ class BestMatch(Value):
     equal; `distance` in the unit of the comparison, 0 is equal; each None where the comparison does not give it.
     """
 
-    reference: int
+    reference: Annotated[int, Bounds(ge=0)]
     turn: float
-    similarity: float | None = None
-    distance: float | None = None
+    similarity: Annotated[float | None, Bounds(ge=0, le=1)] = None
+    distance: Annotated[float | None, Bounds(ge=0)] = None

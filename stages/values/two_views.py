@@ -1,9 +1,12 @@
 """Two views of the same points, as bearings, and how the second was taken from the first."""
 
+from typing import Annotated
+
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape
 
 Array = npt.NDArray[np.float64]
 
@@ -11,8 +14,8 @@ Array = npt.NDArray[np.float64]
 class BearingPairs(Value):
     """What in one view is what in another. `first`, `second`: (N, 3) unit vectors in the robot's frame of each view."""
 
-    first: Array
-    second: Array
+    first: Annotated[Array, Shape("N", 3)]
+    second: Annotated[Array, Shape("N", 3)]
 
     def __len__(self) -> int:
         return len(self.first)
@@ -24,7 +27,7 @@ class RelativeView(Value):
     `inliers` (N,): which pairs agree with it. `samples`: how many were tried (0: known, not found).
     """
 
-    rotation: Array
-    translation: Array
-    inliers: npt.NDArray[np.bool_]
-    samples: int = 0
+    rotation: Annotated[Array, Shape(3, 3)]
+    translation: Annotated[Array, Shape(3)]
+    inliers: Annotated[npt.NDArray[np.bool_], Shape("N")]
+    samples: Annotated[int, Bounds(ge=0)] = 0

@@ -147,21 +147,21 @@ class ViewEvent(Value):
     component of each, and `parts` (n,), its number of components.
     """
 
-    views: int
-    components: int
-    inserted: Ints
-    seen: Ints
-    removed: Ints
+    views: Annotated[int, Bounds(ge=0)]
+    components: Annotated[int, Bounds(ge=0)]
+    inserted: Annotated[Ints, Shape("m")]
+    seen: Annotated[Ints, Shape("m")]
+    removed: Annotated[Ints, Shape("removed")]
     why: Literal["", "forgotten", "merged", "full"]
-    changed: Ints
-    weights: Array
-    places: Array
-    parts: Ints
+    changed: Annotated[Ints, Shape("n")]
+    weights: Annotated[Array, Shape("n"), Bounds(ge=0)]
+    places: Annotated[Array, Shape("n", 2)]
+    parts: Annotated[Ints, Shape("n")]
 
 
 class MixturesNow(Value):
     """Components of some views after a tick: `ids` (C,) of their views, `means` (C, 3) m and rad, `weights` (C,)."""
 
-    ids: npt.NDArray[np.int64]
-    means: npt.NDArray[np.float32]
-    weights: npt.NDArray[np.float32]
+    ids: Annotated[npt.NDArray[np.int64], Shape("C")]
+    means: Annotated[npt.NDArray[np.float32], Shape("C", 3)]
+    weights: Annotated[npt.NDArray[np.float32], Shape("C"), Bounds(ge=0)]

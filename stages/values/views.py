@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape
 from omninav.stages.geometry.appearance.rotated_distances import turned_distances, turns_of_nearest
 from omninav.stages.geometry.appearance.spectra import best_turns, spectral_distances
 
@@ -21,7 +22,7 @@ class WholeView(Value):
     stages need not know what the vector means.
     """
 
-    values: FloatArray
+    values: Annotated[FloatArray, Shape("D")]
 
     @abstractmethod
     def distances(self, kept: FloatArray) -> Array:
@@ -39,7 +40,7 @@ class Coefficients(WholeView):
     row compares views as they are, at one heading only, and all turns are 0.
     """
 
-    turned: FloatArray
+    turned: Annotated[FloatArray, Shape("H", "D")]
 
     def distances(self, kept: FloatArray) -> Array:
         return turned_distances(self.turned, kept)
@@ -56,8 +57,8 @@ class Spectrum(WholeView):
     the robot they were made from.
     """
 
-    channels: int
-    segments: int
+    channels: Annotated[int, Bounds(ge=1)]
+    segments: Annotated[int, Bounds(ge=1)]
 
     def distances(self, kept: FloatArray) -> Array:
         return spectral_distances(self.values, kept, self.channels, self.segments)
@@ -86,8 +87,8 @@ class Neighbours(Value):
     its heading in each of them, radians. `nearest`: the distance to the nearest view of the whole map, inf without one.
     """
 
-    rows: npt.NDArray[np.int64]
-    distances: Array
-    similarities: Array
-    turns: Array
+    rows: Annotated[npt.NDArray[np.int64], Shape("J"), Bounds(ge=0)]
+    distances: Annotated[Array, Shape("J"), Bounds(ge=0)]
+    similarities: Annotated[Array, Shape("J"), Bounds(ge=0, le=1)]
+    turns: Annotated[Array, Shape("J")]
     nearest: float

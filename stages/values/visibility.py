@@ -1,9 +1,12 @@
 """Visibility areas: from where the views of a map can be seen."""
 
+from typing import Annotated
+
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape, Starts
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
@@ -19,13 +22,13 @@ class VisibilityAreas(Value):
     `shape` rows, columns; `resolution` (m); `origin` x, y (m) of its lower left corner.
     """
 
-    axes: Array
-    target: Ints
-    points: Array
-    starts: Ints
-    runs: npt.NDArray[np.uint16]
+    axes: Annotated[Array, Shape("S")]
+    target: Annotated[Ints, Shape("R", "S"), Bounds(ge=-1)]
+    points: Annotated[Array, Shape("T", 2)]
+    starts: Annotated[Ints, Shape("T+1"), Starts("N")]
+    runs: Annotated[npt.NDArray[np.uint16], Shape("N", 3)]
     shape: tuple[int, int]
-    resolution: float
+    resolution: Annotated[float, Bounds(gt=0)]
     origin: tuple[float, float]
 
     @property

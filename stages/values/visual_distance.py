@@ -1,9 +1,12 @@
 """How far the present view is from the places of a map, by what is seen."""
 
+from typing import Annotated
+
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Value
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import Shape
 
 
 class VisualDistances(Value):
@@ -13,6 +16,6 @@ class VisualDistances(Value):
     clockwise, against the medoid's heading (rad); 0 where the distance is inf. `matches` (P,): features that matched.
     """
 
-    distances: npt.NDArray[np.float64]
-    turns: npt.NDArray[np.float64]
-    matches: npt.NDArray[np.int64]
+    distances: Annotated[npt.NDArray[np.float64], Shape("P", finite=False), Bounds(ge=0)]
+    turns: Annotated[npt.NDArray[np.float64], Shape("P")]
+    matches: Annotated[npt.NDArray[np.int64], Shape("P"), Bounds(ge=0)]

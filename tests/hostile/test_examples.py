@@ -41,7 +41,7 @@ def replaced(name: str, content: bytes) -> bytes:
     ("content", "said"),
     [
         (poses_like(np.zeros(6)), "'poses' has the shape (6,), expected (R, 3)"),
-        (poses_like(np.full((6, 3), np.nan)), "'poses' holds a number that is not finite"),
+        (poses_like(np.full((6, 3), np.nan)), "'poses' holds nan, expected finite numbers"),
         (poses_like(np.zeros((5, 3))), "'features' has the shape (6, 10, 20), expected (R, segments, bins), R = 5"),
         (without("header.json"), "no sound artifact"),
         (replaced("header.json", b"[1]"), "written in format None"),

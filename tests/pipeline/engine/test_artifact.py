@@ -98,7 +98,7 @@ def test_a_file_whose_sum_is_right_and_whose_content_is_not_is_refused(file: Pat
 
 def test_a_value_that_does_not_hold_what_its_fields_state_is_refused_by_name(tmp_path: Path):
     write_artifact(tmp_path / "points.omap", Points(np.array([[0.0, np.nan]])))
-    with pytest.raises(BadInput, match="it is no sound Points: 'points' holds a number that is not finite"):
+    with pytest.raises(BadInput, match="it is no sound Points: 'points' holds nan"):
         read_artifact(tmp_path / "points.omap")
 
 

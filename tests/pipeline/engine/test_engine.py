@@ -6,7 +6,7 @@ import pytest
 
 from omninav.pipeline import Context
 from omninav.pipeline.engine.cache import Cache
-from omninav.pipeline.engine.call import StageFailed
+from omninav.pipeline.engine.call import CHECKED_TICKS, StageFailed
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix, prefix_nodes
 from omninav.pipeline.graph.builder import build
@@ -281,3 +281,22 @@ def test_a_result_that_is_given_every_tick_is_there_though_no_tick_runs_again(tm
             keep_prefix(engine, prefix, cache)
         found.append(engine.last("latest.metrics").values)
     assert found == [{"latest": 9.0}, {"latest": 9.0}]
+
+
+@pytest.mark.parametrize(("since", "validate"), [(3, False), (CHECKED_TICKS + 3, True)])
+def test_an_output_that_is_not_what_its_type_states_ends_the_run(since: int, validate: bool):
+    nodes = {"source": {"_target_": "Count", "length_": 20}, "doubt": {"_target_": "Doubt", "since": since}}
+    graph = graph_of(nodes, {"doubt": {"number": "source.number"}})
+    said = (
+        rf"stage 'doubt' \(toys.Doubt\) failed at tick {since} \(log 0, frame {since}\): its output 'certainty' is"
+        r" no sound Certainty: 'share' holds nan, expected finite numbers"
+    )
+    with pytest.raises(StageFailed, match=said):
+        Engine(graph, {}, EngineOptions(validate=validate)).run()
+
+
+def test_later_outputs_are_checked_only_where_asked_for():
+    nodes = {"source": {"_target_": "Count", "length_": 20}, "doubt": {"_target_": "Doubt", "since": 15}}
+    engine = Engine(graph_of(nodes, {"doubt": {"number": "source.number"}}))
+    engine.run()
+    assert engine.ticks == 20

@@ -53,8 +53,8 @@ def test_a_value_that_holds_what_it_states_is_sound():
     [
         ({"points": np.zeros(6)}, "'points' has the shape (6,), expected (N, 2)"),
         ({"names": ("a", "b")}, "'names' has the shape (2,), expected (N,), N = 3"),
-        ({"points": np.full((3, 2), np.nan)}, "'points' holds a number that is not finite"),
-        ({"points": np.full((3, 2), 10 * MAX_MAGNITUDE)}, "beyond 1e+15"),
+        ({"points": np.full((3, 2), np.nan)}, "'points' holds nan, expected finite numbers"),
+        ({"points": np.full((3, 2), 10 * MAX_MAGNITUDE)}, "up to 1e+15"),
         ({"points": np.zeros((3, 2), np.float32)}, "'points' is an array of float32"),
         ({"points": np.zeros((3, 2), ">f8")}, "'points' is an array of >f8"),
         ({"pairs": np.array([[0, 3]])}, "'pairs' names a row that does not exist, expected 0 to 2"),
@@ -66,8 +66,8 @@ def test_a_value_that_holds_what_it_states_is_sound():
         ({"spread": np.array([[[1.0, 0.1], [0.0, 1.0]]])}, "'spread' holds a matrix that is no covariance"),
         ({"kind": "third"}, "'kind' is 'third', not 'one' | 'other'"),
         ({"names": [1, 2, 3]}, "'names' is list, not list of str"),
-        ({"part": Part(-1.0)}, "'part': 'length' holds a number that is not > 0"),
-        ({"part": Part(2**70)}, "'part': 'length' holds a number that is not finite, or beyond"),
+        ({"part": Part(-1.0)}, "'part': 'length' holds -1, expected > 0"),
+        ({"part": Part(2**70)}, "'part': 'length' holds 1.18059e+21, expected finite numbers up to"),
         ({"part": "x" * 1000}, "'part' is 'xxxx"),
     ],
 )
