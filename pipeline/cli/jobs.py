@@ -85,8 +85,12 @@ def run_job(config: Any, arguments: Sequence[str], run_experiment: Callable[[Any
 def _run(config: Any, sweep: SweepJob | None, folder: Path | None) -> None:
     from omninav.pipeline.report.progress import Progress
     from omninav.pipeline.report.terminal_tables import results_table
+    from omninav.pipeline.report.warning_lines import warning_lines
 
-    planned = plan(complete(config))
+    settings = complete(config)
+    if sweep is not None and settings.get("plots") == "auto":
+        settings["plots"] = "none"
+    planned = plan(settings)
     if sweep is None and folder is not None and (folder / "manifest.json").exists():
         raise BadInput(
             f"{folder}: there is a run in it; `omninav resume` goes on with it, hydra.run.dir=… names another"
@@ -97,7 +101,7 @@ def _run(config: Any, sweep: SweepJob | None, folder: Path | None) -> None:
         metrics = execute(run, planned, progress)
     if sweep is None:
         show(results_table(metrics))
-        for sentence in run.manifest["warnings"]:
+        for sentence in warning_lines(run.manifest):
             print(f"mind: {sentence}", file=sys.stderr, flush=True)
     print(f"report: {shown(run.folder / 'report.html')}", flush=True)
 

@@ -73,11 +73,25 @@ def _merge(into: dict[str, Any], more: Mapping[str, Any]) -> None:
             into[key] = dict(value) if isinstance(value, Mapping) else value
 
 
+class Slide(Value):
+    """One frame of a figure that is stepped through.
+
+    `label`: what it is of (`frame 12, 3.4 s`). `overlay`: SVG to be laid over the figure's drawing, in its units.
+    `photographs`: each its caption and its JPEG bytes. `facts`: names and what they are at this frame, as texts.
+    """
+
+    label: str
+    overlay: str = ""
+    photographs: tuple[tuple[str, bytes], ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()
+
+
 class Figure(Value):
     """A plot for the report. `content`: PNG, JPEG or SVG bytes; `caption`: what it shows and what to look for.
 
     `name` is its file name without suffix; plots are shown in the order of `order`, then of their names. A video is
-    one too (`media_type` video/mp4): `per_second`, its frames in a second, lets the reader step through it.
+    one too (`media_type` video/mp4): `per_second`, its frames in a second, lets the reader step through it. `slides`
+    are what changes from frame to frame over an SVG, which the reader steps through as well.
     """
 
     reported = True
@@ -88,6 +102,7 @@ class Figure(Value):
     media_type: str = "image/png"
     order: int = 50
     per_second: float | None = None
+    slides: tuple[Slide, ...] = ()
 
 
 class Table(Value):

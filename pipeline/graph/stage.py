@@ -172,6 +172,9 @@ class Stage:
     the engine keep the prefix of a graph (what follows from its logs alone) for the next run.
     """
 
+    on_request: ClassVar[bool] = False
+    """Of a stage that only draws: whether it is left out unless all plots are asked for (`plots=all`)."""
+
     if TYPE_CHECKING:
         step: ClassVar[Callable[..., Any]]
 

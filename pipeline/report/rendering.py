@@ -14,5 +14,5 @@ def render(template: str, **values: Any) -> str:
     environment = Environment(
         loader=loader, autoescape=template.endswith(".html"), trim_blocks=True, lstrip_blocks=True
     )
-    css = Markup(folder.joinpath("page.css").read_text(encoding="utf-8"))
-    return environment.get_template(template).render(css=css, **values)
+    css, script = (Markup(folder.joinpath(name).read_text(encoding="utf-8")) for name in ("page.css", "report.js"))
+    return environment.get_template(template).render(css=css, script=script, **values)

@@ -1,17 +1,22 @@
 """A run as one self-contained page."""
 
 import base64
+import json
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from omninav.pipeline.files import write_whole
-from omninav.pipeline.graph.results import Figure, Metrics, Table
+from omninav.pipeline.graph.results import Figure, Metrics, Slide, Table
 
-from .quantities import digits, head_of, headlines, numbers, per_log, words
+from .chart import BEGINNING
+from .drawn_graph import DrawnGraph
+from .parameter_table import parameter_rows
+from .quantities import digits, head_of, headlines, numbers, per_log, title, unit
 from .rendering import render
 from .results import results
+from .warning_lines import skipped, warning_lines
 
 LIFETIMES = {"before": "before the loop", "tick": "every tick", "after": "after the loop"}
 Rows = list[dict[str, Any]]
@@ -26,24 +31,16 @@ def write_report(
     figures: Sequence[Figure],
     tables: Sequence[Table],
     config_yaml: str,
+    graph: DrawnGraph | None = None,
 ) -> Path:
-    """Write `report.html` into a run's folder: results, skipped data, plots, graph, times, how to run it again.
+    """Write `report.html` into a run's folder: warnings, key figures and plots, then all else, folded.
 
-    Nothing on the page is fetched from anywhere. Figures and tables stand in their order.
+    Nothing on the page is fetched from anywhere. Figures and tables stand in their order. The parameters are those of
+    `graph`.
     """
     from markupsafe import Markup
 
-    inlined = [
-        {
-            "name": figure.name,
-            "title": figure.title,
-            "caption": figure.caption,
-            "media_type": figure.media_type,
-            "base64": base64.b64encode(figure.content).decode(),
-            "per_second": figure.per_second if figure.media_type.startswith("video/") else None,
-        }
-        for figure in sorted(figures, key=lambda figure: (figure.order, figure.name))
-    ]
+    shown_figures = [_figure(figure) for figure in sorted(figures, key=lambda figure: (figure.order, figure.name))]
     shown_tables = [
         {"title": t.title, "caption": t.caption, "columns": t.columns, "rows": [[_cell(c) for c in r] for r in t.rows]}
         for t in sorted(tables, key=lambda table: (table.order, table.name))
@@ -55,11 +52,13 @@ def write_report(
         tiles=_tiles(metrics, timing),
         results=results(metrics),
         logs=_log_table(metrics),
-        facts=[(words(str(k)), _cell(v)) for k, v in (manifest.get("facts") or {}).items()],
-        dropped=_dropped(manifest),
-        figures=inlined,
+        warnings=warning_lines(manifest),
+        facts=[_fact(str(name), value) for name, value in (manifest.get("facts") or {}).items()],
+        dropped=skipped(manifest),
+        figures=shown_figures,
         tables=shown_tables,
         graph_svg=Markup(graph_svg[graph_svg.find("<svg") :]),  # our own drawing, escaped where it was drawn
+        parameters=[] if graph is None else parameter_rows(graph),
         timing=_timing(timing),
         again=shlex.join(map(str, manifest.get("argv") or ["omninav"])),
         resume=f"omninav resume {shlex.quote(_seen_from(folder, manifest.get('cwd')))}",
@@ -71,6 +70,43 @@ def write_report(
     return path
 
 
+def _figure(figure: Figure) -> dict[str, Any]:
+    """A figure as the page shows it: a chart of ours stands in it as it is, everything else as a picture."""
+    from markupsafe import Markup
+
+    shown: dict[str, Any] = {"name": figure.name, "title": figure.title, "caption": figure.caption, "kind": "picture"}
+    if figure.content.startswith(BEGINNING.encode()):
+        drawn = figure.content.decode().replace(' xmlns="http://www.w3.org/2000/svg"', "", 1)
+        shown |= {"kind": "chart", "svg": Markup(drawn)}
+        if figure.slides:
+            shown |= {"kind": "slides", "slides": figure.slides, "data": Markup(_slides(figure.slides))}
+        return shown
+    video = figure.media_type.startswith("video/") and figure.per_second
+    shown |= {"media_type": figure.media_type, "base64": base64.b64encode(figure.content).decode()}
+    return shown | ({"kind": "video", "per_second": figure.per_second} if video else {})
+
+
+def _slides(slides: Sequence[Slide]) -> str:
+    """JSON for the page's script; a picture that several slides show is in it once."""
+    numbers: dict[bytes, int] = {}
+    rows = [
+        {
+            "label": slide.label,
+            "overlay": slide.overlay,
+            "photographs": [(words, numbers.setdefault(jpeg, len(numbers))) for words, jpeg in slide.photographs],
+            "facts": slide.facts,
+        }
+        for slide in slides
+    ]
+    photographs = [base64.b64encode(jpeg).decode() for jpeg in numbers]
+    return json.dumps({"slides": rows, "photographs": photographs}).replace("<", "\\u003c")
+
+
+def _fact(name: str, value: Any) -> tuple[str, str]:
+    of = unit(name)
+    return title(name), f"{_cell(value)} {of}" if of and isinstance(value, int | float) else _cell(value)
+
+
 def _tiles(metrics: Metrics, timing: Mapping[str, Any]) -> Rows:
     """What one looks for first."""
     known = numbers(metrics)
@@ -79,7 +115,9 @@ def _tiles(metrics: Metrics, timing: Mapping[str, Any]) -> Rows:
         for found in (known[path] for path in headlines([metrics]) if path in known)
     ]
     if timing.get("ticks_per_second"):
-        tiles.append({"name": "Frames per second", "value": digits(float(timing["ticks_per_second"])), "unit": ""})
+        cached = ", features from the cache" if timing.get("cached") else ""
+        rate = digits(float(timing["ticks_per_second"]))
+        tiles.append({"name": f"Frames per second{cached}", "value": rate, "unit": ""})
     return tiles
 
 
@@ -91,16 +129,6 @@ def _log_table(metrics: Metrics) -> dict[str, Any] | None:
     heads = ["log", *(head_of(path, logs) for path in paths)]
     rows = [[str(n), *(log[path].text if path in log else "–" for path in paths)] for n, log in enumerate(logs)]
     return {"columns": heads, "rows": rows}
-
-
-def _dropped(manifest: Mapping[str, Any]) -> Rows:
-    found = manifest.get("dropped") or {}
-    return [
-        {"kind": words(kind), "count": entry["count"], "first": entry.get("first", "")}
-        if isinstance(entry, Mapping)
-        else {"kind": words(kind), "count": entry, "first": ""}
-        for kind, entry in found.items()
-    ]
 
 
 def _timing(timing: Mapping[str, Any]) -> dict[str, Any]:
@@ -115,7 +143,10 @@ def _timing(timing: Mapping[str, Any]) -> dict[str, Any]:
     ]
     rate = timing.get("ticks_per_second")
     ticks = timing.get("ticks")
-    return {"rows": rows, "ticks": ticks, "ticks_per_second": rate, "per_second": digits(float(rate)) if rate else ""}
+    cached = timing.get("cached") or ()
+    counted = "without the first frame" + (f" and without {', '.join(cached)}, read from the cache" if cached else "")
+    per_second = digits(float(rate)) if rate else ""
+    return {"rows": rows, "ticks": ticks, "ticks_per_second": rate, "per_second": per_second, "counted": counted}
 
 
 def _provenance(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -114,7 +114,7 @@ def _finish(run: Run, engine: Engine, prefix_reason: str) -> Metrics:
         log.warning("%s: %s%s", kind, entry["count"], f" (first: {entry['first']})" if entry["first"] else "")
     graph_svg, config_yaml = (run.folder / "graph.svg").read_text(), (run.folder / CONFIG).read_text()
     done = {**run.manifest, "status": "complete"}
-    write_report(run.folder, done, metrics, timing, graph_svg, figures, tables, config_yaml)
+    write_report(run.folder, done, metrics, timing, graph_svg, figures, tables, config_yaml, engine.graph)
     run.manifest = done | {"files": _digests(run.folder)}
     run.save()
     for sequence in engine.sequences.values():

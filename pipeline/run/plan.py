@@ -11,11 +11,12 @@ from omninav.pipeline.engine.artifact import OWN_PACKAGE, read_header, type_of
 from omninav.pipeline.engine.code_version import graph_digest
 from omninav.pipeline.files import digest_file
 from omninav.pipeline.graph.builder import build
-from omninav.pipeline.graph.graph import Graph
+from omninav.pipeline.graph.graph import ARTIFACTS, Graph
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import UnknownStage, entries, resolve
 
 from .artifact_specification import ArtifactSpecification, read_specifications, without_absent
+from .plots import PLOTS, with_plots
 
 
 @dataclass(frozen=True)
@@ -88,6 +89,9 @@ def plan(config: Mapping[str, Any]) -> Plan:
     except ProblemsFound as found:
         problems += found.problems
     saves = config.get("saves") or {}
+    plots = config.get("plots", PLOTS[0])
+    if plots not in PLOTS:
+        problems.append(Problem("plots", f"{plots!r:.40}, expected {', '.join(PLOTS)}", f"type plots={PLOTS[0]}"))
     if graph is not None:
         for made in artifacts:
             if made.file is not None:
@@ -99,6 +103,9 @@ def plan(config: Mapping[str, Any]) -> Plan:
                 problems.append(_no_output(f"saves.{name}", str(origin), graph))
     if problems or graph is None:
         raise ProblemsFound(dict.fromkeys(problems))
+    graph = with_plots(graph, plots, [str(origin).partition(".")[0] for origin in saves.values()])
+    read = {origin for wire in graph.wires for origin in (wire.origin, wire.initial)}
+    artifacts = [made for made in artifacts if f"{ARTIFACTS}.{made.name}" in read or specs[made.name].required]
     return Plan(config, graph, tuple(artifacts), saves)
 
 

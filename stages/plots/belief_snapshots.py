@@ -7,13 +7,12 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Figure, Outputs, Stage
 from omninav.pipeline.report.plot_style import plot
-from omninav.stages.geometry.probability.gaussians import moments
-from omninav.stages.geometry.probability.particles import weighted_moments
 from omninav.stages.values.belief import GaussianMixture, Particles, PlaceBelief
 from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.map_places import AnyMap, map_poses
 
+from .belief_spread import spread_m
 from .drawing import (
     ESTIMATE,
     PARTICLE,
@@ -41,6 +40,8 @@ class BeliefSnapshots(Stage):
     Particles are dots; a mixture's Gaussians are ellipses of two standard deviations, as opaque as they weigh; places
     are discs, as large as they are probable. With `grid` wired, all of it over what is occupied there.
     """
+
+    on_request = True
 
     frames: Annotated[int, Bounds(ge=1, le=12)] = 6
     """Number of panels."""
@@ -99,7 +100,7 @@ def _draw(
             plan_axes(axes, extent)
             error = float(np.hypot(*(estimate - truth)[:2]))
             suffix = f", error {error:.2f} m" if np.isfinite(error) else ""
-            axes.set_title(f"frame {frame} · {seconds:.1f} s\nspread {_spread(belief):.2f} m{suffix}", fontsize=8.5)
+            axes.set_title(f"frame {frame} · {seconds:.1f} s\nspread {spread_m(belief):.2f} m{suffix}", fontsize=8.5)
             if number % columns:
                 axes.set_ylabel("")
             if number < len(panels) - columns:
@@ -130,15 +131,3 @@ def _draw_belief(axes: "Axes", belief: Shown) -> None:
         colours = faded(PARTICLE, np.clip(belief.weights, 0.15, 1))
         draw_gaussians(axes, belief.means, belief.covariances, colours)
         axes.scatter(x, y, s=6, c=colours, linewidths=0, zorder=3, label="Gaussians")
-
-
-def _spread(belief: Shown) -> float:
-    """Standard deviation (m) of the distance from the belief's mean."""
-    if not len(_poses(belief)):
-        return float("nan")
-    if isinstance(belief, GaussianMixture):
-        _, covariance, _ = moments(belief.means, belief.covariances, belief.weights)
-    else:
-        weights = belief.probabilities if isinstance(belief, PlaceBelief) else belief.weights
-        _, covariance = weighted_moments(belief.poses, weights)
-    return float(np.sqrt(max(covariance[0, 0] + covariance[1, 1], 0.0)))

@@ -1,20 +1,13 @@
 """Plots the error of the estimate, frame by frame."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from omninav.pipeline import Context, Figure, Outputs, Stage
-from omninav.pipeline.report.plot_style import plot
+from omninav.pipeline.report.chart import Chart, Colour, Layer, stacked
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive
-
-from .drawing import ESTIMATE, MARK, ODOMETRY
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.ticker import Formatter
 
 
 class ErrorOverTime(Stage):
@@ -24,7 +17,7 @@ class ErrorOverTime(Stage):
     """
 
     class Out(Outputs):
-        """`figure`: one pair of panels per log, on the same scales."""
+        """`figure`: position above heading, the logs one after the other."""
 
         figure: Figure | None = None
 
@@ -41,54 +34,62 @@ class ErrorOverTime(Stage):
             figure=Figure(
                 name="error_over_time",
                 title="Error over time",
-                caption="Distance from the true position and size of the heading error. Odometry alone starts at each "
-                "log's first true pose and is not aligned. The green line marks where the estimate stays below 1 m and "
-                "20 degrees for ten frames. The scale is logarithmic.",
+                caption=" ".join(_summary(log, len(logs) > 1) for log in logs) + " Odometry alone starts at each log's "
+                "first true pose and is not aligned. The scale is logarithmic.",
                 content=_draw(logs),
+                media_type="image/svg+xml",
                 order=20,
             )
         )
 
 
+def _summary(drive: Drive, several: bool) -> str:
+    settled, odometry = _settled(drive), drive.odometry_alone()
+    which = f"Log {drive.log[0]}: " if several else ""
+    words = "never converged" if settled is None else f"converged after {settled} frames (green line)"
+    beside = "" if odometry is None else f", odometry alone {_last(odometry, drive):.2f} m"
+    text = f"{which}{words}; at the end the estimate is {_last(drive.estimate, drive):.2f} m off{beside}."
+    return text[:1].upper() + text[1:]
+
+
 def _draw(logs: Sequence[Drive]) -> bytes:
-    """Logs stand side by side on the same scales, at most three in a row."""
-    columns = min(len(logs), 3)
-    bands = -(-len(logs) // columns)
-    kinds = (("position error (m)", position_errors, 1.0, None), ("heading error (°)", heading_errors_deg, 20.0, 250))
-    floors = [_floor(np.concatenate([errors(log.estimate, log.truth) for log in logs])) for _, errors, _, _ in kinds]
-    with plot(8.0 if columns == 1 else 10.0, 4.2 * bands) as drawn:
-        panels = drawn.canvas.subplots(2 * bands, columns, sharey="row", squeeze=False)
-        for panel in panels[:, len(logs) - columns * (bands - 1) :][2 * (bands - 1) :].flat:
-            panel.remove()
-        for number, drive in enumerate(logs):
-            band, column = divmod(number, columns)
-            odometry, settled = drive.odometry_alone(), _settled(drive)
-            upper, lower = panels[2 * band : 2 * band + 2, column]
-            for axes, (name, errors, limit, top), floor in zip((upper, lower), kinds, floors, strict=True):
-                if odometry is not None:
-                    wrong = errors(odometry, drive.truth)
-                    axes.plot(drive.seconds, wrong, "--", color=ODOMETRY, linewidth=1.2, label="odometry alone")
-                wrong = errors(drive.estimate, drive.truth)
-                axes.plot(drive.seconds, wrong, color=ESTIMATE, linewidth=1.2, label="estimate")
-                axes.axhline(limit, color="#999999", linewidth=0.7, linestyle=":")
-                if settled is not None:
-                    axes.axvline(drive.seconds[settled], color=MARK, linewidth=1.2, label="converged")
-                axes.set_yscale("log")
-                axes.set_ylim(bottom=floor, top=top)
-                axes.yaxis.set_major_formatter(_plain())
-                axes.yaxis.set_minor_formatter("")
-                if not column:
-                    axes.set_ylabel(name)
-            upper.tick_params(labelbottom=False)
-            lower.set_xlim(upper.get_xlim())
-            lower.set_xlabel("time since the log's first frame (s)")
-            converged = "never converged" if settled is None else f"converged after {settled} frames"
-            ends = f"at the end {_last(drive.estimate, drive):.2f} m off"
-            beside = "" if odometry is None else f", odometry {_last(odometry, drive):.2f} m"
-            upper.set_title(f"log {drive.log[0]}: {converged}\n{ends}{beside}", fontsize=8.5)
-        named = {label: handle for axes in drawn.canvas.axes for handle, label in zip(*_legend(axes), strict=True)}
-        drawn.canvas.legend(named.values(), named.keys(), loc="outside lower center", ncols=3)
-    return drawn.content
+    """Logs stand one after the other on one axis of time."""
+    begins = np.cumsum([0.0, *(float(drive.seconds[-1]) + 1.0 for drive in logs)])
+    charts = []
+    for name, errors, limit, top in (
+        ("position error (m)", position_errors, 1.0, np.inf),
+        ("heading error (°)", heading_errors_deg, 20.0, 180.0),
+    ):
+        lines = [
+            (drive, begin, errors(drive.estimate, drive.truth), None if alone is None else errors(alone, drive.truth))
+            for drive, begin in zip(logs, begins.tolist(), strict=False)
+            for alone in (drive.odometry_alone(),)
+        ]
+        every = np.concatenate([wrong for _, _, *both in lines for wrong in both if wrong is not None])
+        every = every[np.isfinite(every)]
+        low, high = _floor(every), min(max(float(every.max(initial=0.0)), limit) * 1.2, top)
+        time = "time (s), logs one after the other" if len(logs) > 1 else "time (s)"
+        chart = Chart((0.0, max(float(begins[-1]) - 1.0, 0.1)), (low, high), time, name, log=True)
+        chart.base.level(limit, "quiet")
+        for drive, begin, estimate, alone in lines:
+            seconds = drive.seconds + begin
+            if alone is not None:
+                _line(chart.base, seconds, np.clip(alone, low, None), "orange", dashed=True)
+                chart.name("odometry alone", "orange", "dashes")
+            _line(chart.base, seconds, np.clip(estimate, low, None), "blue")
+            chart.name("estimate", "blue")
+            settled = _settled(drive)
+            if settled is not None:
+                chart.base.upright(float(seconds[settled]), "green")
+                chart.name("converged", "green")
+            if len(logs) > 1:
+                chart.base.upright(begin, "line", f"log {drive.log[0]}")
+        charts.append(chart)
+    return stacked(charts)
+
+
+def _line(layer: Layer, seconds: Array, errors: Array, colour: Colour, dashed: bool = False) -> None:
+    layer.line(np.column_stack([seconds, errors]), colour, 1.6, dashed)
 
 
 def _settled(drive: Drive) -> int | None:
@@ -104,17 +105,6 @@ def _last(poses: Array, drive: Drive) -> float:
     return float(there[-1]) if len(there) else float("nan")
 
 
-def _legend(axes: "Axes") -> tuple[list[Any], list[Any]]:
-    return axes.get_legend_handles_labels()
-
-
 def _floor(errors: Array) -> float:
     """Where a logarithmic axis begins: below nearly all errors, without following single zeros down."""
-    errors = errors[np.isfinite(errors)]
     return max(float(np.percentile(errors, 2)) / 2, 1e-4) if len(errors) else 1e-2
-
-
-def _plain() -> "Formatter":
-    from matplotlib.ticker import FuncFormatter
-
-    return FuncFormatter(lambda value, _: f"{value:g}")

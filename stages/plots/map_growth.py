@@ -18,6 +18,8 @@ BINS = 80
 class MapGrowth(Stage):
     """Plots references and components over the frames of all logs, and how many references came and went."""
 
+    on_request = True
+
     class Out(Outputs):
         """`figure`: absent where nothing was ever learned."""
 

@@ -10,6 +10,9 @@ from omninav.stages.values.image import Panorama, Windows
 
 from .snapshot_times import is_snapshot_frame
 
+COLUMNS, QUALITY = 480, 80
+"""Of a kept image: largest width (px), and JPEG quality; some 15 kB."""
+
 
 class EncodedPanorama(Value):
     """A panorama as JPEG bytes, columns as in `Panorama`; or windows side by side, the left one on the left.
@@ -23,7 +26,7 @@ class EncodedPanorama(Value):
 
 
 class PanoramaSnapshot(Stage):
-    """Encodes the panorama or the windows at frames 0, 1, 2, 5, 10, 20, 50, …; JPEG quality 90, at most 720 columns."""
+    """Encodes the panorama or the windows at even steps, some 60 to 120 of a drive; JPEG, at most 480 columns."""
 
     class Out(Outputs):
         """`snapshot`: absent at all other frames."""
@@ -34,7 +37,7 @@ class PanoramaSnapshot(Stage):
         """One frame."""
         if not is_snapshot_frame(tick.frame):
             return self.Out()
-        return self.Out(snapshot=EncodedPanorama(*small_jpeg(panorama, 720, 90)))
+        return self.Out(snapshot=EncodedPanorama(*small_jpeg(panorama, COLUMNS, QUALITY)))
 
 
 def small_jpeg(panorama: Panorama | Windows, max_columns: int, quality: int) -> tuple[bytes, tuple[float, ...]]:

@@ -33,6 +33,8 @@ class ReferenceLife(Stage):
     frames at which the reference changed; where map updates come late its view was seen before.
     """
 
+    on_request = True
+
     name: Annotated[int, Bounds(ge=0)] | None = None
     """Number of the reference. None: the one whose heaviest component moved furthest in sum, which is where wrong
     associations show."""

@@ -43,6 +43,8 @@ class RetrievalStrip(Stage):
     Wolf, Burgard & Burkhardt 2005, figures 2 and 5. Without `thumbnails` the references' poses stand in their places.
     """
 
+    on_request = True
+
     frames: Annotated[int, Bounds(ge=1, le=8)] = 3
     """Number of queries."""
 

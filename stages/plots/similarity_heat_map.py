@@ -27,6 +27,8 @@ from .snapshot_times import spread_out
 class SimilarityHeatMap(Stage):
     """Plots each reference's best similarity over the map, and the heading profile of the best one."""
 
+    on_request = True
+
     frames: Annotated[int, Bounds(ge=1, le=8)] = 4
     """Number of columns."""
 

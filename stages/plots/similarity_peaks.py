@@ -1,4 +1,4 @@
-"""Keeps what a plot needs of the similarities: the best one of each reference, at a few frames."""
+"""Keeps what a plot needs of the similarities: the best one of each reference, at some frames."""
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +23,7 @@ class Peaks(Value):
 
 
 class SimilarityPeaks(Stage):
-    """Keeps, at frames 0, 1, 2, 5, 10, 20, 50, …, the best similarity of each reference and the best one's headings."""
+    """Keeps, at even steps the best similarity of each reference and the best one's headings."""
 
     class Out(Outputs):
         """`peaks`: absent at all other frames."""

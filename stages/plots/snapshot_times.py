@@ -1,13 +1,25 @@
-"""Frames of snapshots: more of them at the beginning of a drive, where a filter converges."""
+"""Frames of snapshots, of drives whose length is not known while they last."""
 
 import numpy as np
 
+FRAMES = 60
+"""Snapshots that are shown of a drive at most."""
+
 
 def is_snapshot_frame(frame: int) -> bool:
-    """Frames 0, 1, 2, 5, 10, 20, 50, 100, …: known while the drive is still going on."""
-    while frame >= 10 and frame % 10 == 0:
-        frame //= 10
-    return frame in (0, 1, 2, 5)
+    """Every frame below 2 x `FRAMES`, every second one below 4 x `FRAMES`, every fourth below 8 x `FRAMES`, and so on.
+
+    So there are always enough at even steps, and few beside them.
+    """
+    return frame % max(1, 1 << (frame // FRAMES).bit_length() >> 1) == 0
+
+
+def even_frames(frames: int) -> range:
+    """At most `FRAMES` of so many frames at even steps from the first on, all of them snapshot frames."""
+    step = 1
+    while frames > FRAMES * step:
+        step *= 2
+    return range(0, frames, step)
 
 
 def geometric_steps(frames: int, wanted: int) -> list[int]:

@@ -43,6 +43,8 @@ class ShowVisibilityAreas(Stage):
     steps along the map. With `drive` wired its true path is drawn over the last panel.
     """
 
+    on_request = True
+
     examples: Annotated[int, Bounds(ge=1, le=11)] = 5
     """Number of references that have a panel."""
 

@@ -46,8 +46,8 @@ WORDS = frozenset(
         "worlds",
     ]
 )
-NOT_MEANT = r"\bmap\(|\bimage/|\*map\b"
-"""The built-in function, and media types."""
+NOT_MEANT = r"\bmap\(|\bimage/|\*map\b|<image\b|\bimage-rendering"
+"""The built-in function, media types, and an element of SVG with its style."""
 
 
 def words(line: str) -> set[str]:

@@ -1,11 +1,19 @@
 import base64
 import html
+import json
 import re
 from html.parser import HTMLParser
+from types import SimpleNamespace
+from typing import Annotated
 
+import numpy as np
 from sample_metrics import VALUES, measured
 
-from omninav.pipeline import Figure, Metrics, Quantity, Table
+from omninav.pipeline import Bounds, Context, Figure, Metrics, Outputs, Quantity, Stage, Table
+from omninav.pipeline.graph.results import Slide
+from omninav.pipeline.graph.signature import signature
+from omninav.pipeline.report.chart import Chart
+from omninav.pipeline.report.parameter_table import parameter_rows
 from omninav.pipeline.report.run_page import write_report
 
 MANIFEST = {
@@ -31,7 +39,7 @@ PICTURE = Figure("path", "The path", "Where it went & why.", b"\x89PNG not reall
 class Wellformed(HTMLParser):
     """Raises where an element is closed that was not the last one opened."""
 
-    VOID = frozenset({"meta", "img", "br", "rect", "path", "circle", "link"})
+    VOID = frozenset({"meta", "img", "br", "rect", "path", "circle", "link", "input"})
 
     def __init__(self) -> None:
         super().__init__()
@@ -63,14 +71,14 @@ def report(tmp_path, metrics=None, manifest=MANIFEST, figures=(PICTURE,), tables
 
 
 def text_of(page: str) -> str:
-    plain = re.sub(r"<style>.*?</style>", "", page, flags=re.S)
+    plain = re.sub(r"<(style|script).*?</\1>", "", page, flags=re.S)
     return " ".join(html.unescape(re.sub(r"<[^>]*>", " ", plain)).split())
 
 
 def test_a_page_refers_to_nothing_outside_itself(tmp_path):
     page = report(tmp_path)
     assert re.findall(r"https?://[^\"\s<]+", page.replace(SVG, "")) == []
-    assert not re.search(r"<(?:link|script|iframe)\b|@import|url\(", page)
+    assert not re.search(r"<(?:link|iframe|script src)\b|@import|url\(", page)
     assert set(re.findall(r'(?:src|href)="([^":#]*):', page)) == {"data"}
 
 
@@ -92,7 +100,7 @@ def test_results_stand_with_units_and_the_estimate_beside_odometry_alone(tmp_pat
 def test_a_page_has_skipped_data_notes_and_the_command(tmp_path):
     said = text_of(report(tmp_path))
     assert "source.duplicate frame 7 frame 12 <twice>" in said
-    assert "odometry synthetic" in said
+    assert "Odometry synthetic" in said
     assert "omninav variant=omniview_mcl 'log=my drive.mcap'" in said
     assert "omninav resume 'runs/a run'" in said
     assert "match every tick 300 1.23 2.50 31.0" in said
@@ -114,10 +122,9 @@ def test_a_video_is_inside_the_page_and_can_be_stepped_through(tmp_path):
     page = report(tmp_path, figures=(PICTURE, video))
     assert 'src="data:video/mp4;base64,' in page
     assert 'data-per-second="8.0"' in page
-    assert page.count("<script>") == 1
-    assert "<script>" not in report(tmp_path, figures=(PICTURE,))
+    assert page.count("<video") == 1
     picture = Figure("film", "The drive", "Moving.", b"GIF89a not really", "image/gif", per_second=8.0)
-    assert "<script>" not in report(tmp_path, figures=(picture,))  # a browser plays it by itself
+    assert "<video" not in report(tmp_path, figures=(picture,))  # a browser plays it by itself
 
 
 def test_tables_of_stages_are_shown(tmp_path):
@@ -146,3 +153,57 @@ def test_tiles_are_the_headlines_in_the_order_of_their_stages(tmp_path):
 
 def test_a_run_in_which_nothing_is_measured_says_so(tmp_path):
     assert "No stage of this graph measures anything" in text_of(report(tmp_path, metrics=Metrics({})))
+
+
+def chart() -> Chart:
+    drawn = Chart((0.0, 2.0), (0.0, 1.0), "x (m)", "y (m)", equal=True)
+    drawn.base.line(np.array([[0.0, 0.0], [1.0, 0.5], [np.nan, 0.0], [2.0, 1.0]]), "blue")
+    return drawn
+
+
+def test_a_chart_stands_in_the_page_in_the_colours_of_the_page(tmp_path):
+    page = report(tmp_path, figures=(Figure("path", "The path", "It went.", chart().svg(), "image/svg+xml"),))
+    assert 'style="fill:none;stroke-linejoin:round;stroke:var(--blue,#0072b2)' in page
+    assert "prefers-color-scheme: dark" in page
+    assert "--blue: #5fb4e6" in page
+
+
+def test_slides_hold_each_photograph_once_and_cannot_end_their_script(tmp_path):
+    slides = tuple(
+        Slide(f"frame {n} </script>", "<circle/>", (("seen", b"JPEG"),), (("error", "1 m"),)) for n in (0, 1)
+    )
+    figure = Figure("frames", "Frames", "One by one.", chart().svg(), "image/svg+xml", slides=slides)
+    page = report(tmp_path, figures=(figure,))
+    data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', page, flags=re.S)[1])
+    assert data["photographs"] == [base64.b64encode(b"JPEG").decode()]
+    assert [slide["photographs"] for slide in data["slides"]] == [[["seen", 0]]] * 2
+    assert data["slides"][1]["label"] == "frame 1 </script>"
+    assert data["slides"][0]["overlay"] == "<circle/>"
+
+
+def test_what_was_skipped_stands_above_the_results(tmp_path):
+    said = text_of(report(tmp_path))
+    assert said.index("source.duplicate frame: 7 (first: frame 12 <twice>)") < said.index("Position error")
+
+
+def test_parameters_stand_beside_their_defaults_with_what_they_mean(tmp_path):
+    class Smoothed(Stage):
+        """Smooths."""
+
+        window: Annotated[int, Bounds(ge=1)] = 5
+        """Readings that are averaged."""
+        robust: bool = False
+        """Whether outliers are left out."""
+
+        class Out(Outputs):
+            value: Metrics
+
+        def step(self, ctx: Context) -> Out: ...
+
+    node = SimpleNamespace(name="smooth", signature=signature(Smoothed), parameters={"window": 9})
+    rows = parameter_rows(SimpleNamespace(nodes={"smooth": node}))
+    assert [(row.name, row.value, row.default, row.changed) for row in rows] == [
+        ("window", "9", "5", True),
+        ("robust", "False", "False", False),
+    ]
+    assert rows[0].meaning == "Readings that are averaged."

@@ -47,8 +47,9 @@ def all_figures(run, learned):
 def test_every_picture_can_be_decoded_is_small_and_the_same_each_time(run, learned):
     figures = list(all_figures(run, learned))
     for figure in figures:
-        pixels = cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR)
-        assert pixels.std() > 5, f"{figure.name} is blank"
+        if figure.media_type != "image/svg+xml":
+            pixels = cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR)
+            assert pixels.std() > 5, f"{figure.name} is blank"
         assert len(figure.content) < 150_000
         assert figure.title
         assert len(figure.caption) > 30

@@ -7,8 +7,8 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
 from omninav.stages.mapping.thumbnails import CollectThumbnails, ReferenceSnapshot, ThumbnailsState
 from omninav.stages.plots.feature_matrix import FeatureMatrix
+from omninav.stages.plots.frame_by_frame import FrameByFrame
 from omninav.stages.plots.panorama_snapshot import PanoramaSnapshot
-from omninav.stages.plots.panorama_strip import PanoramaStrip
 from omninav.stages.plots.retrieval_strip import RetrievalStrip
 from omninav.stages.values.image import Panorama, Windows
 from omninav.stages.values.maps import ReferenceGraph
@@ -64,7 +64,7 @@ def test_windows_are_kept_side_by_side_from_the_left_to_the_right() -> None:
     seen = [round(float(part.mean())) for part in np.split(decoded(shot.jpeg), 4, axis=1)]
     assert seen == pytest.approx([160, 80, 0, 240], abs=3)
     assert np.degrees(shot.headings) == pytest.approx([180, 90, 0, 270])
-    figure = PanoramaStrip().step(CTX, collected([Tick(0, 0)], [None]), [shot]).figure
+    figure = FrameByFrame().step(CTX, collected([Tick(0, 0)], [None]), [shot]).figure
     assert figure is not None
     assert "Windows" in figure.caption
 
@@ -106,12 +106,3 @@ def test_the_feature_matrix_of_one_frame_is_drawn(kind: str) -> None:
     assert figure is not None
     assert "frame 5" in figure.caption
     assert cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR).std() > 5
-
-
-def test_pictures_that_look_one_way_stand_side_by_side() -> None:
-    shots = [PanoramaSnapshot().step(CTX, Tick(0, 0), windows(level)).snapshot for level in (40, 200)]
-    figure = PanoramaStrip().step(CTX, collected([Tick(0, 0), Tick(1, 1, frame=1)], [None, None]), shots).figure
-    assert figure is not None
-    assert "camera's image" in figure.caption
-    drawn = cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR)
-    assert drawn.shape[1] > 2 * drawn.shape[0]

@@ -1,0 +1,26 @@
+"""What whoever reads a run's results should know first: what its stages warn of, and what was skipped."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from .quantities import words
+
+
+def skipped(manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Of each kind of data that was skipped: `kind`, `count`, and the `first` case as text."""
+    found = manifest.get("dropped") or {}
+    return [
+        {"kind": words(kind), "count": entry["count"], "first": entry.get("first", "")}
+        if isinstance(entry, Mapping)
+        else {"kind": words(kind), "count": entry, "first": ""}
+        for kind, entry in found.items()
+    ]
+
+
+def warning_lines(manifest: Mapping[str, Any]) -> list[str]:
+    """A line for each warning, and one for each kind of skipped data."""
+    lines = [str(warning) for warning in manifest.get("warnings") or ()]
+    for row in skipped(manifest):
+        first = f" (first: {row['first']})" if row["first"] else ""
+        lines.append(f"{row['kind']}: {row['count']}{first}")
+    return lines

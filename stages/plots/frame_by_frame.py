@@ -1,0 +1,202 @@
+"""Shows a drive frame by frame: the image, the best reference, and the belief over the map."""
+
+import math
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline.graph.results import Slide
+from omninav.pipeline.report.chart import Chart, Layer, broken
+from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
+from omninav.stages.values.belief import GaussianMixture, Particles, PlaceBelief
+from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.floor_plan import FloorPlan
+from omninav.stages.values.grid import OccupancyGrid
+from omninav.stages.values.map_places import AnyMap, map_poses
+from omninav.stages.values.thumbnails import Thumbnails
+from omninav.stages.values.topological_map import TopologicalMap
+from omninav.stages.values.view_mixtures import ViewMixtures
+
+from .belief_spread import spread_m
+from .drawing import extent_of
+from .panorama_snapshot import EncodedPanorama
+from .plan_chart import draw_surroundings, jumps, plan_chart
+from .snapshot_times import even_frames
+
+Shown = Particles | GaussianMixture | PlaceBelief
+MAX_DOTS = 150
+"""Particles that are drawn of a belief at most."""
+
+
+class FrameByFrame(Stage):
+    """Shows up to 60 frames of the last log, at even steps: what the robot saw, and where it believed to be.
+
+    The reference (or place) of the map that looked most like the image is ringed; with `thumbnails` its image stands
+    below the robot's, turned as the robot is turned against it.
+    """
+
+    class Out(Outputs):
+        """`figure`: absent where there are no frames."""
+
+        figure: Figure | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        drive: Drive,
+        snapshots: Sequence[EncodedPanorama | None],
+        beliefs: Sequence[Shown | None] | None = None,
+        map: AnyMap | None = None,
+        thumbnails: Thumbnails | None = None,
+        grid: OccupancyGrid | None = None,
+        plan: FloorPlan | None = None,
+    ) -> Out:
+        """The whole run at once."""
+        last = drive.last_log
+        shown = {frame for frame in even_frames(int(last.frames[-1]) + 1)} if len(last) else set()
+        rows = [n for n, frame in enumerate(last.frames.tolist()) if frame in shown]
+        if not rows:
+            return self.Out()
+        path = _path(last)
+        chart = plan_chart(extent_of(path, last.estimate, map_poses(map), margin=0.05))
+        _draw_base(chart, last, path, map, grid, plan)
+        slides = []
+        for n in rows:
+            tick = int(last.row[n])
+            layer, belief = chart.layer(), None if beliefs is None else beliefs[tick]
+            spot, snapshot = _spot(last, n, map), snapshots[tick]
+            _draw_now(layer, belief, last, path, n, spot)
+            photographs = [] if snapshot is None else [("image", snapshot.jpeg)]
+            if photographs and last.reference[n] >= 0:
+                photographs += _reference_picture(last, n, map, thumbnails)
+            label = f"frame {int(last.frames[n])} · {last.seconds[n]:.1f} s"
+            slides.append(Slide(label, layer.svg, tuple(photographs), tuple(_facts(last, n, belief, spot))))
+        words = [f"{len(slides)} of {len(last)} frames."]
+        if beliefs is not None:
+            chart.name("belief", "pink", "dot")
+            chart.name("estimate", "blue", "line")
+        if not isinstance(map, ViewMixtures) and (last.reference >= 0).any():
+            chart.name("best reference", "green", "ring")
+        words += _what_images_show(snapshots[int(last.row[rows[0]])])
+        return self.Out(
+            figure=Figure(
+                name="frame_by_frame",
+                title="Frame by frame",
+                caption=" ".join(words),
+                content=chart.svg(),
+                media_type="image/svg+xml",
+                order=30,
+                slides=tuple(slides),
+            )
+        )
+
+
+def _what_images_show(snapshot: EncodedPanorama | None) -> list[str]:
+    if snapshot is None:
+        return []
+    if not snapshot.headings:
+        return ["Panoramas have forward in the middle and the robot's left on the left."]
+    if len(snapshot.headings) == 1:
+        return ["The camera's images."]
+    headings = ", ".join(f"{math.degrees(heading):.0f}°" for heading in snapshot.headings)
+    return [f"Windows cut from the camera's images look, from left to right, to {headings} from forward."]
+
+
+def _path(drive: Drive) -> Array:
+    """The true path, without truth the estimated one, without estimates odometry alone."""
+    if drive.has_truth:
+        return drive.truth
+    if known(drive.estimate).any():
+        return drive.estimate
+    alone = drive.odometry_alone()
+    return drive.estimate if alone is None else alone
+
+
+def _draw_base(
+    chart: Chart, drive: Drive, path: Array, map: AnyMap | None, grid: OccupancyGrid | None, plan: FloorPlan | None
+) -> None:
+    draw_surroundings(chart, map, grid, plan)
+    if drive.has_truth:
+        chart.base.line(path, "ink", 1.6, opacity=0.6)
+        chart.name("ground truth", "ink")
+    else:
+        estimated = known(drive.estimate).any()
+        chart.base.line(broken(path, jumps(path)), "blue" if estimated else "orange", 1.2, opacity=0.6)
+        if not estimated:
+            chart.name("odometry alone", "orange")
+
+
+def _draw_now(layer: Layer, belief: Shown | None, drive: Drive, path: Array, n: int, spot: Array | None) -> None:
+    if isinstance(belief, Particles):
+        step = max(1, -(-len(belief.poses) // MAX_DOTS))
+        layer.dots(belief.poses[::step], "pink", 2.0, 0.75)
+    elif isinstance(belief, PlaceBelief):
+        layer.discs(belief.poses, 16 * np.sqrt(belief.probabilities), "pink", 0.75)
+    elif belief is not None and len(belief):
+        heavy = np.argsort(-belief.weights, kind="stable")[:40]
+        share = np.clip(belief.weights[heavy] / belief.weights.max(), 0.15, 1.0)
+        layer.ellipses(belief.means[heavy], belief.covariances[heavy], share, "pink")
+    if spot is not None:
+        layer.ring(spot, "green")
+    layer.dart(path[n] if not known(drive.estimate).any() or drive.has_truth else np.full(3, np.nan), "ink")
+    layer.dart(drive.estimate[n], "blue")
+
+
+def _spot(drive: Drive, n: int, map: AnyMap | None) -> Array | None:
+    """Where the best reference was taken. Views that may be forgotten have no one place."""
+    reference = int(drive.reference[n])
+    if map is None or isinstance(map, ViewMixtures) or not 0 <= reference < len(map):
+        return None
+    poses = map.poses[map.places] if isinstance(map, TopologicalMap) else map.poses
+    spot: Array = poses[reference]
+    return spot
+
+
+def _reference_picture(
+    drive: Drive, n: int, map: AnyMap | None, thumbnails: Thumbnails | None
+) -> list[tuple[str, bytes]]:
+    """The best reference's image, turned as the robot is turned against it."""
+    image = int(drive.reference[n])
+    if isinstance(map, TopologicalMap):
+        image = int(map.places[image])
+    if thumbnails is None or image >= len(thumbnails) or thumbnails.ends[image] == thumbnails.ends[image + 1]:
+        return []
+    kept = thumbnails.image(image)
+    if kept.shape[1] > 2 * kept.shape[0]:  # a panorama, not a mirror's disc
+        kept = np.roll(kept, _columns(drive.reference_turn[n], kept.shape[1]), axis=1)
+    jpeg = cv2.imencode(".jpg", kept, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()
+    return [("best match in the map", jpeg)]
+
+
+def _columns(turn: float, width: int) -> int:
+    return round(float(np.nan_to_num(turn)) / (2 * math.pi) * width)
+
+
+def _facts(drive: Drive, n: int, belief: Shown | None, spot: Array | None) -> list[tuple[str, str]]:
+    one = slice(n, n + 1)
+    facts = []
+    (metres,), (degrees,) = (
+        errors(drive.estimate[one], drive.truth[one]) for errors in (position_errors, heading_errors_deg)
+    )
+    if np.isfinite(metres):
+        facts.append(("error", f"{metres:.2f} m, {degrees:.1f}°"))
+    if known(drive.estimate[one]).all():
+        x, y, heading = drive.estimate[n]
+        facts.append(("estimate", f"x {x:.2f} m, y {y:.2f} m, {math.degrees(heading):.0f}°"))
+    if isinstance(belief, PlaceBelief):
+        place = int(np.argmax(belief.probabilities))
+        facts.append(("believed", f"place {place}, {100 * belief.probabilities[place]:.0f} %"))
+    elif belief is not None and np.isfinite(spread := spread_m(belief)) and spread > 0:
+        facts.append(("spread of the belief", f"{spread:.2f} m"))
+    if drive.reference[n] >= 0:
+        words = [f"number {drive.reference[n]}"]
+        if np.isfinite(drive.similarity[n]):
+            words.append(f"similarity {100 * drive.similarity[n]:.0f} %")
+        elif np.isfinite(drive.visual_distance[n]):
+            words.append(f"visual distance {drive.visual_distance[n]:.2f}")
+        if spot is not None and np.isfinite(gap := math.hypot(*(spot - drive.truth[n])[:2])):
+            words.append(f"taken {gap:.2f} m away")
+        facts.append(("best match", ", ".join(words)))
+    return facts
