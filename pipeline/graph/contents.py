@@ -22,6 +22,9 @@ MAX_MAGNITUDE = 1e15
 MAX_SUM_ERROR = 1e-4
 """By how much the sum of shares may differ from 1: many in single precision."""
 
+MAX_LENGTH_ERROR = 1e-3
+"""By how much the length of a unit vector may differ from 1."""
+
 
 class Shape:
     """The sizes of an array, or the length of a sequence or value: `Annotated[Array, Shape("rows", 3)]`.
@@ -53,6 +56,10 @@ class Starts:
 
 class Shares:
     """Weights or probabilities: not negative, and their sum is 1; of none, nothing is asked."""
+
+
+class UnitRows:
+    """Vectors (…, n) of length 1, or of zeros alone where there is nothing to describe."""
 
 
 class Covariances:
@@ -186,6 +193,11 @@ def _wrong_numbers(name: str, thing: Any, marks: Sequence[Any], sizes: Mapping[s
         elif isinstance(mark, Shares) and numbers.size:
             if low < 0 or abs(float(numbers.sum()) - 1.0) > MAX_SUM_ERROR:
                 yield f"'{name}' holds {low:g} and sums to {float(numbers.sum()):g}, expected shares of 1"
+        elif isinstance(mark, UnitRows) and numbers.size:
+            lengths = np.linalg.norm(numbers, axis=-1).ravel()
+            wrong = lengths[(np.abs(lengths - 1.0) > MAX_LENGTH_ERROR) & (lengths > 0.0)]
+            if wrong.size:
+                yield f"'{name}' holds a vector of length {wrong[0]:g}, expected 1"
         elif isinstance(mark, Covariances) and numbers.size:
             yield from _wrong_covariances(name, numbers)
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.appearance.segments import similarities
+from omninav.stages.geometry.appearance.segments import MAX_DISTANCES, similarities
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
@@ -75,10 +75,12 @@ class AppearanceLengthScale(Stage):
         if len(map) < self.min_references:
             return self.default_m
         chosen = np.unique(np.linspace(0, len(map) - 1, min(self.samples, len(map))).astype(np.int64))
-        histograms = map.kind == "histograms"
+        histograms, scale = map.kind == "histograms", MAX_DISTANCES[map.kind]
         similarity = np.stack(
             [
-                similarities(map.features, map.features[n], self.headings, histograms, False, 0.0).max(axis=1)
+                similarities(
+                    map.features, map.features[n], self.headings, histograms, False, 0.0, max_distance=scale
+                ).max(axis=1)
                 for n in chosen
             ]
         ).astype(np.float64)

@@ -8,7 +8,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
-from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph, kind_of
+from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph
 from omninav.stages.values.pose import Pose
 
 from .pose_of_view import Supervised, pose_of_view
@@ -63,11 +63,11 @@ class ImageDatabase(Stage):
             return self.Out(map=map)
         directions = features.directions if isinstance(features, SegmentHistograms) else None
         if directions is None:
-            added = [map.insert(pose, features.values, kind_of(features))]
+            added = [map.insert(pose, features.values, features.kind)]
         else:
             added = [
                 map.insert(
-                    Pose(pose.x, pose.y, float(wrap(pose.heading + direction))), window[np.newaxis], kind_of(features)
+                    Pose(pose.x, pose.y, float(wrap(pose.heading + direction))), window[np.newaxis], features.kind
                 )
                 for direction, window in zip(directions, features.values, strict=True)
             ]

@@ -7,7 +7,7 @@ import numpy as np
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.appearance.segments import similarity_at
 from omninav.stages.values.features import SegmentFeatures
-from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph, kind_of, within
+from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph, within
 from omninav.stages.values.pose import Pose
 
 from .pose_of_view import Supervised, pose_of_view
@@ -62,7 +62,7 @@ class LearnReferenceGraph(Stage):
         reason = self._reason(features, pose, map, near)
         event = None
         if reason is not None:
-            here = map.insert(pose, features.values, kind_of(features))
+            here = map.insert(pose, features.values, features.kind)
             event = ReferenceEvent(here, reason)
         else:
             here = int(near[0])
@@ -84,8 +84,7 @@ class LearnReferenceGraph(Stage):
             return "far"
         if self.similarity > 0.0:
             turns = pose.heading - map.poses[near, 2]
-            histograms = map.kind == "histograms"
-            similarities = similarity_at(map.features[near], features.values, turns, histograms)
+            similarities = similarity_at(map.features[near], features.values, turns, map.kind)
             if float(similarities.max()) < self.similarity:
                 return "unlike"
         return None

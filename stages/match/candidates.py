@@ -10,10 +10,11 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.geometry.appearance.segments import FeatureKind
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures
 from omninav.stages.values.length_scale import LengthScale
-from omninav.stages.values.maps import ReferenceGraph, kind_of
+from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 
 Array = npt.NDArray[np.float64]
@@ -138,13 +139,13 @@ class NearBelief:
         return near_belief(map.poses, near, radius, recovery_radius, *sample)
 
 
-def check_same_kind(features: SegmentFeatures, map: ReferenceGraph) -> bool:
-    """Whether view and map are histograms (else colours). Raises BadInput where their features differ."""
-    kind = kind_of(features)
+def check_same_kind(features: SegmentFeatures, map: ReferenceGraph) -> FeatureKind:
+    """What view and map are described by. Raises BadInput where their features differ."""
+    kind = features.kind
     shape = tuple(map.features.shape[1:])
     if len(map) and (map.kind != kind or shape != features.values.shape):
         raise BadInput(
             f"map: its views are {map.kind} of {shape[0]} segments x {shape[1]} bins, the current one is {kind} of "
             f"{features.values.shape[0]} x {features.values.shape[1]}; learn the map anew with these features"
         )
-    return kind == "histograms"
+    return kind

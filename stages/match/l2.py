@@ -26,7 +26,7 @@ class L2Match(NearBelief, Stage):
         length_scale: LengthScale | None = None,
     ) -> NearBelief.Out:
         """Compare one view."""
-        histograms = check_same_kind(features, map)
+        kind = check_same_kind(features, map)
         chosen, sampling_weight = self.candidates(ctx, map, near, length_scale)
-        values = euclidean_similarities(map.features, features.values, self.headings, histograms, chosen)
+        values = euclidean_similarities(map.features, features.values, self.headings, kind, chosen)
         return self.Out(similarities=Similarities(values, chosen, sampling_weight))

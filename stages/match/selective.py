@@ -3,7 +3,7 @@
 from typing import Annotated, Literal
 
 from omninav.pipeline import Bounds, Context, Stage
-from omninav.stages.geometry.appearance.segments import EXPONENTS, MAX_COLOUR_DISTANCE, similarities
+from omninav.stages.geometry.appearance.segments import EXPONENTS, MAX_COLOUR_DISTANCE, MAX_DISTANCES, similarities
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures
 from omninav.stages.values.length_scale import LengthScale
@@ -18,7 +18,8 @@ class SelectiveMatch(NearBelief, Stage):
 
     Gross & Koenig 2004, section 2: S = max_k (sum of the k largest s_j) sqrt(1 / (k n)) over all k (erratum 21 in
     docs/papers.md); s_j is the intersection of segment j's histograms. The paper gives s_j for histograms only; for
-    colours it is 1 - |difference| / `colour_scale`, not below 0. Raises BadInput where the map has other features.
+    colours it is 1 - |difference| / `colour_scale`, not below 0, and for descriptors 1 - |difference| / 2. Raises
+    BadInput where the map has other features.
     """
 
     penalty: Literal["sqrt", "cube_root", "three_quarters", "none"] = "sqrt"
@@ -37,8 +38,10 @@ class SelectiveMatch(NearBelief, Stage):
         length_scale: LengthScale | None = None,
     ) -> NearBelief.Out:
         """Compare one view."""
-        histograms = check_same_kind(features, map)
+        kind = check_same_kind(features, map)
         chosen, sampling_weight = self.candidates(ctx, map, near, length_scale)
-        exponent, scale = EXPONENTS[self.penalty], self.colour_scale
-        values = similarities(map.features, features.values, self.headings, histograms, True, exponent, chosen, scale)
+        exponent, scale = EXPONENTS[self.penalty], self.colour_scale if kind == "colours" else MAX_DISTANCES[kind]
+        values = similarities(
+            map.features, features.values, self.headings, kind == "histograms", True, exponent, chosen, scale
+        )
         return self.Out(similarities=Similarities(values, chosen, sampling_weight, exponent, scale))

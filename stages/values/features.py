@@ -1,12 +1,13 @@
 """Descriptions of a view, segment by segment around the robot."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
-from omninav.pipeline.graph.contents import Shape
+from omninav.pipeline.graph.contents import Shape, UnitRows
+from omninav.stages.geometry.appearance.segments import FeatureKind
 
 FloatArray = npt.NDArray[np.float32]
 
@@ -14,8 +15,12 @@ FloatArray = npt.NDArray[np.float32]
 class SegmentFeatures(Value):
     """A view described by equal segments of its panorama. `values`: (segments, bins) float32.
 
-    Segment j covers the columns from j/segments to (j+1)/segments of the panorama, clockwise from straight behind.
+    Segment j covers the columns from j/segments to (j+1)/segments of the panorama, clockwise from straight behind. A
+    view that is described as a whole is one segment, and says nothing of the robot's heading. `kind`: how segments of
+    a class are compared, and what a map calls them.
     """
+
+    kind: ClassVar[FeatureKind]
 
     values: Annotated[FloatArray, Shape("segments", "bins")]
 
@@ -30,9 +35,27 @@ class SegmentHistograms(SegmentFeatures):
     length one after the other, of one image by the same kernels at growing size, each of which sums to at most 1.
     """
 
+    kind = "histograms"
+
     directions: Annotated[npt.NDArray[np.float64] | None, Shape("segments")] = None
     scales: Annotated[int, Bounds(ge=1)] = 1
 
 
 class SegmentColours(SegmentFeatures):
     """Mean colour per segment: (segments, 3), blue-green-red in 0..255."""
+
+    kind = "colours"
+
+
+class SegmentDescriptors(SegmentFeatures):
+    """A vector of any kind per segment, of length 1: what a network says of it, for example. (segments, D) float32."""
+
+    kind = "descriptors"
+
+    values: Annotated[FloatArray, Shape("segments", "bins"), UnitRows()]
+
+    @classmethod
+    def of(cls, vectors: npt.NDArray[np.floating]) -> "SegmentDescriptors":
+        """Vectors (segments, D) of any length, brought to length 1; zeros stay zeros."""
+        lengths = np.linalg.norm(vectors.astype(np.float64), axis=1, keepdims=True)
+        return cls((vectors / np.where(lengths > 0.0, lengths, 1.0)).astype(np.float32))

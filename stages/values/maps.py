@@ -7,17 +7,10 @@ import numpy.typing as npt
 
 from omninav.pipeline import Value
 from omninav.pipeline.graph.contents import RowsOf, Shape
+from omninav.stages.geometry.appearance.segments import FeatureKind
 
-from .features import SegmentFeatures, SegmentHistograms
 from .growable_arrays import GrowableArrays
 from .pose import Pose, PoseSource
-
-FeatureKind = Literal["histograms", "colours"]
-
-
-def kind_of(features: SegmentFeatures) -> FeatureKind:
-    """What a map calls features like these."""
-    return "histograms" if isinstance(features, SegmentHistograms) else "colours"
 
 
 class ReferenceGraph(GrowableArrays, Value):

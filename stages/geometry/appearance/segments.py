@@ -1,6 +1,7 @@
 """Views described by segments around the robot: turning and comparing them."""
 
 import functools
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,16 @@ EXPONENTS = {"sqrt": 0.5, "cube_root": 1.0 / 3.0, "three_quarters": 0.75, "none"
 
 MAX_COLOUR_DISTANCE = float(np.sqrt(3.0) * 255.0)
 """Distance of black and white in blue-green-red 0..255."""
+
+FeatureKind = Literal["histograms", "colours", "descriptors"]
+"""What segments are described by: histograms that sum to 1, colours in 0..255, or vectors of length 1."""
+
+MAX_DISTANCES: dict[FeatureKind, float] = {
+    "histograms": float(np.sqrt(2.0)),
+    "colours": MAX_COLOUR_DISTANCE,
+    "descriptors": 2.0,
+}
+"""The largest distance that two segments of a kind can have."""
 
 
 def turned_views(view: Floats, headings: int) -> Floats:
@@ -124,12 +135,12 @@ def similarities(
     selective: bool,
     exponent: float = 0.5,
     chosen: Ints | None = None,
-    colour_scale: float = MAX_COLOUR_DISTANCE,
+    max_distance: float = MAX_COLOUR_DISTANCE,
 ) -> Floats:
     """Similarity of a view to references at equally spaced headings: (chosen, headings) float32 in [0, 1].
 
     `references` (R, segments, bins) and `view` (segments, bins): histograms that sum to 1 per segment (compared by
-    intersection), or colours in 0..255 (s_j = 1 - |difference| / colour_scale, not below 0). `selective`: S = max_k
+    intersection), or others (s_j = 1 - |difference| / max_distance, not below 0). `selective`: S = max_k
     (sum of the k largest s_j) k^-exponent n^-(1-exponent), all k tried, since S(k) is not unimodal (Gross & Koenig
     2004, section 2; errata 20, 21); otherwise the mean of all s_j. `chosen`: indices of the references to compare; None
     means all.
@@ -146,7 +157,7 @@ def similarities(
     else:
         factors = np.zeros(segments, np.float32)
         factors[-1] = 1.0 / segments
-    scale = np.float32(colour_scale)
+    scale = np.float32(max_distance)
     _compare(np.ascontiguousarray(references, np.float32), chosen, query, histograms, network, factors, scale, out)
     return np.minimum(out, np.float32(1.0))
 
@@ -188,20 +199,33 @@ def _compare_many(expected: Floats, observed: Floats, network: Ints, factors: Fl
 
 
 def euclidean_similarities(
-    references: Floats, view: Floats, headings: int, histograms: bool, chosen: Ints | None = None
+    references: Floats, view: Floats, headings: int, kind: FeatureKind, chosen: Ints | None = None
 ) -> Floats:
     """1 - |difference| / the largest possible one, over whole views: (chosen, headings) float32 in [0, 1].
 
     The non-selective comparison by the L2 norm of the difference vector (Gross & Koenig 2004, section 2). The largest
-    difference is sqrt(2 n) for n histograms and sqrt(3 n) 255 for n colours.
+    difference is sqrt(2 n) for n histograms, sqrt(3 n) 255 for n colours, and 2 sqrt(n) for n unit vectors.
     """
     some = references if chosen is None else references[chosen]
     query = turned_views(view, headings).reshape(headings, -1)
     flat = np.ascontiguousarray(some, np.float32).reshape(len(some), -1)
     # |a - b|^2 = a.a + b.b - 2 a.b
     squared = (flat * flat).sum(axis=1)[:, None] + (query * query).sum(axis=1) - 2 * (flat @ query.T)
-    largest = np.sqrt(2.0 * len(view)) if histograms else np.sqrt(len(view)) * MAX_COLOUR_DISTANCE
+    largest = np.sqrt(2.0 * len(view)) if kind == "histograms" else np.sqrt(len(view)) * MAX_DISTANCES[kind]
     alike: Floats = (1.0 - np.sqrt(np.maximum(squared, 0.0)) / largest).astype(np.float32)
+    return np.clip(alike, 0.0, 1.0)
+
+
+def cosine_similarities(references: Floats, view: Floats, headings: int, chosen: Ints | None = None) -> Floats:
+    """Cosine of the angle between whole views as vectors, not below 0: (chosen, headings) float32 in [0, 1].
+
+    `references` (R, segments, bins), `view` (segments, bins), of any kind and length; a view of zeros is like nothing.
+    """
+    some = references if chosen is None else references[chosen]
+    query = turned_views(view, headings).reshape(headings, -1)
+    flat = np.ascontiguousarray(some, np.float32).reshape(len(some), -1)
+    lengths = np.linalg.norm(flat, axis=1)[:, None] * np.linalg.norm(query, axis=1)
+    alike: Floats = ((flat @ query.T) / np.where(lengths > 0.0, lengths, 1.0)).astype(np.float32)
     return np.clip(alike, 0.0, 1.0)
 
 
@@ -217,7 +241,7 @@ def turned_view(view: Floats, turn: float) -> Floats:
 
 
 def similarity_at(
-    references: Floats, view: Floats, turns: npt.NDArray[np.float64], histograms: bool, exponent: float = 0.5
+    references: Floats, view: Floats, turns: npt.NDArray[np.float64], kind: FeatureKind, exponent: float = 0.5
 ) -> Floats:
     """Selective similarity of a view to each reference at one heading each: (N, segments, bins), (N,) turns -> (N,).
 
@@ -227,10 +251,10 @@ def similarity_at(
     out = np.empty(len(references), np.float32)
     for n, turn in enumerate(turns):
         expected = turned_view(references[n], float(turn))
-        if histograms:
+        if kind == "histograms":
             alike = np.minimum(expected, view).sum(axis=1)
         else:
-            alike = 1.0 - np.sqrt(np.square(expected - view).sum(axis=1)) / MAX_COLOUR_DISTANCE
+            alike = 1.0 - np.sqrt(np.square(expected - view).sum(axis=1)) / MAX_DISTANCES[kind]
         best = np.cumsum(np.sort(alike)[::-1]) * penalties(segments, exponent)
         out[n] = best.max()
     return out

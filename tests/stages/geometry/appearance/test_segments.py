@@ -4,6 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from omninav.stages.geometry.appearance.segments import (
+    cosine_similarities,
     euclidean_similarities,
     penalties,
     selective_similarity,
@@ -57,9 +58,9 @@ def test_colours_are_compared_by_their_distance() -> None:
 def test_colours_farther_apart_than_the_scale_are_not_alike_at_all() -> None:
     references, view = np.full((1, 4, 3), 100, np.float32), np.full((4, 3), 100, np.float32)
     view[:, 0] += [0, 15, 30, 90]
-    assert similarities(references, view, 1, False, False, colour_scale=60.0)[0, 0] == pytest.approx(2.25 / 4)
+    assert similarities(references, view, 1, False, False, max_distance=60.0)[0, 0] == pytest.approx(2.25 / 4)
     # s = 1, 3/4, 1/2, 0: three segments, (9/4) / sqrt(3 x 4) = .65, beat four and two.
-    found = similarities(references, view, 1, False, True, colour_scale=60.0)[0, 0]
+    found = similarities(references, view, 1, False, True, max_distance=60.0)[0, 0]
     assert found == pytest.approx(2.25 / np.sqrt(12), abs=1e-6)
 
 
@@ -133,7 +134,10 @@ def test_a_robot_turned_left_is_found_at_the_heading_it_turned_by(turn: int) -> 
     # Erratum 24: the reference's own view, with the scene moved to the right, is the view after a left turn.
     reference = histograms(1, 18, 20)
     turned = np.roll(reference[0], turn, axis=0)
-    for found in (similarities(reference, turned, 18, True, True), euclidean_similarities(reference, turned, 18, True)):
+    for found in (
+        similarities(reference, turned, 18, True, True),
+        euclidean_similarities(reference, turned, 18, "histograms"),
+    ):
         assert int(np.argmax(found[0])) == turn
         assert found[0, turn] == pytest.approx(1.0, abs=2e-4)
 
@@ -150,7 +154,7 @@ def test_one_heading_each_agrees_with_all_headings() -> None:
     references, view = histograms(5, 12, 20), histograms(1, 12, 20, seed=3)[0]
     everywhere = similarities(references, view, 12, True, True)
     picked = np.array([0, 3, 5, 11, 7])
-    one = similarity_at(references, view, 2 * np.pi * picked / 12, True)
+    one = similarity_at(references, view, 2 * np.pi * picked / 12, "histograms")
     assert np.allclose(one, everywhere[np.arange(5), picked], atol=1e-5)
 
 
@@ -159,13 +163,27 @@ def test_chosen_references_are_compared_as_all_are() -> None:
     chosen = np.array([1, 4, 8])
     for compare in (
         lambda c: similarities(references, view, 36, True, True, chosen=c),
-        lambda c: euclidean_similarities(references, view, 36, True, c),
+        lambda c: euclidean_similarities(references, view, 36, "histograms", c),
     ):
         assert np.allclose(compare(chosen), compare(None)[chosen], atol=1e-6)
 
 
 def test_distances_of_whole_views_agree_with_numpy() -> None:
     references, view = histograms(5, 8, 20), histograms(1, 8, 20, seed=6)[0]
-    found = euclidean_similarities(references, view, 8, True)
+    found = euclidean_similarities(references, view, 8, "histograms")
     gap = np.linalg.norm((references - view).reshape(5, -1), axis=1)
     assert np.allclose(found[:, 0], 1 - gap / np.sqrt(16), atol=1e-4)
+
+
+def test_the_cosine_is_that_of_whole_views_whatever_their_length() -> None:
+    references = np.array([[[1, 0], [0, 0]], [[0, 0], [3, 0]], [[-1, 0], [0, 0]], [[0, 0], [0, 0]]], np.float32)
+    view = np.array([[2, 0], [0, 0]], np.float32)
+    found = cosine_similarities(references, view, 2)
+    np.testing.assert_allclose(found, [[1, 0], [0, 1], [0, 0], [0, 0]], atol=1e-6)
+    np.testing.assert_array_equal(cosine_similarities(references, view, 2, np.array([1])), found[1:2])
+
+
+def test_unit_vectors_that_point_away_from_each_other_are_as_far_apart_as_can_be() -> None:
+    references = np.array([[[1, 0]], [[-1, 0]]], np.float32)
+    np.testing.assert_allclose(euclidean_similarities(references, references[0], 1, "descriptors"), [[1], [0]])
+    np.testing.assert_allclose(similarity_at(references, references[0], np.zeros(2), "descriptors"), [1, 0], atol=1e-6)
