@@ -88,6 +88,7 @@ class Engine:
         self.static = set(self.values) | {
             f"{node.name}.{port}" for node in graph.of_lifetime("before") for port in node.signature.outputs
         }
+        self.stateful = self.graph.leading_to([wire.origin for wire in graph.wires if wire.delay]).nodes
         self.calls = {node.name: self._call(node) for node in graph.nodes.values()}
         self.channels = {
             channel_key(wire): Channel(wire, graph.is_marked(wire.origin, "in_place"))
@@ -123,8 +124,9 @@ class Engine:
         ]
         ctx.read = frozenset(port for name, _, port in (o.partition(".") for o in origins) if name == node.name)
         wires = [wire for wire in self.graph.inputs_of(node.name) if not wire.collect]
-        given = [wire for wire in self.graph.wires if wire.from_node == node.name and not wire.collect]
-        ctx.readers = {w.from_port: tuple(o.to_node for o in given if o.from_port == w.from_port) for w in given}
+        for wire in self.graph.wires:
+            if wire.from_node == node.name and not wire.collect and wire.to_node in self.stateful:
+                ctx.readers.setdefault(wire.from_port, []).append(wire.to_node)
         return Call(node, wires, ctx, self.static, self.options.validate)
 
     def run(self) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform
 
@@ -87,8 +87,8 @@ class Context:
         self.warnings: list[str] = []
         self.drew = False
         self.read: frozenset[str] | None = None
-        self.readers: Mapping[str, tuple[str, ...]] = {}
-        """By output, the nodes that read it tick by tick."""
+        self.readers: dict[str, list[str]] = {}
+        """By output, the nodes that read it tick by tick and lead to a delayed wire: what they give is kept."""
         self.progress: Callable[[int, int | None], None] = lambda done, total: None
         self.doing: Callable[[str], None] = lambda words: None
         self._rng = rng

@@ -52,6 +52,8 @@ class SupervisedViews(Stage):
             map.add_component(row, np.array([pose.x, pose.y, pose.heading]), covariance, 1.0, 1.0)
             map.step()
         if not len(map):
-            raise BadInput("mapping: the tour has no ground truth; use a tour with /ground_truth/pose")
+            raise BadInput(
+                "mapping: the tour has no ground truth; name it: tour_settings.truth=FILE or topics.truth=TOPIC"
+            )
         ctx.fact("map_poses", "truth")
         return self.Out(map=map)

@@ -155,7 +155,7 @@ class ViewComparison(Stage):
         there = any(pose is not None for pose in truth)
         if self.supervised == "truth" and not there:
             raise BadInput(
-                "mapping: the tour has no ground truth; use a tour with /ground_truth/pose, or "
+                "mapping: the tour has no ground truth; use a tour with it (tour_settings.truth=FILE), or "
                 "nodes.views.supervised=auto"
             )
         source: PoseSource = "truth" if there and self.supervised != "odometry" else "odometry"

@@ -66,13 +66,12 @@ def settled_speed(ctx: Context, name: str, speed: float | None) -> float:
     Where none is given, a nominal one, for drawing. Raises `UnreadableRecording` where a node reads motion tick by
     tick and none is given, or one makes a map of positions and the speed is 0, naming it and what to type.
     """
-    maps = ctx.readers.get("odometry", ())
-    readers = tuple(dict.fromkeys((*ctx.readers.get("motion", ()), *maps)))
+    maps = ctx.readers.get("odometry", [])
+    readers = list(dict.fromkeys([*ctx.readers.get("motion", []), *maps]))
     if speed is None and readers:
         raise UnreadableRecording(
-            f"{name}: it has neither odometry nor positions, which {_listed(readers)} of this variant needs; type "
-            "speed=0.5 to guess it (m/s, turns are seen in the images), or take a variant that needs none, such as "
-            "topological_localisation"
+            f"{name}: it has neither odometry nor positions, needed by {_listed(readers)}; type speed=0.5 to "
+            "guess it (m/s, turns are seen in the images), or take a variant that needs none: topological_localisation"
         )
     if maps and not speed:
         raise UnreadableRecording(

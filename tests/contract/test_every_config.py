@@ -40,7 +40,7 @@ def test_its_first_line_is_its_package_and_its_second_says_what_it_is(path: Path
     package, said = head(path)
     role = group(path)
     content = yaml.safe_load(path.read_text()) or {}
-    graph = "nodes" in content or "wires" in content
+    graph = any(key in content for key in ("nodes", "wires", "inputs"))
     wanted = "_global_" if role in ("variant", "results", "ablation") or graph else None
     of_a_stage = "_target_" in content
     of_the_world = f"world.{role.removeprefix('world_')}"

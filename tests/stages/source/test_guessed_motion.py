@@ -17,7 +17,7 @@ from omninav.stages.values.pose import GuessedMotion, Motion
 TURNS_DEG = (0.0, 5.0, 5.0, -20.0, 90.0)
 
 
-def context(**readers: tuple[str, ...]) -> Context:
+def context(**readers: list[str]) -> Context:
     made = Context("source", np.random.default_rng(0))
     made.readers = readers
     return made
@@ -65,10 +65,10 @@ def test_who_reads_motion_is_refused_by_name_until_a_speed_is_stated(turning: st
     with pytest.raises(
         UnreadableRecording, match=r"turn.avi: .*neither odometry nor positions.*'motion'.*type speed=0.5"
     ):
-        LogSource(log=turning).setup(context(motion=("motion", "sensor")))
+        LogSource(log=turning).setup(context(motion=["motion", "sensor"]))
     with pytest.raises(UnreadableRecording, match=r"speed=0 .*'mapping' makes a map of positions"):
-        LogSource(log=turning, speed_m_s=0.0).setup(context(odometry=("mapping",)))
-    LogSource(log=turning, speed_m_s=0.0).setup(context(motion=("motion",)))
+        LogSource(log=turning, speed_m_s=0.0).setup(context(odometry=["mapping"]))
+    LogSource(log=turning, speed_m_s=0.0).setup(context(motion=["motion"]))
     ctx = context()
     LogSource(log=turning).setup(ctx)
     assert "drawn as if driven" in ctx.warnings[0]
