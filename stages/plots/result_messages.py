@@ -25,7 +25,6 @@ from omninav.stages.values.drive import Array, pose_row
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.homing import HomingVector
-from omninav.stages.values.image import Panorama, Windows
 from omninav.stages.values.map_places import AnyMap, map_poses
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Motion, Pose
@@ -37,7 +36,7 @@ from omninav.stages.values.visual_distance import VisualDistances
 
 from .grid_message import grid_message
 from .markers import GREEN, PINK, gaussian_markers, homing_arrow, map_markers, weighted_points
-from .panorama_snapshot import small_jpeg
+from .panorama_snapshot import EncodedPanorama
 from .thin_belief import heaviest, thin
 
 PATH_POSES = 500
@@ -92,8 +91,6 @@ class ResultMessages(Stage):
 
     particles: Annotated[int, Bounds(ge=1)] = 200
     """Largest number of poses in a message of the belief."""
-    image_columns: Annotated[int, Bounds(ge=0, le=8192)] = 360
-    """Columns of the panoramas (JPEG of quality 70, some 10 kB each at 360 columns); 0: none are written."""
 
     class Out(Outputs):
         """`messages`: of this tick."""
@@ -111,7 +108,7 @@ class ResultMessages(Stage):
         belief: Belief | None = None,
         map: AnyMap | None = None,
         plan: FloorPlan | OccupancyGrid | None = None,
-        panorama: Panorama | Windows | None = None,
+        panorama: EncodedPanorama | None = None,
         similarities: Similarities | Neighbours | VisualDistances | None = None,
         route: PlannedRoute | None = None,
         vector: HomingVector | None = None,
@@ -132,9 +129,9 @@ class ResultMessages(Stage):
             self._show_belief(out, belief)
         if similarities is not None and map is not None:
             _show_similarities(out, similarities, map)
-        if panorama is not None and self.image_columns:
-            jpeg, _ = small_jpeg(panorama, self.image_columns, 70)
-            fields = {"header": header(tick.stamp, BASE), "format": "jpeg", "data": np.frombuffer(jpeg, np.uint8)}
+        if panorama is not None:
+            data = np.frombuffer(panorama.jpeg, np.uint8)
+            fields = {"header": header(tick.stamp, BASE), "format": "jpeg", "data": data}
             out.add("/panorama/compressed", "sensor_msgs/msg/CompressedImage", fields)
         if route is not None and isinstance(map, TopologicalMap) and route.number != shown.route:
             shown.route = route.number

@@ -15,6 +15,7 @@ from small_run import mixture_run, small_run
 
 from omninav.pipeline import BadInput, Context
 from omninav.stages.plots.foxglove_server import FoxgloveServer
+from omninav.stages.plots.small_panorama import SmallPanorama
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.command import Command
 from omninav.stages.values.floor_plan import FloorPlan
@@ -26,7 +27,7 @@ from omninav.stages.values.visual_distance import VisualDistances
 
 HERE = Path(__file__).parent
 PLAN = FloorPlan(np.array([[[2.0, 2.0], [4.0, 2.0], [4.0, 3.0], [2.0, 3.0]]]), 6.0, 4.0)
-PANORAMA = Panorama(np.full((90, 720, 3), 90, np.uint8))
+PANORAMA = SmallPanorama().step(Context("small"), Panorama(np.full((90, 720, 3), 90, np.uint8))).panorama
 VECTOR = HomingVector(0, 0.5, 0.1, 1.0, 1.0, 1.0, 1.5, 30, "tracking")
 needs_node = pytest.mark.skipif(
     shutil.which("node") is None or not (HERE / "node_modules").is_dir(),

@@ -1,0 +1,28 @@
+"""Makes panoramas small enough to be kept of every frame."""
+
+from typing import Annotated
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.values.image import Panorama, Windows
+
+from .panorama_snapshot import EncodedPanorama, small_jpeg
+
+
+class SmallPanorama(Stage):
+    """Encodes the panorama or the windows of every frame as a small JPEG (quality 70).
+
+    It is a stage of its own so that it can be cached with the log's other features: whoever needs the panorama itself
+    makes every run read and unwarp all images again.
+    """
+
+    columns: Annotated[int, Bounds(ge=1, le=8192)] = 360
+    """Largest width (px); some 10 kB an image at 360."""
+
+    class Out(Outputs):
+        """`panorama`: encoded."""
+
+        panorama: EncodedPanorama
+
+    def step(self, ctx: Context, panorama: Panorama | Windows) -> Out:
+        """One frame."""
+        return self.Out(panorama=EncodedPanorama(*small_jpeg(panorama, self.columns, 70)))
