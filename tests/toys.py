@@ -187,6 +187,13 @@ class Look(Stage):
         return self.Out(number=Number(float(len(ledger.entries))))
 
 
+class Say(Stage):
+    """Takes a word."""
+
+    def step(self, ctx: Context, word: Word) -> None:
+        ctx.fact("said", word.text)
+
+
 class Spell(Stage):
     """A number as a word."""
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import networkx as nx
@@ -150,6 +151,7 @@ class _Builder:
         port = node.signature.inputs.get(port_name)
         if port is None:
             hint = suggest(port_name, node.signature.inputs, "input ports", prefix=f"wires.{node.name}.")
+            hint += f"; to take the wire out, type '~{where}'" if not self.prefix else ""
             self._problem(where, f"{type(node.stage).__name__} has no input port '{port_name}'", hint)
             return
         options = {"from": spec} if isinstance(spec, str) else spec
@@ -221,21 +223,38 @@ class _Builder:
         outputs = self.nodes[node].signature.outputs
         if port not in outputs:
             hint = suggest(port, outputs, f"outputs of {node}", prefix=f"{node}.")
+            hint += f"; type '~{where}' if it can do without" if wanted.optional and not self.prefix else ""
             self._problem(
-                where, f"node '{node}' ({type(self.nodes[node].stage).__name__}) has no output '{port}'", hint
+                where,
+                f"node '{node}' ({type(self.nodes[node].stage).__name__}) has no output '{port}'",
+                f"{hint}; {self._producers(wanted)}",
             )
             return None
         return outputs[port]
 
     def _producers(self, wanted: Port) -> str:
-        """Which outputs of the graph would fit a port: what to type instead of a wrong name."""
-        found = [f"{ARTIFACTS}.{name}" for name, kind in self.artifacts.items() if compatible(kind, wanted.type)]
-        for node in self.nodes.values():
-            found += [
-                f"{node.name}.{p.name}" for p in node.signature.outputs.values() if compatible(p.type, wanted.type)
-            ]
-        kind = type_name(wanted.type)
-        return f"outputs of type {kind}: {', '.join(sorted(found))}" if found else f"no output here is of type {kind}"
+        """Which outputs of the graph would fit a port, else which stages: what to type instead of a wrong name."""
+        found, kind = self._fitting(wanted), type_name(wanted.type)
+        if found:
+            return f"outputs of type {kind}: {', '.join(found)}"
+        stages = ", ".join(stages_that_give(wanted.type))
+        return f"no output here is of type {kind}" + (f"; stages that give it: {stages}" if stages else "")
+
+    def _fitting(self, wanted: Port) -> list[str]:
+        """The outputs and artifacts of the graph that fit a port."""
+        kinds = {f"{ARTIFACTS}.{name}": kind for name, kind in self.artifacts.items() if kind is not Any}
+        kinds |= {f"{n.name}.{p.name}": p.type for n in self.nodes.values() for p in n.signature.outputs.values()}
+        return sorted(origin for origin, kind in kinds.items() if compatible(kind, wanted.type))
+
+    def _to_wire(self, where: str, port: Port) -> str:
+        """What to type for a port that nothing is wired to."""
+        own = f"{where.split('.')[1]}."
+        fitting = [] if port.collects or self.prefix else self._fitting(port)
+        found = [origin for origin in fitting if not origin.startswith(own)]
+        if not found:
+            return self._producers(port)
+        more = f" (or {', '.join(found[1:])})" if len(found) > 1 else ""
+        return f"type +{where}={found[0]}{more}"
 
     def _check_types(self, where: str, origin: str, given: Port, node: Node, port: Port) -> None:
         if not compatible(given.type, port.type):
@@ -258,7 +277,7 @@ class _Builder:
                     where = f"wires.{node.name}.{port.name}"
                     wanted = f"{type_name(port.type)} on '{port.name}'"
                     what = f"{type(node.stage).__name__} needs {wanted}, and nothing is wired to it"
-                    self._problem(where, what, self._producers(port))
+                    self._problem(where, what, self._to_wire(where, port))
         sources = [node.name for node in self.nodes.values() if node.signature.is_source]
         if len(sources) > 1:
             self._problem(
@@ -368,6 +387,17 @@ def _cycle(order: "nx.DiGraph[str]") -> list[str] | None:
         return [edge[0] for edge in nx.find_cycle(order)]
     except nx.NetworkXNoCycle:
         return None
+
+
+def stages_that_give(kind: Any) -> list[str]:
+    """The stages, by their names, of which an output fits a port of this type."""
+    found = set()
+    for entry in entries():
+        with suppress(UnknownStage, BadStage):
+            given = [] if entry.problem else signature(resolve(entry.target)).outputs.values()
+            if any(compatible(port.type, kind) for port in given):
+                found.add(entry.name)
+    return sorted(found)
 
 
 def _unset(name: str, target: str, cls: type[Stage], read: Signature) -> Node:

@@ -11,6 +11,7 @@ import typing
 from collections.abc import Sequence
 from typing import Annotated, Any, Union, get_args, get_origin
 
+from .problems import cut
 from .stage import Outputs, Source, Stage, State, Truth
 
 
@@ -85,7 +86,8 @@ _SIGNATURES: dict[type[Stage], Signature] = {}
 def signature(cls: type[Stage]) -> Signature:
     """Ports, parameters and state of a stage class.
 
-    Raises `BadStage` where the class has no `step`, an argument without a type, or no readable `Out`.
+    Raises `BadStage` where the class has no `step` that begins with `ctx`, an argument or a parameter without a type,
+    a default that its own type refuses, or no readable `Out`.
     """
     if cls not in _SIGNATURES:
         _SIGNATURES[cls] = _read_signature(cls)
@@ -100,9 +102,12 @@ def _read_signature(cls: type[Stage]) -> Signature:
     hints = _hints(step, cls)
     inputs: dict[str, Port] = {}
     state: tuple[str, type[State]] | None = None
-    for name, argument in list(inspect.signature(step).parameters.items())[1:]:
-        if name == "ctx":
-            continue
+    arguments = list(inspect.signature(step).parameters.items())[1:]
+    if not arguments or arguments[0][0] != "ctx":
+        found = f"'{arguments[0][0]}'" if arguments else "missing"
+        raise BadStage(f"{where}.step: its first argument is {found}; write `def step(self, ctx: Context, …)`")
+    _refuse_untyped(cls, where)
+    for name, argument in arguments[1:]:
         if name not in hints:
             raise BadStage(f"{where}.step: argument '{name}' has no type; write `{name}: SomeValue`")
         annotation, optional = split_optional(hints[name])
@@ -119,16 +124,44 @@ def _read_signature(cls: type[Stage]) -> Signature:
     return Signature(
         inputs=inputs,
         outputs=_read_outputs(cls, hints.get("return"), where),
-        parameters=read_parameters(cls),
+        parameters=_sound_parameters(cls, where),
         state=state,
         summary=first_line(cls),
         is_source=issubclass(cls, Source),
     )
 
 
+def _refuse_untyped(cls: type[Stage], where: str) -> None:
+    """Raise `BadStage` for a plain value in the body of a stage class: without a type it sets no parameter."""
+    fields = {field.name for field in dataclasses.fields(cls)}  # type: ignore[arg-type]  # Stage makes it a dataclass
+    constants = {name for base in cls.__mro__ for name in inspect.get_annotations(base)} - fields
+    for base in cls.__mro__[: cls.__mro__.index(Stage)]:
+        for name in vars(base).keys() - inspect.get_annotations(base).keys() - constants:
+            value = vars(base)[name]
+            plain = isinstance(value, int | float | str | tuple | list | dict | None)
+            if plain and not name.startswith("_") and not name.isupper():
+                typed = f"{name}: {type(value).__name__} = {cut(value)}"
+                raise BadStage(f"{where}: '{name}' has no type, and so sets no parameter; write `{typed}`")
+
+
+def _sound_parameters(cls: type[Stage], where: str) -> dict[str, Parameter]:
+    """The parameters of a stage. Raises `BadStage` for a default that its type or bounds refuse."""
+    from .ports import convert  # which reads parameters itself
+
+    parameters = read_parameters(cls)
+    for name, parameter in parameters.items():
+        if parameter.default is not dataclasses.MISSING:
+            problems = convert(parameter.default, parameter.type, name)[1]
+            if problems:
+                raise BadStage(f"{where}: the default of '{name}': {problems[0].what}; write another")
+    return parameters
+
+
 def _read_outputs(cls: type[Stage], returned: Any, where: str) -> dict[str, Port]:
     returned, _ = split_optional(returned)
     if returned is None or returned is type(None):
+        if inspect.isclass(getattr(cls, "Out", None)):
+            raise BadStage(f"{where}.step does not say that it gives its Out; write `-> Out`")
         return {}
     if not (inspect.isclass(returned) and issubclass(returned, Outputs)):
         raise BadStage(f"{where}.step returns {returned!r}; write a nested `class Out(Outputs)` and `-> Out`")

@@ -111,7 +111,7 @@ def test_wrong_types_on_a_wire_show_both_sides_and_what_would_fit():
 
 def test_a_missing_input_names_what_would_fit():
     problem = only({"c": "Constant", "s": "Scale"})
-    assert (problem.where, problem.hint) == ("wires.s.number", "outputs of type Number: c.number, s.number")
+    assert (problem.where, problem.hint) == ("wires.s.number", "type +wires.s.number=c.number")
 
 
 def test_an_unknown_node_on_a_wire_names_the_nearest_one():
@@ -298,3 +298,19 @@ def test_a_node_can_be_taken_out():
     assert list(
         build(config({"c": "Constant"}) | {"nodes": {"c": {"_target_": "toys.Constant"}, "d": None}}).nodes
     ) == ["c"]
+
+
+def test_what_a_swap_leaves_over_says_what_to_type():
+    nodes, wires = (
+        {"c": "Constant", "s": "Spell", "all": "Collected"},
+        {"s": {"number": "c.number", "gain": "c.number"}},
+    )
+    left_over, missing = problems({**nodes, "sum": "Add"}, {**wires, "sum": {"number": "c.word"}})[:2]
+    assert left_over.hint.endswith("to take the wire out, type '~wires.s.gain'")
+    assert missing.hint.endswith("outputs of c: number; outputs of type Number: c.number, sum.number")
+
+
+def test_where_no_output_fits_the_stages_that_give_one_are_named(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("OMNINAV_STAGES", "words.spell=toys:Spell")
+    (problem,) = problems({"say": "Say", "c": "Constant"})
+    assert problem.hint == "no output here is of type Word; stages that give it: words.spell"

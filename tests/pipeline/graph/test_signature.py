@@ -68,9 +68,53 @@ class Nameless(Stage):
         """Nothing."""
 
 
+class WithoutContext(Stage):
+    """Forgets the context."""
+
+    def step(self, number: toys.Number) -> None:
+        """Nothing."""
+
+
+class UntypedParameter(Stage):
+    """Has a parameter that is none."""
+
+    gain = 3
+
+    def step(self, ctx: Context) -> None:
+        """Nothing."""
+
+
+class OtherDefault(Widened):
+    """Means to change a default."""
+
+    offset = 2.0
+
+
+class OutOfBounds(Stage):
+    """Breaks its own bounds."""
+
+    gain: Annotated[float, Bounds(gt=0)] = -1.0
+    """Of something."""
+
+    def step(self, ctx: Context) -> None:
+        """Nothing."""
+
+
+class Silent(toys.Constant):
+    """Does not say what it gives."""
+
+    def step(self, ctx: Context):
+        """Nothing."""
+
+
 @pytest.mark.parametrize(
     ("cls", "message"),
     [
+        (WithoutContext, "step: its first argument is 'number'; write `def step\\(self, ctx: Context, …\\)`"),
+        (UntypedParameter, "'gain' has no type, and so sets no parameter; write `gain: int = 3`"),
+        (OtherDefault, "'offset' has no type, and so sets no parameter; write `offset: float = 2.0`"),
+        (OutOfBounds, "the default of 'gain': -1.0 is out of bounds, expected float > 0; write another"),
+        (Silent, "step does not say that it gives its Out; write `-> Out`"),
         (NoStep, "has no step method; write `def step"),
         (Untyped, "argument 'number' has no type; write `number: SomeValue`"),
         (Bare, "write a nested `class Out\\(Outputs\\)`"),
