@@ -1,4 +1,4 @@
-"""`omninav simulate`: what the variant `simulate` computes, written as a log."""
+"""`omninav simulate`: what the variant `simulate` computes, written as a log, or sent while it is computed."""
 
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.engine.engine import Engine, EngineOptions
@@ -7,10 +7,11 @@ from omninav.pipeline.run.plan import plan
 
 
 def command(arguments: list[str]) -> int:
-    """Run the variant; it leaves no run folder."""
+    """Run the variant `simulate`, or with `live=…` the variant `simulate_live`; neither leaves a run folder."""
+    live = any(word.startswith("live=") for word in arguments)
     with Progress() as progress:
         progress.say("reading the configuration")
-        with composed(["variant=simulate", *arguments]) as config:
+        with composed([f"variant=simulate{'_live' if live else ''}", *arguments]) as config:
             planned = plan(complete(config))  # of no artifacts
 
         def on_tick(done: int, total: int | None) -> None:

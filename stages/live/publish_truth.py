@@ -1,0 +1,39 @@
+"""What only a simulator knows, as ROS 2 messages."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline.mcap.message_types import encode_message
+from omninav.stages.recordings.pose_messages import header, ros_pose
+from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.pose import Pose
+
+from .transport import TransportName, connect
+
+
+class PublishTruth(Stage):
+    """Publishes the true pose on `/ground_truth/pose` and the number of collisions so far on `/collisions` (UInt32)."""
+
+    transport: Literal["ros2", "rclpy", "dds"] = "ros2"
+    """As of the driver."""
+    domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
+    """The ROS domain; null: `ROS_DOMAIN_ID`, else 0."""
+
+    class Out(Outputs):
+        """Nothing: it is sent."""
+
+    def setup(self, ctx: Context) -> None:
+        """Join the domain."""
+        names: dict[str, TransportName] = {"ros2": "rclpy", "rclpy": "rclpy", "dds": "dds"}
+        self._transport = connect(names[self.transport], self.domain)
+
+    def step(self, ctx: Context, tick: Tick, truth: Pose, tally: DriveTally) -> Out:
+        """One tick; it has the stamp that the driver gave it."""
+        fields = {"header": header(tick.stamp), "pose": ros_pose(np.array([truth.x, truth.y, truth.heading]))}
+        pose = "geometry_msgs/msg/PoseStamped"
+        self._transport.publish("/ground_truth/pose", pose, encode_message(pose, fields))
+        number = encode_message("std_msgs/msg/UInt32", {"data": tally.collisions})
+        self._transport.publish("/collisions", "std_msgs/msg/UInt32", number)
+        return self.Out()
