@@ -76,8 +76,8 @@ class RobotDriver(Stage):
     """`ros2` (or `rclpy`): a sourced ROS 2, or omninav[ros2]. `dds`: without ROS, omninav[live]."""
     domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
     """The ROS domain; null: `ROS_DOMAIN_ID`, else 0."""
-    pace: Literal["real", "fast"] = "real"
-    """`real`: a second takes a second, where the computer is fast enough. `fast`: ticks follow at once."""
+    real_time: bool = True
+    """A second takes a second, where the computer is fast enough; else ticks follow each other at once."""
     command_topic: str = "/cmd_vel"
     """Where commands come from."""
     command_s: Annotated[float, Bounds(gt=0)] = 0.5
@@ -157,7 +157,7 @@ class RobotDriver(Stage):
                 self._transport.subscribe(self.command_topic, offered)
                 self._subscribed = offered
         while True:
-            left = self._started + seconds - time.monotonic() if self.pace == "real" else 0.0
+            left = self._started + seconds - time.monotonic() if self.real_time else 0.0
             arrival = self._transport.take(max(0.0, left))
             if arrival is not None:
                 message = standard_types().deserialize_cdr(arrival.data, arrival.msgtype)
@@ -226,7 +226,7 @@ class RobotDriver(Stage):
         """Every few seconds, say how fast time passes and whether anybody commands."""
         now, (before, then) = time.monotonic(), self._noted
         if now - then > NOTE_S:
-            pace = f", {(seconds - before) / (now - then):.2f} times real time" if then else ""
+            speed = f", {(seconds - before) / (now - then):.2f} times real time" if then else ""
             obeys = f"obeys {self.command_topic}" if self._subscribed else f"nobody publishes {self.command_topic}"
-            ctx.doing(f"{seconds:.0f} s{pace}; {obeys}")
+            ctx.doing(f"{seconds:.0f} s{speed}; {obeys}")
             self._noted = seconds, now

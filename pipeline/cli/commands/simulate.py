@@ -17,5 +17,8 @@ def command(arguments: list[str]) -> int:
         def on_tick(done: int, total: int | None) -> None:
             progress.update("simulate", done, total)
 
-        Engine(planned.graph, {}, EngineOptions(planned.seed, on_tick=on_tick, on_doing=progress.say)).run()
+        try:
+            Engine(planned.graph, {}, EngineOptions(planned.seed, on_tick=on_tick, on_doing=progress.say)).run()
+        except KeyboardInterrupt:
+            return 0 if live else 130  # live it runs until it is stopped, and nothing of it is left
     return 0

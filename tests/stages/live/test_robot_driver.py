@@ -63,7 +63,7 @@ class Drive:
     """A driver that is given ticks five times a second, and goes 0.1 m ahead in each."""
 
     def __init__(self, **parameters) -> None:
-        self.stage = RobotDriver(**{"pace": "fast", **parameters})
+        self.stage = RobotDriver(**{"real_time": False, **parameters})
         self.state, self.ctx, self.ticks = RobotDriverState(), Context("driver"), 0
         self.stage.setup(self.ctx)
 
@@ -132,7 +132,7 @@ def test_the_camera_is_described_in_a_file(wire, tmp_path):
 def test_in_real_time_a_tick_takes_its_time(wire):
     import time
 
-    drive = Drive(pace="real")
+    drive = Drive(real_time=True)
     drive.tick()
     drive.tick()
     before = time.monotonic()
@@ -150,7 +150,7 @@ def test_truth_and_collisions_have_the_stamps_of_the_driver(wire):
 
 
 def test_a_node_of_ros_2_hears_the_robot_and_drives_it(other_end: OtherEnd):
-    drive = Drive(transport="dds", pace="real")
+    drive = Drive(transport="dds", real_time=True)
     drive.tick()
     for topic, msgtype in [("/odom", "nav_msgs/msg/Odometry"), ("/scan", "sensor_msgs/msg/LaserScan")]:
         other_end.order("subscribe", topic, type=msgtype)
