@@ -9,6 +9,7 @@ import pytest
 from hydra import compose, initialize_config_module
 from omegaconf import OmegaConf
 
+from omninav.pipeline.cli.commands.simulate import is_live
 from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.cli.main import COMMANDS
 from omninav.pipeline.cli.overrides import jobs_to_try, with_unlisted_parameters
@@ -43,7 +44,9 @@ def test_a_command_on_a_page_composes(line: str, monkeypatch: pytest.MonkeyPatch
         return
     words = [word for word in words if "=" in word and "…" not in word and not word.startswith("hydra")]
     with initialize_config_module("omninav.conf", version_base="1.3"):
-        for job in jobs_to_try(["variant=simulate", *words] if command == "simulate" else words, []):
+        for job in jobs_to_try(
+            [f"variant=simulate{'_live' if is_live(words) else ''}", *words] if command == "simulate" else words, []
+        ):
             composed(job)
 
 

@@ -6,9 +6,14 @@ from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.run.plan import plan
 
 
+def is_live(arguments: list[str]) -> bool:
+    """Whether what is simulated is sent, and not written as a log."""
+    return any(word.startswith("live=") for word in arguments)
+
+
 def command(arguments: list[str]) -> int:
     """Run the variant `simulate`, or with `live=…` the variant `simulate_live`; neither leaves a run folder."""
-    live = any(word.startswith("live=") for word in arguments)
+    live = is_live(arguments)
     with Progress() as progress:
         progress.say("reading the configuration")
         with composed([f"variant=simulate{'_live' if live else ''}", *arguments]) as config:
