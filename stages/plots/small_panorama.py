@@ -15,14 +15,16 @@ class SmallPanorama(Stage):
     makes every run read and unwarp all images again.
     """
 
-    columns: Annotated[int, Bounds(ge=1, le=8192)] = 360
-    """Largest width (px); some 10 kB an image at 360."""
+    columns: Annotated[int, Bounds(ge=0, le=8192)] = 360
+    """Largest width (px); some 10 kB an image at 360; 0: none are kept."""
 
     class Out(Outputs):
         """`panorama`: encoded."""
 
-        panorama: EncodedPanorama
+        panorama: EncodedPanorama | None = None
 
     def step(self, ctx: Context, panorama: Panorama | Windows) -> Out:
         """One frame."""
+        if not self.columns:
+            return self.Out()
         return self.Out(panorama=EncodedPanorama(*small_jpeg(panorama, self.columns, 70)))
