@@ -27,6 +27,8 @@ _HEADER, _REST, _SUM = "header.json", "rest.npy", "sha256:"
 UNPACKED_BYTES, UNPACKED_RATIO = 1 << 26, 64
 """How many bytes a file may unpack to: that many, or that many times its own."""
 _NPY_HEAD, _STEP = 1 << 16, 1 << 20
+_EMPTY_ROWS = 1 << 24
+"""Rows that an array without any bytes may have: whoever goes through them row by row comes to an end."""
 
 
 def write_artifact(path: Path, value: Value, facts: dict[str, Any] | None = None) -> None:
@@ -102,7 +104,7 @@ class _Unfit(Exception):
 
 
 def _header(archive: zipfile.ZipFile) -> dict[str, Any]:
-    header = json.loads(archive.read(_HEADER))
+    header = json.loads(archive.read(_HEADER), parse_float=_finite, parse_constant=_finite)
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         found = header.get("format") if isinstance(header, dict) else None
         raise _Unfit(f"written in format {found!r:.20}, this version reads {FORMAT}")
@@ -110,6 +112,13 @@ def _header(archive: zipfile.ZipFile) -> dict[str, Any]:
         if not isinstance(header.get(key), kind):
             raise _Unfit(f"its header says no {key}")
     return header
+
+
+def _finite(text: str) -> float:
+    """A number of a header. Raises `_Unfit` where it is none that can be reckoned with."""
+    if not math.isfinite(float(text)):
+        raise _Unfit(f"its header holds {text:.20}")
+    return float(text)
 
 
 def _type(header: Mapping[str, Any]) -> type[Value]:
@@ -140,6 +149,8 @@ def _array(archive: zipfile.ZipFile, name: str) -> tuple[npt.NDArray[Any], str]:
     data, count = content[head.tell() : read], math.prod(shape)
     if dtype.hasobject or by_column or min(shape, default=0) < 0 or count * dtype.itemsize != len(data):
         raise _Unfit("an array is not as long as it says")
+    if not data.nbytes and max(shape, default=0) > _EMPTY_ROWS:
+        raise _Unfit(f"an array of nothing has {max(shape)} rows")
     array = np.frombuffer(data, dtype, count).reshape(shape) if count else np.empty(shape, dtype)
     return array, hashlib.sha256(data).hexdigest()
 

@@ -65,9 +65,10 @@ def _png_is_whole(data: bytes) -> bool:
     """Whether every chunk up to the end is there: OpenCV makes room for as many bytes as a chunk says it has."""
     at = 8
     while at + 12 <= len(data):
-        if data[at + 4 : at + 8] == b"IEND":
-            return True
+        kind = data[at + 4 : at + 8]
         at += 12 + int.from_bytes(data[at : at + 4], "big")
+        if kind == b"IEND":
+            return at <= len(data)
     return False
 
 

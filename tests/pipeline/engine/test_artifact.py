@@ -68,6 +68,7 @@ def test_a_value_and_how_it_was_made_come_back(file: Path):
         ({"type": "elsewhere.Map"}, "holds a 'elsewhere.Map', which is no value known here; load the stage"),
         ({"type": "toys.Word"}, "does not fit Word of this version"),
         ({"format": 0}, "written in format 0, this version reads 1; make it again"),
+        ({"facts": {"variant": float("inf")}}, "its header holds Infinity"),
     ],
 )
 def test_a_file_of_another_version_is_refused_in_one_line(file: Path, changes: dict, message: str):
@@ -86,6 +87,10 @@ def test_a_file_of_another_version_is_refused_in_one_line(file: Path, changes: d
         ({"rest.npy": b""}, "no sound artifact"),
         ({"rest.npy": npy("{'descr': '<f8', 'fortran_order': False, 'shape': (4611686018427387904,)}")}, "as long as"),
         ({"rest.npy": npy("{'descr': '|O', 'fortran_order': False, 'shape': (1,)}")}, "as long as it says"),
+        (
+            {"rest.npy": npy("{'descr': '|V0', 'fortran_order': False, 'shape': (1099511627776,)}")},
+            "of nothing has 10995",
+        ),
         ({"surplus.npy": bytes(100_000_000)}, r"it would unpack \d+ bytes to 1000\d+"),
     ],
 )

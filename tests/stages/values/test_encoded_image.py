@@ -51,9 +51,10 @@ def test_a_jpeg_of_very_many_scans_is_not_decoded():
         decode_image(data[:scan] + data[scan:-2] * 100 + b"\xff\xd9")
 
 
-def test_a_png_whose_chunk_says_it_is_larger_than_the_file_is_not_decoded():
+@pytest.mark.parametrize("chunk", [b"IDAT", b"IEND"])
+def test_a_png_whose_chunk_says_it_is_larger_than_the_file_is_not_decoded(chunk: bytes):
     data = bytearray(encoded(".png"))
-    data[data.index(b"IDAT") - 4] = 0x7F
+    data[data.index(chunk) - 4] = 0x7F
     with pytest.raises(Undecodable, match="a PNG without its end"):
         decode_image(bytes(data))
 
