@@ -18,7 +18,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
-from omninav.pipeline.graph.registry import plugins
+from omninav.pipeline.graph.registry import UnknownStage, plugins, resolve
 from omninav.pipeline.graph.stage import Bounds
 from omninav.pipeline.run.artifact_specification import ArtifactSpecification, read_specifications, without_absent
 from omninav.pipeline.run.inputs import not_taken, read_inputs
@@ -134,6 +134,14 @@ def _unfit_settings(plain: Mapping[str, Any]) -> list[Problem]:
     return [Problem(p.where.lstrip("."), p.what, p.hint) for p in convert_fields(settings, RunSettings, "")[1]]
 
 
+def _is_repeatable(node: Any) -> bool:
+    """Whether a node may stand in an artifact's graph too: all but sources that give their ticks once."""
+    try:
+        return bool(getattr(resolve(str(node.get("_target_"))), "repeatable", True))
+    except UnknownStage:  # reported by `build`
+        return True
+
+
 def _graph_of(config: Any, name: str, spec: ArtifactSpecification, variants: Variants) -> dict[str, Any]:
     other = variants(str(spec.variant))
     OmegaConf.set_struct(other, False)
@@ -146,7 +154,7 @@ def _graph_of(config: Any, name: str, spec: ArtifactSpecification, variants: Var
             hint = suggest(key, settings, "settings")
             raise ProblemsFound([Problem(f"artifacts.{name}.set.{key}", "there is no such setting", hint)])
         other[key] = value
-    for node in spec.inherit:
+    for node in filter(lambda node: _is_repeatable(config.nodes[node]), spec.inherit):
         other.nodes[node] = OmegaConf.to_container(config.nodes[node], resolve=False)
     for node, changes in spec.nodes.items():
         other.nodes[node] = OmegaConf.merge(other.nodes.get(node) or {}, changes)

@@ -7,7 +7,19 @@ import sys
 from collections.abc import Sequence
 from importlib.resources import files
 
-COMMANDS = ("check", "graph", "stages", "variants", "simulate", "report", "compare", "resume", "experiments", "doctor")
+COMMANDS = (
+    "check",
+    "graph",
+    "stages",
+    "variants",
+    "simulate",
+    "live",
+    "report",
+    "compare",
+    "resume",
+    "experiments",
+    "doctor",
+)
 """Each is the function `command` of its module in `commands`; everything else runs a variant or an experiment."""
 
 

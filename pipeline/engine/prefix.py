@@ -15,6 +15,7 @@ from typing import Any
 
 from omninav.pipeline.files import digest_text
 from omninav.pipeline.graph.graph import ARTIFACTS, Graph
+from omninav.pipeline.graph.stage import Source
 
 from .cache import Cache, seeded
 from .code_version import graph_digest
@@ -43,13 +44,16 @@ class CachedPrefix:
 
 
 def prefix_nodes(graph: Graph, artifacts: bool = False, without: Collection[str] = ()) -> frozenset[str]:
-    """The names of the prefix's nodes; empty where the source reads outputs of the graph (a closed loop).
+    """The names of the prefix's nodes; empty where the source reads outputs of the graph (a closed loop)
+    or is not repeatable.
 
     With `artifacts`, what follows from the logs and the artifacts: the prefix that runs share which differ in their
     seed only. `without` these nodes (those `following` from draws of random numbers).
     """
     source = graph.source
     if source is None or source.name in without or graph.inputs_of(source.name):
+        return frozenset()
+    if isinstance(source.stage, Source) and not source.stage.repeatable:
         return frozenset()
     prefix = {source.name}
     before = {node.name for node in graph.of_lifetime("before")} - set(without)

@@ -36,6 +36,10 @@ def build(
     return graph
 
 
+WIRE_OPTIONS = ("from", "delay", "initial", "hold", "collect", "optional")
+"""What a wire may say. One that is `optional` is left out where the graph has not both its ends."""
+
+
 class _Builder:
     def __init__(
         self, config: Mapping[str, Any], artifacts: dict[str, Any], prefix: str, shared: frozenset[str]
@@ -149,6 +153,8 @@ class _Builder:
     def _read_wire(self, node: Node, port_name: str, spec: Any) -> None:
         where = f"wires.{node.name}.{port_name}"
         port = node.signature.inputs.get(port_name)
+        if isinstance(spec, Mapping) and spec.get("optional") is True and (port is None or not self._given(spec)):
+            return
         if port is None:
             hint = suggest(port_name, node.signature.inputs, "input ports", prefix=f"wires.{node.name}.")
             hint += f"; to take the wire out, type '~{where}'" if not self.prefix else ""
@@ -160,12 +166,12 @@ class _Builder:
                 where, f"{spec!r} is no wire", "write node.port, or {from: node.port, delay: 1, initial: node.port}"
             )
             return
-        unknown = [key for key in options if key not in ("from", "delay", "initial", "hold", "collect")]
+        unknown = [key for key in options if key not in WIRE_OPTIONS]
         for key in unknown:
             self._problem(
                 f"{where}.{key}",
                 "a wire has no such option",
-                suggest(str(key), ("from", "delay", "initial", "hold", "collect"), "options"),
+                suggest(str(key), WIRE_OPTIONS, "options"),
             )
         delay, initial = options.get("delay", 0), options.get("initial")
         hold, collect = options.get("hold", False), options.get("collect", False)
@@ -199,6 +205,13 @@ class _Builder:
             self._problem(where, "a collect wire has neither delay nor hold")
         source_node, _, source_port = options["from"].partition(".")
         self.wires.append(Wire(node.name, port_name, source_node, source_port, delay, hold, collect, initial))
+
+    def _given(self, options: Mapping[str, Any]) -> bool:
+        """Whether what an optional wire comes from is there; one that is no wire is judged like any other."""
+        node, _, port = str(options.get("from")).partition(".")
+        if node == ARTIFACTS:
+            return port in self.artifacts
+        return node in self.broken or (node in self.nodes and port in self.nodes[node].signature.outputs)
 
     def _output(self, where: str, origin: Any, wanted: Port) -> Port | None:
         if not isinstance(origin, str) or origin.count(".") != 1:
@@ -269,8 +282,8 @@ class _Builder:
             for name, ports in (wires.items() if isinstance(wires, Mapping) else ())
             if isinstance(ports, Mapping)
             for port, spec in ports.items()
-            if spec is not None
-        }
+            if spec is not None and not (isinstance(spec, Mapping) and spec.get("optional") is True)
+        } | {(wire.to_node, wire.to_port) for wire in self.wires}
         for node in self.nodes.values():
             for port in node.signature.inputs.values():
                 if not port.optional and (node.name, port.name) not in attempted:

@@ -193,8 +193,12 @@ class Stage:
 class Source(Stage):
     """A stage that makes ticks. `Out` has a port `tick: Tick`; `step` returns None when there is no more.
 
-    Its position is its `State`. A source may have delayed inputs only (a simulation takes the last command).
+    Its position is its `State`. A source may have delayed inputs only (a simulation takes the last command). One that
+    is not `repeatable` gives other ticks in every run, or waits for them: nothing of it is cached, and no artifact is
+    made from it.
     """
+
+    repeatable: ClassVar[bool] = True
 
     def length(self) -> int | None:
         """Number of ticks to come in all, where it is known (for the progress line). Called after `setup`."""

@@ -8,7 +8,7 @@ from collections import Counter
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import IO, Any
 
 from mcap.writer import CompressionType, Writer
 
@@ -18,36 +18,20 @@ from .message import LogError
 from .message_types import encode_message, standard_types
 
 
-class LogWriter:
-    """Writes one MCAP file of ROS 2 messages; a context manager, the file appears when its block ends well.
+class LogStream:
+    """Writes ROS 2 messages as MCAP to an open file, which is one once `finish` has been called.
 
     The bytes follow from what is written alone: no clock, no machine, no library version. `chunk_bytes`: how much is
-    compressed and checksummed together, and so what a flipped bit costs at most.
+    compressed and checksummed together, and so what a flipped bit costs at most. `path` is what messages name.
     """
 
-    def __init__(self, path: Path | str, chunk_bytes: int = 1 << 20) -> None:
-        self.path, self.chunk_bytes = Path(path), chunk_bytes
-        self._stack = ExitStack()
+    def __init__(self, file: IO[bytes], path: Path | str, chunk_bytes: int = 1 << 20) -> None:
+        self.path = Path(path)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, tuple[int, str]] = {}
         self._written: Counter[str] = Counter()
-
-    def __enter__(self) -> "LogWriter":
-        part = self._stack.enter_context(whole_file(self.path))
-        file = self._stack.enter_context(part.open("wb"))
-        self._writer = Writer(file, self.chunk_bytes, CompressionType.ZSTD, enable_crcs=True, enable_data_crcs=True)
+        self._writer = Writer(file, chunk_bytes, CompressionType.ZSTD, enable_crcs=True, enable_data_crcs=True)
         self._writer.start(profile="ros2", library="omninav")
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if kind is None:
-            self._writer.finish()  # type: ignore[no-untyped-call]
-        self._stack.__exit__(kind, error, trace)
 
     def write(
         self,
@@ -79,6 +63,10 @@ class LogWriter:
         """Append an attachment."""
         self._writer.add_attachment(0, 0, name, media_type, data)
 
+    def finish(self) -> None:
+        """Write what a file ends with."""
+        self._writer.finish()  # type: ignore[no-untyped-call]
+
     def _open_channel(self, topic: str, msgtype: str) -> int:
         store = standard_types()
         if msgtype not in self._schemas:
@@ -92,3 +80,26 @@ class LogWriter:
         )
         self._channels[topic] = (channel, msgtype)
         return channel
+
+
+class LogWriter(LogStream):
+    """Writes one MCAP file of ROS 2 messages; a context manager, the file appears when its block ends well."""
+
+    def __init__(self, path: Path | str, chunk_bytes: int = 1 << 20) -> None:
+        self.path, self.chunk_bytes = Path(path), chunk_bytes
+        self._stack = ExitStack()
+
+    def __enter__(self) -> "LogWriter":
+        part = self._stack.enter_context(whole_file(self.path))
+        super().__init__(self._stack.enter_context(part.open("wb")), self.path, self.chunk_bytes)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if kind is None:
+            self.finish()
+        self._stack.__exit__(kind, error, trace)

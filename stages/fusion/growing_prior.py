@@ -12,6 +12,7 @@ from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.geometry.probability.gaussians import drawn, floored, moments
 from omninav.stages.values.belief import GaussianMixture, Particles
 from omninav.stages.values.pose import Pose, StartPose
+from omninav.stages.values.requests import Restart
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 Array = npt.NDArray[np.float64]
@@ -34,9 +35,11 @@ class GrowingPrior:
     initial_sigma_deg: Annotated[float, Bounds(gt=0)] = 0.5
     """Standard deviation of the heading at which a map is begun; 0.1 rad where there is a map."""
 
-    def known(self, map: ViewMixtures, truth: Pose | None) -> tuple[Array, Array] | None:
+    def known(
+        self, map: ViewMixtures, truth: Pose | None, restart: Restart | None = None
+    ) -> tuple[Array, Array] | None:
         """The pose (3,) and its standard deviations (3,), or None where the belief is uniform over the map."""
-        at = self.at
+        at = self.at if restart is None else restart.at or "uniform"
         if at == "uniform":
             if len(map):
                 return None
@@ -66,11 +69,11 @@ class ParticlesInMap(GrowingPrior, Stage):
 
         belief: Particles | None = None
 
-    def step(self, ctx: Context, map: ViewMixtures, truth: Pose | None) -> Out:
-        """Give the first belief."""
-        if not ctx.tick.first_of_log:
+    def step(self, ctx: Context, map: ViewMixtures, truth: Pose | None, restart: Restart | None = None) -> Out:
+        """Give the first belief, also where somebody asks a running robot to begin anew (`restart`)."""
+        if not ctx.tick.first_of_log and restart is None:
             return self.Out()
-        known = self.known(map, truth)
+        known = self.known(map, truth, restart)
         if known is None:
             poses = drawn(map.means, map.covariances, map.weights, self.number, ctx.rng)
             poses[:, 2] = ctx.rng.uniform(-np.pi, np.pi, self.number)
@@ -92,11 +95,11 @@ class MixtureInMap(GrowingPrior, Stage):
 
         belief: GaussianMixture | None = None
 
-    def step(self, ctx: Context, map: ViewMixtures, truth: Pose | None) -> Out:
-        """Give the first belief."""
-        if not ctx.tick.first_of_log:
+    def step(self, ctx: Context, map: ViewMixtures, truth: Pose | None, restart: Restart | None = None) -> Out:
+        """Give the first belief, also where somebody asks a running robot to begin anew (`restart`)."""
+        if not ctx.tick.first_of_log and restart is None:
             return self.Out()
-        known = self.known(map, truth)
+        known = self.known(map, truth, restart)
         if known is None:
             mean, covariance, _ = moments(map.means, map.covariances, map.weights)
             covariance = floored(

@@ -13,6 +13,7 @@ from omninav.stages.values.grid import FreeSpace
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose, StartPose
+from omninav.stages.values.requests import Restart
 
 
 class ParticlePrior(Stage):
@@ -44,13 +45,15 @@ class ParticlePrior(Stage):
         truth: Pose | None,
         length_scale: LengthScale | None = None,
         area: FreeSpace | None = None,
+        restart: Restart | None = None,
     ) -> Out:
-        """Give the first belief."""
-        if not ctx.tick.first_of_log:
+        """Give the first belief, also where somebody asks a running robot to begin anew (`restart`)."""
+        if not ctx.tick.first_of_log and restart is None:
             return self.Out()
-        if self.at == "uniform" and area is not None:
+        where = self.at if restart is None else restart.at or "uniform"
+        if where == "uniform" and area is not None:
             poses = area.draw(ctx.rng, self.number)
-        elif self.at == "uniform":
+        elif where == "uniform":
             if map is None or not len(map):
                 raise BadInput(
                     "start: `uniform` needs a map with references; use start=origin, start=truth, or give a map"
@@ -58,14 +61,14 @@ class ParticlePrior(Stage):
             unit = self.length_scale_m if length_scale is None else length_scale.metres
             poses = uniform_around(map.poses, self.radius * unit, self.number, ctx.rng)
         else:
-            if self.at == "truth":
+            if where == "truth":
                 if truth is None:
                     raise BadInput("start: this log has no true pose at its first image; use start=uniform")
                 x, y, heading, metres, radians = truth.x, truth.y, truth.heading, 0.1, 0.1
-            elif self.at == "origin":
+            elif where == "origin":
                 x, y, heading, metres, radians = 0.0, 0.0, 0.0, 0.1, 0.1
             else:
-                x, y, heading, metres, radians = self.at
+                x, y, heading, metres, radians = where
             noise = ctx.rng.standard_normal((self.number, 3)) * (metres, metres, radians)
             poses = noise + np.array([x, y, heading])
             poses[:, 2] = wrap(poses[:, 2])

@@ -8,6 +8,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.pose import Pose, StartPose
+from omninav.stages.values.requests import Restart
 from omninav.stages.values.topological_map import TopologicalMap
 
 
@@ -29,20 +30,25 @@ class PlacePrior(Stage):
 
         belief: PlaceBelief | None = None
 
-    def step(self, ctx: Context, tick: Tick, map: TopologicalMap, truth: Pose | None = None) -> Out:
-        """Give the first belief."""
-        if not (tick.first_of_log or (self.restart_after and tick.index % self.restart_after == 0)):
+    def step(
+        self, ctx: Context, tick: Tick, map: TopologicalMap, truth: Pose | None = None, restart: Restart | None = None
+    ) -> Out:
+        """Give the first belief, also where somebody asks a running robot to begin anew (`restart`)."""
+        where = self.at if restart is None else restart.at or "uniform"
+        if not (
+            tick.first_of_log or restart is not None or (self.restart_after and tick.index % self.restart_after == 0)
+        ):
             return self.Out()
         if not len(map):
             raise BadInput("start: the map has no place; make it from a tour with images (tour=...)")
         poses = map.poses[map.places]
-        if self.at == "uniform":
+        if where == "uniform":
             return self.Out(belief=PlaceBelief(np.full(len(map), 1.0 / len(map)), poses))
-        if self.at == "truth" and truth is None:
+        if where == "truth" and truth is None:
             raise BadInput("start: this log has no true pose at its first image; use start=uniform")
-        if self.at == "truth" and truth is not None:
+        if where == "truth" and truth is not None:
             x, y = truth.x, truth.y
         else:
-            x, y = (0.0, 0.0) if isinstance(self.at, str) else self.at[:2]
+            x, y = (0.0, 0.0) if isinstance(where, str) else where[:2]
         closest = int(np.argmin(np.hypot(poses[:, 0] - x, poses[:, 1] - y)))
         return self.Out(belief=PlaceBelief((np.arange(len(map)) == closest).astype(np.float64), poses))

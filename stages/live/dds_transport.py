@@ -94,8 +94,8 @@ class DdsTransport(Transport):
         """Topics that are published now, with their types."""
         found = {}
         for sample in self._offers.read(N=10_000):
-            topic, kind = getattr(sample, "topic_name", ""), getattr(sample, "type_name", "").split("::")
-            if topic.startswith("rt/") and len(kind) == 4:
+            topic, kind = getattr(sample, "topic_name", None), str(getattr(sample, "type_name", "")).split("::")
+            if topic and topic.startswith("rt/") and len(kind) == 4:
                 found[topic[2:]] = f"{kind[0]}/{kind[1]}/{kind[3].removesuffix('_')}"
         return found
 

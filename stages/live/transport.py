@@ -1,14 +1,18 @@
 """What carries ROS 2 messages to and from a robot: bytes in, bytes out, and who is at the other end."""
 
+import atexit
 import importlib
 import os
 import threading
 from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Literal, NamedTuple
 
 from omninav.pipeline.graph.problems import BadInput
+
+from .status import LiveStatus
 
 TransportName = Literal["dds", "rclpy"]
 """`dds`: CycloneDDS, no ROS needed (`pip install 'omninav[live]'`). `rclpy`: a sourced ROS 2, or `omninav[ros2]`."""
@@ -65,7 +69,9 @@ class Transport(ABC):
     """
 
     def __init__(self) -> None:
-        self.inbox = Inbox()
+        self.inbox, self.status = Inbox(), LiveStatus()
+        self.farewells: list[Callable[[], None]] = []
+        """What is still to be sent before the transport is closed."""
 
     @abstractmethod
     def subscribe(self, topic: str, msgtype: str, newest: bool = False) -> None:
@@ -130,7 +136,14 @@ def connect(transport: TransportName, domain: int | None = None) -> Transport:
 def disconnect() -> None:
     """Close all transports of this process."""
     while _OPEN:
-        _OPEN.popitem()[1].close()
+        transport = _OPEN.popitem()[1]
+        for farewell in transport.farewells:
+            with suppress(Exception):  # whatever fails, the next one is sent
+                farewell()
+        transport.close()
+
+
+atexit.register(disconnect)
 
 
 def _domain() -> int:

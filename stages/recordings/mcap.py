@@ -11,7 +11,8 @@ from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.mcap.message import Location, Record
 from omninav.pipeline.mcap.reader import LogReader
 
-from .recording import Format, OpenOptions
+from .live_record import HEADER, LiveRecording
+from .recording import Format, OpenOptions, UnreadableRecording
 from .topic_recording import TopicRecording
 from .topics import record_topics
 
@@ -33,7 +34,7 @@ class Mcap(Format):
         """The files of a folder in the order of its metadata. Raises `UnreadableRecording` or `LogError`."""
         path = user_path(log)
         if not path.is_dir():
-            return record_topics(log, LogReader(path), options, [path])
+            return _one_file(log, path, options)
         parts = sorted(path.glob("*.mcap"))
         listed = _listed(path / "metadata.yaml") or [part.name for part in parts]
         there = [path / file for file in listed if (path / file).is_file()] or parts
@@ -42,6 +43,16 @@ class Mcap(Format):
             if not (path / file).is_file():
                 feed.drop("missing_file", f"{log}: its part {file} does not exist")
         return record_topics(log, feed, options, there)
+
+
+def _one_file(log: str, path: Path, options: OpenOptions) -> TopicRecording:
+    feed = LogReader(path)
+    if HEADER not in feed.topics:
+        return record_topics(log, feed, options, [path])
+    recording = LiveRecording(log, feed, [path])
+    if not len(recording.stamps):
+        raise UnreadableRecording(f"{log}: the live run that it records has made no tick; name another")
+    return recording
 
 
 def _listed(path: Path) -> list[str]:

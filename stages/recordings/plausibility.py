@@ -122,13 +122,17 @@ def seconds_within(gaps: Stamps, stamps: Stamps) -> Array:
     return inside
 
 
-def _resumes(last: int, row: int, stamps: Stamps, poses: Array, limits: MotionLimits) -> bool:
-    """Whether a track that was at pose `last` can be at pose `row`: `_possible` of one pair, many times faster."""
-    seconds = float(stamps[row] - stamps[last]) / 1e9
-    (x, y, heading), (x_then, y_then, heading_then) = poses[row].tolist(), poses[last].tolist()
+def possible_between(before: Array, after: Array, seconds: float, limits: MotionLimits) -> bool:
+    """Whether a robot within `limits` gets from a pose (3,) to another in that time."""
+    (x, y, heading), (x_then, y_then, heading_then) = after.tolist(), before.tolist()
     if not math.hypot(x - x_then, y - y_then) <= limits.speed * max(seconds, MIN_INTERVAL_S):  # nor is NaN
         return False
     return abs(math.remainder(heading - heading_then, 2 * math.pi)) <= limits.turn * max(seconds, MIN_INTERVAL_S)
+
+
+def _resumes(last: int, row: int, stamps: Stamps, poses: Array, limits: MotionLimits) -> bool:
+    """Whether a track that was at pose `last` can be at pose `row`: `_possible` of one pair, many times faster."""
+    return possible_between(poses[last], poses[row], float(stamps[row] - stamps[last]) / 1e9, limits)
 
 
 def _possible(before: Stamps, start: Array, after: Stamps, end: Array, limits: MotionLimits) -> npt.NDArray[np.bool_]:

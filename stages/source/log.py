@@ -13,6 +13,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
 from omninav.pipeline.files import digest_text
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.plausibility import MotionLimits
 from omninav.stages.recordings.recording import Recording, Topics, UnreadableRecording
@@ -20,6 +21,7 @@ from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import BridgedMotion, Motion, Pose
+from omninav.stages.values.requests import GoalPoint, Restart
 from omninav.stages.values.scan import Scan
 
 from .cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames, thinned
@@ -110,6 +112,8 @@ class LogSource(Source):
         motion: Motion | None = None
         truth: Pose | None = None
         scan: Scan | None = None
+        restart: Restart | None = None
+        goal: GoalPoint | None = None
 
     def setup(self, ctx: Context) -> None:
         """Open all logs; what is lost by then is counted."""
@@ -221,6 +225,8 @@ class LogSource(Source):
             motion=motion,
             truth=_pose(truth),
             scan=recording.scan(frame) if ctx.is_read("scan") else None,
+            restart=recording.restart(frame) if isinstance(recording, LiveRecording) else None,
+            goal=recording.goal(frame) if isinstance(recording, LiveRecording) else None,
         )
 
     def _guessed(
@@ -281,6 +287,10 @@ class LogSource(Source):
             unaware = np.empty((0, 3)) if poses is None else as_if_driven(poses, self.cuts)
             pauses = np.diff(recording.stamps[frames]) > self.new_log_after_s * 1e9
             pauses &= ~crossed(self.cuts, frames)
+            if isinstance(
+                recording, LiveRecording
+            ):  # its run went on after pauses, and not where its clock was set back
+                pauses = np.diff(recording.stamps[frames]) <= 0
             for part in np.split(frames, np.flatnonzero(pauses) + 1):
                 self._recordings.append(recording)
                 self._frames.append(part)

@@ -1,0 +1,267 @@
+"""What comes from a robot, put together: the newest image that odometry reaches, and what belongs to it."""
+
+import struct
+import time
+from collections import Counter
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.mcap.message_types import standard_types
+from omninav.stages.camera.model import Camera
+from omninav.stages.recordings.camera_yaml import camera_from_info
+from omninav.stages.recordings.live_record import DriveSoFar, Frame, LiveHeader, Role
+from omninav.stages.recordings.messages import IMAGE_TYPES, SCAN_TYPE, is_blank, pixels_of
+from omninav.stages.recordings.plausibility import EXCURSION_S
+from omninav.stages.values.encoded_image import Undecodable
+from omninav.stages.values.image import Pixels
+
+from .status import LiveStatus
+from .transport import Arrival, Transport
+
+CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+EMPTY = "std_msgs/msg/Empty"
+POSE_STAMPED = "geometry_msgs/msg/PoseStamped"
+POSE_WITH_COVARIANCE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+TYPES: dict[Role, str] = {
+    "odometry": "nav_msgs/msg/Odometry",
+    "truth": POSE_STAMPED,
+    "scan": SCAN_TYPE,
+    "initial_pose": POSE_WITH_COVARIANCE,
+    "goal": POSE_STAMPED,
+    "restart": EMPTY,
+}
+"""What each role's topic carries; an image's type follows from its topic."""
+NOTHING = b"\0\1\0\0\0"
+"""An Empty message in CDR."""
+SILENT_S = 1.0
+"""A topic that has been heard and says nothing for so long is a trouble."""
+
+
+class _Pending(NamedTuple):
+    stamp: int
+    since: float
+    arrival: Arrival
+
+
+class Taken(NamedTuple):
+    """A tick's image with all that belongs to it; `arrivals`: what it consumed, in the order of the record."""
+
+    stamp: int
+    pixels: Pixels
+    frame: Frame
+    arrivals: list[Arrival]
+
+
+@dataclass
+class Intake:
+    """Takes from a transport what a drive is made of, and says what is missing."""
+
+    transport: Transport
+    status: LiveStatus
+    header: LiveHeader
+    drive: DriveSoFar
+    camera: Camera | None
+    camera_info: str | None
+    patience_s: float
+    last_stamp: int | None = None
+    """Stamp (ns) of the last image that was used."""
+
+    def __post_init__(self) -> None:
+        self.counts: Counter[str] = Counter()
+        self.details: dict[str, str] = {}
+        self.unrecorded: list[Arrival] = []
+        self._images: list[_Pending] = []
+        self._earlier: int | None = None
+        self._received: dict[str, float] = {}
+        self._used_any = self.last_stamp is not None
+
+    def subscribe(self) -> None:
+        """Ask for all topics. Of images, only the newest is kept while nobody takes them."""
+        for topic, role in self.header.topics.items():
+            self.transport.subscribe(topic, type_on(topic, role), newest=role == "image")
+        if self.camera is None and self.camera_info is not None:
+            self.transport.subscribe(self.camera_info, CAMERA_INFO, newest=True)
+
+    def serve_restart(self, service: str) -> None:
+        """Where the transport has services, a call is as good as a message on the topic of that name."""
+
+        def answer(_: bytes) -> bytes:
+            self.transport.inbox.put(Arrival(service, EMPTY, time.time_ns(), NOTHING))
+            return NOTHING
+
+        self.transport.serve(service, "std_srvs/srv/Empty", answer)
+
+    def next(self, wait_s: float) -> Taken | None:
+        """The newest image that can be used, of all that has come; None where none can within that time."""
+        until = time.monotonic() + wait_s
+        while True:
+            while (arrival := self.transport.take()) is not None:
+                self._take(arrival)
+            taken = self._newest()
+            left = until - time.monotonic()
+            if taken is not None or left <= 0:
+                return taken
+            arrival = self.transport.take(left)
+            if arrival is not None:
+                self._take(arrival)
+
+    def watch(self) -> None:
+        """Note what is missing, and what is well again."""
+        now = time.monotonic()
+        mismatched = self.transport.mismatched()
+        offered = self.transport.offered()
+        needed = {topic: type_on(topic, role) for topic, role in self.header.topics.items() if self._needs(topic, role)}
+        if self.camera is None and self.camera_info is not None:
+            needed[self.camera_info] = CAMERA_INFO
+        for topic, kind in needed.items():
+            heard = self._received.get(topic)
+            trouble = ""
+            if topic in mismatched:
+                trouble = f"{topic}: its {mismatched[topic]} (QoS) does not fit"
+            elif topic in offered and offered[topic] != kind:
+                trouble = f"{topic} carries {offered[topic]:.80}, not {kind}"
+            elif heard is None:
+                trouble = f"nothing on {topic} yet" + ("" if self.transport.matched(topic) else ", nobody publishes it")
+            elif now - heard > max(SILENT_S, self.patience_s):
+                trouble = f"{topic} has been silent for {now - heard:.0f} s"
+            self.status.note(topic, trouble)
+        self.status.counts = self.dropped()
+
+    def dropped(self) -> Counter[str]:
+        """What was left out so far, by kind."""
+        tracks = (self.drive.odometry, self.drive.truth)
+        found = sum((track.dropped for track in tracks if track is not None), self.counts.copy())
+        images = [topic for topic, role in self.header.topics.items() if role == "image"]
+        found["overtaken_image"] += sum(self.transport.overtaken[topic] for topic in images)
+        return +found
+
+    def _needs(self, topic: str, role: Role) -> bool:
+        """Whether no tick can be made without a topic: of several of images, the one that is heard, else the first."""
+        images = [name for name, each in self.header.topics.items() if each == "image"]
+        heard = [name for name in images if name in self._received]
+        return role == "odometry" or topic == (heard or images)[0]
+
+    def _drop(self, kind: str, detail: str) -> None:
+        self.counts[kind] += 1
+        self.details.setdefault(kind, detail)
+
+    def _take(self, arrival: Arrival) -> None:
+        self._received[arrival.topic] = time.monotonic()
+        role = self.header.topics.get(arrival.topic)
+        if role == "image":
+            stamp = stamp_of(arrival)
+            if stamp is None:
+                self._drop("bad_message", f"{arrival.topic}: a message of {len(arrival.data)} bytes is no image")
+            else:
+                self._images.append(_Pending(stamp, time.monotonic(), arrival))
+            return
+        try:
+            message = standard_types().deserialize_cdr(arrival.data, arrival.msgtype)
+            if role is None:
+                if self.camera is None:
+                    self.camera = camera_from_info(message, str(arrival.topic))
+                return
+            header = getattr(message, "header", None)
+            stamp = arrival.received if header is None else header.stamp.sec * 10**9 + header.stamp.nanosec
+            items = self.drive.add(role, stamp, message, arrival)
+        except BadInput:
+            raise
+        except Exception as error:  # damaged bytes raise whatever the generated decoder stumbles over
+            self._drop("bad_message", f"{arrival.topic}: a message is no sound {arrival.msgtype} ({error!s:.120})")
+            return
+        self.unrecorded += items
+
+    def _newest(self) -> Taken | None:
+        """Of the images that odometry has reached, the newest sound one; older ones are overtaken by it."""
+        if self.camera is None:
+            self._images.clear()
+            return None
+        track, now = self.drive.odometry, time.monotonic()
+        reached = [one for one in self._images if track is None or (track.last is not None and one.stamp <= track.last)]
+        for one in sorted(reached, key=lambda one: one.stamp, reverse=True):
+            if self._awaits_truth(one, now):
+                return None
+            taken = self._use(one, self.camera)
+            self._images.remove(one)
+            if taken is not None:
+                late = [other for other in self._images if other in reached]
+                self.counts["overtaken_image"] += len(late)
+                self._images = [other for other in self._images if other not in late]
+                return taken
+        for one in self._images:
+            if now - one.since > self.patience_s:
+                where = "nothing" if track is None or track.last is None else f"up to {track.last / 1e9:.3f} s"
+                self._drop("outside_odometry", f"image of {one.stamp / 1e9:.3f} s: odometry says {where}")
+        self._images = [one for one in self._images if now - one.since <= self.patience_s]
+        return None
+
+    def _awaits_truth(self, image: _Pending, now: float) -> bool:
+        truth = self.drive.truth
+        if truth is None or now - image.since > self.patience_s / 2:
+            return False
+        topic = next(name for name, role in self.header.topics.items() if role == "truth")
+        speaks = now - self._received.get(topic, -1e9) < self.patience_s
+        return speaks and truth.last is not None and truth.last < image.stamp
+
+    def _use(self, image: _Pending, camera: Camera) -> Taken | None:
+        where = f"{image.arrival.topic}: the image of {image.stamp / 1e9:.3f} s"
+        if not self._follows(image.stamp):
+            self._drop("backward_stamp", f"{where} comes after one of {(self.last_stamp or 0) / 1e9:.3f} s")
+            return None
+        try:
+            message = standard_types().deserialize_cdr(image.arrival.data, image.arrival.msgtype)
+            pixels = pixels_of(message)
+        except Undecodable as error:
+            self._drop("undecodable_image", f"{where}: {error}")
+            return None
+        except Exception as error:  # as above
+            self._drop("bad_message", f"{where} is no sound {image.arrival.msgtype} ({error!s:.120})")
+            return None
+        size = (camera.height_px, camera.width)
+        if pixels.shape[:2] != size:
+            is_not = f"{pixels.shape[1]} x {pixels.shape[0]}, its camera {size[1]} x {size[0]}"
+            if not self._used_any:
+                raise BadInput(f"{image.arrival.topic}: its images are {is_not}; give camera=PATH/camera.yaml")
+            self._drop("wrong_size", f"{where} is {is_not}")
+            return None
+        if is_blank(pixels):
+            self._drop("blank_image", f"{where} is blank")
+            return None
+        made = self.drive.frame(image.stamp)
+        if made is None:
+            self._drop("outside_odometry", f"{where}: odometry begins later")
+            return None
+        frame, scans = made
+        arrivals = [*self.recordable(), *scans, image.arrival]
+        self.last_stamp, self._used_any, self._earlier = image.stamp, True, None
+        return Taken(image.stamp, pixels, frame, arrivals)
+
+    def recordable(self) -> list[Arrival]:
+        """What was consumed since this was last asked."""
+        arrivals, self.unrecorded = self.unrecorded, []
+        return arrivals
+
+    def _follows(self, stamp: int) -> bool:
+        """Whether an image comes after the last one used; or its clock was set back for good."""
+        if self.last_stamp is None or stamp > self.last_stamp:
+            return True
+        if self._earlier is None or stamp < self._earlier:
+            self._earlier = stamp
+        return stamp - self._earlier >= EXCURSION_S * 1e9
+
+
+def type_on(topic: str, role: Role) -> str:
+    """The message type that a topic of that role carries."""
+    if role != "image":
+        return TYPES[role]
+    return IMAGE_TYPES[0 if topic.endswith("compressed") else 1]
+
+
+def stamp_of(arrival: Arrival) -> int | None:
+    """The header stamp (ns) of a message that begins with a header; None where it is too short for one."""
+    data = arrival.data
+    if len(data) < 12:
+        return None
+    seconds, nanoseconds = struct.unpack_from("<iI" if data[1] & 1 else ">iI", data, 4)
+    return int(seconds) * 10**9 + int(nanoseconds)

@@ -1,0 +1,196 @@
+"""What a live run tells the robot and whoever watches, every tick."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline.mcap.message_types import encode_message, standard_types
+from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.recordings.pose_messages import (
+    BASE,
+    MAP,
+    ODOM,
+    Fields,
+    covariance_6x6,
+    header,
+    pose_messages,
+    ros_pose,
+    transform,
+)
+from omninav.stages.values.belief import Belief, GaussianMixture, Particles
+from omninav.stages.values.command import Command
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.ros_messages import RosMessages
+
+from .transport import Transport, TransportError, TransportName, connect
+from .watchdog import Watchdog
+
+Array = npt.NDArray[np.float64]
+POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+POSE_ARRAY = "geometry_msgs/msg/PoseArray"
+TF = "tf2_msgs/msg/TFMessage"
+PARTICLE_CLOUD = "nav2_msgs/msg/ParticleCloud"
+NAV2 = """std_msgs/Header header
+nav2_msgs/Particle[] particles
+===
+MSG: nav2_msgs/Particle
+geometry_msgs/Pose pose
+float64 weight
+"""
+
+
+class Publish(Stage):
+    """Publishes the pose, `map -> odom`, the belief and the command over ROS 2; changes nothing of the run.
+
+    The command is published as it was computed in this tick, zero where there was none, once more zero when the run
+    ends, and by a watchdog thread when no tick has ended within two periods. A topic whose parameter is null is not
+    published; one whose type the transport does not have is left out and said in diagnostics.
+    """
+
+    transport: TransportName = "dds"
+    """As the source's."""
+    domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
+    """As the source's."""
+    pose: str | None = "/estimate/pose"
+    """The estimate (PoseWithCovarianceStamped, latched); `/amcl_pose` takes AMCL's place."""
+    particles: str | None = "/belief"
+    """The belief in few poses."""
+    particles_type: Literal["PoseArray", "ParticleCloud"] = "PoseArray"
+    """What it is published as: geometry_msgs/PoseArray, or nav2_msgs/ParticleCloud with weights."""
+    tf: str | None = "/tf"
+    """Where `map_frame -> odom_frame` is published: the estimate over the odometry."""
+    tf_tolerance_s: Annotated[float, Bounds(ge=0)] = 1.0
+    """How far ahead of the image the transform is dated, so that it holds until the next one: as AMCL's."""
+    map_frame: str = MAP
+    """The map's frame."""
+    odom_frame: str = ODOM
+    """Odometry's frame."""
+    base_frame: str = BASE
+    """The robot's frame, for commands with a header."""
+    command: str | None = "/cmd_vel"
+    """Where the robot takes commands."""
+    command_type: Literal["TwistStamped", "Twist"] = "TwistStamped"
+    """As Nav2 has them since Kilted, or without a header."""
+
+    class Out(Outputs):
+        """Nothing: what is published is the result."""
+
+    def setup(self, ctx: Context) -> None:
+        """Join the domain."""
+        self._transport: Transport = connect(self.transport, self.domain)
+        self._watchdog: Watchdog | None = None
+        self._stamps: list[int] = []
+
+    def step(
+        self,
+        ctx: Context,
+        tick: Tick,
+        belief: Belief | None = None,
+        particles: Particles | GaussianMixture | None = None,
+        odometry: Pose | None = None,
+        command: Command | None = None,
+    ) -> Out:
+        """Publish what there is. `particles`: the belief, thinned. Nothing while a record is made again."""
+        if not self._transport.status.live:
+            return self.Out()
+        if self.command is not None and (command is not None or self._watchdog is not None):
+            self._drive(tick.stamp, command or Command(0.0, 0.0))
+        if belief is not None:
+            self._publish_belief(tick.stamp, belief, odometry)
+        if self.particles is not None and particles is not None:
+            self._publish_particles(self.particles, tick.stamp, particles)
+        self._transport.status.published(tick.stamp)
+        return self.Out()
+
+    def _publish_belief(self, stamp: int, belief: Belief, odometry: Pose | None) -> None:
+        estimate = belief.estimate()
+        self._transport.status.spread_m = float(np.sqrt(max(0.0, np.trace(estimate.covariance[:2, :2]))))
+        at = _row(estimate.pose)
+        if self.pose is not None:
+            pose = {"pose": ros_pose(at), "covariance": covariance_6x6(estimate.covariance)}
+            self._send(self.pose, POSE, {"header": header(stamp, self.map_frame), "pose": pose}, latched=True)
+        if self.tf is not None and odometry is not None:
+            until = stamp + round(self.tf_tolerance_s * 1e9)
+            correction = compose(at, between(_row(odometry), np.zeros(3)))
+            self._send(self.tf, TF, {"transforms": [transform(until, self.map_frame, self.odom_frame, correction)]})
+
+    def _publish_particles(self, topic: str, stamp: int, particles: Particles | GaussianMixture) -> None:
+        poses = pose_messages(particles.poses if isinstance(particles, Particles) else particles.means)
+        if self.particles_type == "PoseArray":
+            self._send(topic, POSE_ARRAY, {"header": header(stamp, self.map_frame), "poses": poses})
+            return
+        types = standard_types()
+        if PARTICLE_CLOUD not in types.fielddefs:  # nav2's messages do not come with ROS
+            from rosbags.typesys import get_types_from_msg
+
+            types.register(get_types_from_msg(NAV2, PARTICLE_CLOUD))
+        particle = types.types["nav2_msgs/msg/Particle"]
+        weighted = [particle(pose, weight) for pose, weight in zip(poses, particles.weights.tolist(), strict=True)]
+        self._send(topic, PARTICLE_CLOUD, {"header": header(stamp, self.map_frame), "particles": weighted})
+
+    def _drive(self, stamp: int, command: Command) -> None:
+        if self._watchdog is None:
+            self._watchdog = Watchdog(self._halt)
+            self._transport.farewells.append(self._halt)
+        self._stamps = [*self._stamps[-10:], stamp]
+        periods = np.diff(self._stamps) / 1e9
+        self._command(stamp, command)
+        if command.speed == 0.0 and command.turning == 0.0:
+            self._watchdog.rest()
+        else:
+            self._watchdog.feed(2 * float(np.median(periods)) if len(periods) else 1.0)
+
+    def _halt(self) -> None:
+        self._command(self._stamps[-1], Command(0.0, 0.0))
+
+    def _command(self, stamp: int, command: Command) -> None:
+        assert self.command is not None
+        twist = {"linear": {"x": float(command.speed)}, "angular": {"z": float(command.turning)}}
+        stamped = {"header": header(stamp, self.base_frame), "twist": twist}
+        fields: Fields = stamped if self.command_type == "TwistStamped" else twist
+        self._send(self.command, f"geometry_msgs/msg/{self.command_type}", fields)
+
+    def _send(self, topic: str, msgtype: str, fields: Fields, latched: bool = False) -> None:
+        send(self._transport, topic, msgtype, encode_message(msgtype, fields), latched)
+
+
+class PublishMessages(Stage):
+    """Publishes what else a run shows of each tick, as its `result.mcap` has it: the path, the map, the route."""
+
+    transport: TransportName = "dds"
+    """As the source's."""
+    domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
+    """As the source's."""
+    topics: tuple[str, ...] = ("/estimate/path", "/map", "/grid", "/plan", "/homing")
+    """Topics of `result.mcap` that are published, under their names there, latched."""
+
+    class Out(Outputs):
+        """Nothing: what is published is the result."""
+
+    def setup(self, ctx: Context) -> None:
+        """Join the domain."""
+        self._transport: Transport = connect(self.transport, self.domain)
+
+    def step(self, ctx: Context, messages: RosMessages) -> Out:
+        """One tick."""
+        if self._transport.status.live:
+            for topic, msgtype, data in zip(messages.topics, messages.types, messages.data, strict=True):
+                if topic in self.topics:
+                    send(self._transport, topic, msgtype, data, latched=True)
+        return self.Out()
+
+
+def send(transport: Transport, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
+    """Publish a message; where that cannot be, note it and leave the topic out from then on."""
+    if topic in transport.status.troubles:
+        return
+    try:
+        transport.publish(topic, msgtype, data, latched)
+    except TransportError as error:
+        transport.status.note(topic, str(error))
+
+
+def _row(pose: Pose) -> Array:
+    return np.array([pose.x, pose.y, pose.heading])

@@ -1,0 +1,57 @@
+"""How a live run fares: what the terminal and `/diagnostics` say."""
+
+import time
+from collections import Counter, deque
+
+import numpy as np
+
+WINDOW = 100
+"""Ticks over which rate and latency are taken."""
+
+
+class LiveStatus:
+    """What stages of a live run have noted; changes no byte of it. `live`: no record is being made again."""
+
+    def __init__(self) -> None:
+        self.troubles: dict[str, str] = {}
+        self.counts: Counter[str] = Counter()
+        self.live = False
+        self.spread_m = float("nan")
+        self._latencies: deque[float] = deque(maxlen=WINDOW)
+        self._ended: deque[float] = deque(maxlen=WINDOW)
+
+    def note(self, what: str, trouble: str) -> None:
+        """Say what is wrong with something, "" once it is well."""
+        if trouble:
+            self.troubles[what] = trouble
+        else:
+            self.troubles.pop(what, None)
+
+    def published(self, stamp: int) -> None:
+        """A tick of an image with that stamp (ns) has led to a pose, now."""
+        self._latencies.append((time.time_ns() - stamp) / 1e6)
+        self._ended.append(time.monotonic())
+
+    @property
+    def latencies_ms(self) -> tuple[float, float] | None:
+        """Image stamp to pose in milliseconds, median and 95th percentile; None before the first."""
+        if not self._latencies:
+            return None
+        median, high = np.percentile(np.array(self._latencies), [50, 95])
+        return float(median), float(high)
+
+    @property
+    def rate_hz(self) -> float:
+        """Ticks a second, lately."""
+        if len(self._ended) < 2:
+            return 0.0
+        return (len(self._ended) - 1) / max(1e-6, self._ended[-1] - self._ended[0])
+
+    def line(self) -> str:
+        """In one line."""
+        words = [f"{self.rate_hz:.1f} Hz"]
+        if self.latencies_ms is not None:
+            words.append(f"{self.latencies_ms[0]:.0f} ms from image to pose")
+        if np.isfinite(self.spread_m):
+            words.append(f"spread {self.spread_m:.2f} m")
+        return ", ".join([*words, *sorted(self.troubles.values())])

@@ -1,0 +1,43 @@
+"""A thread that stops the robot where nobody has commanded it in time."""
+
+import threading
+import time
+from collections.abc import Callable
+
+MIN_TIMEOUT_S = 0.2
+"""Of a fast robot: what a busy computer is late by must not stop it."""
+
+
+class Watchdog:
+    """Calls `stop` where the time since the last `feed` exceeds that given with it, and goes on to until it is fed."""
+
+    def __init__(self, stop: Callable[[], None]) -> None:
+        self._stop = stop
+        self._changed = threading.Condition()
+        self._until: float | None = None
+        self.stopped = 0
+        threading.Thread(target=self._watch, name="watchdog", daemon=True).start()
+
+    def feed(self, timeout_s: float) -> None:
+        """The robot has been commanded; the next command is due within this time."""
+        with self._changed:
+            self._until = time.monotonic() + max(timeout_s, MIN_TIMEOUT_S)
+            self._changed.notify()
+
+    def rest(self) -> None:
+        """The robot stands: there is nothing to watch."""
+        with self._changed:
+            self._until = None
+
+    def _watch(self) -> None:
+        while True:
+            with self._changed:
+                now = time.monotonic()
+                late = self._until is not None and now >= self._until
+                if late:
+                    self._until = now + MIN_TIMEOUT_S
+                    self.stopped += 1
+                else:
+                    self._changed.wait(None if self._until is None else self._until - now)
+            if late:
+                self._stop()

@@ -1,0 +1,203 @@
+"""What a live run consumed, as a recording: an image in it is a tick, made of what lies before it in the file."""
+
+import json
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline.graph.ports import convert_fields
+from omninav.pipeline.mcap.message import BadMessage
+from omninav.stages.camera.model import Camera
+from omninav.stages.values.image import Pixels
+from omninav.stages.values.requests import GoalPoint, Restart
+from omninav.stages.values.scan import Scan
+
+from .camera_yaml import parse_camera
+from .live_track import LiveTrack
+from .messages import pixels_of, pose_of, scan_of
+from .plausibility import MotionLimits
+from .recording import UnreadableRecording
+from .topic_recording import STALE, Feed, TopicRecording
+
+Array = npt.NDArray[np.float64]
+Role = Literal["image", "odometry", "truth", "scan", "initial_pose", "goal", "restart"]
+HEADER, HEADER_TYPE = "/omninav/live", "std_msgs/msg/String"
+"""The topic that makes a file a live record: its one message says what the others are."""
+CAMERA = "camera.yaml"
+SCANS = 64
+"""Range readings that are kept for images that come late."""
+
+
+@dataclass(frozen=True)
+class LiveHeader:
+    """`topics`: name -> role. `limits`: what the robot was believed to be able to do."""
+
+    topics: dict[str, Role]
+    limits: MotionLimits = field(default_factory=MotionLimits)
+
+    def text(self) -> str:
+        """As the message holds it."""
+        return json.dumps(asdict(self), sort_keys=True)
+
+
+def read_header(feed: Feed, name: str) -> LiveHeader:
+    """The header of a live record. Raises `UnreadableRecording` where it cannot be understood."""
+    content = None
+    try:
+        record = next(iter(feed.scan({HEADER})), None)
+        if record is not None:
+            content = json.loads(feed.decode(HEADER, record.data).data)
+    except (BadMessage, ValueError, RecursionError, AttributeError):
+        pass
+    fields, problems = convert_fields(content if isinstance(content, dict) else {}, LiveHeader, "")
+    if problems or not fields.get("topics"):
+        raise UnreadableRecording(f"{name}: its message on {HEADER} is damaged, or of another version of omninav")
+    return LiveHeader(**fields)
+
+
+class Frame(NamedTuple):
+    """All but the image of a tick. `odometry` and `truth` (3,), NaN where `truth` is not known."""
+
+    odometry: Array | None
+    unmeasured_s: float
+    truth: Array | None
+    scan: Scan | None
+    restart: Restart | None
+    goal: GoalPoint | None
+
+
+class DriveSoFar:
+    """What is known of a drive from the messages that have come, in the order in which they came."""
+
+    def __init__(self, header: LiveHeader) -> None:
+        roles = header.topics.values()
+        self.odometry = LiveTrack(header.limits, jumps=False) if "odometry" in roles else None
+        self.truth = LiveTrack(header.limits, jumps=True) if "truth" in roles else None
+        self._scans: deque[tuple[int, Scan, Any]] = deque(maxlen=SCANS)
+        self._restart: Restart | None = None
+        self._goal: GoalPoint | None = None
+
+    def add(self, role: Role, stamp: int, message: Any, item: Any = None) -> list[Any]:
+        """Take a decoded message. Returns the items of messages that are now used: a replay needs them, in that order.
+
+        Raises ValueError or AttributeError where the message cannot be what its role says.
+        """
+        if role == "odometry" and self.odometry is not None:
+            return self.odometry.add(stamp, pose_of(message), item)
+        if role == "truth" and self.truth is not None:
+            return self.truth.add(stamp, pose_of(message), item)
+        if role == "scan":
+            self._scans.append((stamp, scan_of(message), item))
+            return []
+        if role == "goal":
+            x, y, _ = pose_of(message)
+            self._goal = GoalPoint(x, y)
+        elif role == "restart":
+            self._restart = Restart()
+        elif role == "initial_pose":
+            self._restart = Restart(_start_of(message))
+        return [item]
+
+    def frame(self, stamp: int) -> tuple[Frame, list[Any]] | None:
+        """What belongs to an image, and the items of range readings used; None where odometry does not reach it."""
+        odometry = None if self.odometry is None else self.odometry.at(stamp)
+        if self.odometry is not None and odometry is None:
+            return None
+        truth = None if self.truth is None else self.truth.at(stamp)
+        used = max((n for n, one in enumerate(self._scans) if 0 <= stamp - one[0] <= STALE), default=None)
+        scan, item = None, None
+        if used is not None:
+            at, scan, item = self._scans[used]
+            self._scans[used] = (at, scan, None)  # once in the record is enough
+        frame = Frame(
+            odometry=odometry,
+            unmeasured_s=0.0 if self.odometry is None else self.odometry.unmeasured_s(stamp),
+            truth=truth if truth is not None or self.truth is None else np.full(3, np.nan),
+            scan=scan,
+            restart=self._restart,
+            goal=self._goal,
+        )
+        self._restart = self._goal = None
+        return frame, [] if item is None else [item]
+
+
+class LiveRecording(TopicRecording):
+    """The record of a live run. Its frames are the run's ticks: nothing is judged again."""
+
+    def __init__(self, name: str, feed: Feed, files: Sequence[Path]) -> None:
+        header = read_header(feed, name)
+        self._frames: list[Frame] = []
+        stamps: list[int] = []
+        places: list[tuple[str, Any]] = []
+        drive = self.drive = DriveSoFar(header)
+        for record in feed.scan(set(header.topics)):
+            role = header.topics[record.topic]
+            if role == "image":
+                made = drive.frame(record.stamp)
+                if made is None:
+                    feed.drop("outside_odometry", f"{name}: image with stamp {record.stamp} ns has no odometry")
+                    continue
+                self._frames.append(made[0])
+                stamps.append(record.stamp)
+                places.append((record.topic, record.location))
+                continue
+            try:
+                drive.add(role, record.stamp, feed.decode(record.topic, record.data))
+            except (BadMessage, ValueError, AttributeError) as error:
+                feed.drop("bad_message", f"{name}: a message on {record.topic}: {error!s:.160}")
+
+        def read_image(frame: int) -> Pixels:
+            topic, location = places[frame]
+            return pixels_of(feed.decode(topic, feed.fetch(location)))
+
+        frames = self._frames
+        odometry = None if drive.odometry is None else np.array([frame.odometry for frame in frames]).reshape(-1, 3)
+        super().__init__(
+            name=name,
+            camera=_camera(name, feed),
+            stamps=np.array(stamps, dtype=np.int64),
+            odometry=odometry,
+            truth=None if drive.truth is None else np.array([frame.truth for frame in frames]).reshape(-1, 3),
+            unmeasured_s=np.array([frame.unmeasured_s for frame in frames]),
+            feed=feed,
+            read_image=read_image,
+            files=files,
+        )
+
+    def scan(self, frame: int) -> Scan | None:
+        """The range readings that the tick had."""
+        return self._frames[frame].scan
+
+    def restart(self, frame: int) -> Restart | None:
+        """Where the belief was to begin anew at that tick."""
+        return self._frames[frame].restart
+
+    def goal(self, frame: int) -> GoalPoint | None:
+        """Where the robot was asked to go at that tick."""
+        return self._frames[frame].goal
+
+    def frame(self, frame: int) -> Frame:
+        """All but the image of a tick."""
+        return self._frames[frame]
+
+
+def _camera(name: str, feed: Feed) -> Camera:
+    if CAMERA not in feed.attachments:
+        raise UnreadableRecording(f"{name}: its attachment {CAMERA} is missing; give camera=PATH/camera.yaml")
+    return parse_camera(feed.attachments[CAMERA], f"{name}: attachment {CAMERA}")
+
+
+def _start_of(message: Any) -> tuple[float, float, float, float, float]:
+    """x, y, heading and their standard deviations of a PoseWithCovarianceStamped."""
+    x, y, heading = pose_of(message)
+    covariance = np.asarray(message.pose.covariance, dtype=np.float64)
+    variances = np.array([(covariance[0] + covariance[7]) / 2, covariance[35]])
+    if not (np.isfinite(variances).all() and (variances >= 0).all()):
+        raise ValueError("its covariance is none")
+    metres, radians = np.sqrt(variances).tolist()
+    return x, y, heading, metres, radians

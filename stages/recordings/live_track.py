@@ -1,0 +1,146 @@
+"""The poses of one topic as they come: each is believed, left out or doubted until the next ones decide."""
+
+from collections import Counter, deque
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.geometry.plane.se2 import between, compose, interpolate
+
+from .plausibility import EXCURSION_S, MotionLimits, possible_between, seconds_within
+
+Array = npt.NDArray[np.float64]
+KEPT_S = 30.0
+"""How far back a pose can be asked for."""
+MAX_PAUSE_S = 10.0
+"""A message that comes later than this after the last tells of a clock that leapt, until others follow it."""
+
+
+class _Pose(NamedTuple):
+    stamp: int
+    pose: Array
+    item: Any
+
+
+class LiveTrack:
+    """Poses (x, y, heading) at ascending stamps (ns), as far as they have come.
+
+    What no robot can have driven, and what lies before the last stamp or long after it, is doubted: dropped where the
+    track goes on as before, and believed once it has gone on for `EXCURSION_S` by itself. Then odometry is joined to
+    where it was (`jumps` false), or the truth begins anew there; where stamps went back, all before is forgotten.
+    `dropped` counts by kind what was left out. What comes of it depends on what was kept alone: fed with that, another
+    track gives the same.
+    """
+
+    def __init__(self, limits: MotionLimits, jumps: bool) -> None:
+        self.dropped: Counter[str] = Counter()
+        self._limits, self._jumps = limits, jumps
+        self._known: deque[_Pose] = deque()
+        self._doubted: list[_Pose] = []
+        self._gaps: list[tuple[int, int]] = []
+        self._origin: tuple[Array, Array] | None = None
+
+    @property
+    def last(self) -> int | None:
+        """Stamp of the last pose that is believed."""
+        return self._known[-1].stamp if self._known else None
+
+    @property
+    def first(self) -> int | None:
+        """Stamp of the first pose that is still known."""
+        return self._known[0].stamp if self._known else None
+
+    def add(self, stamp: int, pose: Sequence[float], item: Any = None) -> list[Any]:
+        """Take a pose. Returns the items of all poses that are now believed and were not before, in their order."""
+        new = _Pose(stamp, np.array(pose, dtype=np.float64), item)
+        if not np.isfinite(new.pose).all():
+            self.dropped["impossible_pose"] += 1
+            return []
+        if self._known and stamp == self._known[-1].stamp:
+            self.dropped["duplicate_stamp"] += 1
+            return []
+        if not self._known or self._follows(self._known[-1], new, joined=True):
+            self._drop_doubted()
+            self._append(new)
+            return [item]
+        if self._doubted and not self._follows(self._doubted[-1], new, joined=False):
+            self._drop_doubted()
+        self._doubted.append(new)
+        if stamp - self._doubted[0].stamp < EXCURSION_S * 1e9:
+            return []
+        return self._believe_doubted()
+
+    def at(self, stamp: int) -> Array | None:
+        """The pose (3,) at a stamp, interpolated; None where none is known on either side of it."""
+        after = next((k for k in range(len(self._known) - 1, -1, -1) if self._known[k].stamp <= stamp), None)
+        if after is None:
+            return None
+        one = self._known[after]
+        if one.stamp == stamp:
+            return one.pose
+        if after + 1 == len(self._known):
+            return None
+        other = self._known[after + 1]
+        times = np.array([0, other.stamp - one.stamp]) / 1e9
+        pose: Array = interpolate(times, np.stack([one.pose, other.pose]), np.array([stamp - one.stamp]) / 1e9)[0]
+        return pose
+
+    def unmeasured_s(self, stamp: int) -> float:
+        """Seconds up to a stamp about which no measurement is believed."""
+        gaps = np.array(self._gaps, np.int64).reshape(-1, 2)
+        return float(seconds_within(gaps, np.array([stamp], np.int64))[0])
+
+    def _follows(self, before: _Pose, after: _Pose, joined: bool) -> bool:
+        seconds = (after.stamp - before.stamp) / 1e9
+        if not 0 < seconds <= MAX_PAUSE_S:
+            return False
+        pose = self._join(after.pose) if joined else after.pose
+        return possible_between(before.pose, pose, seconds, self._limits)
+
+    def _believe_doubted(self) -> list[Any]:
+        believed, self._doubted = self._doubted, []
+        first, last = believed[0], self._known[-1]
+        if first.stamp < last.stamp:
+            self._known.clear()
+            self._gaps.clear()
+            self._origin = None
+        elif not self._jumps:
+            seconds = (first.stamp - last.stamp) / 1e9
+            if not possible_between(last.pose, self._join(first.pose), seconds, self._limits):
+                self._gaps.append((last.stamp, first.stamp))
+                self._origin = first.pose, compose(last.pose, self._step(first.stamp))
+        for one in believed:
+            self._append(one)
+        return [one.item for one in believed]
+
+    def _step(self, stamp: int) -> Array:
+        """As far as the robot goes until a stamp if it goes on as before, or by one step where that is shorter."""
+        if len(self._known) < 2:
+            return np.zeros(3)
+        one, last = self._known[-2], self._known[-1]
+        step: Array = between(one.pose, last.pose) * min(1.0, (stamp - last.stamp) / (last.stamp - one.stamp))
+        return step
+
+    def _join(self, pose: Array) -> Array:
+        """A measured pose as it would be had the track never jumped."""
+        if self._origin is None:
+            return pose
+        jumped, joined = self._origin
+        whole: Array = compose(joined, between(jumped, pose))
+        return whole
+
+    def _append(self, new: _Pose) -> None:
+        self._known.append(_Pose(new.stamp, self._join(new.pose), None))
+        while new.stamp - self._known[0].stamp > KEPT_S * 1e9 and len(self._known) > 2:
+            self._known.popleft()
+
+    def _drop_doubted(self) -> None:
+        for one in self._doubted:
+            late = bool(self._known) and one.stamp > self._known[-1].stamp
+            kind = "impossible_motion" if late else "backward_stamp"
+            if late and one.stamp - self._known[-1].stamp > MAX_PAUSE_S * 1e9:
+                kind = "lone_stamp"
+            self.dropped[kind] += 1
+        self._doubted.clear()

@@ -1,0 +1,280 @@
+"""The source of a robot that runs now: one tick for the newest image that its odometry reaches."""
+
+import signal
+import threading
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
+from omninav.pipeline.files import user_path
+from omninav.pipeline.mcap.reader import LogReader
+from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.live.diagnostics import publish_diagnostics
+from omninav.stages.live.drive_record import DriveRecord, unfinished
+from omninav.stages.live.intake import Intake
+from omninav.stages.live.transport import TransportName, connect, disconnect
+from omninav.stages.recordings.camera_yaml import read_camera
+from omninav.stages.recordings.live_record import HEADER, DriveSoFar, Frame, LiveHeader, LiveRecording, Role
+from omninav.stages.recordings.plausibility import MotionLimits
+from omninav.stages.recordings.recording import Topics, UnreadableRecording
+from omninav.stages.recordings.topics import IMAGE_TOPICS
+from omninav.stages.values.command import Command
+from omninav.stages.values.image import Image, Pixels
+from omninav.stages.values.planned_route import PlannedRoute
+from omninav.stages.values.pose import BridgedMotion, Motion, Pose
+from omninav.stages.values.requests import GoalPoint, Restart
+from omninav.stages.values.scan import Scan
+
+Array = npt.NDArray[np.float64]
+RECORD = "live.mcap"
+"""The record in the run's folder."""
+WATCH_S = 1.0
+"""How often diagnostics and the terminal say how it goes."""
+
+
+class LiveSourceState(State):
+    """Ticks made, logs begun (a clock that is set back begins one), and of the last tick the stamp (ns), the odometry
+    pose (m, rad) and the seconds of odometry not believed. `first` and `ended`: stamps of the first tick, and of that
+    at which the planned route ended (0: it has not)."""
+
+    ticks: int = 0
+    log: int = 0
+    stamp: int = 0
+    x: float = 0.0
+    y: float = 0.0
+    heading: float = 0.0
+    unmeasured_s: float = 0.0
+    first: int = 0
+    ended: int = 0
+
+
+class LiveSource(Source):
+    """A robot that runs now, over ROS 2: one tick for the newest image whose stamp lies between two odometry messages.
+
+    Images that were overtaken meanwhile are counted and never queued. Whatever a tick was made of is written to
+    `live.mcap` in the run's folder, as it came: the same graph over that file (`log=live.mcap`) gives the same bytes.
+    A run that was killed and is resumed first makes the ticks again that its record holds, then joins the robot.
+
+    It ends with Ctrl-C or SIGTERM, as a log does at its last image. A topic that is missing, silent or of another type,
+    a QoS that does not fit and clocks that jump are said on the terminal and in diagnostics, and waited out. Raises
+    `TransportError` where the transport's library is missing, `BadInput` where the camera cannot be its images'.
+    """
+
+    repeatable: ClassVar[bool] = False
+
+    transport: TransportName = "dds"
+    """`dds` needs no ROS: CycloneDDS. `rclpy` needs a sourced ROS 2, and answers services too."""
+    domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
+    """The ROS domain; null: `ROS_DOMAIN_ID`, else 0."""
+    topics: Topics = Topics()
+    """Which topics are read. An image topic whose name ends with `compressed` carries compressed images."""
+    initial_pose: str | None = "/initialpose"
+    """Where somebody says where the robot is (PoseWithCovarianceStamped): the belief begins anew there."""
+    goal: str | None = "/goal_pose"
+    """Where somebody says where it is to go (PoseStamped)."""
+    restart: str | None = "/reinitialize_global_localization"
+    """Topic (Empty), and service of that name where the transport has services: the belief begins anew, uniform."""
+    camera: str | None = None
+    """A camera.yaml; null: the robot's CameraInfo, which is waited for."""
+    limits: MotionLimits = MotionLimits()
+    """What the robot can do: odometry and truth beyond it are doubted until they have gone on so for a second."""
+    patience_s: Annotated[float, Bounds(gt=0)] = 1.0
+    """How long an image waits for the odometry after it, and how long a topic may be silent."""
+    diagnostics: str | None = "/diagnostics"
+    """Where the state of the run is published every second (DiagnosticArray)."""
+    seconds: Annotated[float, Bounds(gt=0)] | None = None
+    """Ends after this time by the images' stamps; null: only when it is told to."""
+    rest_s: Annotated[float, Bounds(ge=0)] | None = None
+    """Ends this long after the planned route has: the robot has arrived, or given up; null: it waits for a new goal."""
+
+    class Out(Outputs):
+        tick: Tick
+        image: Image
+        camera: Camera
+        odometry: Pose | None = None
+        motion: Motion | None = None
+        truth: Pose | None = None
+        scan: Scan | None = None
+        restart: Restart | None = None
+        goal: GoalPoint | None = None
+
+    def setup(self, ctx: Context) -> None:
+        """Join the domain, so that endpoints match while the rest is made ready; find what was recorded before."""
+        self._camera = None if self.camera is None else read_camera(user_path(self.camera))
+        self._header = LiveHeader(self._roles(ctx.is_read("scan")), self.limits)
+        self._transport = connect(self.transport, self.domain)
+        self._path = None if ctx.folder is None else ctx.folder / RECORD
+        self._before = None if self._path is None else _recorded(self._path)
+        self._intake: Intake | None = None
+        self._record: DriveRecord | None = None
+        self._counted: Counter[str] = Counter()
+        self._stop, self._handlers = threading.Event(), dict[int, Any]()
+        self._watched = 0.0
+
+    def step(
+        self,
+        ctx: Context,
+        position: LiveSourceState,
+        command: Command | None = None,
+        route: PlannedRoute | None = None,
+    ) -> Out | None:
+        """The next tick, once there is one; None when the run is to end. `command` is sent elsewhere."""
+        again = self._again(position)
+        if again is not None:
+            return self._out(position, *again)
+        if self._intake is None:
+            self._intake = self._join(position)
+        while not self._ends(position, route):
+            taken = self._intake.next(0.1)
+            self._watch(ctx, self._intake)
+            if taken is not None:
+                self._write(self._intake, taken.arrivals)
+                assert self._intake.camera is not None
+                return self._out(position, taken.stamp, self._intake.camera, taken.pixels, taken.frame)
+            if len(self._intake.unrecorded) > 256 and self._record is not None:
+                self._write(self._intake, self._intake.recordable())
+        self._leave(ctx, self._intake)
+        return None
+
+    def _again(self, position: LiveSourceState) -> tuple[int, Camera, Pixels, Frame] | None:
+        """The next tick of what was recorded before this process; None where it has all been."""
+        before = self._before
+        if before is None or position.ticks >= len(before.stamps):
+            return None
+        pixels = before.image(position.ticks)
+        if pixels is None:
+            raise UnreadableRecording(f"{before.name}: its image {position.ticks} is damaged; start a new run")
+        return int(before.stamps[position.ticks]), before.camera, pixels, before.frame(position.ticks)
+
+    def _join(self, position: LiveSourceState) -> Intake:
+        """Subscribe, and let signals end the run well."""
+        before, self._before = self._before, None
+        if position.ticks > (0 if before is None else len(before.stamps)):
+            raise UnreadableRecording(f"{self._path}: it holds fewer ticks than the run made; start a new run")
+        intake = Intake(
+            transport=self._transport,
+            status=self._transport.status,
+            header=self._header,
+            drive=DriveSoFar(self._header) if before is None else before.drive,
+            camera=self._camera if before is None else before.camera,
+            camera_info=self.topics.camera_info,
+            patience_s=self.patience_s,
+            last_stamp=position.stamp if position.ticks else None,
+        )
+        intake.subscribe()
+        self._transport.status.live = True
+        if self.restart is not None:
+            intake.serve_restart(self.restart)
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                self._handlers[number] = signal.signal(number, lambda *_: self._told_to_stop())
+        return intake
+
+    def _told_to_stop(self) -> None:
+        self._stop.set()
+        self._give_signals_back()  # who asks twice is not kept waiting
+
+    def _give_signals_back(self) -> None:
+        while self._handlers:
+            signal.signal(*self._handlers.popitem())
+
+    def _ends(self, position: LiveSourceState, route: PlannedRoute | None) -> bool:
+        if self._stop.is_set():
+            return True
+        ended = route is not None and route.state in ("arrived", "gave up")
+        position.ended = (position.ended or position.stamp) if ended else 0
+        if self.rest_s is not None and position.ended and position.stamp - position.ended >= self.rest_s * 1e9:
+            return True
+        return self.seconds is not None and position.stamp - position.first >= self.seconds * 1e9
+
+    def _leave(self, ctx: Context, intake: Intake) -> None:
+        self._count_losses(ctx, intake)
+        self._write(intake, intake.recordable())
+        if self._record is not None:
+            self._record.close()
+        self._give_signals_back()
+        disconnect()
+
+    def _write(self, intake: Intake, arrivals: list[Any]) -> None:
+        if self._path is None or intake.camera is None:
+            return
+        if self._record is None:
+            self._record = DriveRecord(self._path, self._header, intake.camera)
+        self._record.write(arrivals)
+
+    def _watch(self, ctx: Context, intake: Intake) -> None:
+        """Every second, say how it goes."""
+        now = time.monotonic()
+        if now - self._watched < WATCH_S:
+            return
+        self._watched = now
+        intake.watch()
+        self._count_losses(ctx, intake)
+        ctx.doing(self._transport.status.line())
+        if self.diagnostics is not None:
+            publish_diagnostics(self._transport, self.diagnostics)
+
+    def _count_losses(self, ctx: Context, intake: Intake) -> None:
+        """Count in the manifest what was left out since the last time."""
+        counts = intake.dropped()
+        for kind, number in (counts - self._counted).items():
+            ctx.count(kind, number, intake.details.get(kind, ""))
+        self._counted = counts
+
+    def _out(self, position: LiveSourceState, stamp: int, camera: Camera, pixels: Pixels, frame: Frame) -> Out:
+        first = position.ticks == 0 or stamp <= position.stamp
+        position.log += first and position.ticks > 0
+        motion = None
+        if frame.odometry is not None and not first:
+            moved = between(np.array([position.x, position.y, position.heading]), frame.odometry)
+            motion = motion_of(moved, abs(frame.unmeasured_s - position.unmeasured_s))
+        tick = Tick(index=position.ticks, stamp=stamp, log=position.log, frame=position.ticks, first_of_log=first)
+        position.ticks, position.stamp, position.unmeasured_s = position.ticks + 1, stamp, frame.unmeasured_s
+        position.first = position.first or stamp
+        if frame.odometry is not None:
+            position.x, position.y, position.heading = frame.odometry.tolist()
+        return self.Out(
+            tick=tick,
+            image=Image(pixels),
+            camera=camera,
+            odometry=_pose(frame.odometry),
+            motion=motion,
+            truth=_pose(frame.truth),
+            scan=frame.scan,
+            restart=frame.restart,
+            goal=frame.goal,
+        )
+
+    def _roles(self, scan: bool) -> dict[str, Role]:
+        roles: dict[str | None, Role] = dict.fromkeys(
+            [self.topics.image] if self.topics.image else IMAGE_TOPICS, "image"
+        )
+        roles[self.topics.odometry], roles[self.topics.truth] = "odometry", "truth"
+        roles[self.topics.scan if scan else None] = "scan"
+        roles[self.initial_pose], roles[self.goal], roles[self.restart] = "initial_pose", "goal", "restart"
+        return {topic: role for topic, role in roles.items() if topic is not None}
+
+
+def motion_of(increment: Array, unmeasured_s: float = 0.0) -> Motion:
+    """An increment (3,) as a value; a bridged one where some of it was not measured."""
+    x, y, turn = (float(value) for value in increment)
+    return BridgedMotion(x, y, turn, unmeasured_s) if unmeasured_s else Motion(x, y, turn)
+
+
+def _pose(row: Array | None) -> Pose | None:
+    return None if row is None or not np.isfinite(row).all() else Pose(*(float(value) for value in row))
+
+
+def _recorded(path: Path) -> LiveRecording | None:
+    """What an earlier process of this run has recorded; None where there is nothing."""
+    file = unfinished(path)
+    if not file.exists():
+        return None
+    feed = LogReader(file)
+    return LiveRecording(str(file), feed, [file]) if HEADER in feed.topics else None

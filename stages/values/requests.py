@@ -1,0 +1,18 @@
+"""What somebody asks of a robot while it runs."""
+
+from omninav.pipeline import Value
+
+from .pose import StartPose
+
+
+class Restart(Value):
+    """The belief is to begin anew: at a pose (x, y, heading, sigma_xy, sigma_heading; m, rad), or uniform (None)."""
+
+    at: StartPose | None = None
+
+
+class GoalPoint(Value):
+    """Where the robot is to go: a point in the map frame (m)."""
+
+    x: float
+    y: float
