@@ -30,7 +30,7 @@ COLOURS: dict[Colour, str] = {
 """Okabe & Ito's (2008), as they are on white."""
 BEGINNING = '<svg class="chart"'
 """Of every chart, and of no other drawing."""
-LEFT, RIGHT, TOP, BOTTOM, ROW = 58.0, 12.0, 10.0, 50.0, 24.0
+LEFT, RIGHT, TOP, BOTTOM, ROW = 64.0, 12.0, 30.0, 50.0, 24.0
 """Pixels around the axes, and of a row of the legend; wide enough for the larger letters of a narrow page."""
 
 
@@ -138,6 +138,20 @@ class Layer:
             side = f'width="{2 * half:g}" height="{2 * half:g}"'
             self.marks.append(f'<rect x="{x - half:.1f}" y="{y - half:.1f}" {side} style="fill:{ink(colour)}"/>')
 
+    def crosses(self, points: Array, colour: Colour, half: float = 4.0) -> None:
+        """A cross at each point."""
+        arms = "".join(
+            f"M{x - half:.1f} {y - half:.1f}l{2 * half:g} {2 * half:g}m0 {-2 * half:g}l{-2 * half:g} {2 * half:g}"
+            for x, y in self._pixels(points).tolist()
+            if math.isfinite(x + y)
+        )
+        self._path(arms, f"stroke:{ink(colour)};stroke-width:2")
+
+    def text(self, point: Array, words: str) -> None:
+        """Words beside a point."""
+        ((x, y),) = self._pixels(point[None, :2]).tolist()
+        self.marks.append(_text(x + 5, y - 4, words, "start"))
+
     def dart(self, place: Array, colour: Colour, size: float = 9.0) -> None:
         """A dart of so many pixels at x, y that points along an angle (rad, counter-clockwise from x): (3,)."""
         ((x, y),) = self._pixels(place[None, :2]).tolist()
@@ -243,9 +257,7 @@ class Chart:
         out += [_text(at, bottom + 18, f"{n:g}", "middle") for n, at in zip(x.ticks(), x(x.ticks()), strict=True)]
         out += [_text(LEFT - 6, at + 4, f"{n:g}", "end") for n, at in zip(y.ticks(), y(y.ticks()), strict=True)]
         out.append(_text((LEFT + right) / 2, bottom + 40, self.labels[0], "middle"))
-        middle = TOP + self.tall / 2
-        turned = f' transform="rotate(-90 14 {middle:.1f})"'
-        out.append(_text(14, middle, self.labels[1], "middle", turned))
+        out.append(_text(8, TOP - 12, self.labels[1], "start"))
         legend, rows = self._drawn_legend(bottom + BOTTOM)
         out += [*legend, "</g>"]
         return "".join(out), top + bottom + BOTTOM + ROW * rows
@@ -297,8 +309,8 @@ def broken(points: Array, rows: npt.NDArray[np.int64] | Sequence[int]) -> Array:
     return np.concatenate([row for part in parts for row in (part, gap)][:-1]) if parts else points
 
 
-def _text(x: float, y: float, words: str, anchor: str, more: str = "") -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}"{more}>{escape(words)}</text>'
+def _text(x: float, y: float, words: str, anchor: str) -> str:
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(words)}</text>'
 
 
 def _symbol(x: float, y: float, colour: Colour, symbol: Symbol) -> str:

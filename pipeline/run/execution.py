@@ -91,14 +91,15 @@ def _finish(run: Run, engine: Engine, prefix_reason: str) -> Metrics:
     notes, timing = notes_of(engine), stage_times(engine)
     write_metrics(run.folder, metrics)
     write_whole(run.folder / "timing.json", json.dumps(timing, indent=1) + "\n")
+    artifacts = _with_own_notes(run.manifest["artifacts"])
     facts = {
         f"{key} ({name})": value
-        for name, artifact in run.manifest["artifacts"].items()
+        for name, artifact in artifacts.items()
         for key, value in (artifact.get("facts") or {}).items()
     }
     warnings = [
         f"{name}: {sentence!s:.300}"
-        for name, artifact in run.manifest["artifacts"].items()
+        for name, artifact in artifacts.items()
         if isinstance(artifact.get("warnings"), list)  # of a file, which may hold anything
         for sentence in artifact["warnings"]
     ]
@@ -121,6 +122,16 @@ def _finish(run: Run, engine: Engine, prefix_reason: str) -> Metrics:
         sequence.close()
     shutil.rmtree(run.memory, ignore_errors=True)
     return metrics
+
+
+def _with_own_notes(artifacts: dict[str, Any]) -> dict[str, Any]:
+    """The artifacts that state something new: what came together from one graph states the same."""
+    found: dict[str, Any] = {}
+    for name, artifact in artifacts.items():
+        notes = [artifact.get(key) for key in ("variant", "facts", "warnings")]
+        if notes not in ([other.get(key) for key in ("variant", "facts", "warnings")] for other in found.values()):
+            found[name] = artifact
+    return found
 
 
 def _digests(folder: Path) -> dict[str, str]:

@@ -106,6 +106,7 @@ def plan(config: Mapping[str, Any]) -> Plan:
     graph = with_plots(graph, plots, [str(origin).partition(".")[0] for origin in saves.values()])
     read = {origin for wire in graph.wires for origin in (wire.origin, wire.initial)}
     artifacts = [made for made in artifacts if f"{ARTIFACTS}.{made.name}" in read or specs[made.name].required]
+    artifacts.sort(key=lambda made: not specs[made.name].required)  # what comes with another one follows it
     return Plan(config, graph, tuple(artifacts), saves)
 
 

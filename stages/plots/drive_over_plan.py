@@ -5,23 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from omninav.pipeline import Context, Figure, Outputs, Stage
-from omninav.pipeline.report.plot_style import plot
+from omninav.pipeline.report.chart import broken
 from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.topological_map import TopologicalMap
 
-from .drawing import (
-    EDGE,
-    ESTIMATE,
-    MARK,
-    ODOMETRY,
-    REFERENCE,
-    broken_at_jumps,
-    draw_links,
-    fitting_height,
-    plan_axes,
-)
+from .plan_chart import draw_surroundings, jumps, plan_chart
 
 
 class DriveOverPlan(Stage):
@@ -58,6 +48,7 @@ class DriveOverPlan(Stage):
                 f"It touched something {int(drive.collisions.max())} times (orange crosses). "
                 f"Dashed: odometry alone.{_caption_of_map(map, planned)}",
                 content=_draw(path, dead_reckoning, path[contacts], plan, map, planned),
+                media_type="image/svg+xml",
                 order=4,
             )
         )
@@ -89,32 +80,22 @@ def _draw(
     map: TopologicalMap | None,
     planned: Sequence[Array],
 ) -> bytes:
-    from matplotlib.collections import PolyCollection
-
-    extent = (-0.3, plan.width + 0.3, -0.3, plan.depth + 0.3)
-    with plot(8.0, fitting_height(extent, 8.0, 2.6, 8.5)) as drawn:
-        axes = drawn.canvas.add_subplot()
-        axes.add_collection(PolyCollection(list(plan.outlines), facecolors=EDGE, edgecolors=REFERENCE, linewidths=0.6))
-        if map is not None:
-            draw_links(axes, map)
-            spots = map.poses[map.places]
-            axes.plot(*spots[:, :2].T, "o", color=REFERENCE, markersize=4, zorder=2, label=f"places ({len(map)})")
-        for number, route in enumerate(planned):
-            last = number == len(planned) - 1
-            look = (
-                {"linewidth": 6.0, "alpha": 0.45, "label": "planned route"}
-                if last
-                else {"linewidth": 1.5, "alpha": 0.6}
-            )
-            axes.plot(*route.T, color=MARK, solid_capstyle="round", zorder=2.2, **look)
-        if planned:
-            axes.plot(*planned[-1][-1:].T, "*", color=MARK, markersize=15, zorder=6, label="goal")
-        if dead_reckoning is not None:
-            axes.plot(*dead_reckoning[:, :2].T, "--", color=ODOMETRY, linewidth=1.0, label="odometry alone")
-        axes.plot(*broken_at_jumps(path).T, color=ESTIMATE, linewidth=1.6, zorder=4, label="true path")
-        axes.plot(*path[:1, :2].T, "s", color=MARK, markersize=7, zorder=5, label="start")
-        if len(contacts):
-            axes.plot(*contacts[:, :2].T, "x", color=ODOMETRY, markersize=7, markeredgewidth=2, label="contact")
-        plan_axes(axes, extent)
-        drawn.canvas.legend(loc="outside lower center", ncols=7 if map is not None else 4)
-    return drawn.content
+    chart = plan_chart((-0.3, plan.width + 0.3, -0.3, plan.depth + 0.3))
+    for number, route in enumerate(planned):
+        last = number == len(planned) - 1
+        chart.base.line(route, "green", 7.0 if last else 1.8, opacity=0.45)
+    draw_surroundings(chart, map, None, plan)
+    if dead_reckoning is not None:
+        chart.base.line(dead_reckoning, "orange", 1.2, dashed=True)
+        chart.name("odometry alone", "orange", "dashes")
+    chart.base.line(broken(path, jumps(path, 1.0)), "blue", 1.8)
+    chart.name("true path", "blue")
+    chart.base.square(path[0], "green")
+    chart.name("start", "green", "square")
+    if planned:
+        chart.base.ring(planned[-1][-1], "green", 8.0)
+        chart.name("planned route, goal", "green", "ring")
+    if len(contacts):
+        chart.base.crosses(contacts, "orange")
+        chart.name("contact", "orange", "square")
+    return chart.svg()

@@ -38,7 +38,7 @@ class ErrorOverTime(Stage):
                 "first true pose and is not aligned. The scale is logarithmic.",
                 content=_draw(logs),
                 media_type="image/svg+xml",
-                order=20,
+                order=11,
             )
         )
 

@@ -6,15 +6,17 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, Outputs, Stage
-from omninav.pipeline.report.plot_style import plot
+from omninav.pipeline.report.chart import Chart, Colour, stacked
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.drive import known as poses_known
 from omninav.stages.values.topological_map import TopologicalMap
 
-from .drawing import ESTIMATE, MARK, ODOMETRY, PARTICLE, TRUTH
+from .plan_chart import tinted
 
+PINK = (154, 96, 195)
+"""Blue-green-red."""
 COLUMNS = 900
 """Ticks that are told apart in the plot; of longer drives the largest belief in each."""
 
@@ -60,10 +62,11 @@ class PlaceBeliefOverTime(Stage):
             figure=Figure(
                 name="place_belief",
                 title="Belief over places",
-                caption=f"Above: {len(map)} places, numbered as the map has them, as dark as they were believed.{truly}"
+                caption=f"Above: {len(map)} places, by number, as opaque as they were believed.{truly}"
                 f"{right} Below: how probable the most probable place was, and how probable the truly nearest, alone "
                 "and with the places linked to it.",
                 content=_draw(last.seconds, shares, nearest, map),
+                media_type="image/svg+xml",
                 order=28,
             )
         )
@@ -86,40 +89,22 @@ def binned(shares: Array, columns: int) -> Array:
 
 
 def _draw(seconds: Array, shares: Array, nearest: npt.NDArray[np.int64], map: TopologicalMap) -> bytes:
-    from matplotlib.colors import LinearSegmentedColormap, PowerNorm
-
     step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 1.0
-    height = float(np.clip(0.09 * len(map) + 0.8, 2.2, 5.0))
-    with plot(9.5, height + 2.0) as drawn:
-        upper, lower = drawn.canvas.subplots(2, 1, sharex=True, height_ratios=[height, 1.5])
-        shades = LinearSegmentedColormap.from_list("belief", ["#ffffff", PARTICLE, "#4a1536"])
-        dark = shades.with_extremes(bad="#eceef1")
-        extent = (float(seconds[0]), float(seconds[-1]) + step, -0.5, len(map) - 0.5)
-        image = upper.imshow(
-            binned(shares, COLUMNS).T,
-            extent=extent,
-            origin="lower",
-            aspect="auto",
-            interpolation="nearest",
-            cmap=dark,
-            norm=PowerNorm(0.5, 0.0, 1.0),
-        )
-        known = np.where(nearest >= 0, nearest, np.nan)
-        if np.isfinite(known).any():
-            middle = seconds + step / 2
-            upper.plot(middle, known, "_", color=MARK, markersize=5, markeredgewidth=2, label="truly nearest place")
-            upper.legend(loc="upper right", bbox_to_anchor=(1.0, 1.12))
-        upper.set_ylabel("place")
-        upper.grid(visible=False)
-        drawn.canvas.colorbar(image, ax=upper, label="probability", fraction=0.04, pad=0.01)
-        alone, around = with_neighbours(shares, nearest, map)
-        lower.plot(seconds, shares.max(axis=1), color=ESTIMATE, linewidth=1.2, label="most probable")
-        if np.isfinite(alone).any():
-            lower.plot(seconds, around, color=ODOMETRY, linewidth=1.0, label="truly nearest, with its neighbours")
-            lower.plot(seconds, alone, color=MARK, linewidth=1.2, label="truly nearest")
-        lower.set_ylim(-0.03, 1.05)
-        lower.set_ylabel("probability")
-        lower.set_xlabel("time since the log's first frame (s)")
-        lower.axhline(1 / len(map), color=TRUTH, linewidth=0.6, linestyle=":")
-        drawn.canvas.legend(*lower.get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    return drawn.content
+    time, middle = (float(seconds[0]), float(seconds[-1]) + step), seconds + step / 2
+    upper = Chart(time, (-0.5, len(map) - 0.5), "time (s)", "place", height=(float(np.clip(5 * len(map), 150, 320)), 0))
+    opacity = np.round(255 * np.sqrt(np.nan_to_num(binned(shares, COLUMNS)))).astype(np.uint8)
+    upper.base.raster(tinted(opacity.T[::-1], PINK), (*time, -0.5, len(map) - 0.5))
+    upper.name("belief", "pink", "square")
+    if (nearest >= 0).any():
+        upper.base.dots(np.column_stack([middle, np.where(nearest >= 0, nearest, np.nan)]), "green", 2.0)
+        upper.name("truly nearest place", "green", "dot")
+    lower = Chart(time, (0.0, 1.03), "time (s)", "probability", height=(150, 0))
+    lower.base.level(1 / len(map), "quiet")
+    alone, around = with_neighbours(shares, nearest, map)
+    shown: list[tuple[Array, Colour, str]] = [(shares.max(axis=1), "blue", "most probable")]
+    if np.isfinite(alone).any():
+        shown += [(around, "orange", "truly nearest and neighbours"), (alone, "green", "truly nearest")]
+    for probable, colour, name in shown:
+        lower.base.line(np.column_stack([middle, probable]), colour, 1.5)
+        lower.name(name, colour)
+    return stacked([upper, lower])

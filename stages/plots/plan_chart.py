@@ -31,7 +31,7 @@ def plan_chart(extent: Extent | None, height: tuple[float, float] = (190.0, 520.
 def draw_surroundings(chart: Chart, map: AnyMap | None, grid: OccupancyGrid | None, plan: FloorPlan | None) -> None:
     """What stands on the floor, by the grid or else the plan, and the map's references or places over it."""
     if grid is not None:
-        chart.base.raster(_png(np.where(grid.cells[::-1] == OCCUPIED, 190, 0).astype(np.uint8)), grid_extent(grid))
+        chart.base.raster(tinted(np.where(grid.cells[::-1] == OCCUPIED, 190, 0).astype(np.uint8)), grid_extent(grid))
         chart.name("occupied", "grey", "square")
     elif plan is not None and len(plan.outlines):
         chart.base.raster(*_outlines(plan))
@@ -82,11 +82,11 @@ def _outlines(plan: FloorPlan) -> tuple[bytes, Extent]:
     corners = (plan.outlines - (extent[0], extent[2])) * scale
     for outline in np.round(corners * 16).astype(np.int32):
         cv2.fillPoly(covered, [outline], 110, cv2.LINE_AA, 4)
-    return _png(covered[::-1]), extent
+    return tinted(covered[::-1]), extent
 
 
-def _png(opacity: npt.NDArray[np.uint8]) -> bytes:
-    """One grey, as opaque as (rows, columns) says."""
+def tinted(opacity: npt.NDArray[np.uint8], colour: tuple[int, int, int] = STANDING) -> bytes:
+    """PNG bytes of one colour (blue-green-red), as opaque as (rows, columns) says."""
     pixels = np.empty((*opacity.shape, 4), np.uint8)
-    pixels[:, :, :3], pixels[:, :, 3] = STANDING, opacity
+    pixels[:, :, :3], pixels[:, :, 3] = colour, opacity
     return cv2.imencode(".png", pixels)[1].tobytes()

@@ -56,7 +56,7 @@ class TrajectoryOverMap(Stage):
             caption=f"The {len(logs) - 1} log(s) before the last one, in their order.",
             content=_draw(logs[:-1], map, grid, plan),
             media_type="image/svg+xml",
-            order=11,
+            order=13,
         )
         return self.Out(figure=last, earlier=earlier)
 

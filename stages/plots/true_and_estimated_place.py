@@ -6,33 +6,30 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, Outputs, Stage
-from omninav.pipeline.report.plot_style import plot
+from omninav.pipeline.report.chart import Colour, broken
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.drive import Array, Drive, known
+from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.topological_map import TopologicalMap
 
-from .drawing import (
-    ESTIMATE,
-    MARK,
-    ODOMETRY,
-    TRUTH,
-    broken_at_jumps,
-    draw_map,
-    extent_of,
-    faded,
-    fitting_height,
-    plan_axes,
-)
+from .drawing import extent_of
+from .plan_chart import draw_surroundings, jumps, plan_chart
 
 RIGHT, BESIDE, WRONG = range(3)
+JUDGED: tuple[tuple[int, Colour, str], ...] = (
+    (RIGHT, "green", "nearest"),
+    (BESIDE, "blue", "beside it"),
+    (WRONG, "orange", "another"),
+)
+"""Kinds of believed places, by the truly nearest one."""
 
 
 class TrueAndEstimatedPlace(Stage):
     """Plots the true path over the topological map, each image joined with its most probable place (map frame, m).
 
-    As opaque as it was probable; green where that place's medoid is the truly nearest, blue where it is linked with the
-    nearest, orange elsewhere. Of the last log.
+    Faint where it was believed with less than a half; green where that place's medoid is the truly nearest, blue where
+    it is linked with the nearest, orange elsewhere. Of the last log.
     """
 
     class Out(Outputs):
@@ -46,6 +43,7 @@ class TrueAndEstimatedPlace(Stage):
         drive: Drive,
         beliefs: Sequence[PlaceBelief | None],
         map: TopologicalMap,
+        plan: FloorPlan | None = None,
     ) -> Out:
         """The whole run at once."""
         last = drive.last_log
@@ -66,13 +64,13 @@ class TrueAndEstimatedPlace(Stage):
             figure=Figure(
                 name="believed_places",
                 title="True and estimated place",
-                caption=f"Black: the true path. Grey: {len(map)} places where their medoids were taken, joined along "
-                "the images between them. From each image a line to the place that was believed most, as dark as "
-                f"it was probable: the truly nearest (green, {counted[RIGHT]:.0f} % of the images), one that is "
+                caption=f"From each image of the true path a line to the place that was believed most, faint where "
+                f"by less than a half: the truly nearest (green, {counted[RIGHT]:.0f} % of the images), one that is "
                 f"linked with it (blue, {counted[BESIDE]:.0f} %), another (orange, {counted[WRONG]:.0f} %). Where the "
                 "drive leaves the tour's path no place is near.",
-                content=_draw(path, believed, np.array(shares), kinds, map),
-                order=9,
+                content=_draw(path, believed, np.array(shares), kinds, map, plan),
+                media_type="image/svg+xml",
+                order=12,
             )
         )
 
@@ -84,30 +82,26 @@ def judged(path: Array, believed: npt.NDArray[np.int64], map: TopologicalMap) ->
 
 
 def _draw(
-    path: Array, believed: npt.NDArray[np.int64], shares: Array, kinds: npt.NDArray[np.int64], map: TopologicalMap
+    path: Array,
+    believed: npt.NDArray[np.int64],
+    shares: Array,
+    kinds: npt.NDArray[np.int64],
+    map: TopologicalMap,
+    plan: FloorPlan | None,
 ) -> bytes:
-    from matplotlib.collections import LineCollection
-
     medoids = map.poses[map.places][:, :2]
-    extent = extent_of(map.poses, path, margin=0.05)
-    with plot(8.5, fitting_height(extent, 8.5, 2.6, 8.5)) as drawn:
-        axes = drawn.canvas.add_subplot()
-        draw_map(axes, map)
-        axes.plot(*broken_at_jumps(path, 2.5).T, color=TRUTH, linewidth=1.4, zorder=2, label="true path")
-        axes.plot(*path.T, ".", color=TRUTH, markersize=3, zorder=4)
-        for kind, colour, name in (
-            (RIGHT, MARK, "nearest"),
-            (BESIDE, ESTIMATE, "beside it"),
-            (WRONG, ODOMETRY, "another"),
-        ):
-            mine = kinds == kind
-            lines = np.stack([path[mine], medoids[believed[mine]]], axis=1)
-            colours = faded(colour, np.clip(shares[mine], 0.12, 1.0))
-            axes.add_collection(LineCollection(list(lines), colors=colours, linewidths=1.3, zorder=3))
-            axes.plot([], [], color=colour, linewidth=1.6, label=f"believed: {name} ({int(mine.sum())})")
-        if len(map) <= 80:
-            for place, spot in enumerate(medoids):
-                axes.annotate(str(place), spot, fontsize=6, xytext=(3, 3), textcoords="offset points", zorder=6)
-        plan_axes(axes, extent)
-        drawn.canvas.legend(loc="outside lower center", ncols=5)
-    return drawn.content
+    chart = plan_chart(extent_of(map.poses, path, margin=0.05))
+    draw_surroundings(chart, map, None, plan)
+    chart.base.line(broken(path, jumps(path)), "ink", 1.6)
+    chart.name("true path", "ink")
+    for kind, colour, name in JUDGED:
+        mine = np.flatnonzero(kinds == kind)
+        for faint in (True, False):  # the less probable ones fainter
+            shown = mine[(shares[mine] < 0.5) == faint]
+            lines = np.stack([path[shown], medoids[believed[shown]], np.full((len(shown), 2), np.nan)], axis=1)
+            chart.base.line(lines.reshape(-1, 2), colour, 1.4, opacity=0.35 if faint else 1.0)
+        chart.name(f"believed: {name} ({len(mine)})", colour)
+    if len(map) <= 40:
+        for place, spot in enumerate(medoids):
+            chart.base.text(spot, str(place))
+    return chart.svg()
