@@ -107,7 +107,8 @@ class ResultMessages(Stage):
         estimate: PoseEstimate | None = None,
         belief: Belief | None = None,
         map: AnyMap | None = None,
-        plan: FloorPlan | OccupancyGrid | None = None,
+        plan: FloorPlan | None = None,
+        grid: OccupancyGrid | None = None,
         panorama: EncodedPanorama | None = None,
         similarities: Similarities | Neighbours | VisualDistances | None = None,
         route: PlannedRoute | None = None,
@@ -119,8 +120,9 @@ class ResultMessages(Stage):
         if tick.first_of_log:
             shown.odometry, shown.correction, shown.anchored = np.zeros(3), np.zeros(3), False
             shown.path, shown.stamps, shown.stride, shown.map_size = np.zeros((0, 3)), [], 1, 0
-            if plan is not None:
-                out.add("/grid", "nav_msgs/msg/OccupancyGrid", grid_message(plan, tick.stamp))
+            floor = plan if grid is None else grid
+            if floor is not None:
+                out.add("/grid", "nav_msgs/msg/OccupancyGrid", grid_message(floor, tick.stamp))
         if map is not None and len(map) and len(map) > 1.1 * shown.map_size:
             shown.map_size = len(map)
             out.markers("/map", map_markers(map, tick.stamp)["markers"])
