@@ -38,6 +38,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     os.environ.setdefault("PYTHONSAFEPATH", "1")  # processes of ours do not import what lies in the working directory
     if arguments and arguments[0] in COMMANDS:
         name, arguments = arguments[0], arguments[1:]
+    elif _is_tool(arguments):
+        name = "tool"
     elif arguments and arguments[0].isidentifier():
         return _unknown_command(arguments[0])
     else:
@@ -89,6 +91,13 @@ def _refuse_lost_folder() -> None:
         os.getcwd()
     except OSError:
         raise BadInput("the folder that you are in is gone; change to another: cd FOLDER") from None
+
+
+def _is_tool(arguments: Sequence[str]) -> bool:
+    """Whether the first two words together name a variant."""
+    words = arguments[:2]
+    named = len(words) == 2 and all(word.isidentifier() for word in words)
+    return named and files("omninav.conf").joinpath(f"variant/{'_'.join(words)}.yaml").is_file()
 
 
 def _unknown_command(name: str) -> int:
