@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-demo: $(VENV)/.installed  ## simulate a small world, map it, localise a drive, write a report
+demo: $(VENV)/.demo  ## simulate a small world, map it, localise a drive, write a report
 	$(BIN)/omninav
 
 # Small matrix products are many times slower with several threads on busy cores.
@@ -54,9 +54,13 @@ fuzz: $(VENV)/.installed  ## read hostile inputs of every format on all cores (S
 clean:  ## remove the virtual environment and all build and check caches
 	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
 
-$(VENV)/.installed: pyproject.toml
+$(VENV)/.demo: pyproject.toml
 	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "omninav needs Python 3.11: make PYTHON=python3.11 …"'
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	touch $@
+
+$(VENV)/.installed: $(VENV)/.demo
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	touch $@
 

@@ -14,6 +14,7 @@ from hydra.types import RunMode
 from omegaconf import OmegaConf
 
 from omninav.pipeline.engine.call import StageFailed
+from omninav.pipeline.engine.compile_notice import compile_notice
 from omninav.pipeline.files import locked, write_json
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input
 from omninav.pipeline.run.execution import execute
@@ -97,7 +98,7 @@ def _run(config: Any, sweep: SweepJob | None, folder: Path | None) -> None:
         )
     argv = ["omninav", *(sweep.overrides.split() if sweep else sys.argv[1:])]
     run = start(planned, argv, folder, _hydra_files(config))
-    with Progress() as progress:
+    with Progress() as progress, compile_notice(progress.say):
         metrics = execute(run, planned, progress)
     if sweep is None:
         show(results_table(metrics))

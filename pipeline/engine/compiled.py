@@ -9,6 +9,7 @@ import numpy as np
 from numba.core import caching
 
 from .code_version import module_version, version
+from .compile_notice import compiling
 
 FunctionCache: Any = caching.FunctionCache
 Index: Any = caching.IndexDataCacheFile
@@ -44,12 +45,15 @@ class CompiledCache(FunctionCache):  # type: ignore[misc]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was kept for a signature; None where that is nothing, or damaged."""
+        found = None
         try:
-            return super().load_overload(sig, target_context)
+            found = super().load_overload(sig, target_context)
         except Exception:
             with suppress(OSError):
                 self.flush()
-            return None
+        if found is None:
+            compiling()
+        return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep it; where the disk is full it is compiled again the next time."""

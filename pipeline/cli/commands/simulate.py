@@ -1,6 +1,7 @@
 """`omninav simulate`: what the variant `simulate` computes, written as a log, or sent while it is computed."""
 
 from omninav.pipeline.cli.composition import complete, composed
+from omninav.pipeline.engine.compile_notice import compile_notice
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.run.plan import plan
@@ -14,7 +15,7 @@ def is_live(arguments: list[str]) -> bool:
 def command(arguments: list[str]) -> int:
     """Run the variant `simulate`, or with `live=…` the variant `simulate_live`; neither leaves a run folder."""
     live = is_live(arguments)
-    with Progress() as progress:
+    with Progress() as progress, compile_notice(progress.say):
         progress.say("reading the configuration")
         with composed([f"variant=simulate{'_live' if live else ''}", *arguments]) as config:
             planned = plan(complete(config))  # of no artifacts
