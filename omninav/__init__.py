@@ -1,5 +1,92 @@
-"""omninav: localisation, mapping and navigation with an omnidirectional camera, as typed stages in a dataflow graph."""
+"""omninav: localisation, mapping and navigation with an omnidirectional camera, as typed stages in a dataflow graph.
 
+These names are all that a user needs; whatever else is inside may move. Each is imported when it is first used.
+"""
+
+import importlib
 import os
+from typing import TYPE_CHECKING, Any
 
 os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", "100000000")  # read as OpenCV is loaded: none larger is decoded
+
+if TYPE_CHECKING:
+    from . import testing
+    from .pipeline import (
+        BadInput,
+        Bounds,
+        Context,
+        Figure,
+        Metrics,
+        Outputs,
+        Problem,
+        ProblemsFound,
+        Quantity,
+        Source,
+        Stage,
+        State,
+        Table,
+        Tick,
+        Truth,
+        Value,
+    )
+    from .pipeline.api.configuration import Configuration, check, compose
+    from .pipeline.api.run import Run, open_run, run
+    from .pipeline.api.session import Session, Step, open, resume
+    from .pipeline.engine.artifact import read_artifact as load_map
+    from .pipeline.engine.call import StageFailed
+
+__all__ = [
+    "BadInput",
+    "Bounds",
+    "Configuration",
+    "Context",
+    "Figure",
+    "Metrics",
+    "Outputs",
+    "Problem",
+    "ProblemsFound",
+    "Quantity",
+    "Run",
+    "Session",
+    "Source",
+    "Stage",
+    "StageFailed",
+    "State",
+    "Step",
+    "Table",
+    "Tick",
+    "Truth",
+    "Value",
+    "check",
+    "compose",
+    "load_map",
+    "open",
+    "open_run",
+    "resume",
+    "run",
+    "testing",
+]
+
+_PLACES = {
+    "testing": "testing",
+    "Configuration check compose": "pipeline.api.configuration",
+    "Run open_run run": "pipeline.api.run",
+    "Session Step open resume": "pipeline.api.session",
+    "load_map": "pipeline.engine.artifact",
+    "StageFailed": "pipeline.engine.call",
+}
+"""Where names are defined; the others are the framework's own, for authors of stages."""
+_PLACE_OF = {name: place for names, place in _PLACES.items() for name in names.split()}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module 'omninav' has no attribute '{name}'; it has: {', '.join(__all__)}")
+    module = importlib.import_module(f"omninav.{_PLACE_OF.get(name, 'pipeline')}")
+    thing = module if name == "testing" else getattr(module, "read_artifact" if name == "load_map" else name)
+    globals()[name] = thing
+    return thing
+
+
+def __dir__() -> list[str]:
+    return __all__

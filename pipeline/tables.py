@@ -1,10 +1,12 @@
 """Tables as files: CSV for whoever reads or types, Parquet for programs."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .files import whole_file
+from .graph.problems import BadInput
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -25,3 +27,15 @@ def write_table(path: Path, columns: Mapping[str, "npt.NDArray[Any]"]) -> None:
         csv.write_csv(table, file, csv.WriteOptions(include_header=False))
     with whole_file(path.with_name(f"{path.name}.parquet")) as part:
         parquet.write_table(table, part)
+
+
+def read_table(path: Path, wanted: Callable[[str], bool] = lambda name: True) -> Any:
+    """The wanted columns of a Parquet file: a pandas DataFrame where pandas is installed, else a pyarrow Table."""
+    import pyarrow.parquet as parquet
+
+    try:
+        names = [name for name in parquet.read_schema(path).names if wanted(name)]
+        table = parquet.read_table(path, columns=names)
+    except (OSError, ValueError) as error:
+        raise BadInput(f"{path}: not a table that can be read ({str(error).splitlines()[0]:.120})") from None
+    return table.to_pandas() if find_spec("pandas") is not None else table

@@ -92,10 +92,8 @@ def _run(config: Any, sweep: SweepJob | None, folder: Path | None) -> None:
     if sweep is not None and settings.get("plots") == "auto":
         settings["plots"] = "none"
     planned = plan(settings)
-    if sweep is None and folder is not None and (folder / "manifest.json").exists():
-        raise BadInput(
-            f"{folder}: there is a run in it; `omninav resume` goes on with it, hydra.run.dir=… names another"
-        )
+    if sweep is None and folder is not None:
+        no_run_in(folder)
     argv = ["omninav", *(sweep.overrides.split() if sweep else sys.argv[1:])]
     run = start(planned, argv, folder, _hydra_files(config))
     with Progress() as progress, compile_notice(progress.say):
@@ -105,6 +103,15 @@ def _run(config: Any, sweep: SweepJob | None, folder: Path | None) -> None:
         for sentence in warning_lines(run.manifest):
             print(f"mind: {sentence}", file=sys.stderr, flush=True)
     print(f"report: {shown(run.folder / 'report.html')}", flush=True)
+
+
+def no_run_in(folder: Path) -> Path:
+    """The folder itself. Raises `BadInput` where there is a run in it."""
+    if (folder / "manifest.json").exists():
+        raise BadInput(
+            f"{folder}: there is a run in it; `omninav resume` goes on with it, hydra.run.dir=… names another"
+        )
+    return folder
 
 
 def _hydra_files(config: Any) -> dict[str, str]:

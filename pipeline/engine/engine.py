@@ -192,6 +192,11 @@ class Engine:
             self._run_after(node)
         return {origin: self.last(origin) for origin in self.wanted}
 
+    def close(self) -> None:
+        """Close the files of what is collected; nothing runs any more."""
+        for sequence in self.sequences.values():
+            sequence.close()
+
     def last(self, origin: str) -> Any:
         """The last present value of an output that is wanted or read after the loop; else that of the last tick."""
         return self.values.get(held_key(origin), self.values.get(origin))

@@ -33,7 +33,7 @@ from omninav.pipeline.report.quantities import numbers
 from omninav.pipeline.run.artifacts import Execution, obtain
 from omninav.pipeline.run.plan import ArtifactPlan, Plan, plan
 from omninav.pipeline.run.results import notes_of, results_of
-from omninav.pipeline.run.run_folder import Run
+from omninav.pipeline.run.run_folder import RunFolder
 from omninav.pipeline.run.timing import stage_times
 
 from .job_progress import Heartbeat
@@ -144,7 +144,7 @@ def _repeat(given: Mapping[str, Any], send: Send) -> None:
         raise BadInput("the code has changed while the experiment ran; type the same command again")
     cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
     graph = measured(planned.graph)
-    run = Run(folder)
+    run = RunFolder(folder)
     shutil.rmtree(run.memory, ignore_errors=True)
     execution = Execution(run, BASE_SEED, cache, math.inf, Heartbeat(send))
     artifacts: dict[str, Value] = {}

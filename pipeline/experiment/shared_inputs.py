@@ -18,7 +18,7 @@ from omninav.pipeline.graph.recordable import Recordable
 from omninav.pipeline.graph.stage import Context
 from omninav.pipeline.run.artifacts import Execution, obtain
 from omninav.pipeline.run.plan import Plan, plan
-from omninav.pipeline.run.run_folder import Run
+from omninav.pipeline.run.run_folder import RunFolder
 
 from .conditions import ConditionRun
 from .job_progress import Heartbeat
@@ -204,7 +204,7 @@ def make_artifact(given: Mapping[str, Any], send: Send) -> None:
 def _make_artifact(given: Mapping[str, Any], send: Send) -> None:
     planned = plan(given["config"])
     cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
-    run = Run(Path(given["folder"]))
+    run = RunFolder(Path(given["folder"]))
     execution = Execution(run, BASE_SEED, cache, math.inf, Heartbeat(send))
     run.folder.mkdir(parents=True, exist_ok=True)  # nothing else makes it where the cache has the artifact
     for artifact in planned.artifacts:

@@ -18,7 +18,7 @@ from omninav.pipeline.graph.value import Value
 
 from .plan import ArtifactPlan, digests_of, stages_of
 from .results import notes_of
-from .run_folder import Run
+from .run_folder import RunFolder
 
 
 class ProgressDisplay(Protocol):
@@ -32,7 +32,7 @@ class ProgressDisplay(Protocol):
 class Execution:
     """With what a run's graphs are run."""
 
-    run: Run
+    run: RunFolder
     seed: int
     cache: Cache | None = None
     checkpoint_s: float = 5.0

@@ -17,30 +17,43 @@ from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.engine.engine import Engine
 from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix
-from omninav.pipeline.files import digest_file, open_itself, write_whole
+from omninav.pipeline.files import digest_file, open_itself, whole_file, write_whole
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.value import Value
 
 from .artifacts import Execution, ProgressDisplay, companions, identity, obtain, provenance
-from .metrics_files import MANIFEST, write_metrics
+from .metrics_files import MANIFEST, read_metrics, write_metrics
 from .plan import Plan
 from .results import notes_of, results_of
-from .run_folder import CONFIG, Run
+from .run_folder import CONFIG, RunFolder, recorded_name
 from .timing import stage_times
 
 log = logging.getLogger("omninav")
 LOG = "run.log"
 
 
-def execute(run: Run, planned: Plan, display: ProgressDisplay | None = None) -> Metrics:
+def execute(run: RunFolder, planned: Plan, display: ProgressDisplay | None = None) -> Metrics:
     """Run a planned configuration in its folder, from its start or from where it was left, and return its metrics.
 
     Raises `StageFailed` or `BadInput`; by then the manifest says so and the traceback is in `run.log`.
     """
+    with running(run, planned, display) as engine:
+        while engine.tick():
+            pass
+    return read_metrics(run.folder)
+
+
+@contextmanager
+def running(run: RunFolder, planned: Plan, display: ProgressDisplay | None = None) -> Iterator[Engine]:
+    """The engine of a planned configuration, ready for its next tick; whoever has it calls `tick`.
+
+    When the block ends well, what comes after the loop has run and the folder is complete. When it raises, the manifest
+    says so, and the run can go on from its last checkpoint.
+    """
     with run.owned(), _logged(run):
         try:
-            return _execute(run, planned, display)
+            yield from _running(run, planned, display)
         except KeyboardInterrupt:
             _fail(run, "interrupted", "stopped by the user")
             raise
@@ -52,7 +65,7 @@ def execute(run: Run, planned: Plan, display: ProgressDisplay | None = None) -> 
             raise
 
 
-def _execute(run: Run, planned: Plan, display: ProgressDisplay | None) -> Metrics:
+def _running(run: RunFolder, planned: Plan, display: ProgressDisplay | None) -> Iterator[Engine]:
     config = planned.config
     cache = Cache(Path(str(config["cache"]))) if config.get("cache") else None
     execution = Execution(
@@ -68,10 +81,18 @@ def _execute(run: Run, planned: Plan, display: ProgressDisplay | None) -> Metric
     own = identity(planned.graph, planned.seed, *(facts["sha256"] for facts in made.values()))
     options = execution.options(planned.variant, run.memory, own, run.folder)
     wanted = sorted(set(planned.saves.values()))
-    with cached_prefix(planned.graph, cache, planned.seed, wanted) as prefix:
+    with cached_prefix(planned.graph, cache, planned.seed, {*wanted, *planned.record}) as prefix:
         replay, recorded = (prefix.replay, prefix.recorded()) if prefix is not None else (None, {})
-        engine = Engine(planned.graph, artifacts, options, wanted=wanted, replay=replay, recorded=recorded)
-        last = engine.run()
+        engine = Engine(
+            planned.graph, artifacts, options, wanted=wanted, replay=replay, recorded=recorded, kept=planned.record
+        )
+        try:
+            engine.begin()
+            yield engine
+            last = engine.finish()
+        except BaseException:
+            engine.close()  # what goes on with the run, perhaps in this process, writes to the same files
+            raise
         keep_prefix(engine, prefix, cache)
     for name, origin in planned.saves.items():
         value = last[origin]
@@ -80,11 +101,15 @@ def _execute(run: Run, planned: Plan, display: ProgressDisplay | None) -> Metric
             write_artifact(file, value, provenance(planned.graph.leading_to([origin]), engine, planned.variant))
             saved = {"file": file.name, "bytes": file.stat().st_size, "sha256": digest_file(file)}
             run.manifest.setdefault("saved", {})[name] = saved
+    for origin in planned.record:
+        with whole_file(run.folder / recorded_name(origin)) as part:
+            engine.sequences[origin].flush()
+            shutil.copyfile(engine.sequences[origin].path, part)
     none = "not cached: nothing in this graph follows from its log alone"
-    return _finish(run, engine, prefix.reason if prefix is not None else none)
+    _finish(run, engine, prefix.reason if prefix is not None else none)
 
 
-def _finish(run: Run, engine: Engine, prefix_reason: str) -> Metrics:
+def _finish(run: RunFolder, engine: Engine, prefix_reason: str) -> None:
     from omninav.pipeline.report.run_page import write_report
 
     metrics, figures, tables = results_of(engine)
@@ -118,10 +143,8 @@ def _finish(run: Run, engine: Engine, prefix_reason: str) -> Metrics:
     write_report(run.folder, done, metrics, timing, graph_svg, figures, tables, config_yaml, engine.graph)
     run.manifest = done | {"files": _digests(run.folder)}
     run.save()
-    for sequence in engine.sequences.values():
-        sequence.close()
+    engine.close()
     shutil.rmtree(run.memory, ignore_errors=True)
-    return metrics
 
 
 def _with_own_notes(artifacts: dict[str, Any]) -> dict[str, Any]:
@@ -140,7 +163,7 @@ def _digests(folder: Path) -> dict[str, str]:
     return {path.name: digest_file(path) for path in files if path.name not in (MANIFEST, LOG, ".lock")}
 
 
-def _fail(run: Run, status: str, what: str) -> None:
+def _fail(run: RunFolder, status: str, what: str) -> None:
     run.manifest |= {"status": status, "error": what, "ended": datetime.now().isoformat(timespec="seconds")}
     with suppress(OSError):  # a full disk; what stopped the run is raised, and the run can go on without this
         run.save()
@@ -160,7 +183,7 @@ class _LogFile(logging.FileHandler):
 
 
 @contextmanager
-def _logged(run: Run) -> Iterator[None]:
+def _logged(run: RunFolder) -> Iterator[None]:
     handler = _LogFile(run.folder / LOG, encoding="utf-8")
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     log.addHandler(handler)

@@ -12,6 +12,7 @@ from omninav.pipeline.engine.code_version import graph_digest
 from omninav.pipeline.files import digest_file
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import ARTIFACTS, Graph
+from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import UnknownStage, entries, resolve
 
@@ -42,6 +43,8 @@ class Plan:
     graph: Graph
     artifacts: tuple[ArtifactPlan, ...]
     saves: Mapping[str, str]
+    record: tuple[str, ...] = ()
+    """Outputs (`node.port`) whose value of every tick is kept in the run's folder."""
 
     @property
     def variant(self) -> str:
@@ -66,7 +69,7 @@ def plan(config: Mapping[str, Any]) -> Plan:
     types: dict[str, Any] = {}
     config = without_absent(config)
     specs = read_specifications(config)
-    _load_stages(config)
+    load_stages(config)
     seed = config.get("seed", 0)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         problems.append(Problem("seed", f"{seed!r}, expected a whole number >= 0", "type seed=0"))
@@ -101,13 +104,26 @@ def plan(config: Mapping[str, Any]) -> Plan:
         for name, origin in saves.items():
             if graph.port(str(origin)) is None:
                 problems.append(_no_output(f"saves.{name}", str(origin), graph))
+        problems += _unrecordable(graph, config.get("record") or ())
     if problems or graph is None:
         raise ProblemsFound(dict.fromkeys(problems))
-    graph = with_plots(graph, plots, [str(origin).partition(".")[0] for origin in saves.values()])
+    record = tuple(dict.fromkeys(config.get("record") or ()))
+    graph = with_plots(graph, plots, [str(origin).partition(".")[0] for origin in (*saves.values(), *record)])
     read = {origin for wire in graph.wires for origin in (wire.origin, wire.initial)}
     artifacts = [made for made in artifacts if f"{ARTIFACTS}.{made.name}" in read or specs[made.name].required]
     artifacts.sort(key=lambda made: not specs[made.name].required)  # what comes with another one follows it
-    return Plan(config, graph, tuple(artifacts), saves)
+    return Plan(config, graph, tuple(artifacts), saves, record)
+
+
+def _unrecordable(graph: Graph, origins: Any) -> Iterator[Problem]:
+    origins, problems = convert(origins, tuple[str, ...], "record")
+    yield from problems
+    for origin in () if problems else origins:
+        if graph.port(origin) is None or graph.nodes[origin.partition(".")[0]].lifetime != "tick":
+            outputs = [f"{node.name}.{port}" for node in graph.of_lifetime("tick") for port in node.signature.outputs]
+            yield Problem("record", f"there is no output '{origin}' in the loop", suggest(origin, outputs, "outputs"))
+        elif graph.is_marked(origin, "in_place"):
+            yield Problem("record", f"'{origin}' is updated in place, and kept at the end only", "leave it out")
 
 
 def _no_output(where: str, origin: str, graph: Graph) -> Problem:
@@ -115,7 +131,7 @@ def _no_output(where: str, origin: str, graph: Graph) -> Problem:
     return Problem(where, f"there is no output '{origin}'", suggest(origin, outputs, "outputs"))
 
 
-def _load_stages(config: Mapping[str, Any]) -> None:
+def load_stages(config: Mapping[str, Any]) -> None:
     """Import the stages' modules, so that the value types which a file may hold are known."""
     nodes = config.get("nodes")
     for spec in nodes.values() if isinstance(nodes, Mapping) else ():

@@ -19,8 +19,8 @@ from omninav.pipeline.graph.small_files import parse_yaml
 from .artifacts import ProgressDisplay
 from .execution import execute
 from .metrics_files import MANIFEST, read_metrics
-from .plan import input_digests, plan
-from .run_folder import CONFIG, Run
+from .plan import Plan, input_digests, plan
+from .run_folder import CONFIG, RunFolder
 
 
 @dataclass(frozen=True)
@@ -38,20 +38,30 @@ class Manifest:
     """Hashes of a complete run's files."""
 
 
-def resume(folder: Path, display: ProgressDisplay | None = None) -> tuple[Run, Metrics]:
+def resume(folder: Path, display: ProgressDisplay | None = None) -> tuple[RunFolder, Metrics]:
     """Go on with a run that was stopped, from its last checkpoint, to the bytes it would have given unbroken.
 
     What is damaged in its folder is made again, from the start where need be. Raises `BadInput` where another process
     runs it, and where too much is damaged to know what the run was.
     """
-    run = Run(Path(os.path.realpath(folder)))
+    run = RunFolder(Path(os.path.realpath(folder)))
+    with run.owned():
+        planned = reopened(run, folder)
+        return run, read_metrics(folder) if planned is None else execute(run, planned, display)
+
+
+def reopened(run: RunFolder, folder: Path) -> Plan | None:
+    """What was stopped, ready to be executed in its folder, from the directory in which it was started.
+
+    None where it is complete. Raises `BadInput` as `resume` does.
+    """
     if not (folder / MANIFEST).is_file() and not run.beginning.is_file():
         raise BadInput(f"{folder}: not a run folder (no manifest.json and config.yaml); `ls runs` shows what there is")
     with run.owned():
-        return _resume(run, folder, display)
+        return _reopened(run, folder)
 
 
-def _resume(run: Run, folder: Path, display: ProgressDisplay | None) -> tuple[Run, Metrics]:
+def _reopened(run: RunFolder, folder: Path) -> Plan | None:
     for half_written in folder.glob("*.part"):  # by the process that was killed; it is written anew
         half_written.unlink()
     began, config = _beginning(run, folder)
@@ -60,7 +70,7 @@ def _resume(run: Run, folder: Path, display: ProgressDisplay | None) -> tuple[Ru
         if damaged is None:
             shutil.rmtree(run.memory, ignore_errors=True)
             run.complete = True
-            return run, read_metrics(folder)
+            return None
         say_damaged(f"{folder}: {damaged} is damaged or gone; the run is made again")
     if Path(began.cwd).is_dir():
         os.chdir(began.cwd)  # its paths are relative to where it was started
@@ -82,10 +92,10 @@ def _resume(run: Run, folder: Path, display: ProgressDisplay | None) -> tuple[Ru
         run.manifest.pop(name, None)
     run.seal_beginning(config)
     run.save()
-    return run, execute(run, planned, display)
+    return planned
 
 
-def _beginning(run: Run, folder: Path) -> tuple[Manifest, str]:
+def _beginning(run: RunFolder, folder: Path) -> tuple[Manifest, str]:
     """The manifest and the text of the configuration, or what was sealed of them where they are damaged."""
     sealed: Mapping[str, Any] = {}
     try:

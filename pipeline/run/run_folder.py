@@ -25,7 +25,7 @@ CONFIG = "config.yaml"
 
 
 @dataclass
-class Run:
+class RunFolder:
     """A run folder with its manifest, which is written at the start and completed at the end.
 
     One process owns it at a time, until it releases it or dies.
@@ -80,6 +80,11 @@ class Run:
         write_whole(self.folder / "graph.mmd", mermaid(planned.graph))
 
 
+def recorded_name(origin: str) -> str:
+    """The file that holds every value of a recorded output."""
+    return f"{origin}.values"
+
+
 def config_text(planned: Plan) -> str:
     """A plan's configuration as its file holds it."""
     return yaml.safe_dump(dict(planned.config), sort_keys=False, allow_unicode=True, width=120)
@@ -87,7 +92,7 @@ def config_text(planned: Plan) -> str:
 
 def start(
     planned: Plan, argv: Sequence[str], folder: Path | None = None, files: Mapping[str, str] | None = None
-) -> Run:
+) -> RunFolder:
     """Make the run's folder with config, graph and manifest, and with more `files` by their names.
 
     `folder` is given by a sweep or by the user, else made from the date. The latter appears under its name when all
@@ -99,7 +104,7 @@ def start(
     root, named = Path(str(config.get("runs", "runs"))), f"{datetime.now():%Y-%m-%d_%H-%M-%S}_{planned.variant}"
     beginning = root / f".{named}.{os.getpid()}.part" if folder is None else folder
     beginning.mkdir(parents=True, exist_ok=True)
-    run = Run(beginning)
+    run = RunFolder(beginning)
     config_file = config_text(planned)
     run.manifest = {
         "omninav": version("omninav"),

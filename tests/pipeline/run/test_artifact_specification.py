@@ -13,7 +13,7 @@ from omninav.pipeline.graph.problems import ProblemsFound
 from omninav.pipeline.run.artifact_specification import read_specifications, without_companions
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import plan
-from omninav.pipeline.run.run_folder import Run, start
+from omninav.pipeline.run.run_folder import RunFolder, start
 
 
 def configuration(port: str, file: Path | None) -> dict[str, Any]:
@@ -117,7 +117,7 @@ def test_a_damaged_map_in_the_cache_is_made_again_and_is_the_same(
     assert cached.read_bytes() == content
 
 
-def sum_of(run: Run) -> str:
+def sum_of(run: RunFolder) -> str:
     return str(run.manifest["artifacts"]["map"]["sha256"])
 
 

@@ -17,7 +17,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import plan
 from omninav.pipeline.run.resume import resume
-from omninav.pipeline.run.run_folder import Run, start
+from omninav.pipeline.run.run_folder import RunFolder, start
 
 CONFIG = {
     "variant": "toy",
@@ -48,7 +48,7 @@ def in_its_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(damage, "_shown", set())
 
 
-def begun(place: Path) -> Run:
+def begun(place: Path) -> RunFolder:
     return start(plan({**CONFIG, "runs": str(place)}), ["omninav", "variant=toy"])
 
 
@@ -61,7 +61,7 @@ def whole(tmp_path: Path) -> bytes:
 
 
 @pytest.fixture
-def stopped(tmp_path: Path) -> Run:
+def stopped(tmp_path: Path) -> RunFolder:
     run = begun(tmp_path / "stopped")
     with pytest.raises(KeyboardInterrupt):
         execute(run, plan({**CONFIG, "runs": str(tmp_path / "stopped")}), Stop())
@@ -73,7 +73,7 @@ def files_of(folder: Path) -> Iterator[str]:
     yield from (str(path.relative_to(folder)) for path in sorted(folder.rglob("*")) if path.is_file())
 
 
-def damaged(run: Run, name: str, seed: int) -> Run:
+def damaged(run: RunFolder, name: str, seed: int) -> RunFolder:
     """A copy of a run folder in which one bit of a file is flipped, or its end is gone."""
     folder = run.folder.with_name(f"damaged_{seed}_{name.replace('/', '_')}")
     shutil.copytree(run.folder, folder)
@@ -81,10 +81,10 @@ def damaged(run: Run, name: str, seed: int) -> Run:
     if content and seed:
         content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
     (folder / name).write_bytes(content if seed else content[: len(content) // 2])
-    return Run(folder)
+    return RunFolder(folder)
 
 
-def test_a_stopped_run_with_any_damage_ends_at_the_same_bytes(stopped: Run, whole: bytes):
+def test_a_stopped_run_with_any_damage_ends_at_the_same_bytes(stopped: RunFolder, whole: bytes):
     names = list(files_of(stopped.folder))
     assert {"checkpoints/checkpoint", "checkpoints/start", "checkpoints/sum.number.sequence"} <= set(names)
     for name in names:
@@ -96,7 +96,7 @@ def test_a_stopped_run_with_any_damage_ends_at_the_same_bytes(stopped: Run, whol
 
 
 @pytest.mark.parametrize("names", [("manifest.json", "checkpoints/start"), ("config.yaml", "checkpoints/start")])
-def test_a_run_of_which_too_much_is_damaged_is_refused_in_one_line(stopped: Run, names: tuple[str, str]):
+def test_a_run_of_which_too_much_is_damaged_is_refused_in_one_line(stopped: RunFolder, names: tuple[str, str]):
     run = damaged(damaged(stopped, names[0], 1), names[1], 1)
     with pytest.raises(BadInput, match=f"{names[0]} is damaged.* start ") as refused:
         resume(run.folder)
@@ -104,7 +104,7 @@ def test_a_run_of_which_too_much_is_damaged_is_refused_in_one_line(stopped: Run,
 
 
 def test_a_complete_run_with_any_damage_is_made_again_or_refused_in_one_line(tmp_path: Path, whole: bytes):
-    (complete,) = (Run(folder) for folder in (tmp_path / "whole").iterdir() if not folder.is_symlink())
+    (complete,) = (RunFolder(folder) for folder in (tmp_path / "whole").iterdir() if not folder.is_symlink())
     for name in files_of(complete.folder):
         run = damaged(complete, name, 1)
         with pytest.raises(BadInput) if name in ("config.yaml", "manifest.json") else nullcontext():
@@ -112,7 +112,7 @@ def test_a_complete_run_with_any_damage_is_made_again_or_refused_in_one_line(tmp
         assert (run.folder / "metrics.json").read_bytes() == whole, name
 
 
-def test_damage_is_said_once_and_where_it_is(stopped: Run, capfd: pytest.CaptureFixture[str]):
+def test_damage_is_said_once_and_where_it_is(stopped: RunFolder, capfd: pytest.CaptureFixture[str]):
     file = stopped.memory / "sum.number.sequence"
     file.write_bytes(file.read_bytes().replace(b"toys.Number", b"toys.number", 1))
     resume(stopped.folder)
@@ -121,10 +121,10 @@ def test_damage_is_said_once_and_where_it_is(stopped: Run, capfd: pytest.Capture
     assert "begins again at its first tick" in said
 
 
-def test_a_run_that_a_living_process_owns_is_refused_by_its_number(stopped: Run):
+def test_a_run_that_a_living_process_owns_is_refused_by_its_number(stopped: RunFolder):
     hold = (
-        "import sys\nfrom pathlib import Path\nfrom omninav.pipeline.run.run_folder import Run\n"
-        f"with Run(Path({str(stopped.folder)!r})).owned():\n    print('owned', flush=True)\n    sys.stdin.read()"
+        "import sys\nfrom pathlib import Path\nfrom omninav.pipeline.run.run_folder import RunFolder\n"
+        f"with RunFolder(Path({str(stopped.folder)!r})).owned():\n    print('owned', flush=True)\n    sys.stdin.read()"
     )
     owner = subprocess.Popen([sys.executable, "-c", hold], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert owner.stdout is not None
@@ -140,7 +140,7 @@ def test_a_run_that_a_living_process_owns_is_refused_by_its_number(stopped: Run)
 
 @pytest.mark.parametrize("link", [os.symlink, os.link])
 @pytest.mark.parametrize("name", [".lock", "run.log", "checkpoints/sum.number.sequence"])
-def test_nothing_is_written_through_a_link(stopped: Run, tmp_path: Path, name: str, link: object):
+def test_nothing_is_written_through_a_link(stopped: RunFolder, tmp_path: Path, name: str, link: object):
     elsewhere = tmp_path / "elsewhere"
     elsewhere.write_text("mine")
     (stopped.folder / name).unlink()
@@ -150,7 +150,7 @@ def test_nothing_is_written_through_a_link(stopped: Run, tmp_path: Path, name: s
     assert elsewhere.read_text() == "mine"
 
 
-def test_a_sequence_that_does_not_hold_every_tick_stops_the_run(stopped: Run, monkeypatch: pytest.MonkeyPatch):
+def test_a_sequence_that_does_not_hold_every_tick_stops_the_run(stopped: RunFolder, monkeypatch: pytest.MonkeyPatch):
     """As two processes in one folder would have left it."""
     from omninav.pipeline.engine.disk_sequence import DiskSequence
 

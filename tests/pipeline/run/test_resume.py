@@ -12,11 +12,11 @@ from omninav.pipeline.files import digest_text, read_json
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.run.plan import plan
 from omninav.pipeline.run.resume import resume
-from omninav.pipeline.run.run_folder import Run, start
+from omninav.pipeline.run.run_folder import RunFolder, start
 from toys import Number
 
 
-def begun(place: Path, **changes: Any) -> Run:
+def begun(place: Path, **changes: Any) -> RunFolder:
     """A run that has been started and has done nothing yet."""
     config = {
         "variant": "toy",
@@ -27,7 +27,7 @@ def begun(place: Path, **changes: Any) -> Run:
     return start(plan(config | changes), ["omninav", "variant=toy"])
 
 
-def rewrite(run: Run, **nodes: str) -> None:
+def rewrite(run: RunFolder, **nodes: str) -> None:
     """As if the run had been started with these stages."""
     config = yaml.safe_load((run.folder / "config.yaml").read_text())
     config["nodes"] |= {name: {"_target_": target} for name, target in nodes.items()}

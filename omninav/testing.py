@@ -1,0 +1,1 @@
+"""What a third party tests its stages with."""

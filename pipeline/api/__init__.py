@@ -1,0 +1,1 @@
+"""Configurations, runs, sessions and sweeps as Python objects: what `import omninav` offers."""

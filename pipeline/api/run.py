@@ -1,0 +1,181 @@
+"""Runs: started, and opened when they have ended."""
+
+import os
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from omninav.pipeline.cli.jobs import no_run_in
+from omninav.pipeline.engine.artifact import read_artifact
+from omninav.pipeline.engine.disk_sequence import DiskSequence
+from omninav.pipeline.files import Damaged, read_json
+from omninav.pipeline.graph.problems import BadInput, suggest
+from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline.graph.small_files import read_yaml
+from omninav.pipeline.graph.value import Value
+from omninav.pipeline.report.progress import Progress
+from omninav.pipeline.report.terminal_tables import results_table
+from omninav.pipeline.run.execution import execute
+from omninav.pipeline.run.metrics_files import MANIFEST, read_metrics
+from omninav.pipeline.run.plan import load_stages
+from omninav.pipeline.run.run_folder import CONFIG, recorded_name, start
+from omninav.pipeline.tables import read_table
+
+from .configuration import Configuration, configured
+
+
+class Figures(dict[str, Any]):
+    """The figures of `metrics.json`: nested, and by path too: `figures["some_error_m.median"]`."""
+
+    def __missing__(self, path: str) -> Any:
+        inside: Any = dict(self)
+        for name in path.split("."):
+            if not isinstance(inside, dict) or name not in inside:
+                raise KeyError(
+                    f"no figure '{path}'; {suggest(name, inside if isinstance(inside, dict) else (), 'figures')}"
+                )
+            inside = inside[name]
+        return inside
+
+
+class Run:
+    """A run's folder, as Python sees it. In a notebook it shows its results.
+
+    Every `.omap` file in its folder is an attribute by the file's name: what the run used or made.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        self.folder = Path(os.path.realpath(folder))
+        """Where its files lie."""
+        if not (self.folder / MANIFEST).is_file():
+            raise BadInput(f"{folder}: not a run folder (no {MANIFEST}); `ls runs` shows what there is")
+
+    @property
+    def manifest(self) -> dict[str, Any]:
+        """How it came about: command, versions, inputs, seed, status, what was skipped."""
+        try:
+            return read_json(self.folder / MANIFEST)
+        except Damaged as damaged:
+            raise BadInput(str(damaged)) from None
+
+    @property
+    def status(self) -> str:
+        """`complete`, `running`, `failed` or `interrupted`."""
+        return str(self.manifest.get("status"))
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Its whole configuration."""
+        return dict(read_yaml(self.folder / CONFIG))
+
+    @property
+    def metrics(self) -> Figures:
+        """Its figures; `metrics["some_error_m.median"]`."""
+        return Figures(self._described().values)
+
+    @property
+    def frames(self) -> Any:
+        """A row for every frame: a `pandas.DataFrame` where pandas is installed, else a `pyarrow.Table`.
+
+        `runs/README.md` says what the columns are.
+        """
+        return read_table(self._file("frames.parquet"))
+
+    @property
+    def trajectory(self) -> Any:
+        """The rows and columns of `frames` that say where the estimate was: `stamp_ns` and `estimate_…`."""
+        return read_table(self._file("frames.parquet"), lambda name: name == "stamp_ns" or name.startswith("estimate_"))
+
+    @property
+    def report(self) -> Path:
+        """The page that shows it."""
+        return self._file("report.html")
+
+    @property
+    def recorded(self) -> list[str]:
+        """Outputs of which `values` has every frame's."""
+        return sorted(file.name.removesuffix(recorded_name("")) for file in self.folder.glob(recorded_name("*")))
+
+    def values(self, origin: str) -> Sequence[Any]:
+        """What an output (`match.similarities`) gave in every frame, None where nothing; read as it is looked at.
+
+        It was kept where the run was told to: `record=[match.similarities]`.
+        """
+        file = self.folder / recorded_name(origin)
+        if not file.is_file():
+            there = f"recorded are: {', '.join(self.recorded)}" if self.recorded else "nothing was recorded"
+            raise BadInput(f"{self.folder}: no values of {origin}, {there}; run it again with record=[{origin}]")
+        load_stages(self.settings)
+        return DiskSequence(file, append=False)
+
+    def __getattr__(self, name: str) -> Value:
+        file = self.__dict__.get("folder", Path()) / f"{name}.omap"
+        if name.startswith("_") or not file.is_file():
+            files = [path.stem for path in file.parent.glob("*.omap")]
+            raise AttributeError(f"{self.__dict__.get('folder')}: there is no {name}; {suggest(name, files, 'files')}")
+        return read_artifact(file)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *(path.stem for path in self.folder.glob("*.omap"))]
+
+    def _described(self) -> Metrics:
+        return read_metrics(self.folder)
+
+    def _file(self, name: str) -> Path:
+        file = self.folder / name
+        if not file.is_file():
+            hint = f"`omninav resume {self.folder}` goes on with a run that did not end"
+            raise BadInput(f"{self.folder}: no {name} in it; {hint}")
+        return file
+
+    def __repr__(self) -> str:
+        return f"Run({str(self.folder)!r}: {self.manifest.get('variant')}, {self.status})"
+
+    def __str__(self) -> str:
+        """Its results as a table."""
+        return _rendered(self._described(), html=False)
+
+    def _repr_html_(self) -> str:
+        head = (
+            f"<p><b>{escape(self.folder.name)}</b> {escape(self.status)}, <code>{escape(str(self.folder))}</code></p>"
+        )
+        return head + (_rendered(self._described(), html=True) if (self.folder / "metrics.json").is_file() else "")
+
+
+def _rendered(metrics: Metrics, html: bool) -> str:
+    import io
+
+    from rich.console import Console
+
+    console = Console(file=io.StringIO(), record=html, width=100)
+    console.print(results_table(metrics))
+    if html:
+        return console.export_html(inline_styles=True, code_format="<pre style='line-height:1.2'>{code}</pre>")
+    assert isinstance(console.file, io.StringIO)
+    return console.file.getvalue()
+
+
+def run(
+    *words: "str | Configuration",
+    folder: str | os.PathLike[str] | None = None,
+    progress: bool = True,
+    **settings: Any,
+) -> Run:
+    """Run a configuration to its end: `run("some_variant", log="drive.mcap", seed=3)`.
+
+    Words and settings are those of `compose`, or a configuration comes first. `folder`: where its files are left; None:
+    a new one in `runs`. `progress`: whether it says on the standard error how far it is. Raises `ProblemsFound`,
+    `BadInput`, or `StageFailed` where a stage raised.
+    """
+    made = configured(words, settings)
+    place = None if folder is None else no_run_in(Path(folder))
+    begun = start(made.plan, ["omninav", *made.words], place)
+    with Progress() as shown:
+        execute(begun, made.plan, shown if progress else None)
+    return Run(begun.folder)
+
+
+def open_run(folder: str | os.PathLike[str] = "runs/latest") -> Run:
+    """A run that has ended, or is still running, by its folder."""
+    return Run(folder)

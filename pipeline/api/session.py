@@ -1,0 +1,167 @@
+"""Sessions: a graph that is pushed one frame at a time, by the engine that runs logs."""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from omninav.pipeline.cli.jobs import no_run_in
+from omninav.pipeline.engine.engine import Engine
+from omninav.pipeline.graph.graph import Graph
+from omninav.pipeline.graph.problems import BadInput, suggest
+from omninav.pipeline.graph.pushed import Pushed, push
+from omninav.pipeline.graph.registry import only_listed
+from omninav.pipeline.run.execution import execute, running
+from omninav.pipeline.run.plan import Plan
+from omninav.pipeline.run.resume import reopened
+from omninav.pipeline.run.run_folder import RunFolder, start
+
+from .configuration import Configuration, configured
+from .run import Run
+
+PUSHED = "source=pushed"
+
+
+class Step(Mapping[str, Any]):
+    """What the stages gave for a frame; None where one gave nothing.
+
+    `out["match.similarities"]` is the output of a node, and `out.estimate` the one of that name, whichever node has it.
+    """
+
+    def __init__(self, values: Mapping[str, Any], names: Mapping[str, str]) -> None:
+        self._values, self._names = {origin: values.get(origin) for origin in names.values()}, names
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._names:
+            raise KeyError(f"there is no output '{name}'; {suggest(name, self._names, 'outputs')}")
+        return self._values[self._names[name]]
+
+    def __getattr__(self, name: str) -> Any:
+        names = self.__dict__.get("_names", {})
+        if name not in names:
+            short = [known for known in names if "." not in known]
+            raise AttributeError(f"there is no output '{name}'; {suggest(name, short, 'outputs')}")
+        return self._values[names[name]]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *(name for name in self._names if "." not in name)]
+
+
+class Session(AbstractContextManager["Session"]):
+    """A run whose frames come one at a time. It is a run like any other: folder, checkpoints, metrics and report.
+
+    `with` closes it at the end of its block; without `with`, call `close`. What was interrupted goes on with `resume`,
+    from the last `save`, or from the last of the checkpoints that are written every few seconds.
+    """
+
+    def __init__(self, run: RunFolder, planned: Plan) -> None:
+        source = planned.graph.source
+        if source is None or not isinstance(source.stage, Pushed):
+            raise BadInput(f"{planned.variant}: nothing can be pushed into its source; type {PUSHED}")
+        self._source, self._run, self._names = source.stage, run, outputs_by_name(planned.graph)
+        self._stack = ExitStack()
+        self._engine: Engine = self._stack.enter_context(running(run, planned))
+        self._given = self._engine.calls[source.name].times
+        self._over: str | None = None
+
+    @property
+    def folder(self) -> Path:
+        """Where its files lie."""
+        return self._run.folder
+
+    @property
+    def steps(self) -> int:
+        """How many frames it has had."""
+        return self._engine.ticks
+
+    def step(self, **frame: Any) -> Step:
+        """Push a frame and run every stage once. What a frame may bring, its source says (`omninav stages source`).
+
+        Raises `BadInput` where the source refuses the frame: it is then as if it had not come. Raises `StageFailed`
+        where a stage raised; after that the session can only be resumed.
+        """
+        if self._over is not None:
+            raise BadInput(f"{self.folder}: {self._over}")
+        push(self._source, frame)
+        given = len(self._given)
+        try:
+            self._engine.tick()
+        except BaseException:
+            if len(self._given) > given:  # the source took it, so some stages have run and others not
+                self._over = "a stage failed; omninav.resume goes on from the last checkpoint"
+            raise
+        return Step(self._engine.values, self._names)
+
+    def save(self) -> Path:
+        """Write a checkpoint, from which `resume` goes on; gives the run's folder."""
+        if self._over is not None:
+            raise BadInput(f"{self.folder}: {self._over}")
+        self._engine.save()
+        return self.folder
+
+    def close(self) -> Run:
+        """End it: what comes after the last frame runs (metrics, plots, report). Gives the finished run."""
+        self.__exit__(None, None, None)
+        return Run(self.folder)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None and self._over is not None:
+            error = BadInput(self._over)
+        self._over = "the session is closed; omninav.resume goes on with one that was interrupted"
+        self._stack.__exit__(type(error) if error is not None else None, error, trace)
+        self._stack = ExitStack()
+
+
+def outputs_by_name(graph: Graph) -> dict[str, str]:
+    """Which output each name stands for, and every output under its own (`node.port`).
+
+    Of several of one name it is the one that is read again at the next tick, else the last in running order.
+    """
+    origins = [f"{node.name}.{port}" for node in graph.of_lifetime("tick") for port in node.signature.outputs]
+    again = {wire.origin for wire in graph.wires if wire.delay}
+    names = {origin.partition(".")[2]: origin for origin in sorted(origins, key=lambda origin: origin in again)}
+    return names | {origin: origin for origin in origins}
+
+
+def open(*words: str | Configuration, folder: str | os.PathLike[str] | None = None, **settings: Any) -> Session:
+    """Begin a session: `with omninav.open("some_variant") as session: out = session.step(…)`.
+
+    Words and settings are those of `compose`, or a configuration comes first. `folder`: where the run's files are left;
+    None: a new one in `runs`.
+    """
+    made = configured(words, settings)
+    if PUSHED not in made.words:
+        made = made.with_(PUSHED)
+    place = None if folder is None else no_run_in(Path(folder))
+    return Session(start(made.plan, ["omninav", *made.words], place), made.plan)
+
+
+def resume(folder: str | os.PathLike[str] = "runs/latest", trust: Sequence[str] = ()) -> Run | Session:
+    """Go on with what was interrupted: a session with its next frame, any other run to its end.
+
+    The bytes are those that it would have given unbroken. Of the stages that the folder names, those that `omninav
+    stages` lists are run, and others only where their module or file is in `trust`. Raises `BadInput`.
+    """
+    here, given = os.getcwd(), Path(os.path.realpath(folder))
+    run = RunFolder(given)
+    try:
+        with only_listed(trust):
+            planned = reopened(run, given)
+            if planned is None:
+                return Run(given)
+            if planned.graph.source is not None and isinstance(planned.graph.source.stage, Pushed):
+                return Session(run, planned)
+            execute(run, planned)
+            return Run(given)
+    finally:
+        os.chdir(here)  # a run goes on where it was started

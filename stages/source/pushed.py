@@ -1,0 +1,186 @@
+"""The source of a program's own loop: one tick for every image that is pushed."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import BadInput, Context, Outputs, Source, State, Tick
+from omninav.pipeline.files import digest_text, user_path
+from omninav.stages.camera.model import Camera
+from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.recordings.camera_yaml import write_camera
+from omninav.stages.recordings.messages import is_blank
+from omninav.stages.recordings.named_camera import named_camera
+from omninav.stages.values.encoded_image import Undecodable, decode_image
+from omninav.stages.values.image import Image, Pixels
+from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.scan import Scan
+
+Row = npt.NDArray[np.float64]
+INTERVAL_NS = 100_000_000
+"""Between images that come without a time stamp."""
+
+
+class PushedFrame(NamedTuple):
+    """What came with an image; `rows`: motion, odometry and truth, (3,) each."""
+
+    image: Image
+    stamp: int | None
+    rows: dict[str, Row | None]
+    scan: Scan | None
+    new_log: bool
+
+
+class PushedSourceState(State):
+    """Ticks made, the present log and its next frame, the last stamp (ns), and the last pose by odometry."""
+
+    ticks: int = 0
+    log: int = 0
+    frame: int = 0
+    stamp: int = -INTERVAL_NS
+    x: float = 0.0
+    y: float = 0.0
+    heading: float = 0.0
+
+
+class PushedSource(Source):
+    """Images that a program pushes, with whatever else it knows of each: a tick for every one.
+
+    It gives what `LogSource` gives of a recording, so that both lead to the same results. Poses are metres and radians.
+    """
+
+    repeatable = False
+
+    camera: str | None = None
+    """A camera.yaml, or the name of a camera (equirectangular, fisheye, …), of the images."""
+
+    class Out(Outputs):
+        tick: Tick
+        image: Image
+        camera: Camera
+        odometry: Pose | None = None
+        motion: Motion | None = None
+        truth: Pose | None = None
+        scan: Scan | None = None
+
+    def setup(self, ctx: Context) -> None:
+        """Open the camera's file."""
+        self._frame: PushedFrame | None = None
+        self._opened: Camera | None = None
+        if self.camera is not None and user_path(self.camera).is_file():
+            self._opened = self._camera_of(self.camera, (0, 0))
+
+    def inputs_digest(self) -> str | None:
+        """Hash of the camera, where a file says everything about it. Raises `BadInput` where there is no camera."""
+        if self.camera is None:
+            raise BadInput("camera: what took the images is not known; type camera=FILE.yaml or camera=NAME")
+        is_file = user_path(self.camera).is_file()
+        return digest_text(write_camera(self._camera_of(self.camera, (0, 0)))) if is_file else None
+
+    def push(
+        self,
+        image: Pixels | bytes,
+        motion: Sequence[float] | None = None,
+        stamp: int | None = None,
+        odometry: Sequence[float] | None = None,
+        truth: Sequence[float] | None = None,
+        scan: Scan | None = None,
+        new_log: bool = False,
+    ) -> None:
+        """Take a frame for the next tick. Raises `BadInput` where something of it cannot be used.
+
+        `image`: pixels, (rows, columns, 3) uint8 blue-green-red as OpenCV reads them or (rows, columns) grey, or the
+        bytes of a JPEG or PNG file; it is copied. `motion`: (forward m, left m, counter-clockwise rad) since the image
+        before, or `odometry`: the robot's pose (x m, y m, heading rad) in the odometry's own frame, from which motion
+        follows. `stamp`: nanoseconds; None: a tenth of a second after the image before. `truth`: the true pose in the
+        map frame, for metrics only. `scan`: range readings, for variants that keep clear of obstacles. `new_log`: the
+        robot has been put elsewhere, or another drive begins: there is no motion from the image before.
+        """
+        pixels = _pixels(image)
+        if stamp is not None and (isinstance(stamp, bool) or not isinstance(stamp, int | np.integer)):
+            raise BadInput(f"step: stamp={stamp!r:.40}, expected whole nanoseconds; seconds are int(seconds * 1e9)")
+        rows = {"motion": motion, "odometry": odometry, "truth": truth}
+        found = {name: None if row is None else _row(name, row) for name, row in rows.items()}
+        self._frame = PushedFrame(Image(pixels), None if stamp is None else int(stamp), found, scan, new_log)
+
+    def step(self, ctx: Context, position: PushedSourceState) -> Out | None:
+        """The frame that was pushed; None without one."""
+        frame, self._frame = self._frame, None
+        if frame is None:
+            return None
+        image, stamp, rows, scan, new_log = frame
+        stamp = position.stamp + INTERVAL_NS if stamp is None else stamp
+        first = position.ticks == 0 or new_log
+        if position.ticks and stamp <= position.stamp:
+            raise BadInput(f"step: stamp={stamp} is not after that of the image before ({position.stamp})")
+        camera = self._camera(image.pixels)
+        if new_log and position.ticks:
+            position.log, position.frame = position.log + 1, 0
+        before = np.array([position.x, position.y, position.heading])
+        motion, odometry = rows["motion"], rows["odometry"]
+        if odometry is None:
+            odometry = compose(before, motion) if motion is not None else before
+        elif motion is None:
+            motion = between(before, odometry)
+        measured = rows["motion"] is not None or rows["odometry"] is not None
+        if measured:
+            ctx.fact("odometry", "measured")
+        tick = Tick(position.ticks, stamp, position.log, position.frame, first)
+        position.ticks, position.frame, position.stamp = position.ticks + 1, position.frame + 1, stamp
+        position.x, position.y, position.heading = (float(number) for number in odometry)
+        return self.Out(
+            tick=tick,
+            image=image,
+            camera=camera,
+            odometry=_pose(odometry) if measured else None,
+            motion=None if motion is None or first else Motion(*(float(number) for number in motion)),
+            truth=_pose(rows["truth"]),
+            scan=scan,
+        )
+
+    def _camera(self, pixels: Pixels) -> Camera:
+        size = pixels.shape[1], pixels.shape[0]
+        if self._opened is None:
+            self._opened = self._camera_of(str(self.camera), size)
+        camera = self._opened
+        if (camera.width, camera.height_px) != size:
+            wanted = f"{camera.width} x {camera.height_px}"
+            raise BadInput(f"step: the image has {size[0]} x {size[1]} pixels, and the camera takes {wanted}")
+        return camera
+
+    def _camera_of(self, name: str, size: tuple[int, int]) -> Camera:
+        return named_camera(name, lambda: size)[0]
+
+
+def _pixels(image: Pixels | bytes) -> Pixels:
+    if isinstance(image, bytes | bytearray | memoryview):
+        try:
+            image = decode_image(bytes(image))
+        except Undecodable as error:
+            raise BadInput(f"step: the image cannot be decoded ({error}); leave this frame out") from None
+    if not isinstance(image, np.ndarray) or image.dtype != np.uint8 or image.shape[2:] not in ((), (3,)):
+        kind = f"{image.dtype}{image.shape}" if isinstance(image, np.ndarray) else type(image).__name__
+        raise BadInput(f"step: image is {kind}, expected uint8 of (rows, columns, 3), or the bytes of an image file")
+    if image.ndim < 2 or not image.size:
+        raise BadInput(f"step: image has the shape {image.shape}, expected (rows, columns, 3)")
+    image = np.array(image if image.ndim == 3 else cv2.cvtColor(image, cv2.COLOR_GRAY2BGR))  # the caller's may change
+    if is_blank(image):
+        raise BadInput("step: the image is blank; leave this frame out")
+    return image
+
+
+def _row(name: str, given: Sequence[float]) -> Row:
+    try:
+        row = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        row = np.empty(0)
+    if row.shape != (3,) or not np.isfinite(row).all():
+        raise BadInput(f"step: {name}={given!r:.60}, expected three finite numbers (m, m, rad)")
+    return row
+
+
+def _pose(row: Row | None) -> Pose | None:
+    return None if row is None else Pose(*(float(number) for number in row))

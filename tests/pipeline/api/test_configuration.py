@@ -1,0 +1,60 @@
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import omninav
+from omninav.pipeline.api.words import words_of
+
+
+def test_importing_omninav_imports_nothing_heavy():
+    code = (
+        "import sys, omninav; print([m for m in ('numpy', 'numba', 'matplotlib', 'hydra', 'cv2') if m in sys.modules])"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+def test_every_name_that_is_offered_is_there():
+    assert {name for name in omninav.__all__ if getattr(omninav, name, None) is None} == set()
+    with pytest.raises(AttributeError, match=r"no attribute 'compos'; it has: .*compose"):
+        omninav.compos  # noqa: B018
+
+
+def test_python_values_become_the_words_that_one_would_type():
+    settings = {"seed": np.int64(3), "log": Path("a b.mcap"), "grid": None, "validate": True, "cuts": [[1, 2.5]]}
+    assert words_of(("omniview_mcl", "match=l2"), settings) == [
+        "variant=omniview_mcl",
+        "match=l2",
+        "seed=3",
+        "log='a b.mcap'",
+        "grid=null",
+        "validate=true",
+        "cuts=[[1,2.5]]",
+    ]
+    with pytest.raises(omninav.BadInput, match="a ndarray cannot be a setting"):
+        words_of((), {"map": np.zeros(3)})
+
+
+def test_a_configuration_knows_its_variant_and_draws_its_graph():
+    made = omninav.compose("plain_matching", "match=l2", seed=3)
+    assert (made.variant, made.settings["seed"]) == ("plain_matching", 3)
+    assert "fusion" in made._repr_svg_()
+    assert made._repr_svg_() in made._repr_html_()
+    assert made.with_(seed=4).settings["seed"] == 4
+    assert "_target_: omninav.stages.match.l2" in str(made)
+
+
+def test_a_text_with_odd_characters_arrives_as_it_is(tmp_path):
+    odd = tmp_path / "it's {a} $b, c=d.mcap"
+    assert omninav.compose("omniview_cml", log=odd).settings["log"] == str(odd)
+
+
+def test_what_is_wrong_is_an_exception_and_no_exit():
+    with pytest.raises(omninav.ProblemsFound, match="did you mean 'seed=3'"):
+        omninav.compose("plain_matching", sead=3)
+    with pytest.raises(omninav.ProblemsFound, match="no such file"):
+        omninav.compose("plain_matching", map="missing.omap", log="missing.mcap")
+    with pytest.raises(omninav.BadInput, match="command line"):
+        omninav.compose("+experiment=omniview_mcl/table_1")

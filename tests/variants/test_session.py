@@ -1,0 +1,127 @@
+"""Frames that a program pushes one at a time lead to what a run over their log gives."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import DRIVE, TOUR
+
+import omninav
+from omninav.stages.recordings.camera_yaml import write_camera
+from omninav.stages.recordings.opening import open_recording
+
+SAME = ("trajectory.tum", "metrics.json", "frames.csv", "result.mcap", "map.omap")
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return open_recording(str(DRIVE))
+
+
+@pytest.fixture(scope="module")
+def camera(recording, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("camera") / "camera.yaml"
+    file.write_text(write_camera(recording.camera))
+    return file
+
+
+@pytest.fixture(scope="module")
+def batch(shared_cache: Path, tmp_path_factory: pytest.TempPathFactory) -> omninav.Run:
+    words = {"tour": TOUR, "log": DRIVE, "cache": shared_cache, "progress": False}
+    return omninav.run("omniview_mcl", folder=tmp_path_factory.mktemp("batch") / "run", **words)
+
+
+def frames_of(recording, first: int = 0, stop: int | None = None):
+    for k in range(first, len(recording.stamps) if stop is None else stop):
+        truth = recording.truth[k] if np.isfinite(recording.truth[k]).all() else None
+        odometry, stamp = recording.odometry[k], recording.stamps[k]
+        yield {"image": recording.image(k), "odometry": odometry, "stamp": stamp, "truth": truth}
+
+
+def same_files(one: omninav.Run, other: omninav.Run) -> list[str]:
+    return [name for name in SAME if (one.folder / name).read_bytes() != (other.folder / name).read_bytes()]
+
+
+def test_a_recording_pushed_frame_by_frame_gives_the_bytes_of_the_batch_run(recording, camera, batch, tmp_path):
+    with omninav.open("omniview_mcl", map=batch.folder / "map.omap", camera=camera, folder=tmp_path / "run") as session:
+        for frame in frames_of(recording):
+            out = session.step(**frame)
+    assert same_files(batch, omninav.open_run(tmp_path / "run")) == []
+    assert out.estimate.pose.x == batch.frames["estimate_x"].iloc[-1]
+    assert out.best_match.reference == batch.frames["reference"].iloc[-1]
+    assert out.belief is out["fusion.belief"]
+
+
+def test_a_map_that_is_learned_on_the_way_is_the_same_too(recording, camera, shared_cache, tmp_path):
+    whole = omninav.run("omniview_cml", log=DRIVE, cache=shared_cache, folder=tmp_path / "batch", progress=False)
+    session = omninav.open("omniview_cml", camera=camera, folder=tmp_path / "run")
+    for frame in frames_of(recording):
+        session.step(**frame)
+    assert same_files(whole, session.close()) == ["result.mcap"]  # which shows the floor plan that lies beside the log
+
+
+def test_an_interrupted_session_goes_on_from_where_it_was_saved(recording, camera, batch, tmp_path):
+    folder = tmp_path / "run"
+    settings = {"map": batch.folder / "map.omap", "camera": camera, "checkpoint_s": 1e6}
+    session = omninav.open("omniview_mcl", folder=folder, **settings)
+    for frame in frames_of(recording, 0, 9):
+        session.step(**frame)
+    session.save()
+    session.step(**next(frames_of(recording, 9)))
+    session.__exit__(RuntimeError, RuntimeError("the program fails"), None)
+    assert omninav.open_run(folder).status == "failed"
+    with omninav.resume(folder) as session:
+        assert session.steps == 9
+        for frame in frames_of(recording, 9):
+            session.step(**frame)
+    assert same_files(batch, omninav.open_run(folder)) == []
+
+
+def test_a_frame_that_is_refused_is_as_if_it_had_not_come(recording, camera, batch, tmp_path):
+    first, second = frames_of(recording, 0, 2)
+    with omninav.open("omniview_mcl", map=batch.folder / "map.omap", camera=camera, folder=tmp_path / "run") as session:
+        session.step(**first)
+        for wrong, what in (
+            ({**second, "stamp": first["stamp"]}, "is not after that of the image before"),
+            ({**second, "image": second["image"][:50]}, "and the camera takes"),
+            ({**second, "image": b"no image"}, "cannot be decoded"),
+            ({**second, "image": np.zeros_like(second["image"])}, "blank"),
+            ({**second, "image": second["image"] / 255}, "expected uint8"),
+            ({**second, "stamp": 12.5}, "expected whole nanoseconds"),
+            ({**second, "motion": (1, 2)}, "expected three finite numbers"),
+            ({**second, "img": second["image"]}, "did you mean 'image'"),
+            ({"stamp": 1}, "image=… is missing"),
+        ):
+            with pytest.raises(omninav.BadInput, match=what):
+                session.step(**wrong)
+        out = session.step(**second)
+        assert session.steps == 2
+    assert out.estimate.pose.x == batch.frames["estimate_x"].iloc[1]
+
+
+def test_motions_lead_where_the_odometry_leads(recording, camera, tmp_path):
+    from omninav.stages.geometry.plane.se2 import between
+
+    with omninav.open("omniview_cml", camera=camera, folder=tmp_path / "run", start="origin") as session:
+        for k, frame in enumerate(frames_of(recording, 0, 4)):
+            odometry = frame.pop("odometry")
+            motion = (0, 0, 0) if k == 0 else between(recording.odometry[k - 1], odometry)
+            out = session.step(**frame, motion=motion)
+    assert (out["source.motion"].x, out["source.motion"].turn) == pytest.approx((motion[0], motion[2]))
+    expected = between(recording.odometry[0], recording.odometry[3])
+    assert (out["source.odometry"].x, out["source.odometry"].y) == pytest.approx(tuple(expected[:2]))
+
+
+def test_a_session_without_a_map_to_match_or_a_camera_is_refused(camera):
+    with pytest.raises(omninav.ProblemsFound, match="needs a map"):
+        omninav.open("omniview_mcl", camera=camera)
+    with pytest.raises(omninav.BadInput, match="type camera=FILE"):
+        omninav.open("omniview_cml")
+
+
+def test_a_closed_session_takes_no_more_frames(recording, camera, tmp_path):
+    session = omninav.open("omniview_cml", camera=camera, folder=tmp_path / "run")
+    session.step(**next(frames_of(recording)))
+    session.close()
+    with pytest.raises(omninav.BadInput, match="the session is closed"):
+        session.step(**next(frames_of(recording)))
