@@ -11,7 +11,13 @@ from omninav.stages.values.encoded_image import Undecodable, decode_image
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
-POSE_TYPES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped")
+POSE_TYPES = (
+    "nav_msgs/msg/Odometry",
+    "geometry_msgs/msg/PoseStamped",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "geometry_msgs/msg/TransformStamped",
+)
+TRANSFORMS_TYPE = "tf2_msgs/msg/TFMessage"
 SCAN_TYPE = "sensor_msgs/msg/LaserScan"
 IMAGE_TYPES = ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image")
 MAX_COORDINATE_M = 1e8
@@ -40,14 +46,17 @@ class ImpossiblePose(ValueError):
 
 
 def pose_of(message: Any) -> tuple[float, float, float]:
-    """x, y (m) and heading (rad) of an Odometry, PoseStamped or PoseWithCovarianceStamped message.
+    """x, y (m) and heading (rad) of an Odometry, PoseStamped, PoseWithCovarianceStamped or TransformStamped message.
 
     Raises ValueError where they are not finite numbers, `ImpossiblePose` where they are nowhere on Earth or the
     quaternion's length is far from 1.
     """
-    pose = message.pose
-    pose = getattr(pose, "pose", pose)
-    position, q = pose.position, pose.orientation
+    if hasattr(message, "transform"):
+        position, q = message.transform.translation, message.transform.rotation
+    else:
+        pose = message.pose
+        pose = getattr(pose, "pose", pose)
+        position, q = pose.position, pose.orientation
     length = math.hypot(q.x, q.y, q.z, q.w)
     if not math.isfinite(position.x + position.y + length):
         raise ValueError("its pose is not finite")

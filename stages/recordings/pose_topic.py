@@ -34,6 +34,9 @@ class PoseTopic:
         self.topic = topic
         self._stamps, self._log_times, self._poses = array("q"), array("q"), array("d")
 
+    def __len__(self) -> int:
+        return len(self._stamps)
+
     def add(self, stamp: int, log_time: int, pose: tuple[float, float, float]) -> None:
         """One message; `NOWHERE` for one whose pose cannot be."""
         self._stamps.append(min(stamp, MAX_STAMP))

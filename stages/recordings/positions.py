@@ -10,7 +10,7 @@ from omninav.stages.geometry.plane.se2 import wrap
 from .description import Description
 from .plausibility import MotionLimits, believed
 from .recording import UnreadableRecording
-from .stamps import ascending, poses_at
+from .stamps import ascending, poses_near
 from .tables import Angle, CsvTable
 
 Array = npt.NDArray[np.float64]
@@ -64,10 +64,7 @@ def frame_poses(
     sure = np.isfinite(track).all(axis=1)
     if sure.sum() < 2:
         raise UnreadableRecording(f"{table.path}: fewer than two rows with a heading")
-    poses[timed] = poses_at(stamps[sure], track[sure], shifted)
-    after = np.clip(np.searchsorted(stamps, shifted), 1, len(stamps) - 1)
-    gap = np.minimum(np.abs(shifted - stamps[after - 1]), np.abs(stamps[after] - shifted))
-    poses[np.array(timed, dtype=np.int64)[gap > positions.max_gap * 1e9]] = np.nan
+    poses[timed] = poses_near(stamps[sure], track[sure], shifted, positions.max_gap)
     return poses, said
 
 

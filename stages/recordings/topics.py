@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +16,14 @@ from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from_info, parse_camera, read_camera
-from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, ImpossiblePose, pixels_of, pose_of
+from .messages import IMAGE_TYPES, POSE_TYPES, SCAN_TYPE, TRANSFORMS_TYPE, ImpossiblePose, pixels_of, pose_of
 from .named_camera import named_camera
 from .plausibility import MotionLimits, seconds_within
 from .pose_topic import NOWHERE, PoseTopic, Track
 from .recording import OpenOptions, Topics, UnreadableRecording
 from .stamps import ascending, lone, poses_at, within
 from .topic_recording import Feed, TopicRecording
+from .transforms import TransformTopic
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -35,14 +36,22 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
     Camera: a camera.yaml named by the user; else one attached, else one beside the file, else CameraInfo.
     Raises `UnreadableRecording` where a topic is missing, or nothing usable remains.
     """
-    topics = options.topics
+    topics, transforms = options.topics, None
+    if topics.truth is not None and ":" in topics.truth:
+        transforms = TransformTopic(topics.truth)
+        topics = replace(topics, truth=transforms.topic)
     wanted = {topic for topic in (topics.camera_info, topics.odometry, topics.truth, topics.scan) if topic}
     wanted |= {topics.image} if topics.image else set(IMAGE_TOPICS)
     found: dict[str, list[Record]] = {topic: [] for topic in wanted}
     poses = {topic: PoseTopic(topic) for topic in (topics.odometry, topics.truth) if topic}
     infos: list[Any] = []
+    if transforms is not None:
+        poses[transforms.topic] = transforms
     for record in feed.scan(wanted):
         try:
+            if transforms is not None and record.topic == transforms.topic:
+                _add_transforms(feed, name, transforms, record)
+                continue
             if record.topic in poses:
                 poses[record.topic].add(record.stamp, record.log_time, _pose(feed, record, name))
                 continue
@@ -55,6 +64,8 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
             continue
         found[record.topic].append(record._replace(data=b""))
 
+    if transforms is not None:
+        transforms.require(name, feed.topics.get(transforms.topic, ""))
     image_topic = _image_topic(name, feed, topics, found)
     odometry = _track(name, feed, "odometry", topics.odometry, poses, options.limits)
     truth = _track(name, feed, "truth", topics.truth, poses, options.limits)
@@ -120,6 +131,15 @@ def find_camera(
         f"{name}: nothing says how its images are to be read: no camera.yaml is attached or lies beside it; "
         "give camera=PATH/camera.yaml"
     )
+
+
+def _add_transforms(feed: Feed, name: str, transforms: TransformTopic, record: Record) -> None:
+    if feed.topics.get(record.topic) != TRANSFORMS_TYPE:
+        return  # said once the log has been gone through
+    try:
+        transforms.add_message(record, feed.decode(record.topic, record.data))
+    except ValueError as error:
+        feed.drop("bad_message", f"{name}: a message on {record.topic}: {error}")
 
 
 def _pose(feed: Feed, record: Record, name: str) -> tuple[float, float, float]:

@@ -70,8 +70,9 @@ def settled_speed(ctx: Context, name: str, speed: float | None) -> float:
     readers = list(dict.fromkeys([*ctx.readers.get("motion", []), *maps]))
     if speed is None and readers:
         raise UnreadableRecording(
-            f"{name}: it has neither odometry nor positions, needed by {_listed(readers)}; type speed=0.5 to "
-            "guess it (m/s, turns are seen in the images), or take a variant that needs none: topological_localisation"
+            f"{name}: it has neither odometry nor positions of all images, needed by {_listed(readers)}; type "
+            "speed=0.5 to guess it (m/s, turns are seen in the images), or take a variant that needs none: "
+            "topological_localisation"
         )
     if maps and not speed:
         raise UnreadableRecording(

@@ -3,6 +3,7 @@
 import hashlib
 import math
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,13 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
-from omninav.pipeline.files import digest_text
+from omninav.pipeline.files import digest_file, digest_text, user_path
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.plausibility import MotionLimits
 from omninav.stages.recordings.recording import Recording, Topics, UnreadableRecording
+from omninav.stages.recordings.truth_file import truth_from
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.values.image import Image
@@ -26,8 +28,10 @@ from omninav.stages.values.scan import Scan
 
 from .cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames, thinned
 from .guessed_motion import VisualCompass, guessed_motion, settled_speed
+from .synthetic_odometry import add_odometry_noise
 
 Array = npt.NDArray[np.float64]
+OdometryKind = Literal["measured", "synthetic", "guessed"]
 DRIVE = "drive.mcap"
 """A simulated drive in the folder of its recording."""
 
@@ -77,8 +81,15 @@ class LogSource(Source):
     """Which topics of the log are read."""
     limits: MotionLimits = MotionLimits()
     """What the robot can do: odometry and truth beyond it are dropped, counted, and odometry's gaps bridged."""
+    truth: str | None = None
+    """The true poses, where they are not on the log's own topic: a file beside it (TUM, or a CSV with time, x, y and
+    heading), a topic, or a frame of a tf topic as /tf:PARENT:CHILD."""
+    truth_clock_offset_s: Annotated[float, Bounds(ge=-1e10, le=1e10)] = 0.0
+    """An image taken at t is looked up in the file at t + this."""
+    truth_max_gap_s: Annotated[float, Bounds(gt=0, le=3600)] = 0.5
+    """How far in time a pose of the file may be from an image."""
     camera: str | None = None
-    """A camera.yaml in place of the log's own."""
+    """A camera.yaml in place of the log's own, or a projection (`equirectangular`, …)."""
     layout_folders: tuple[str, ...] = ()
     """Folders with further descriptions of folders of images."""
     first: Annotated[int, Bounds(ge=0)] = 0
@@ -121,12 +132,11 @@ class LogSource(Source):
         for recording, lost in zip(self._opened, self._lost, strict=True):
             for kind, number in sorted(lost.items()):
                 ctx.count(kind, number, recording.details.get(kind, ""))
-        kinds = [self._odometry_kind(recording) for recording in self._opened]
-        ctx.fact("odometry", ", ".join(dict.fromkeys(kinds)))
+        ctx.fact("odometry", ", ".join(dict.fromkeys(self._kinds)))
         assumed = [sentence for recording in self._opened for sentence in recording.assumed]
         if assumed:
             ctx.fact("assumed", "; ".join(assumed))
-        for recording, kind in zip(self._opened, kinds, strict=True):
+        for recording, kind in zip(self._recordings, self._kinds, strict=True):
             if kind == "synthetic":
                 ctx.warn(f"{recording.name} has no odometry: it was made of its true positions, with noise")
             elif kind == "guessed":
@@ -138,6 +148,8 @@ class LogSource(Source):
         whole = hashlib.sha256()
         for recording in self._opened:
             whole.update(recording.digest().encode())
+        if self._truth_file is not None:
+            whole.update(digest_file(self._truth_file).encode())
         return whole.hexdigest()
 
     def length(self) -> int | None:
@@ -199,7 +211,8 @@ class LogSource(Source):
             frame=frame,
             first_of_log=first,
         )
-        truth = None if recording.truth is None else recording.truth[frame]
+        true_poses = self._truth[position.log]
+        truth = None if true_poses is None else true_poses[frame]
         odometry, motion = None, None
         measured = self._odometry[position.log]
         if recording.odometry is not None:
@@ -208,7 +221,7 @@ class LogSource(Source):
                 gap = 0.0 if recording.unmeasured_s is None else float(np.ptp(recording.unmeasured_s[[last, frame]]))
                 motion = _motion(between(measured[last], odometry), gap)
         else:
-            if self._odometry_kind(recording) == "guessed":
+            if self._kinds[position.log] == "guessed":
                 motion = self._guessed(position, recording, image, last, frame)
             elif last is not None:
                 motion = _motion(self._synthetic(ctx, between(measured[last], measured[frame])))
@@ -229,6 +242,13 @@ class LogSource(Source):
             goal=recording.goal(frame) if isinstance(recording, LiveRecording) else None,
         )
 
+    @property
+    def _truth_file(self) -> Path | None:
+        """The file of true poses; None where they come from a topic."""
+        if self.truth is None or (self.truth.startswith("/") and not Path(self.truth).exists()):
+            return None
+        return user_path(self.truth)
+
     def _guessed(
         self, position: LogSourceState, recording: Recording, image: Image, last: int | None, frame: int
     ) -> Motion | None:
@@ -238,10 +258,14 @@ class LogSource(Source):
         seconds = float(recording.stamps[frame] - recording.stamps[last]) / 1e9
         return guessed_motion(before, position.view, seconds, self._speed)
 
-    def _odometry_kind(self, recording: Recording) -> Literal["measured", "synthetic", "guessed"]:
+    def _read_truth(self, recording: Recording, file: Path) -> Array:
+        return truth_from(recording, file, self.truth_clock_offset_s, self.truth_max_gap_s, self.limits)
+
+    def _odometry_kind(self, recording: Recording, truth: Array | None) -> OdometryKind:
         if recording.odometry is not None:
             return "measured"
-        return "synthetic" if self.speed_m_s is None and recording.truth is not None else "guessed"
+        whole = truth is not None and np.isfinite(truth).all()
+        return "synthetic" if self.speed_m_s is None and whole else "guessed"
 
     def _synthetic(self, ctx: Context, increment: Array) -> Array:
         return add_odometry_noise(
@@ -268,11 +292,15 @@ class LogSource(Source):
         elif not names or None in names:
             raise UnreadableRecording("no recording is named; type log=PATH")
         else:
+            topics = self.topics
+            if self.truth is not None and self._truth_file is None:
+                topics = replace(topics, truth=self.truth)
             recordings = [
-                open_recording(str(name), self.topics, self.camera, self.layout_folders, self.limits, self.rate_hz)
+                open_recording(str(name), topics, self.camera, self.layout_folders, self.limits, self.rate_hz)
                 for name in names
             ]
-        self._recordings, self._frames, self._odometry = [], [], []
+        self._recordings, self._frames, self._odometry, self._truth = [], [], [], []
+        self._kinds: list[OdometryKind] = []
         self._compass = VisualCompass()
         for recording in recordings:
             check_cuts(self.cuts, len(recording.stamps), recording.name)
@@ -283,7 +311,8 @@ class LogSource(Source):
                     f"{recording.name}: first={self.first}, stop={self.stop} leaves none of its frames; "
                     "type nodes.source.first=0 nodes.source.stop=null"
                 )
-            poses = recording.truth if recording.odometry is None else recording.odometry
+            truth = recording.truth if self._truth_file is None else self._read_truth(recording, self._truth_file)
+            poses = truth if recording.odometry is None else recording.odometry
             unaware = np.empty((0, 3)) if poses is None else as_if_driven(poses, self.cuts)
             pauses = np.diff(recording.stamps[frames]) > self.new_log_after_s * 1e9
             pauses &= ~crossed(self.cuts, frames)
@@ -293,31 +322,12 @@ class LogSource(Source):
                 pauses = np.diff(recording.stamps[frames]) <= 0
             for part in np.split(frames, np.flatnonzero(pauses) + 1):
                 self._recordings.append(recording)
+                self._truth.append(truth)
+                self._kinds.append(self._odometry_kind(recording, truth))
                 self._frames.append(part)
                 self._odometry.append(unaware)
         self._opened = recordings
         self._lost = [recording.dropped.copy() for recording in recordings]
-
-
-def add_odometry_noise(
-    increment: Array, noise: Array, distance: float, turn_per_metre: float, turn_per_radian: float
-) -> Array:
-    """An increment of motion (3,) as a poor odometry would have measured it.
-
-    `noise`: two independent standard normal numbers n1, n2. With d the length of the increment (m) and t its turn
-    (rad), the length becomes d + distance sqrt(d) n1 and the turn t + e, e = sqrt(turn_per_metre^2 d +
-    turn_per_radian^2 |t|) n2; the translation is turned by e / 2, as if the error had grown evenly on the way.
-    Variances grow with the way, so that cutting it into more frames changes nothing: over one metre the standard
-    deviations are `distance` (metres, that is, the share of the way) and `turn_per_metre` (radians); a turn of one
-    radian adds `turn_per_radian`. The model is the odometry motion model of Thrun, Burgard & Fox, Probabilistic
-    Robotics (2005), section 5.4, with variances in place of standard deviations.
-    """
-    length, turn = math.hypot(increment[0], increment[1]), abs(float(increment[2]))
-    error = math.sqrt(turn_per_metre**2 * length + turn_per_radian**2 * turn) * float(noise[1])
-    scale = 1.0 + distance / math.sqrt(length) * float(noise[0]) if length > 0 else 1.0
-    cos, sin = math.cos(error / 2) * scale, math.sin(error / 2) * scale
-    x, y = float(increment[0]), float(increment[1])
-    return np.array([cos * x - sin * y, sin * x + cos * y, float(increment[2]) + error])
 
 
 def _motion(increment: Array, unmeasured_s: float = 0.0) -> Motion:

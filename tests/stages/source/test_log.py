@@ -14,7 +14,8 @@ from omninav.pipeline import Context
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import UnreadableRecording
-from omninav.stages.source.log import LogSource, LogSourceState, add_odometry_noise
+from omninav.stages.source.log import LogSource, LogSourceState
+from omninav.stages.source.synthetic_odometry import add_odometry_noise
 from omninav.stages.values.pose import GuessedMotion
 
 

@@ -1,0 +1,150 @@
+"""Ground truth from files beside a log, from other messages, and from transforms."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_logs import FRAMES, START, TRUTH, Made, messages, pose_at, pose_fields, write_mcap
+
+from omninav.pipeline import Context
+from omninav.pipeline.mcap.message_types import make_message
+from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.recording import Topics, UnreadableRecording
+from omninav.stages.recordings.truth_file import read_trajectory
+from omninav.stages.source.log import LogSource, LogSourceState
+
+SECONDS = tuple(0.1 * number for number in range(101))
+
+
+def tum(path: Path, shift_s: float = START / 1e9, seconds: tuple[float, ...] = SECONDS) -> Path:
+    rows = ["# timestamp x y z qx qy qz qw"]
+    for at in seconds:
+        x, y, heading = pose_at(at)
+        rows.append(f"{at + shift_s:.9f} {x:.9f} {y:.9f} 0 0 0 {math.sin(heading / 2):.9f} {math.cos(heading / 2):.9f}")
+    path.write_text("\n".join(rows))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("header", "row"),
+    [
+        ("timestamp,x,y,yaw", "{t:.6f},{x},{y},{h}"),
+        (
+            "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []",
+            "{ns},{x},{y},{qw},0,0,{qz}",
+        ),
+        ("time_ms,x_mm,y_mm,heading_deg", "{ms},{x_mm},{y_mm},{deg}"),
+    ],
+)
+def test_tables_are_read_by_the_names_and_units_of_their_columns(tmp_path: Path, header: str, row: str) -> None:
+    rows = [header]
+    for at in SECONDS:
+        x, y, h = pose_at(at)
+        rows.append(row.format(
+            t=at, ns=round(at * 1e9), ms=at * 1e3, x=x, y=y, h=h, x_mm=x * 1e3, y_mm=y * 1e3, deg=math.degrees(h),
+            qw=math.cos(h / 2), qz=math.sin(h / 2)))  # fmt: skip
+    (tmp_path / "truth.csv").write_text("\n".join(rows))
+    stamps, poses = read_trajectory(tmp_path / "truth.csv")
+    np.testing.assert_allclose(stamps, np.array(SECONDS) * 1e9, atol=1)
+    np.testing.assert_allclose(poses, [pose_at(at) for at in SECONDS], atol=1e-9)
+
+
+def test_a_table_without_headings_is_read_for_the_tracks_direction(tmp_path: Path) -> None:
+    (tmp_path / "truth.csv").write_text("t,x,y\n" + "\n".join(f"{n},{n},{n}" for n in range(9)))
+    assert read_trajectory(tmp_path / "truth.csv")[1][:, 2] == pytest.approx(np.full(9, math.pi / 4))
+
+
+def test_what_is_no_trajectory_says_what_is_missing(tmp_path: Path) -> None:
+    for content, what in (
+        ("name,x,z\na,1,2\n", "no column for time and y among 'name, x, z'; a trajectory is a CSV with time, x, y"),
+        ("1 2 3 0 0 0 0 1\n2 3\n", "line 2: 2 numbers, expected time x y z qx qy qz qw"),
+        ("t,x,y\n1,2,3\n", "fewer than two rows"),
+    ):
+        (tmp_path / "truth.csv").write_text(content)
+        with pytest.raises(UnreadableRecording, match=what):
+            read_trajectory(tmp_path / "truth.csv")
+
+
+def outs(source: LogSource, ctx: Context) -> list:
+    source.setup(ctx)
+    position, found = LogSourceState(), []
+    while (out := source.step(ctx, position)) is not None:
+        found.append(out)
+    return found
+
+
+def test_a_file_beside_the_log_takes_the_place_of_its_own_truth(tmp_path: Path) -> None:
+    without = (made for made in messages() if made.topic != TRUTH)
+    log = str(write_mcap(tmp_path / "log.mcap", without))
+    gap = tuple(at for at in SECONDS if not 2.0 < at < 5.0)
+    ctx = Context("source")
+    source = LogSource(
+        log=log, truth=str(tum(tmp_path / "truth.tum", 100.0, gap)), truth_clock_offset_s=100 - START / 1e9
+    )
+    found = outs(source, ctx)
+    assert len(found) == FRAMES
+    known = [out for out in found if out.truth is not None]
+    for out in known:
+        x, y, heading = pose_at((out.tick.stamp - START) / 1e9)
+        assert (out.truth.x, out.truth.y, out.truth.heading) == pytest.approx((x, y, heading), abs=2e-2)
+    assert 0 < ctx.counts["no_truth"] == FRAMES - len(known)
+    assert ctx.facts["odometry"] == "measured"
+    assert source.inputs_digest() != LogSource(log=log).inputs_digest()
+
+
+def test_clocks_that_do_not_meet_are_said_with_both_spans(tmp_path: Path) -> None:
+    log = str(write_mcap(tmp_path / "log.mcap"))
+    with pytest.raises(UnreadableRecording, match=r"times are 0.000 to 10.000 s, the images' 17.*truth_clock_offset_s"):
+        outs(LogSource(log=log, truth=str(tum(tmp_path / "truth.tum", 0.0))), Context("source"))
+
+
+def replaced(kind: str, fields: str) -> Iterator[Made]:
+    def change(made: Made) -> list[Made]:
+        if made.topic != TRUTH:
+            return [made]
+        pose = pose_fields(*pose_at((made.stamp - START) / 1e9))
+        transform = {"translation": pose["position"], "rotation": pose["orientation"]}
+        stamped = {"transform": transform, "child_frame_id": "base"}
+        content = {
+            "transform": stamped,
+            "covariance": {"pose": {"pose": pose}},
+            "tf": {"transforms": [transform_of(made.stamp, transform, "base"), transform_of(made.stamp, {}, "arm")]},
+        }[fields]
+        return [made._replace(topic="/truth", msgtype=kind, content=make_message(kind, content, made.stamp))]
+
+    return messages(change)
+
+
+def transform_of(stamp: int, transform: dict, child: str) -> object:
+    made = make_message("geometry_msgs/msg/TransformStamped", {"transform": transform, "child_frame_id": child}, stamp)
+    made.header.frame_id = "map"
+    return made
+
+
+@pytest.mark.parametrize(
+    ("kind", "fields", "truth"),
+    [
+        ("geometry_msgs/msg/TransformStamped", "transform", "/truth"),
+        ("geometry_msgs/msg/PoseWithCovarianceStamped", "covariance", "/truth"),
+        ("tf2_msgs/msg/TFMessage", "tf", "/truth:map:base"),
+    ],
+)
+def test_truth_comes_from_any_message_that_holds_a_pose(tmp_path: Path, kind: str, fields: str, truth: str) -> None:
+    path = str(write_mcap(tmp_path / "log.mcap", replaced(kind, fields)))
+    recording, plain = (
+        open_recording(path, Topics(truth=truth)),
+        open_recording(str(write_mcap(tmp_path / "plain.mcap"))),
+    )
+    np.testing.assert_allclose(recording.truth, plain.truth, atol=1e-9)
+
+
+def test_a_transform_that_is_not_there_is_said_with_those_that_are(tmp_path: Path) -> None:
+    path = str(write_mcap(tmp_path / "log.mcap", replaced("tf2_msgs/msg/TFMessage", "tf")))
+    with pytest.raises(
+        UnreadableRecording, match=r"no transform /truth:world:base; type .*: /truth:map:base, /truth:map:arm"
+    ):
+        open_recording(path, Topics(truth="/truth:world:base"))
+    with pytest.raises(UnreadableRecording, match="/odom carries nav_msgs/msg/Odometry, not transforms"):
+        open_recording(path, Topics(truth="/odom:map:base"))
