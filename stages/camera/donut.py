@@ -4,9 +4,9 @@ from typing import Annotated, Self
 
 import numpy as np
 
-from omninav.pipeline import BadInput
+from omninav.pipeline import BadInput, Bounds
 
-from .model import Array, Bools, Camera, Key, Ring, Sense
+from .model import FAR_PX, Array, Bools, Camera, Key, Ring, Sense
 from .rays import angles, unit_vectors
 
 
@@ -18,11 +18,11 @@ class Donut(Camera, projection="donut"):
     then (BadInput).
     """
 
-    centre_x: Annotated[float | None, Key("centre", "x")] = None
+    centre_x: Annotated[float | None, Key("centre", "x"), Bounds(ge=-FAR_PX, le=FAR_PX)] = None
     """Pixels, as the next three."""
-    centre_y: Annotated[float | None, Key("centre", "y")] = None
-    inner_radius_px: Annotated[float | None, Key("mask", "inner_radius_px")] = None
-    outer_radius_px: Annotated[float | None, Key("mask", "outer_radius_px")] = None
+    centre_y: Annotated[float | None, Key("centre", "y"), Bounds(ge=-FAR_PX, le=FAR_PX)] = None
+    inner_radius_px: Annotated[float | None, Key("mask", "inner_radius_px"), Bounds(ge=0, le=FAR_PX)] = None
+    outer_radius_px: Annotated[float | None, Key("mask", "outer_radius_px"), Bounds(gt=0, le=FAR_PX)] = None
     sense: Sense = "clockwise"
 
     @classmethod

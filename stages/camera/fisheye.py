@@ -7,7 +7,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds
 
-from .model import Array, Bools, Camera, InnerRadius, Key, OuterRadius, Ring, Sense
+from .model import FAR_PX, Array, Bools, Camera, InnerRadius, Key, OuterRadius, Ring, Sense
 from .rays import angles, unit_vectors
 
 
@@ -17,10 +17,10 @@ class Fisheye(Camera, projection="fisheye"):
     A pixel's bearing is atan2(v - cy, u - cx) + yaw where `sense` is clockwise, as with a mirror.
     """
 
-    focal_px: Annotated[float, Key("", "focal_px"), Key("K", 0), Bounds(gt=0)]
+    focal_px: Annotated[float, Key("", "focal_px"), Key("K", 0), Bounds(ge=1, le=FAR_PX)]
     """Pixels per radian."""
-    centre_x: Annotated[float, Key("centre", "x"), Key("K", 2)]
-    centre_y: Annotated[float, Key("centre", "y"), Key("K", 5)]
+    centre_x: Annotated[float, Key("centre", "x"), Key("K", 2), Bounds(ge=-FAR_PX, le=FAR_PX)]
+    centre_y: Annotated[float, Key("centre", "y"), Key("K", 5), Bounds(ge=-FAR_PX, le=FAR_PX)]
     outer_radius_px: OuterRadius
     """The image is used out to here."""
     inner_radius_px: InnerRadius = 0.0

@@ -24,6 +24,9 @@ from .model import (
 )
 from .rays import normalised, turned
 
+HalfAxis = Bounds(ge=1e-5, le=1e5)
+"""From a mirror of a tenth of a millimetre in metres to one of a hundred metres in millimetres."""
+
 
 class HyperbolicMirror(Camera, projection="hyperbolic"):
     """A hyperbolic mirror over a perspective camera, by closed forms (Svoboda & Pajdla; erratum 33, docs/papers.md).
@@ -41,9 +44,9 @@ class HyperbolicMirror(Camera, projection="hyperbolic"):
     focal_y: FocalY
     centre_x: CentreX
     centre_y: CentreY
-    a: Annotated[float, Key("mirror", "a"), Bounds(gt=0)]
+    a: Annotated[float, Key("mirror", "a"), HalfAxis]
     """Half axis of the hyperbola along the mirror's axis, in the unit of `b`: rays have no length."""
-    b: Annotated[float, Key("mirror", "b"), Bounds(gt=0)]
+    b: Annotated[float, Key("mirror", "b"), HalfAxis]
     """Half axis of the hyperbola across the mirror's axis."""
     inner_radius_px: InnerRadius
     """Inside it, around the principal point, the robot sees itself."""
@@ -80,7 +83,7 @@ class HyperbolicMirror(Camera, projection="hyperbolic"):
         denominator = e - self.a * np.sqrt(qx * qx + qy * qy + 1.0)
         looks: Bools = denominator > 0.0
         with np.errstate(divide="ignore", invalid="ignore"):
-            scale = np.where(looks, self.b * self.b / denominator, np.nan)
+            scale = np.where(looks, self.b * self.b / np.where(looks, denominator, 1.0), np.nan)
         ray = np.stack([scale * qx, scale * qy, scale - 2.0 * e], axis=-1)
         return turned(normalised(ray), self.yaw), looks
 

@@ -5,6 +5,7 @@ camera.yaml) follows from what it says here.
 """
 
 import importlib
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import KW_ONLY
@@ -15,6 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Value
+
+from .rays import unit_vectors
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -37,8 +40,8 @@ MAX_SIDE, MAX_PIXELS = 32_768, 100_000_000
 """Columns or rows of an image, and its pixels: several arrays of this size are made of a camera."""
 FAR_PX = 1e6
 """No place of a camera's image, and no radius in it, is further from its corner than this."""
-FocalX = Annotated[float, Key("K", 0), Bounds(gt=0, le=FAR_PX)]
-FocalY = Annotated[float, Key("K", 4), Bounds(gt=0, le=FAR_PX)]
+FocalX = Annotated[float, Key("K", 0), Bounds(ge=1, le=FAR_PX)]
+FocalY = Annotated[float, Key("K", 4), Bounds(ge=1, le=FAR_PX)]
 CentreX = Annotated[float, Key("K", 2), Bounds(ge=-FAR_PX, le=FAR_PX)]
 CentreY = Annotated[float, Key("K", 5), Bounds(ge=-FAR_PX, le=FAR_PX)]
 Skew = Annotated[float, Key("K", 1), Bounds(ge=-FAR_PX, le=FAR_PX)]
@@ -84,9 +87,9 @@ class Camera(Value, ABC):
     height_px: Annotated[int, Key("image", "height"), Bounds(gt=0, le=MAX_SIDE)]
     """Rows of an image."""
     _: KW_ONLY
-    height: float | None = None
+    height: Annotated[float, Bounds(ge=0, le=1000)] | None = None
     """Metres of the projection centre above the floor; None where it is not known."""
-    yaw: float = 0.0
+    yaw: Annotated[float, Bounds(ge=-2 * math.pi, le=2 * math.pi)] = 0.0
     """Radians, counter-clockwise, by which the camera is turned against the robot."""
 
     def __init_subclass__(cls, projection: str = "", **kwargs: Any) -> None:
@@ -181,6 +184,31 @@ def seen_at(camera: Camera, rays: Array) -> Array:
     """Pixels (..., 2) at which rays (..., 3) in the robot's frame are seen; NaN where they are not."""
     pixels, shown = camera.project(rays)
     return np.where(shown[..., None], pixels, np.nan)
+
+
+SIGHT_STEPS, LEAST_SIGHT = (144, 73), 0.001
+"""Azimuths and elevations at which a camera is asked what it sees, and the share of the sphere that it must see: 7 by 7
+degrees."""
+
+
+def require_sight(camera: Camera) -> None:
+    """Raise BadInput for a camera that sees nothing, or almost nothing: its numbers are no camera's.
+
+    One whose centre and mask are still to be found in its images is not asked.
+    """
+    if camera.elevations is None and not camera.elevations_known:
+        return
+    azimuths = np.linspace(-math.pi, math.pi, SIGHT_STEPS[0])
+    elevations = np.linspace(-math.pi / 2, math.pi / 2, SIGHT_STEPS[1])
+    with np.errstate(all="ignore"):
+        pixels, shown = camera.project(unit_vectors(azimuths[:, None], elevations))
+        looks = camera.unproject(camera.grid()[:: max(1, camera.height_px // 64), :: max(1, camera.width // 64)])[1]
+    share = float((shown * np.cos(elevations)).sum() / (SIGHT_STEPS[0] * np.cos(elevations).sum()))
+    if not np.isfinite(pixels[shown]).all() or share < LEAST_SIGHT or not looks.any():
+        raise BadInput(
+            f"camera: with these numbers a {camera.projection} camera of {camera.width} x {camera.height_px} pixels "
+            f"sees {100 * share:.2g} % of all directions; check the model, the mask and the size in camera.yaml"
+        )
 
 
 def require_elevations(camera: Camera) -> None:

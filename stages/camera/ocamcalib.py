@@ -4,8 +4,12 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from .model import Array, Bools, Camera, InnerRadius, Key, OuterRadius, Ring
+from omninav.pipeline import Bounds
+
+from .model import FAR_PX, Array, Bools, Camera, InnerRadius, Key, OuterRadius, Ring
 from .rays import normalised, turned
+
+Affine = Bounds(ge=-10, le=10)
 
 STEPS = 1024
 """Radii between which the polynomial is inverted before Newton's method refines them."""
@@ -21,20 +25,20 @@ class OCamCalib(Camera, projection="ocamcalib"):
     atan2(y, x) + yaw of its column and row from the centre.
     """
 
-    polynomial: Annotated[tuple[float, ...], Key("ocamcalib", "polynomial")]
+    polynomial: Annotated[tuple[Annotated[float, Bounds(ge=-FAR_PX, le=FAR_PX)], ...], Key("ocamcalib", "polynomial")]
     """a0, a1, …, of which a0 is negative: the centre of the image looks along -z."""
-    centre_y: Annotated[float, Key("centre", "y")]
+    centre_y: Annotated[float, Key("centre", "y"), Bounds(ge=-FAR_PX, le=FAR_PX)]
     """Row of the centre (pixels)."""
-    centre_x: Annotated[float, Key("centre", "x")]
+    centre_x: Annotated[float, Key("centre", "x"), Bounds(ge=-FAR_PX, le=FAR_PX)]
     """Column of the centre (pixels)."""
     outer_radius_px: OuterRadius
     """The image is used out to here."""
     inner_radius_px: InnerRadius = 0.0
-    c: Annotated[float, Key("ocamcalib", "c")] = 1.0
+    c: Annotated[float, Key("ocamcalib", "c"), Affine] = 1.0
     """Stretch of rows against columns."""
-    d: Annotated[float, Key("ocamcalib", "d")] = 0.0
+    d: Annotated[float, Key("ocamcalib", "d"), Affine] = 0.0
     """Shear of rows by columns."""
-    e: Annotated[float, Key("ocamcalib", "e")] = 0.0
+    e: Annotated[float, Key("ocamcalib", "e"), Affine] = 0.0
     """Shear of columns by rows."""
     looks: Annotated[Literal["up", "down"], Key("ocamcalib", "looks")] = "up"
     """Where the image's centre looks: up through a lens, or down by way of a mirror above the camera."""

@@ -7,11 +7,14 @@ from typing import Annotated
 
 import numpy as np
 
-from .model import Array, Bools, Camera, Key, Sense
+from omninav.pipeline import Bounds
+
+from .model import FAR_PX, Array, Bools, Camera, Key, Sense
 from .rays import angles, unit_vectors
 
-Top = Annotated[float, Key("elevation", "top")]
-Bottom = Annotated[float, Key("elevation", "bottom")]
+Elevation = Bounds(ge=-math.pi / 2 - 1e-6, le=math.pi / 2 + 1e-6)
+Top = Annotated[float, Key("elevation", "top"), Elevation]
+Bottom = Annotated[float, Key("elevation", "bottom"), Elevation]
 
 
 class Strip(Camera):
@@ -19,7 +22,7 @@ class Strip(Camera):
 
     wraps = True
 
-    column_of_forward: float
+    column_of_forward: Annotated[float, Bounds(ge=-FAR_PX, le=FAR_PX)]
     """Where the robot's forward is: edges of columns count from 0, so the middle is width / 2 (pixels)."""
     _: KW_ONLY
     sense: Sense = "clockwise"

@@ -13,15 +13,15 @@ import numpy as np
 import yaml
 
 from omninav.pipeline.graph.ports import convert
-from omninav.pipeline.graph.problems import nearest, shown
+from omninav.pipeline.graph.problems import BadInput, nearest, shown
 from omninav.pipeline.graph.signature import Parameter, read_parameters
 from omninav.pipeline.graph.small_files import parse_yaml, read_yaml
-from omninav.stages.camera.model import Camera, Key, camera_models
+from omninav.stages.camera.model import Camera, Key, camera_models, require_sight
 
 from .recording import UnreadableRecording
 
 Keys = dict[str, set[str]]
-MATRIX = "must be [[fx, skew, cx], [0, fy, cy], [0, 0, 1]], with focal lengths above 0"
+MATRIX = "must be [[fx, skew, cx], [0, fy, cy], [0, 0, 1]], with focal lengths of a pixel or more"
 
 
 def read_camera(path: Path) -> Camera:
@@ -45,9 +45,11 @@ def camera_from(content: Any, where: str, size: tuple[int, int] | None = None) -
     found = {name: _value(content, parameter, known, where) for name, parameter in read_parameters(model).items()}
     _refuse_misspelt(content, known, where)
     try:
-        return model(**{name: value for name, value in found.items() if value is not None})
-    except ValueError as error:
+        camera = model(**{name: value for name, value in found.items() if value is not None})
+        require_sight(camera)
+    except (ValueError, BadInput) as error:
         raise UnreadableRecording(f"{where}: {error}") from None
+    return camera
 
 
 def write_camera(camera: Camera) -> str:
@@ -138,8 +140,8 @@ def _value(content: dict[str, Any], parameter: Parameter, known: Keys, where: st
             raise UnreadableRecording(f"{where}: '{path}' must be a number or a word, not {shown(value)}")
         converted, problems = convert(value, parameter.type, path)
         if problems:
-            what = MATRIX if isinstance(key.name, int) else f"is {problems[0].what}"
-            raise UnreadableRecording(f"{where}: '{path}' {what}")
+            what = f" {MATRIX}" if isinstance(key.name, int) else f": {problems[0].what}"
+            raise UnreadableRecording(f"{where}: '{path}'{what}")
         return converted
     if parameter.default is dataclasses.MISSING:
         raise UnreadableRecording(f"{where}: {_missing(content, keys_of(parameter)[0], known)}")
