@@ -79,7 +79,7 @@ def run_job(config: Any, arguments: Sequence[str], run_experiment: Callable[[Any
     elif folder is not None and folder.is_dir() and not any(folder.iterdir()):
         folder.rmdir()  # Hydra has made it, and nothing has run
     if OUTCOMES in os.environ:
-        with open(os.environ[OUTCOMES], "a") as file:
+        with open(os.environ[OUTCOMES], "a", encoding="utf-8") as file:
             file.write(f"{code} {page or ''}\n")
 
 
@@ -149,7 +149,7 @@ def _note_job(job: SweepJob, code: int, error: str) -> Path:
     from omninav.pipeline.report.sweep_page import write_sweep_page
 
     file = job.folder / "manifest.json"
-    manifest = json.loads(file.read_text()) if file.exists() else {"status": "refused"}
+    manifest = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {"status": "refused"}
     manifest |= {"job": job.number, "overrides": job.overrides} | ({"error": error} if error else {})
     write_json(file, manifest)
     with locked(job.sweep / ".page.lock"):
@@ -160,7 +160,7 @@ def _sweep_rows(sweep: Path) -> Iterator[dict[str, Any]]:
     from omninav.pipeline.run.metrics_files import read_metrics
 
     for file in sweep.rglob("manifest.json"):
-        manifest, folder = json.loads(file.read_text()), file.parent
+        manifest, folder = json.loads(file.read_text(encoding="utf-8")), file.parent
         if "job" in manifest:
             metrics = read_metrics(folder) if (folder / "metrics.json").exists() else None
             yield {"job": manifest["job"], "folder": folder, "manifest": manifest, "metrics": metrics}

@@ -45,7 +45,12 @@ def version(distribution: str) -> str:
 def surroundings() -> str:
     """A hash over what every graph runs in: the framework's code, and the versions of Python and the libraries."""
     files = [file for part in DECIDING for file in sorted([FRAMEWORK / part, *(FRAMEWORK / part).rglob("*.py")])]
-    code = [text for file in files if file.is_file() for text in (str(file.relative_to(FRAMEWORK)), file.read_text())]
+    code = [
+        text
+        for file in files
+        if file.is_file()
+        for text in (str(file.relative_to(FRAMEWORK)), file.read_text(encoding="utf-8"))
+    ]
     versions = [f"{name} {version(name)}" for name in LIBRARIES]
     return digest_text(platform.python_version(), platform.machine(), *versions, *code)
 
@@ -101,7 +106,7 @@ def module_version(module: str, without: str = "") -> str:
             found[name], imported = _read(place, name)
             to_read += [name.rpartition(".")[0], *imported]  # a package's own file runs before its modules
     if not found:  # a file that was given by its path: it has no package, and no name of its own
-        found[inside[-1]] = file.read_text()
+        found[inside[-1]] = file.read_text(encoding="utf-8")
     return digest_text(*(text for name in sorted(found) for text in (name[len(outer) :], found[name])))
 
 
@@ -113,7 +118,7 @@ def _file_of(package: Path, name: str) -> Path | None:
 
 @functools.cache
 def _read(file: Path, name: str) -> tuple[str, tuple[str, ...]]:
-    text = file.read_text()
+    text = file.read_text(encoding="utf-8")
     return text, tuple(_imported(text, name if file.name == "__init__.py" else name.rpartition(".")[0]))
 
 

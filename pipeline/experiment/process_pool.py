@@ -93,7 +93,7 @@ def _cause_of_death(code: int | None) -> str:
 def _run(job: Job, pipe: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C and ends its jobs
     job.log.parent.mkdir(parents=True, exist_ok=True)
-    log = job.log.open("w", buffering=1)
+    log = job.log.open("w", buffering=1, encoding="utf-8")
     os.dup2(log.fileno(), 1)
     os.dup2(log.fileno(), 2)
     error: str | None = None

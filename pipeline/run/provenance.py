@@ -9,7 +9,7 @@ def git_commit() -> str | None:
     command = ["git", "describe", "--always", "--dirty", "--abbrev=40"]
     here = Path(__file__).resolve().parent
     try:
-        ended = subprocess.run(command, cwd=here, capture_output=True, text=True, timeout=5)
+        ended = subprocess.run(command, cwd=here, capture_output=True, encoding="utf-8", errors="replace", timeout=5)
     except (OSError, subprocess.TimeoutExpired):
         return None
     return ended.stdout.strip() or None if ended.returncode == 0 else None

@@ -54,7 +54,7 @@ class RecordLog(Stage):
         drives = [SimulatedRecording(self.world, self.route, day, self.kidnappings) for day in days]
         ctx.doing("rendering the first image (a minute if the renderer has to be compiled)")
         record(drives, path, progress=ctx.progress)
-        path.with_suffix(".camera.yaml").write_text(write_camera(drives[0].camera))
+        path.with_suffix(".camera.yaml").write_text(write_camera(drives[0].camera), encoding="utf-8")
         world = World(self.world, days[0])
         driven = {f"{self.route}, day {drive.day}": drive.truth for drive in drives}
         draw_plan(world, path.with_suffix(".plan.png"), driven)

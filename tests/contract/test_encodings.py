@@ -22,7 +22,8 @@ def silent_calls(tree: ast.AST) -> Iterator[int]:
         opens = name == "open" and isinstance(call.func, ast.Name) and not any("b" in mode for mode in modes)
         opens |= name in ("open", "fdopen") and any(mode in ("r", "w", "a", "x", "r+", "w+") for mode in modes)
         texts = name in ("read_text", "write_text") or (name in RUNNING and keywords & {"text", "universal_newlines"})
-        if (opens or texts) and "encoding" not in keywords:
+        in_zip = isinstance(call.func, ast.Attribute) and getattr(call.func.value, "id", "") == "archive"
+        if (opens or texts) and not in_zip and "encoding" not in keywords:
             yield call.lineno
 
 
@@ -35,5 +36,7 @@ def test_every_text_file_is_opened_as_utf_8(room: str) -> None:
 
 
 def test_a_call_without_an_encoding_is_found() -> None:
-    text = "open(f)\nPath(f).read_text()\nPath(f).open('w')\nrun(a, text=True)\nopen(f, 'rb')\nrun(a, text=True, encoding='utf-8')"
+    text = (
+        "open(f)\nPath(f).read_text()\nPath(f).open('w')\nrun(a, text=True)\nopen(f, 'rb')\nopen(f, encoding='utf-8')"
+    )
     assert list(silent_calls(ast.parse(text))) == [1, 2, 3, 4]

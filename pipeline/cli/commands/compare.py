@@ -19,7 +19,7 @@ def command(arguments: list[str]) -> int:
         folder = Path(word)
         metrics = read_metrics(folder)
         config = read_yaml(folder / "config.yaml")
-        manifest = json.loads((folder / "manifest.json").read_text())
+        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
         runs.append({"name": word.rstrip("/"), "metrics": metrics, "config": config, "manifest": manifest})
     show(compare_table(runs))
     return 0

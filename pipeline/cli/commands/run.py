@@ -68,7 +68,11 @@ def _handed_over(hydra: Hydra, flags: Namespace, words: list[str], job: Callable
                 hydra.multirun("config", job, [*words, "hydra.mode=MULTIRUN"])
             else:
                 hydra.run("config", job, [*words, "hydra.mode=RUN"])
-            ends = [line.partition(" ") for line in outcomes.read_text().splitlines()] if outcomes.exists() else []
+            ends = (
+                [line.partition(" ") for line in outcomes.read_text(encoding="utf-8").splitlines()]
+                if outcomes.exists()
+                else []
+            )
         for page in {page for _, _, page in ends if page}:
             print(f"sweep: {shown(Path(page))}", flush=True)
         return max((int(code) for code, _, _ in ends), default=0)

@@ -14,7 +14,9 @@ def command(arguments: list[str]) -> int:
         for file in group_files("variant"):
             name = file.name.removesuffix(".yaml")
             comments = (
-                line for line in file.read_text().split("\n") if line.startswith("# ") and "@package" not in line
+                line
+                for line in file.read_text(encoding="utf-8").split("\n")
+                if line.startswith("# ") and "@package" not in line
             )
             print(f"{name:27} {next(comments, '').lstrip('# ')}")
             declared = compose("config", overrides=[f"variant={name}"]).inputs
