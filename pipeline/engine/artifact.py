@@ -9,12 +9,12 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline.files import write_whole
+from omninav.pipeline.files import whole_file
 from omninav.pipeline.graph.contents import misfit
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.value import VALUE_TYPES, Value, value_name
@@ -32,37 +32,55 @@ _EMPTY_ROWS = 1 << 24
 
 
 def write_artifact(path: Path, value: Value, facts: dict[str, Any] | None = None) -> None:
-    """Write a value as one file, as `artifact_bytes` gives it."""
-    write_whole(path, artifact_bytes(value, facts))
+    """Write a value as one file: a deflated zip of `.npy` arrays with a JSON header, its sha256 as comment.
+
+    Arrays go to the file piece by piece, so that a large map needs no memory twice. `numpy.load` opens it. The header
+    names the value's type, each field's array with its own sha256, and `facts` about how it was made. Top-level array
+    fields are arrays of the file; everything else is encoded in one more.
+    """
+    with whole_file(path) as part, part.open("w+b") as file:
+        _write(file, value, facts)
 
 
 def artifact_bytes(value: Value, facts: dict[str, Any] | None = None) -> bytes:
-    """A value as the content of a file: a deflated zip of `.npy` arrays with a JSON header, its sha256 as comment.
+    """What `write_artifact` would write."""
+    buffer = io.BytesIO()
+    _write(buffer, value, facts)
+    return buffer.getvalue()
 
-    `numpy.load` opens it. The header names the value's type, each field's array with its own sha256, and `facts`
-    about how it was made. Top-level array fields are arrays of the file; everything else is encoded in one more.
-    """
+
+def _write(file: BinaryIO, value: Value, facts: dict[str, Any] | None) -> None:
     fields = {name: getattr(value, name) for name in field_names(value)}
-    arrays = {name: field for name, field in fields.items() if isinstance(field, np.ndarray)}
+    arrays = {name: np.ascontiguousarray(field) for name, field in fields.items() if isinstance(field, np.ndarray)}
     rest = {name: field for name, field in fields.items() if name not in arrays}
     arrays["rest"] = np.frombuffer(encode(rest), dtype=np.uint8)
     header = {
         "format": FORMAT,
         "type": value_name(type(value)),
         "facts": facts or {},
-        "arrays": {name: hashlib.sha256(np.ascontiguousarray(a).tobytes()).hexdigest() for name, a in arrays.items()},
+        "arrays": {name: hashlib.sha256(_bytes_of(array)).hexdigest() for name, array in arrays.items()},
     }
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as archive:
+    with zipfile.ZipFile(file, "w") as archive:
         archive.writestr(zipfile.ZipInfo(_HEADER), json.dumps(header, indent=1, sort_keys=True))
         for name, content in sorted(arrays.items()):
             entry = zipfile.ZipInfo(f"{name}.npy")
             entry.compress_type = zipfile.ZIP_DEFLATED
-            with archive.open(entry, "w") as file:
-                np.lib.format.write_array(file, np.ascontiguousarray(content), allow_pickle=False)
+            with archive.open(entry, "w") as member:
+                np.lib.format.write_array_header_1_0(member, np.lib.format.header_data_from_array_1_0(content))
+                for start in range(0, content.nbytes, _STEP):
+                    member.write(_bytes_of(content)[start : start + _STEP])
         archive.comment = b" " * (len(_SUM) + 64)
-    whole = buffer.getvalue()[: -len(archive.comment)]
-    return whole + _SUM.encode() + hashlib.sha256(whole).hexdigest().encode()
+    left, whole = file.seek(0, io.SEEK_END) - len(archive.comment), hashlib.sha256()
+    file.seek(0)
+    while left > 0:
+        whole.update(piece := file.read(min(left, _STEP)))
+        left -= len(piece)
+    file.write(_SUM.encode() + whole.hexdigest().encode())
+
+
+def _bytes_of(array: npt.NDArray[Any]) -> memoryview:
+    """The bytes of a contiguous array, row by row, without a copy of them."""
+    return array.reshape(-1).view(np.uint8).data
 
 
 def read_header(path: Path) -> dict[str, Any]:

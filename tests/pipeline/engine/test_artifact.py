@@ -3,6 +3,7 @@
 import hashlib
 import io
 import json
+import tracemalloc
 import zipfile
 from pathlib import Path
 from typing import Annotated
@@ -110,3 +111,15 @@ def test_a_value_that_does_not_hold_what_its_fields_state_is_refused_by_name(tmp
 def test_a_type_named_by_a_file_imports_no_program(file: Path):
     with pytest.raises(BadInput, match="no longer known"):
         type_of(with_header(file, type="omninav.__main__.X"))
+
+
+def test_a_file_needs_no_memory_twice(tmp_path: Path):
+    points = Points(np.random.default_rng(0).random((1_000_000, 2)))  # 16 MB
+    tracemalloc.start()
+    try:
+        write_artifact(tmp_path / "points.omap", points)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 8e6
+    assert np.array_equal(read_artifact(tmp_path / "points.omap").points, points.points)
