@@ -10,7 +10,7 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Source, Stage, State, Tick, Truth, Value
 from omninav.pipeline.files import write_whole
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline.graph.results import Figure, Metrics
 
 
 class Number(Value):
@@ -251,6 +251,22 @@ class Collected(Stage):
         if ctx.folder is not None:
             write_whole(ctx.folder / self.name, repr(values))
         return self.Out(metrics=Metrics({"numbers": {"all": values, "present": len(present)}}))
+
+
+class Draw(Stage):
+    """Draws all numbers."""
+
+    class Out(Outputs):
+        figure: Figure
+
+    def step(self, ctx: Context, numbers: Sequence[Number]) -> Out:
+        return self.Out(figure=Figure("drawn", "All numbers", "As they came.", str(len(numbers)).encode()))
+
+
+class DrawSlowly(Draw):
+    """Draws all numbers where all plots are asked for."""
+
+    on_request = True
 
 
 class Total(Stage):

@@ -32,11 +32,12 @@ def write_report(
     tables: Sequence[Table],
     config_yaml: str,
     graph: DrawnGraph | None = None,
+    shown_as: Path | None = None,
 ) -> Path:
     """Write `report.html` into a run's folder: warnings, key figures and plots, then all else, folded.
 
     Nothing on the page is fetched from anywhere. Figures and tables stand in their order. The parameters are those of
-    `graph`.
+    `graph`. The page names the folder `shown_as`, where that is another one.
     """
     from markupsafe import Markup
 
@@ -47,7 +48,7 @@ def write_report(
     ]
     page = render(
         "report.html",
-        title=folder.resolve().name,
+        title=(shown_as or folder).resolve().name,
         manifest=manifest,
         tiles=_tiles(metrics, timing),
         results=results(metrics),
@@ -61,7 +62,7 @@ def write_report(
         parameters=[] if graph is None else parameter_rows(graph),
         timing=_timing(timing),
         again=shlex.join(map(str, manifest.get("argv") or ["omninav"])),
-        resume=f"omninav resume {shlex.quote(_seen_from(folder, manifest.get('cwd')))}",
+        resume=f"omninav resume {shlex.quote(_seen_from(shown_as or folder, manifest.get('cwd')))}",
         provenance=_provenance(manifest),
         config_yaml=config_yaml,
     )

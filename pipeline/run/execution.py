@@ -143,7 +143,7 @@ def _finish(run: RunFolder, engine: Engine, prefix_reason: str) -> None:
         (run.folder / CONFIG).read_text(encoding="utf-8"),
     )
     done = {**run.manifest, "status": "complete"}
-    write_report(run.folder, done, metrics, timing, graph_svg, figures, tables, config_yaml, engine.graph)
+    write_report(run.folder, done, metrics, timing, graph_svg, figures, tables, config_yaml, engine.graph, run.shown_as)
     run.manifest = done | {"files": _digests(run.folder)}
     run.save()
     engine.close()

@@ -95,6 +95,17 @@ def _reopened(run: RunFolder, folder: Path) -> Plan | None:
     return planned
 
 
+def complete_run(folder: Path) -> tuple[RunFolder, str]:
+    """A run that has ended, and the text of its configuration. Raises `BadInput` where it is not a complete one."""
+    run = RunFolder(Path(os.path.realpath(folder)))
+    if not (folder / MANIFEST).is_file():
+        raise BadInput(f"{folder}: not a run folder (no manifest.json and config.yaml); `ls runs` shows what there is")
+    began, config = _beginning(run, folder)
+    if began.status != "complete":
+        raise BadInput(f"{folder}: the run is {began.status:.40}; `omninav resume {folder}` goes on with it")
+    return run, config
+
+
 def _beginning(run: RunFolder, folder: Path) -> tuple[Manifest, str]:
     """The manifest and the text of the configuration, or what was sealed of them where they are damaged."""
     sealed: Mapping[str, Any] = {}

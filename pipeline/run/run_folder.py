@@ -35,6 +35,8 @@ class RunFolder:
     manifest: dict[str, Any] = field(default_factory=dict)
     complete: bool = False
     """Whether it was complete when it was to go on: then nothing was done."""
+    shown_as: Path | None = None
+    """The folder that its report names, where that is another one."""
     _owned: bool = False
 
     def save(self) -> None:

@@ -12,7 +12,7 @@ from omninav.stages.values.drive import Drive, known
 
 QUANTITIES = {
     "success.within_rate": Quantity(title="Frames within the success radius", better="higher"),
-    "success.at_end": Quantity(title="Final pose correct", better="higher"),
+    "success.at_end": Quantity(title="Final pose correct", unit="%", better="higher"),
     "success.unimodal_after_frames": Quantity(title="Frames until unimodal", better="lower", absent="never"),
     "success.kidnapped_at": Quantity(title="Kidnapped before frame"),
     "success.recovered_after_frames": Quantity(title="Frames until recovered", better="lower", absent="never"),

@@ -1,18 +1,30 @@
-"""`omninav report`: a run's results, and where its report lies."""
+"""`omninav report`: a run's results, and where its report lies; with `plots=all` drawn anew."""
 
 from pathlib import Path
 
-from omninav.pipeline.cli.terminal import show
+from omninav.pipeline.cli.terminal import show, shown
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.report.terminal_tables import results_table
 from omninav.pipeline.run.metrics_files import read_metrics
 
 
 def command(arguments: list[str]) -> int:
-    """Print the results of a run that ended (the latest where none is named)."""
-    folder = Path(arguments[0] if arguments else "runs/latest")
+    """Print the results of a run that ended (the latest where none is named); with `plots=…` draw its report anew."""
+    plots = [word.removeprefix("plots=") for word in arguments if word.startswith("plots=")]
+    named = [word for word in arguments if not word.startswith("plots=")]
+    folder = Path(named[0] if named else "runs/latest").absolute()
+    if plots:
+        _redraw(folder, plots[-1])
     if not (folder / "report.html").is_file():
         raise BadInput(f"{folder}: no report.html in it; `omninav resume {folder}` goes on with a run that did not end")
     show(results_table(read_metrics(folder)))
-    print(f"report: {folder / 'report.html'}")
+    print(f"report: {shown(folder / 'report.html')}")
     return 0
+
+
+def _redraw(folder: Path, plots: str) -> None:
+    from omninav.pipeline.report.progress import Progress
+    from omninav.pipeline.run.redraw import redraw
+
+    with Progress() as progress:
+        redraw(folder, plots, progress)

@@ -1,0 +1,52 @@
+"""Drawing the report of a run that has ended with other plots than it had."""
+
+import json
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+from omninav.pipeline.files import digest_file, write_whole
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.small_files import parse_yaml
+
+from .artifacts import ProgressDisplay
+from .execution import execute
+from .plan import input_digests, plan
+from .resume import complete_run
+from .run_folder import CONFIG, start
+
+REPORT = "report.html"
+
+
+def redraw(folder: Path, plots: str, display: ProgressDisplay | None = None) -> None:
+    """Write a complete run's report anew with `plots` (few, all or none); all else in its folder stays as it is.
+
+    The run is computed once more, from the caches where they hold its features, because a run keeps no more than its
+    results. Raises `BadInput` where it is not complete, where its inputs have changed, or where it gives other figures
+    now.
+    """
+    run, config = complete_run(folder)
+    if Path(str(run.manifest["cwd"])).is_dir():
+        os.chdir(str(run.manifest["cwd"]))  # its paths are relative to where it was started
+    planned = plan({**parse_yaml(config, str(folder / CONFIG)), "plots": plots})
+    known = run.manifest["inputs"]
+    changed = [name for name, digest in input_digests(planned).items() if known.get(name, digest) != digest]
+    if changed:
+        raise BadInput(f"{folder}: {', '.join(changed)} changed since the run; start a new one")
+    place = Path(tempfile.mkdtemp(prefix=".report.", dir=run.folder))
+    try:
+        again = start(planned, run.manifest["argv"], place)
+        again.manifest["started"], again.shown_as = run.manifest["started"], run.folder
+        execute(again, planned, display)
+        if _figures(place) != _figures(run.folder):
+            raise BadInput(f"{folder}: it gives other figures now (the code has changed): start a new run")
+        write_whole(run.folder / REPORT, (place / REPORT).read_text())
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+    run.manifest["files"][REPORT] = digest_file(run.folder / REPORT)
+    run.save()
+
+
+def _figures(folder: Path) -> object:
+    return json.loads((folder / "metrics.json").read_text())

@@ -1,0 +1,85 @@
+"""Which plots a run draws, and how those that it did not draw are drawn later."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from omninav.pipeline.files import digest_file, read_json
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound
+from omninav.pipeline.run.execution import execute
+from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.redraw import redraw
+from omninav.pipeline.run.resume import resume
+from omninav.pipeline.run.run_folder import RunFolder, start
+
+CONFIG: dict[str, Any] = {
+    "variant": "toy",
+    "nodes": {
+        "source": {"_target_": "toys.Count"},
+        "add": {"_target_": "toys.Add"},
+        "scaled": {"_target_": "toys.Scale"},
+        "total": {"_target_": "toys.Total"},
+        "quick": {"_target_": "toys.Draw"},
+        "slow": {"_target_": "toys.DrawSlowly"},
+    },
+    "wires": {
+        "add": {"number": "source.number"},
+        "scaled": {"number": "source.number"},
+        "total": {"numbers": {"from": "add.number", "collect": True}},
+        "quick": {"numbers": {"from": "add.number", "collect": True}},
+        "slow": {"numbers": {"from": "scaled.number", "collect": True}},
+    },
+}
+
+
+def nodes(**settings: Any) -> set[str]:
+    return set(plan(CONFIG | settings).graph.nodes)
+
+
+def ended(place: Path) -> RunFolder:
+    planned = plan(CONFIG | {"runs": str(place)})
+    run = start(planned, ["omninav", "variant=toy"])
+    execute(run, planned)
+    return run
+
+
+def test_slow_plots_and_what_only_they_read_are_left_out_unless_all_are_asked_for() -> None:
+    assert set(CONFIG["nodes"]) - nodes() == {"slow", "scaled"}
+    assert nodes(plots="few") == nodes()
+    assert nodes(plots="all") == set(CONFIG["nodes"])
+    assert nodes(plots="none") == {"source", "add", "total"}
+    assert "scaled" in nodes(saves={"last": "scaled.number"})
+    with pytest.raises(ProblemsFound, match="'some', expected auto, few, all, none"):
+        plan(CONFIG | {"plots": "some"})
+
+
+def test_a_run_that_ended_is_drawn_with_all_plots_and_stays_whole(tmp_path: Path) -> None:
+    run = ended(tmp_path)
+    before = {file.name: digest_file(file) for file in run.folder.iterdir() if file.is_file()}
+    assert (run.folder / "report.html").read_text().count("<figure id=") == 1
+    redraw(run.folder, "all")
+    page = (run.folder / "report.html").read_text()
+    assert page.count("<figure id=") == 2
+    assert f"{run.folder.name}</pre>" in page  # and not the folder in which it was drawn
+    after = {file.name: digest_file(file) for file in run.folder.iterdir() if file.is_file()}
+    assert {name for name in before if before[name] != after.get(name)} == {"report.html", "manifest.json"}
+    assert before.keys() == after.keys()
+    assert resume(run.folder)[0].complete  # nothing seems damaged
+
+
+def test_a_run_that_gives_other_figures_now_is_not_drawn(tmp_path: Path) -> None:
+    run = ended(tmp_path)
+    (run.folder / "metrics.json").write_text('{"other": 1}')
+    page = (run.folder / "report.html").read_bytes()
+    with pytest.raises(BadInput, match="it gives other figures now"):
+        redraw(run.folder, "all")
+    assert (run.folder / "report.html").read_bytes() == page
+    assert read_json(run.folder / "manifest.json")["status"] == "complete"
+    assert not list(run.folder.glob(".report.*"))
+
+
+def test_a_run_that_has_not_ended_is_not_drawn(tmp_path: Path) -> None:
+    run = start(plan(CONFIG | {"runs": str(tmp_path)}), ["omninav", "variant=toy"])
+    with pytest.raises(BadInput, match=r"omninav resume .* goes on with it"):
+        redraw(run.folder, "all")
