@@ -10,6 +10,8 @@ from omninav.pipeline.tables import write_table
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive, known
 
+from .confidence import confident
+
 Columns = dict[str, npt.NDArray[Any]]
 PLANE = (("xx", 0, 0), ("xy", 0, 1), ("xh", 0, 2), ("yy", 1, 1), ("yh", 1, 2), ("hh", 2, 2))
 """Entries of a symmetric covariance over x, y and heading."""
@@ -27,6 +29,7 @@ class FramesTable(Stage):
     | `estimate_x`, `_y`, `_heading` | the belief's heaviest mode |
     | `covariance_xx`, `_xy`, `_xh`, `_yy`, `_yh`, `_hh` | its covariance over x, y and heading (m², m rad, rad²) |
     | `estimate_weight` | its share of the belief, from 0 to 1: how sure the estimate is |
+    | `confident` | 1 where the estimate is confident (see `Confidence`), else 0 |
     | `mean_x`, `_y`, `_heading` | the mean of the whole belief |
     | `truth_x`, `_y`, `_heading` | the ground truth |
     | `position_error_m`, `heading_error_deg` | the estimate against the ground truth |
@@ -46,20 +49,21 @@ class FramesTable(Stage):
         if ctx.folder is not None:
             logs = [columns_of(log) for log in drive.by_log] or [columns_of(drive)]
             table = {name: np.concatenate([log[name] for log in logs]) for name in logs[0]}
-            for name in ("reference", "place"):
+            for name in ("reference", "place", "confident"):
                 table[name] = np.ma.masked_less(table[name], 0)
             write_table(ctx.folder / "frames", table)
         return self.Out()
 
 
 def columns_of(drive: Drive) -> Columns:
-    """The columns of one log; -1 where there is no reference or place."""
+    """The columns of one log; -1 where there is no reference, place or estimate."""
     columns: Columns = {"log": drive.log, "frame": drive.frames, "stamp_ns": drive.stamps, "time_s": drive.seconds}
     both = known(drive.estimate) & known(drive.truth)
     odometry = drive.odometry_alone() if len(drive) else None
     columns |= _poses("estimate", drive.estimate)
     columns |= {f"covariance_{name}": drive.covariance[:, row, column] for name, row, column in PLANE}
     columns["estimate_weight"] = np.where(known(drive.estimate), drive.mode_weight, np.nan)
+    columns["confident"] = np.where(known(drive.estimate), confident(drive), -1)
     columns |= _poses("mean", drive.mean) | _poses("truth", drive.truth)
     columns["position_error_m"] = np.where(both, position_errors(drive.estimate, drive.truth), np.nan)
     columns["heading_error_deg"] = np.where(both, heading_errors_deg(drive.estimate, drive.truth), np.nan)

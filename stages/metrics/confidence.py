@@ -1,0 +1,108 @@
+"""What a run tells of itself where no ground truth says how right it was."""
+
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
+from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.values.drive import Array, Drive, known
+
+QUANTITIES = {
+    "confidence.confident_share": Quantity(title="Frames with a confident estimate", unit="%", better="higher"),
+    "confidence.first_confident_frame": Quantity(title="First confident frame", better="lower", absent="never"),
+    "confidence.spread_m": Quantity(title="Spread of the belief, median", better="lower"),
+    "confidence.weight": Quantity(title="Belief in the estimate, median", unit="%", better="higher"),
+    "confidence.path_m": Quantity(title="Length of the estimated path", context=True),
+    "confidence.odometry_path_m": Quantity(title="Length of odometry's path", context=True),
+    "confidence.step_off_odometry_m": Quantity(title="Step against odometry's, median", better="lower"),
+    "confidence.turn_off_odometry_deg": Quantity(title="Turn against odometry's, median", better="lower"),
+    "confidence.similarity": Quantity(title="Similarity of the best match, median"),
+    "confidence.similarity_p10": Quantity(title="Similarity of the best match, 10th percentile"),
+}
+MIN_WEIGHT = 0.5
+"""Share of the belief that a confident estimate holds: more than everything else together."""
+MAX_SIGMA_M = 1.0
+"""Largest standard deviation of the position of a confident estimate."""
+
+
+class Confidence(Stage):
+    """Measures a run without ground truth: how sure it was, and whether what it says fits together.
+
+    Under `confidence`, of the last log. An estimate is confident where it holds at least `min_weight` of the belief
+    and its position's largest standard deviation is at most `max_sigma_m`; that says how sure the method is, not that
+    it is right. `spread_m`: that standard deviation, `weight`: that share (medians); none of them for a method whose
+    belief is always a single pose. `path_m` and `odometry_path_m`: lengths of the estimated path and of odometry's;
+    `step_off_odometry_m` and `turn_off_odometry_deg`: how far the estimate's motion from frame to frame is from
+    odometry's (medians): jumps of the estimate are large there. `similarity` of the best match, where the comparison
+    has one.
+    """
+
+    min_weight: Annotated[float, Bounds(ge=0, le=1)] = MIN_WEIGHT
+    """Share of the belief that a confident estimate holds."""
+    max_sigma_m: Annotated[float, Bounds(gt=0)] = MAX_SIGMA_M
+    """Largest standard deviation of a confident estimate's position."""
+
+    class Out(Outputs):
+        """`metrics`: absent where the log has ground truth."""
+
+        metrics: Metrics | None = None
+
+    def step(self, ctx: Context, drive: Drive) -> Out:
+        """The whole run at once."""
+        if drive.has_truth or not known(drive.estimate).any():
+            return self.Out()
+        values = confidence_of(drive.last_log, self.min_weight, self.max_sigma_m)
+        headlines = tuple(
+            f"confidence.{name}" for name in ("confident_share", "spread_m", "similarity") if name in values
+        )
+        return self.Out(metrics=Metrics({"confidence": values}, QUANTITIES, headlines or ("confidence.path_m",)))
+
+
+def sigmas_of(drive: Drive) -> Array:
+    """Largest standard deviation (m) of each estimate's position: (N,), NaN where there is none."""
+    found = np.full(len(drive), np.nan)
+    there = np.isfinite(drive.covariance).all(axis=(1, 2))
+    found[there] = np.sqrt(np.linalg.eigvalsh(drive.covariance[there, :2, :2])[:, -1].clip(0.0))
+    return found
+
+
+def confident(drive: Drive, min_weight: float = MIN_WEIGHT, max_sigma_m: float = MAX_SIGMA_M) -> npt.NDArray[np.bool_]:
+    """Which of the frames have a confident estimate, see `Confidence`: (N,)."""
+    sure: npt.NDArray[np.bool_] = known(drive.estimate) & (drive.mode_weight >= min_weight)
+    return sure & (np.nan_to_num(sigmas_of(drive), nan=np.inf) <= max_sigma_m)
+
+
+def has_doubt(drive: Drive) -> bool:
+    """Whether the belief is ever anything but one pose without uncertainty."""
+    there = known(drive.estimate)
+    return bool((drive.mode_weight[there] < 1.0).any() or (sigmas_of(drive)[there] > 0.0).any())
+
+
+def confidence_of(drive: Drive, min_weight: float, max_sigma_m: float) -> dict[str, Any]:
+    """The figures of one log, named as in metrics.json."""
+    there = known(drive.estimate)
+    values: dict[str, Any] = {}
+    if has_doubt(drive):
+        sure = np.flatnonzero(confident(drive, min_weight, max_sigma_m))
+        values["confident_share"] = len(sure) / len(drive)
+        values["first_confident_frame"] = int(sure[0]) if len(sure) else None
+        values["weight"] = float(np.median(drive.mode_weight[there]))
+        if (sigmas_of(drive)[there] > 0.0).any():
+            values["spread_m"] = float(np.nanmedian(sigmas_of(drive)[there]))
+    path = drive.estimate[there]
+    values["path_m"] = float(np.hypot(*np.diff(path[:, :2], axis=0).T).sum())
+    odometry = drive.odometry()
+    if odometry is not None:
+        values["odometry_path_m"] = float(np.hypot(*np.diff(odometry[:, :2], axis=0).T).sum())
+        if len(path) > 1:
+            expected = compose(path[:-1], between(odometry[there][:-1], odometry[there][1:]))
+            values["step_off_odometry_m"] = float(np.median(position_errors(path[1:], expected)))
+            values["turn_off_odometry_deg"] = float(np.median(heading_errors_deg(path[1:], expected)))
+    similar = drive.similarity[np.isfinite(drive.similarity)]
+    if len(similar):
+        values["similarity"] = float(np.median(similar))
+        values["similarity_p10"] = float(np.percentile(similar, 10))
+    return values
