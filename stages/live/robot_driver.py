@@ -21,6 +21,7 @@ from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
 
+from .publish import send
 from .transport import Transport, TransportName, connect
 
 CAMERA = "omni_camera"
@@ -220,7 +221,7 @@ class RobotDriver(Stage):
         self._send("/camera/image/compressed", "sensor_msgs/msg/CompressedImage", fields)
 
     def _send(self, topic: str, msgtype: str, fields: dict[str, Any], latched: bool = False) -> None:
-        self._transport.publish(topic, msgtype, encode_message(msgtype, fields), latched)
+        send(self._transport, topic, msgtype, encode_message(msgtype, fields), latched)
 
     def _note(self, ctx: Context, seconds: float) -> None:
         """Every few seconds, say how fast time passes and whether anybody commands."""
@@ -228,5 +229,5 @@ class RobotDriver(Stage):
         if now - then > NOTE_S:
             speed = f", {(seconds - before) / (now - then):.2f} times real time" if then else ""
             obeys = f"obeys {self.command_topic}" if self._subscribed else f"nobody publishes {self.command_topic}"
-            ctx.doing(f"{seconds:.0f} s{speed}; {obeys}")
+            ctx.doing("; ".join([f"{seconds:.0f} s{speed}", obeys, *self._transport.status.troubles.values()]))
             self._noted = seconds, now

@@ -5,7 +5,7 @@ from omninav.pipeline import Context, Tick
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.live import publish_truth, robot_driver
 from omninav.stages.live.robot_driver import CameraStop, ClockJump, RobotDriver, RobotDriverState
-from omninav.stages.live.transport import Arrival, Transport
+from omninav.stages.live.transport import Arrival, Transport, TransportError
 from omninav.stages.recordings.camera_yaml import read_camera
 from omninav.stages.values.command import Command
 from omninav.stages.values.drive_tally import DriveTally
@@ -139,6 +139,18 @@ def test_in_real_time_a_tick_takes_its_time(wire):
     for _ in range(3):
         drive.tick()
     assert time.monotonic() - before > 0.4  # three ticks of 0.2 s, less what may have been waited before
+
+
+def test_a_topic_whose_type_is_not_installed_is_left_out(wire, monkeypatch):
+    def publish(topic, msgtype, data, latched=False):
+        if "tf2" in msgtype:
+            raise TransportError(f"{topic}: not installed")
+        wire.sent.append((topic, data))
+
+    monkeypatch.setattr(wire, "publish", publish)
+    Drive().tick()
+    assert {"/odom", "/scan", "/clock"} <= {topic for topic, _ in wire.sent}
+    assert sorted(wire.status.troubles) == ["/tf", "/tf_static"]
 
 
 def test_truth_and_collisions_have_the_stamps_of_the_driver(wire):
