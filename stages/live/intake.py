@@ -17,7 +17,7 @@ from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 
 from .status import LiveStatus
-from .transport import Arrival, Transport
+from .transport import Arrival, Transport, TransportError
 
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 EMPTY = "std_msgs/msg/Empty"
@@ -90,7 +90,10 @@ class Intake:
             self.transport.inbox.put(Arrival(service, EMPTY, time.time_ns(), NOTHING))
             return NOTHING
 
-        self.transport.serve(service, "std_srvs/srv/Empty", answer)
+        try:
+            self.transport.serve(service, "std_srvs/srv/Empty", answer)
+        except TransportError as error:  # a ROS without std_srvs
+            self.status.note(service, str(error))
 
     def next(self, wait_s: float) -> Taken | None:
         """The newest image that can be used, of all that has come; None where none can within that time."""

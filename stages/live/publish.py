@@ -133,7 +133,7 @@ class Publish(Stage):
     def _drive(self, stamp: int, command: Command) -> None:
         if self._watchdog is None:
             self._watchdog = Watchdog(self._halt)
-            self._transport.farewells.append(self._halt)
+            self._transport.farewells.append(self._watchdog.close)
         self._stamps = [*self._stamps[-10:], stamp]
         periods = np.diff(self._stamps) / 1e9
         self._command(stamp, command)

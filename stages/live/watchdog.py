@@ -9,13 +9,13 @@ MIN_TIMEOUT_S = 0.2
 
 
 class Watchdog:
-    """Calls `stop` where the time since the last `feed` exceeds that given with it, and goes on to until it is fed."""
+    """Calls `stop` where the time since the last `feed` exceeds that given with it, again and again until it is fed."""
 
     def __init__(self, stop: Callable[[], None]) -> None:
         self._stop = stop
         self._changed = threading.Condition()
         self._until: float | None = None
-        self.stopped = 0
+        self._closed = False
         threading.Thread(target=self._watch, name="watchdog", daemon=True).start()
 
     def feed(self, timeout_s: float) -> None:
@@ -29,15 +29,18 @@ class Watchdog:
         with self._changed:
             self._until = None
 
+    def close(self) -> None:
+        """Stop the robot a last time, and watch no longer."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+            self._stop()
+
     def _watch(self) -> None:
-        while True:
-            with self._changed:
+        with self._changed:
+            while not self._closed:
                 now = time.monotonic()
-                late = self._until is not None and now >= self._until
-                if late:
+                if self._until is not None and now >= self._until:
                     self._until = now + MIN_TIMEOUT_S
-                    self.stopped += 1
-                else:
-                    self._changed.wait(None if self._until is None else self._until - now)
-            if late:
-                self._stop()
+                    self._stop()
+                self._changed.wait(None if self._until is None else self._until - now)

@@ -13,6 +13,7 @@ from omninav.pipeline.graph.problems import BadInput, nearest
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.homing import DrivingStatus, ImagePath, PathProgress
 from omninav.stages.values.planned_route import PlannedRoute
+from omninav.stages.values.requests import GoalPoint
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
 
@@ -26,7 +27,8 @@ class ShortestPathPlannerState(State):
     `planned`: routes so far; `waiting_since` (ns): since when there has been reason to plan, None: there is none.
     `failed_links` (F, 2): the links on which routes have failed, a place with itself for its own medoid, with which a
     route begins; `failures` (F,): how often. `why`: the last reason to plan, `blocked`: the last reason why the way was
-    blocked; `ended`: how the route ended, "" if it has not.
+    blocked; `ended`: how the route ended, "" if it has not. `asked`: the place that somebody has named since (-1:
+    none has), and whether that is still to be planned for (`renewed`).
     """
 
     number: int = -1
@@ -37,6 +39,8 @@ class ShortestPathPlannerState(State):
     failed_links: Ints = field(default_factory=lambda: np.zeros((0, 2), np.int64))
     failures: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     ended: str = ""
+    asked: int = -1
+    renewed: bool = False
     why: str = ""
     blocked: str = ""
 
@@ -89,16 +93,23 @@ class ShortestPathPlanner(Stage):
         image: VisualDistances | None = None,
         status: DrivingStatus | None = None,
         progress: PathProgress | None = None,
+        point: GoalPoint | None = None,
     ) -> Out:
         """Plan where there is reason to; `status` and `progress` are those of the tick before.
 
-        `image`: how far the goal's image is from each place, where the goal is one.
+        `image`: how far the goal's image is from each place, where the goal is one. `point`: where a running robot is
+        asked to go instead; it goes to the place whose medoid is nearest to it.
         """
+        if point is not None:
+            medoids = map.poses[map.places][:, :2]
+            state.asked = int(np.argmin(np.hypot(*(medoids - (point.x, point.y)).T)))
+            state.renewed, state.ended, state.waiting_since = True, "", None
         pictured = None if image is None else place_in_image(self.goal, image, self.max_visual_distance, map)
         goals = places_called(self.goal, map) if pictured is None else pictured
+        goals = goals if state.asked < 0 else np.array([state.asked], np.int64)
         if state.ended or not self._must_plan(state, tick, belief, status, progress):
             return self.Out(route=_route(state))
-        if state.number >= 0 and progress is not None and status is not None:
+        if state.number >= 0 and not state.renewed and progress is not None and status is not None:
             _remember(state, progress.at)
             state.blocked = status.why if status.state == "blocked" else state.blocked
         path = self._plan(ctx, state, belief.probabilities, goals, map)
@@ -112,7 +123,7 @@ class ShortestPathPlanner(Stage):
         status: DrivingStatus | None,
         progress: PathProgress | None,
     ) -> bool:
-        if state.number < 0:
+        if state.number < 0 or state.renewed:
             state.why = "it has no route yet"
         elif progress is None or progress.path != state.number:  # the path has not reached path_following yet
             return False
@@ -151,7 +162,7 @@ class ShortestPathPlanner(Stage):
         if missed % 2 and len(places) > 1:
             views, ends = views[1:], ends - 1
         state.number, state.planned, state.waiting_since = state.number + 1, state.planned + 1, None
-        state.places, state.views, state.why = places, ends, ""
+        state.places, state.views, state.why, state.renewed = places, ends, "", False
         names = tuple(_called(map, int(view)) for view in views)
         return ImagePath(state.number, tuple(map.views.features(int(view)) for view in views), names)
 
@@ -243,7 +254,7 @@ def _forget_medoids(state: ShortestPathPlannerState) -> None:
 
 
 def _given_up(state: ShortestPathPlannerState, why: str) -> ImagePath:
-    state.ended, state.why = "gave up", why
+    state.ended, state.why, state.renewed = "gave up", why, False
     return ImagePath(state.number + 1, (), ())
 
 

@@ -3,10 +3,11 @@
 from pathlib import Path
 
 from omninav.pipeline import Context, Outputs, Stage
-from omninav.pipeline.files import digest_file
+from omninav.pipeline.files import digest_file, user_path
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.small_files import read_small
 from omninav.stages.camera.model import Camera
+from omninav.stages.recordings.camera_yaml import read_camera
 from omninav.stages.simulator.cameras import camera_of
 from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.demo import DEMO
@@ -28,6 +29,8 @@ class GoalImage(Stage):
     """An image file, by its suffix; any other names a place, and there is no image."""
     world: WorldConfig = DEMO
     """The world whose robot took it."""
+    camera: str | None = None
+    """A camera.yaml instead of that robot's."""
 
     class Out(Outputs):
         """Absent where the goal is no image."""
@@ -45,7 +48,8 @@ class GoalImage(Stage):
         file = self._file()
         if file is None:
             return self.Out()
-        pixels, camera = read_image(file), camera_of(self.world)
+        pixels = read_image(file)
+        camera = camera_of(self.world) if self.camera is None else read_camera(user_path(self.camera))
         if pixels.shape[:2] != (camera.height_px, camera.width):
             raise BadInput(
                 f"goal: {file} has {pixels.shape[1]} x {pixels.shape[0]} pixels, and the robot's camera takes "

@@ -1,0 +1,79 @@
+import numpy as np
+import pytest
+
+from omninav.stages.recordings.live_track import LiveTrack
+from omninav.stages.recordings.plausibility import MotionLimits
+
+S = 10**9
+
+
+def straight(track: LiveTrack, seconds: np.ndarray, x0: float = 0.0) -> list[float]:
+    """A robot that drives 1 m/s along x; the times of what came to be believed."""
+    believed: list[float] = []
+    for at in seconds:
+        believed += track.add(round(at * S), (x0 + at, 0.0, 0.0), at)
+    return believed
+
+
+def test_a_pose_between_two_messages_is_interpolated_and_one_beyond_them_is_not_known():
+    track = LiveTrack(MotionLimits(), jumps=False)
+    straight(track, np.array([1.0, 2.0]))
+    assert track.at(round(1.25 * S)) == pytest.approx([1.25, 0, 0])
+    assert track.at(round(2.5 * S)) is None
+    assert track.at(round(0.5 * S)) is None
+
+
+def test_a_single_stamp_that_leaps_ahead_or_back_costs_itself():
+    track = LiveTrack(MotionLimits(), jumps=False)
+    straight(track, np.arange(1.0, 3.0, 0.1))
+    assert track.add(100 * S, (3.0, 0, 0)) == []
+    assert track.add(1 * S, (3.0, 0, 0)) == []
+    assert track.add(round(2.9 * S), (3.0, 0, 0)) == []  # once more the last one
+    assert len(straight(track, np.arange(3.0, 4.0, 0.1))) == 10
+    assert track.dropped == {"lone_stamp": 1, "backward_stamp": 1, "duplicate_stamp": 1}
+
+
+def test_a_counter_that_was_reset_is_joined_to_where_it_was_and_the_gap_is_known():
+    track = LiveTrack(MotionLimits(), jumps=False)
+    straight(track, np.arange(0.0, 5.05, 0.1))
+    kept = straight(track, np.arange(5.1, 7.05, 0.1), x0=-100.0)
+    assert kept[0] == pytest.approx(5.1)  # none is lost once the next second has decided
+    assert track.at(round(6.0 * S)) == pytest.approx([6.0, 0, 0], abs=1e-6)
+    assert track.unmeasured_s(round(6.0 * S)) == pytest.approx(0.1)
+    assert track.unmeasured_s(round(4.0 * S)) == 0.0
+
+
+def test_a_clock_that_is_set_back_for_good_begins_anew():
+    track = LiveTrack(MotionLimits(), jumps=False)
+    straight(track, np.arange(1000.0, 1003.0, 0.1))
+    straight(track, np.arange(1.0, 3.0, 0.1))
+    assert track.last == pytest.approx(2.9 * S)
+    assert track.at(1001 * S) is None
+
+
+def test_an_excursion_is_dropped_where_the_track_goes_on_as_before():
+    track = LiveTrack(MotionLimits(), jumps=False)
+    straight(track, np.arange(0.0, 2.0, 0.1))
+    straight(track, np.arange(2.0, 2.5, 0.1), x0=500.0)
+    straight(track, np.arange(2.5, 4.0, 0.1))
+    assert track.dropped == {"impossible_motion": 5}
+    assert track.at(3 * S) == pytest.approx([3, 0, 0])
+
+
+def test_a_track_that_is_fed_with_what_another_kept_gives_the_same():
+    rng = np.random.default_rng(3)
+    one, other = (LiveTrack(MotionLimits(), jumps=False) for _ in range(2))
+    kept: list[tuple[int, tuple[float, float, float]]] = []
+    for number in range(600):
+        stamp, shift = number * S // 20, 300.0 if 200 < number < 210 or number > 400 else 0.0
+        stamp += int(rng.choice([0, 0, 0, 0, 0, 3600, -7]) * S)
+        pose = (number / 20 + shift + float(rng.normal(0, 0.01)), 0.0, float(rng.normal(0, 0.01)))
+        kept += one.add(stamp, pose, (stamp, pose))
+    for stamp, pose in kept:
+        other.add(stamp, pose)
+    assert sum(one.dropped.values()) > 50
+    assert not other.dropped
+    for at in range(1, 29):
+        here, there = one.at(at * S), other.at(at * S)
+        assert (here is None) == (there is None)
+        assert here is None or here.tobytes() == there.tobytes()

@@ -1,0 +1,232 @@
+"""The live source over a transport of the test's own; the same over real rclpy is in tests/stages/live."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.mcap.message_types import encode_message
+from omninav.pipeline.mcap.reader import LogReader
+from omninav.stages.live.transport import Arrival, Transport
+from omninav.stages.source import live
+from omninav.stages.source.live import LiveSource, LiveSourceState
+from omninav.stages.source.log import LogSource, LogSourceState
+
+DRIVE = Path(__file__).parents[2] / "data/drive.mcap"
+CAMERA = str(Path(__file__).parents[2] / "data/camera.yaml")
+POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+
+
+class Loopback(Transport):
+    """A robot in this process: what it says waits to be taken."""
+
+    def subscribe(self, topic: str, msgtype: str, newest: bool = False) -> None:
+        self.inbox.open(topic, newest)
+
+    def publish(self, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
+        self.sent = [*getattr(self, "sent", []), (topic, msgtype, data)]
+
+    def matched(self, topic: str) -> int:
+        return 1
+
+    def offered(self) -> dict[str, str]:
+        return {}
+
+    def mismatched(self) -> dict[str, str]:
+        return {}
+
+    def close(self) -> None:
+        pass
+
+
+def said() -> list[Arrival]:
+    """What the recorded robot said, in the order in which it was received."""
+    reader = LogReader(DRIVE)
+    types = reader.topics
+    records = sorted(reader.scan(), key=lambda record: record.log_time)
+    return [Arrival(each.topic, types[each.topic], each.log_time, bytes(each.data)) for each in records]
+
+
+@pytest.fixture
+def robot(monkeypatch: pytest.MonkeyPatch) -> Loopback:
+    loopback = Loopback()
+    monkeypatch.setattr(live, "connect", lambda transport, domain: loopback)
+    monkeypatch.setattr(live, "disconnect", lambda: None)
+    return loopback
+
+
+class Drive:
+    """A live source that is stepped; a tick is made as soon as one can be."""
+
+    def __init__(self, folder: Path, state: LiveSourceState | None = None, **parameters: object) -> None:
+        self.source = LiveSource(camera=CAMERA, diagnostics=None, **parameters)
+        self.ctx = Context("source", folder=folder)
+        self.state = state or LiveSourceState()
+        self.source.setup(self.ctx)
+        self.outs: list[LiveSource.Out] = []
+
+    def join(self) -> None:
+        """Subscribe, without a tick."""
+        self.source._intake = self.source._join(self.state)
+
+    def feed(self, robot: Loopback, arrivals: list[Arrival]) -> None:
+        """One message after another, and every tick that they lead to."""
+        intake = self.source._intake
+        assert intake is not None
+        for arrival in arrivals:
+            if arrival.topic in self.source._header.topics:
+                robot.inbox.put(arrival)
+            taken = intake.next(0.0)
+            if taken is not None:
+                monkey = intake.next
+                intake.next = lambda wait_s, taken=taken: taken  # type: ignore[method-assign]
+                out = self.source.step(self.ctx, self.state)
+                intake.next = monkey  # type: ignore[method-assign]
+                assert out is not None
+                self.outs.append(out)
+
+    def end(self) -> None:
+        """As Ctrl-C ends it."""
+        self.source._stop.set()
+        assert self.source.step(self.ctx, self.state) is None
+
+
+def replayed(record: Path) -> list[LogSource.Out]:
+    source, state = LogSource(log=str(record)), LogSourceState()
+    ctx = Context("source")
+    source.setup(ctx)
+    outs = []
+    while (out := source.step(ctx, state)) is not None:
+        outs.append(out)
+    return outs
+
+
+def same(live_outs: list[LiveSource.Out], log_outs: list[LogSource.Out]) -> None:
+    assert len(live_outs) == len(log_outs) > 0
+    for one, other in zip(live_outs, log_outs, strict=True):
+        assert vars(one.tick) == vars(other.tick)
+        assert one.image.pixels.tobytes() == other.image.pixels.tobytes()
+        for name in ("odometry", "motion", "truth", "restart", "goal"):
+            mine, theirs = getattr(one, name), getattr(other, name)
+            assert type(mine) is type(theirs), name
+            assert mine is None or vars(mine) == vars(theirs), name
+
+
+def test_the_record_of_a_live_drive_gives_the_same_ticks_as_the_drive(robot: Loopback, tmp_path: Path):
+    drive = Drive(tmp_path)
+    drive.join()
+    drive.feed(robot, said())
+    drive.end()
+    assert len(drive.outs) > 5
+    assert drive.outs[3].motion is not None
+    same(drive.outs, replayed(tmp_path / "live.mcap"))
+
+
+def test_a_pose_and_a_goal_that_somebody_names_are_in_the_record_at_the_tick_that_had_them(
+    robot: Loopback, tmp_path: Path
+):
+    messages = said()
+    where = {"pose": {"pose": {"position": {"x": 1.5}, "orientation": {"w": 1.0}}, "covariance": np.full(36, 0.25)}}
+    goal = {"pose": {"position": {"x": 3.0, "y": -1.0}, "orientation": {"w": 1.0}}}
+    half = len(messages) // 2
+    messages[half:half] = [
+        Arrival("/initialpose", POSE, messages[half].received, encode_message(POSE, where, 0)),
+        Arrival(
+            "/goal_pose",
+            "geometry_msgs/msg/PoseStamped",
+            messages[half].received,
+            encode_message("geometry_msgs/msg/PoseStamped", goal, 0),
+        ),
+    ]
+    drive = Drive(tmp_path)
+    drive.join()
+    drive.feed(robot, messages)
+    drive.end()
+    asked = [out for out in drive.outs if out.restart is not None]
+    assert [out.restart.at for out in asked if out.restart] == [(1.5, 0.0, 0.0, 0.5, 0.5)]
+    assert [(out.goal.x, out.goal.y) for out in asked if out.goal] == [(3.0, -1.0)]
+    same(drive.outs, replayed(tmp_path / "live.mcap"))
+
+
+def test_a_run_that_was_killed_makes_its_ticks_again_and_goes_on(robot: Loopback, tmp_path: Path):
+    messages = said()
+    drive = Drive(tmp_path)
+    drive.join()
+    drive.feed(robot, messages[: len(messages) // 2])
+    done = len(drive.outs)
+    assert done > 2
+    state = LiveSourceState()  # of a checkpoint before the first tick: all ticks are made again
+    robot.inbox.__init__()  # type: ignore[misc]
+    resumed = Drive(tmp_path, state)
+    again = [resumed.source.step(resumed.ctx, state) for _ in range(done)]
+    same(drive.outs, [out for out in again if out is not None])  # type: ignore[misc]
+    resumed.join()
+    resumed.feed(robot, messages[len(messages) // 2 :])
+    resumed.end()
+    assert resumed.outs[0].motion is not None
+    assert not resumed.outs[0].tick.first_of_log
+    same([*drive.outs, *resumed.outs], replayed(tmp_path / "live.mcap"))
+    assert sorted(os.listdir(tmp_path)) == ["live.mcap"]
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "kind"),
+    [
+        (lambda arrival: arrival._replace(data=arrival.data[:40]), "bad_message"),
+        (lambda arrival: arrival._replace(data=arrival.data[:7]), "bad_message"),
+        (lambda arrival: arrival._replace(data=arrival.data[:200] + b"\0" * (len(arrival.data) - 200)), "undecodable"),
+    ],
+    ids=["cut", "shorter than a header", "zeros"],
+)
+def test_a_damaged_image_is_counted_and_the_next_one_is_used(
+    robot: Loopback, tmp_path: Path, spoilt: Callable[[Arrival], Arrival], kind: str
+):
+    messages = said()
+    images = [number for number, each in enumerate(messages) if each.topic.startswith("/camera/image")]
+    messages[images[4]] = spoilt(messages[images[4]])
+    drive = Drive(tmp_path)
+    drive.join()
+    drive.feed(robot, messages)
+    drive.end()
+    assert any(name.startswith(kind) for name in drive.ctx.counts), drive.ctx.counts
+    assert len(drive.outs) > 5
+    same(drive.outs, replayed(tmp_path / "live.mcap"))
+
+
+def test_images_of_another_size_are_refused_at_the_start_and_counted_later(robot: Loopback, tmp_path: Path):
+    kind = "sensor_msgs/msg/Image"
+    small = {"height": 2, "width": 2, "encoding": "mono8", "step": 2, "data": np.array([0, 90, 120, 250], np.uint8)}
+
+    def image(stamp: int) -> Arrival:
+        return Arrival("/camera/image", kind, stamp, encode_message(kind, small, stamp))
+
+    messages = said()
+    last = max(LogReader(DRIVE).messages({"/odom"}), key=lambda message: message.stamp).stamp
+    early = Drive(tmp_path)
+    early.join()
+    with pytest.raises(BadInput, match=r"/camera/image: its images are 2 x 2, its camera .*; give camera="):
+        early.feed(robot, [*[each for each in messages if each.topic == "/odom"], image(last)])
+    robot.inbox.__init__()  # type: ignore[misc]
+    late = Drive(tmp_path)
+    late.join()
+    late.feed(robot, [*messages, image(last)])
+    late.end()
+    assert late.ctx.counts["wrong_size"] == 1
+
+
+def test_while_a_robot_says_nothing_what_is_missing_is_noted(robot: Loopback, tmp_path: Path):
+    drive = Drive(tmp_path)
+    drive.join()
+    assert drive.source._intake is not None
+    drive.source._intake.watch()
+    assert robot.status.troubles == {
+        "/odom": "nothing on /odom yet",
+        "/camera/image/compressed": "nothing on /camera/image/compressed yet",
+    }
+    drive.feed(robot, said())
+    drive.source._intake.watch()
+    assert not robot.status.troubles
