@@ -16,17 +16,19 @@ from .world import World, outline
 class WorldPlan(Stage):
     """The floor plan of a simulated world on a day, for plots."""
 
-    world: WorldConfig = DEMO
-    """The simulated world."""
+    world: WorldConfig | None = DEMO
+    """The simulated world; null: a real one, of which there is no plan."""
     day: Annotated[int, Bounds(ge=0)] = 1
     """Day of the simulated world."""
 
     class Out(Outputs):
-        plan: FloorPlan
+        """`plan`: absent of a real world."""
+
+        plan: FloorPlan | None = None
 
     def step(self, ctx: Context) -> Out:
         """Outlines of all obstacles."""
-        return self.Out(plan=plan_of(self.world, self.day))
+        return self.Out(plan=None if self.world is None else plan_of(self.world, self.day))
 
 
 class DrivenPlan(Stage):

@@ -27,10 +27,10 @@ class GoalImage(Stage):
 
     goal: str | int | None = None
     """An image file, by its suffix; any other names a place, and there is no image."""
-    world: WorldConfig = DEMO
-    """The world whose robot took it."""
+    world: WorldConfig | None = DEMO
+    """The simulated world whose robot took it; null: a real one's robot."""
     camera: str | None = None
-    """A camera.yaml instead of that robot's."""
+    """The camera.yaml of a real robot, or of another one in that world."""
 
     class Out(Outputs):
         """Absent where the goal is no image."""
@@ -49,7 +49,9 @@ class GoalImage(Stage):
         if file is None:
             return self.Out()
         pixels = read_image(file)
-        camera = camera_of(self.world) if self.camera is None else read_camera(user_path(self.camera))
+        if self.camera is None and self.world is None:
+            raise BadInput(f"goal: nothing says what camera took {file}; give camera=PATH/camera.yaml")
+        camera = camera_of(self.world or DEMO) if self.camera is None else read_camera(user_path(self.camera))
         if pixels.shape[:2] != (camera.height_px, camera.width):
             raise BadInput(
                 f"goal: {file} has {pixels.shape[1]} x {pixels.shape[0]} pixels, and the robot's camera takes "
