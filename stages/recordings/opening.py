@@ -26,6 +26,11 @@ def open_recording(
     `UnreadableRecording` (or another `BadInput`) with one line: file, what is wrong, what to type.
     """
     options = OpenOptions(topics or Topics(), camera, tuple(layout_folders), limits or MotionLimits(), rate)
+    if log.startswith("camera:"):
+        raise UnreadableRecording(
+            f"log={log:.60}: a camera that is plugged in is recorded first: omninav camera record "
+            f"device={log.partition(':')[2]:.40} out=camera.mcap"
+        )
     formats, path = log_formats(), user_path(log)
     meant = next((one for one in formats if one.opens(log)), None)
     if meant is not None and (path.exists() or path.suffix not in meant.suffixes):

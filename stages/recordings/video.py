@@ -15,7 +15,7 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.values.encoded_image import MAX_PIXELS
 from omninav.stages.values.image import Pixels
 
-from .camera_yaml import read_camera, write_camera
+from .camera_yaml import write_camera
 from .messages import is_blank
 from .named_camera import assumed_camera, named_camera
 from .recording import Format, OpenOptions, UnreadableRecording
@@ -119,11 +119,15 @@ class VideoRecording:
         if first is None:
             raise UnreadableRecording(f"{self.name}: its first frame cannot be decoded; {_repair(self._path)}")
         height, width = first.shape[:2]
-        if named is not None:
-            return named_camera(named, lambda: (width, height))[0]
         beside = self._path.parent / "camera.yaml"
-        if beside.is_file():
-            return read_camera(beside)
+        if named is not None or beside.is_file():
+            camera, files = named_camera(named or str(beside), lambda: (width, height))
+            if (camera.width, camera.height_px) != (width, height):
+                raise UnreadableRecording(
+                    f"{files[0]}: it is of images of {camera.width} x {camera.height_px}, and those of {self.name} are "
+                    f"{width} x {height}; name their own: camera=FILE"
+                )
+            return camera
         camera, sentence = assumed_camera(self.name, first)
         self.assumed = (sentence,)
         return camera

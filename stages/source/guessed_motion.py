@@ -60,13 +60,13 @@ def guessed_motion(before: Strip | None, after: Strip | None, seconds: float, sp
     return GuessedMotion(way * math.cos(turn / 2), way * math.sin(turn / 2), turn, sigma_m, sigma_turn)
 
 
-def settled_speed(ctx: Context, name: str, speed: float | None) -> float:
+def settled_speed(ctx: Context, name: str, speed: float | None, has_truth: bool) -> float:
     """The speed (m/s) by which a log without odometry and positions is driven, with a warning that says so.
 
     Where none is given, a nominal one, for drawing. Raises `UnreadableRecording` where a node reads motion tick by
     tick and none is given, or one makes a map of positions and the speed is 0, naming it and what to type.
     """
-    maps = ctx.readers.get("odometry", [])
+    maps = [] if has_truth else ctx.readers.get("odometry", [])  # with it, positions are true
     readers = list(dict.fromkeys([*ctx.readers.get("motion", []), *maps]))
     if speed is None and readers:
         raise UnreadableRecording(

@@ -136,11 +136,11 @@ class LogSource(Source):
         assumed = [sentence for recording in self._opened for sentence in recording.assumed]
         if assumed:
             ctx.fact("assumed", "; ".join(assumed))
-        for recording, kind in zip(self._recordings, self._kinds, strict=True):
+        for recording, kind, truth in zip(self._recordings, self._kinds, self._truth, strict=True):
             if kind == "synthetic":
                 ctx.warn(f"{recording.name} has no odometry: it was made of its true positions, with noise")
             elif kind == "guessed":
-                self._speed = settled_speed(ctx, recording.name, self.speed_m_s)
+                self._speed = settled_speed(ctx, recording.name, self.speed_m_s, truth is not None)
 
     def inputs_digest(self) -> str | None:
         """sha256 over the content of all logs, in their order."""

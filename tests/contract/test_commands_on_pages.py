@@ -42,6 +42,9 @@ def test_a_command_on_a_page_composes(line: str, monkeypatch: pytest.MonkeyPatch
     command = words.pop(0) if words and words[0] in COMMANDS else ""
     if command in NO_GRAPH:
         return
+    tool = "_".join(words[:2])
+    if (ROOT / f"conf/variant/{tool}.yaml").is_file():
+        words = [f"variant={tool}", *words[2:]]
     words = [word for word in words if "=" in word and "…" not in word and not word.startswith("hydra")]
     with initialize_config_module("omninav.conf", version_base="1.3"):
         for job in jobs_to_try(

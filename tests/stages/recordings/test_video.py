@@ -69,6 +69,18 @@ def test_other_images_need_a_camera(tmp_path: Path) -> None:
         open_recording(path, camera="perspektive")
 
 
+def test_a_camera_of_another_size_is_refused_before_every_frame_is(tmp_path: Path) -> None:
+    path = video(tmp_path / "drive.mp4", pictures())
+    (tmp_path / "camera.yaml").write_text(
+        "projection: equirectangular\nimage: {width: 64, height: 32}\ncolumn_of_forward: 32\n"
+    )
+    with pytest.raises(
+        UnreadableRecording, match=r"camera.yaml: it is of images of 64 x 32, and those of .* are 128 x 64"
+    ):
+        open_recording(path)
+    assert open_recording(path, camera="equirectangular").camera.width == 128
+
+
 def test_a_cut_video_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
     whole = Path(video(tmp_path / "whole.mkv", pictures(), "MJPG")).read_bytes()
     (tmp_path / "cut.mkv").write_bytes(whole[: len(whole) // 2])
