@@ -244,6 +244,10 @@ class Chart:
         if (words, colour, symbol) not in self._legend:
             self._legend.append((words, colour, symbol))
 
+    def unnamed(self) -> None:
+        """Leave the legend to another chart of the same drawing."""
+        self._legend.clear()
+
     def parts(self, top: float = 0.0) -> tuple[str, float]:
         """The drawing below `top`, and where it ends."""
         x, y, right, bottom = self.x, self.y, self.width - RIGHT, TOP + self.tall

@@ -85,6 +85,7 @@ def _draw(logs: Sequence[Drive]) -> bytes:
             if len(logs) > 1:
                 chart.base.upright(begin, "line", f"log {drive.log[0]}")
         charts.append(chart)
+    charts[0].unnamed()
     return stacked(charts)
 
 
