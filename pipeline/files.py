@@ -36,6 +36,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f"{path.name}.{os.getpid()}.part")
     part.unlink(missing_ok=True)  # a link of that name would be written through
+    _remove_left_over(path)
     try:
         yield part
         os.replace(part, path)
@@ -44,6 +45,26 @@ def whole_file(path: Path) -> Iterator[Path]:
         raise
     finally:
         part.unlink(missing_ok=True)
+
+
+def _remove_left_over(path: Path) -> None:
+    """Remove what processes left that were killed while they wrote this file."""
+    begins, ends = f"{path.name}.", ".part"
+    for name in os.listdir(path.parent):
+        number = name.removeprefix(begins).removesuffix(ends)
+        if name == f"{begins}{number}{ends}" and number.isdecimal() and not _lives(int(number)):
+            with suppress(OSError):
+                path.with_name(name).unlink()
+
+
+def _lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:  # somebody else's
+        pass
+    return True
 
 
 def user_path(text: str | Path) -> Path:

@@ -85,11 +85,15 @@ def write_mcap(path: Path, made: Iterator[Made] | None = None, camera: bytes | N
     return path
 
 
-def write_rosbag2(folder: Path, made: Iterator[Made] | None = None) -> Path:
+def write_rosbag2(
+    folder: Path, made: Iterator[Made] | None = None, prepare: Callable[[Any], None] = lambda writer: None
+) -> Path:
     from rosbags.rosbag2 import Writer
 
     store = standard_types()
-    with Writer(folder, version=9) as writer:
+    writer = Writer(folder, version=9)
+    prepare(writer)
+    with writer:
         connections: dict[str, Any] = {}
         for m in made if made is not None else messages():
             if m.topic not in connections:

@@ -73,7 +73,8 @@ def unpack(content: bytes, whole: bool, check: bool = True) -> bytes:
     return data
 
 
-def _zstd(packed: memoryview, size: int) -> bytes:
+def unpack_zstd(packed: memoryview | bytes, size: int) -> bytes:
+    """At most one byte more than `size`, so that more is noticed."""
     with zstandard.ZstdDecompressor(max_window_size=MAX_BYTES).stream_reader(packed) as stream:
         return stream.read(size + 1)
 
@@ -84,7 +85,7 @@ def unpack_lz4(packed: memoryview | bytes, size: int) -> bytes:
 
 
 _UNPACK: dict[str, Callable[[memoryview, int], bytes]] = {
-    "zstd": _zstd,
+    "zstd": unpack_zstd,
     "lz4": unpack_lz4,
     "": lambda packed, size: bytes(packed[: size + 1]),
 }

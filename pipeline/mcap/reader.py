@@ -297,7 +297,8 @@ class LogReader:
             if sum(map(len, self._attachments.values())) + len(content) > _BYTES_OF_ATTACHMENTS:
                 raise ValueError(f"all together are larger than {_BYTES_OF_ATTACHMENTS} bytes")
             attachment = parse(Attachment, content)
-            self._attachments[attachment.name] = attachment.data
+            if self._attachments.setdefault(attachment.name, attachment.data) != attachment.data:
+                raise ValueError(f"there is another '{attachment.name:.80}' before it, which is used")
         except Exception as error:
             self.drop("bad_attachment", f"{self.path}: attachment at byte {start}: {error!s:.160}")
 

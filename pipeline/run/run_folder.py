@@ -2,6 +2,7 @@
 
 import os
 import platform
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -154,5 +155,7 @@ def _point_latest(folder: Path) -> None:
         part.unlink(missing_ok=True)
         part.symlink_to(folder.name)
         os.replace(part, link)
-    except OSError:  # a file system without links, or a folder of that name: the run does not need it
+    except OSError as error:  # a file system without links, or a folder of that name: the run does not need it
         part.unlink(missing_ok=True)
+        what = "is a folder and no link" if link.is_dir() and not link.is_symlink() else f"({error.strerror})"
+        print(f"{link} {what}, and does not lead to this run: {folder}", file=sys.stderr)

@@ -1,12 +1,15 @@
 """Recordings in rosbag2 folders and ROS 1 bags, read with the library rosbags."""
 
 import bz2
+import io
 import struct
 from collections import Counter
 from collections.abc import Collection, Iterator
 from itertools import compress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import zstandard
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
@@ -14,7 +17,7 @@ if TYPE_CHECKING:
 from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.small_files import read_yaml
-from omninav.pipeline.mcap.chunks import MAX_BYTES, unpack_lz4
+from omninav.pipeline.mcap.chunks import MAX_BYTES, MAX_RATIO, unpack_lz4, unpack_zstd
 from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.pipeline.mcap.message_types import standard_types
 
@@ -48,6 +51,47 @@ def _bz2(packed: bytes) -> bytes:
 
 def _lz4(packed: bytes) -> bytes:
     return unpack_lz4(packed, MAX_BYTES)
+
+
+class _Zstd:
+    """In place of rosbags' own: a message, and a file of a rosbag2 folder, unpack within the limits of our logs."""
+
+    @staticmethod
+    def decompress(packed: bytes) -> bytes:
+        """A message. Raises ValueError."""
+        unpacked = unpack_zstd(packed, MAX_BYTES)
+        if len(unpacked) > MAX_BYTES:
+            raise ValueError(f"a message unpacks to more than {MAX_BYTES} bytes")
+        return unpacked
+
+    @staticmethod
+    def open(file: BinaryIO, mode: str) -> "_LimitedFile":
+        """A file, to be read from its start."""
+        return _LimitedFile(file)
+
+
+class _LimitedFile(io.RawIOBase):
+    """What a zstd file unpacks to; OSError where that is beyond all proportion to its size."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._limit = max(MAX_BYTES // 2, MAX_RATIO * file.seek(0, io.SEEK_END))
+        file.seek(0)
+        self._stream = zstandard.ZstdDecompressor(max_window_size=MAX_BYTES).stream_reader(
+            file, read_across_frames=True, closefd=False
+        )
+        self._read = 0
+
+    def readable(self) -> bool:
+        """It is."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """The next bytes."""
+        number = self._stream.readinto(buffer)
+        self._read += number
+        if self._read > self._limit:
+            raise OSError(f"a file unpacks to more than {self._limit} bytes")
+        return int(number)
 
 
 def _stated_counts(path: Path) -> dict[str, int]:
@@ -96,8 +140,10 @@ class BagFeed:
     def _open(self, paths: list[Path]) -> "AnyReader":
         from rosbags.highlevel import AnyReader  # slow to import, and seldom needed
         from rosbags.rosbag1.reader import decompressors
+        from rosbags.rosbag2 import reader as rosbag2
 
         decompressors.update(bz2=_bz2, lz4=_lz4)
+        vars(rosbag2)["zstd"] = _Zstd
         reader = AnyReader(paths, default_typestore=standard_types())
         reader.open()
         return reader

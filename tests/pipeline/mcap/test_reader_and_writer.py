@@ -399,3 +399,15 @@ def test_very_many_chunks_that_unpack_to_far_more_than_a_log_holds_are_not_read(
     reader = LogReader(tmp_path / "log.mcap")
     assert keys(reader) == []
     assert "all chunks so far unpack to" in reader.details["bad_chunk"]
+
+
+def test_of_two_attachments_of_one_name_the_first_is_used_and_the_other_counted(tmp_path: Path) -> None:
+    with LogWriter(tmp_path / "log.mcap") as log:
+        for content in (b"first", b"first", b"other"):
+            log.write("/pose", POSE, 1_700_000_000_000_000_000, {})
+            log.attach("camera.yaml", content)
+    reader = LogReader(tmp_path / "log.mcap")
+    list(reader.scan())
+    assert reader.attachments == {"camera.yaml": b"first"}
+    assert reader.dropped["bad_attachment"] == 1
+    assert "there is another 'camera.yaml' before it, which is used" in reader.details["bad_attachment"]

@@ -47,3 +47,12 @@ def test_two_runs_that_start_in_one_second_have_folders_of_their_own(tmp_path: P
 def test_what_is_no_run_folder_is_said(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="not a run folder"):
         resume(tmp_path)
+
+
+def test_a_folder_in_place_of_the_link_to_the_latest_run_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "latest").mkdir()
+    folder = start(tmp_path)
+    said = capsys.readouterr().err
+    assert said == f"{tmp_path / 'latest'} is a folder and no link, and does not lead to this run: {folder}\n"

@@ -31,6 +31,7 @@ from made_logs import (
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.mcap.message_types import make_message
 from omninav.pipeline.mcap.reader import LogReader
+from omninav.stages.recordings import rosbag
 from omninav.stages.recordings.messages import is_blank, pixels_of
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
@@ -363,3 +364,21 @@ def test_a_pipe_in_a_bags_folder_is_refused_without_being_read(tmp_path: Path, n
     os.mkfifo(tmp_path / "bag" / name)
     with pytest.raises(UnreadableRecording, match="pipe"):
         open_recording(str(tmp_path / "bag"))
+
+
+@pytest.mark.parametrize("mode", ["FILE", "MESSAGE"])
+def test_a_compressed_rosbag2_folder_is_read_within_limits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: str
+) -> None:
+    from rosbags.rosbag2.enums import CompressionFormat, CompressionMode
+
+    given = CompressionMode[mode], CompressionFormat.ZSTD
+    folder = write_rosbag2(tmp_path / "bag", prepare=lambda writer: writer.set_compression(*given))
+    reference = open_recording(str(write_rosbag2(tmp_path / "plain")))
+    recording = open_recording(str(folder))
+    np.testing.assert_array_equal(recording.stamps, reference.stamps)
+    np.testing.assert_array_equal(recording.image(1), reference.image(1))
+    monkeypatch.setattr(rosbag, "MAX_BYTES", 100)
+    monkeypatch.setattr(rosbag, "MAX_RATIO", 1)
+    with pytest.raises(UnreadableRecording, match="not a readable bag|image"):
+        open_recording(str(folder))

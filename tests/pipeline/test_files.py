@@ -1,0 +1,21 @@
+"""Files appear whole or not at all."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from omninav.pipeline.files import write_whole
+
+
+def test_what_a_killed_process_left_is_removed_by_the_next_and_nothing_else(tmp_path: Path) -> None:
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    left = tmp_path / f"out.mcap.{ended.pid}.part"
+    others = [tmp_path / name for name in (f"out.mcap.{os.getppid()}.part", f"out.{ended.pid}.part", "out.mcap.x.part")]
+    for file in (left, *others):
+        file.write_bytes(b"half")
+    write_whole(tmp_path / "out.mcap", b"whole")
+    assert not left.exists()
+    assert all(file.exists() for file in others)
+    assert (tmp_path / "out.mcap").read_bytes() == b"whole"
