@@ -37,7 +37,7 @@ def settings_left_open() -> list[str]:
     import yaml
 
     settings = yaml.safe_load(files(CONF).joinpath("config.yaml").read_text(encoding="utf-8"))
-    return [name for name, value in settings.items() if value is None and name != "variant"]
+    return [name for name, value in settings.items() if value is None and name not in ("variant", "objective")]
 
 
 def options_with(entry: Entry) -> list[str]:

@@ -16,7 +16,8 @@ from omegaconf import OmegaConf
 from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.engine.compile_notice import compile_notice
 from omninav.pipeline.files import locked, write_json
-from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input, suggest
+from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import plan
 from omninav.pipeline.run.run_folder import start
@@ -40,18 +41,22 @@ class SweepJob:
     overrides: str
 
 
-def run_job(config: Any, arguments: Sequence[str], run_experiment: Callable[[Any, Sequence[str]], int]) -> None:
-    """Run what a configuration describes. In a sweep the other jobs go on; the exit code is left in a file."""
+def run_job(config: Any, arguments: Sequence[str], run_experiment: Callable[[Any, Sequence[str]], int]) -> float | None:
+    """Run what a configuration describes, and return its objective, if one is named (see `_run`).
+
+    In a sweep the other jobs go on; the exit code is left in a file. A job that fails returns None, which Optuna counts
+    as a failed trial (NaN would end the whole sweep).
+    """
     sweep, folder = _sweep_job(), _folder()
     of_experiment = config.get("experiment") is not None
-    code, error = 0, ""
+    code, error, objective = 0, "", None
     try:
         if of_experiment and sweep is not None:
             raise BadInput("an experiment has its own sweep: leave out -m, and write what varies into its file")
         if of_experiment:
             code = run_experiment(config, arguments)
         else:
-            _run(config, sweep, folder)
+            objective = _run(config, sweep, folder)
     except (ProblemsFound, BadInput) as wrong:
         code, error = 2, str(wrong)
     except StageFailed as failed:
@@ -81,9 +86,11 @@ def run_job(config: Any, arguments: Sequence[str], run_experiment: Callable[[Any
     if OUTCOMES in os.environ:
         with open(os.environ[OUTCOMES], "a", encoding="utf-8") as file:
             file.write(f"{code} {page or ''}\n")
+    return objective
 
 
-def _run(config: Any, sweep: SweepJob | None, folder: Path | None) -> None:
+def _run(config: Any, sweep: SweepJob | None, folder: Path | None) -> float | None:
+    """Run a configuration. Returns its `objective`, None where none is named."""
     from omninav.pipeline.report.progress import Progress
     from omninav.pipeline.report.terminal_tables import results_table
     from omninav.pipeline.report.warning_lines import warning_lines
@@ -103,6 +110,18 @@ def _run(config: Any, sweep: SweepJob | None, folder: Path | None) -> None:
         for sentence in warning_lines(run.manifest):
             print(f"mind: {sentence}", file=sys.stderr, flush=True)
     print(f"report: {shown(run.folder / 'report.html')}", flush=True)
+    return objective_of(metrics, settings["objective"]) if settings.get("objective") else None
+
+
+def objective_of(metrics: Metrics, path: str) -> float | None:
+    """The figure that an optimiser works on; None where it is no number. Raises `BadInput` where there is no figure."""
+    from omninav.pipeline.report.quantities import numbers
+
+    found = numbers(metrics)
+    if path not in found:
+        raise BadInput(f"objective={path}: this run has no such figure; {suggest(path, found, 'figures')}")
+    value = found[path].value
+    return float(value) if isinstance(value, int | float) else None
 
 
 def no_run_in(folder: Path) -> Path:

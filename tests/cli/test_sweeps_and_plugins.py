@@ -5,6 +5,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+import yaml
+
 ROOT = Path(__file__).resolve().parents[2]
 EDGES = ROOT / "examples" / "edges"
 SHORT = "nodes.source.stop=12"  # of tour and drive, where a result is not looked at
@@ -119,3 +122,28 @@ def test_a_broken_plugin_is_a_row_and_never_a_crash(omninav, tmp_path: Path):
     used = omninav("check", "features=broken", **settings)
     assert used.returncode == 2
     assert "No module named 'not_there'" in used.stderr
+
+
+def test_an_optimiser_gets_each_jobs_objective_and_a_failed_one_counts_as_a_failed_trial(
+    omninav, shared_cache: Path, tmp_path: Path
+):
+    pytest.importorskip("hydra_plugins.hydra_optuna_sweeper", reason="pip install 'omninav[optuna]'")
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    words = ("--config-dir", "examples/edges/conf", "features=raises_at_seed", SHORT, f"cache={shared_cache}")
+    optuna = ("hydra/sweeper=optuna", "hydra/sweeper/sampler=grid", "hydra.sweeper.n_trials=4")
+    swept = ("seed=choice(0,1)", "nodes.match.headings=choice(18,36)")
+    ended = omninav("-m", *words, *optuna, *swept, "objective=position_error_m.median")
+    assert "job 1: stage 'features'" in ended.stderr or "job 2: stage 'features'" in ended.stderr, ended.stderr
+    (sweep,) = (tmp_path / "runs").glob("*_sweep")
+    assert f"optimum: runs/{sweep.name}/optimization_results.yaml" in ended.stdout
+    found = yaml.safe_load((sweep / "optimization_results.yaml").read_text())
+    figures = [json.loads(file.read_text()) for file in sweep.glob("*/metrics.json")]
+    assert len(figures) == 2
+    assert found["best_value"] == min(figure["position_error_m"]["median"] for figure in figures)
+    assert found["best_params"]["seed"] == 0
+
+
+def test_an_objective_that_no_run_has_is_named_with_what_there_is(omninav, shared_cache: Path):
+    ended = omninav("variant=plain_matching", SHORT, f"cache={shared_cache}", "objective=position_eror_m.median")
+    assert ended.returncode == 2
+    assert "did you mean 'position_error_m.median'?" in ended.stderr

@@ -40,8 +40,8 @@ def command(arguments: list[str]) -> int:
             _refuse_misspelled_sweep(listed, folders)
             _refuse_other_sweep(listed)
 
-        def job(config: Any) -> None:
-            run_job(config, arguments, run_experiment)
+        def job(config: Any) -> float | None:
+            return run_job(config, arguments, run_experiment)
 
         of_conditions = condition_words(listed)
         typed = [word for word in listed if word not in of_conditions]
@@ -52,7 +52,7 @@ def command(arguments: list[str]) -> int:
             raise ProblemsFound(invalid_overrides(listed, folders, str(error))) from None
 
 
-def _handed_over(hydra: Hydra, flags: Namespace, words: list[str], job: Callable[[Any], None]) -> int:
+def _handed_over(hydra: Hydra, flags: Namespace, words: list[str], job: Callable[[Any], float | None]) -> int:
     """What the flags ask Hydra for: a job, a sweep, or something to print. The worst exit code of the jobs."""
     if flags.hydra_help:
         hydra.hydra_help("config", get_args_parser(), flags)
@@ -75,6 +75,11 @@ def _handed_over(hydra: Hydra, flags: Namespace, words: list[str], job: Callable
             )
         for page in {page for _, _, page in ends if page}:
             print(f"sweep: {shown(Path(page))}", flush=True)
+            optimum = (
+                Path(page).parent / "optimization_results.yaml"
+            )  # by Hydra's sweepers for Optuna, Ax and Nevergrad
+            if optimum.is_file():
+                print(f"optimum: {shown(optimum)}\n{optimum.read_text().strip()}", flush=True)
         return max((int(code) for code, _, _ in ends), default=0)
     return 0
 
