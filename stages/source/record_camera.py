@@ -28,7 +28,7 @@ class RecordCamera(Stage):
     than `rate_hz` are left out. Raises BadInput where there is no such camera, or nothing says how it is to be read.
     """
 
-    device: str = "0"
+    device: int | str = 0
     """Number of the camera, or its file as /dev/video0; a video stands for a camera too."""
     out: str = "camera.mcap"
     """The log to write."""
@@ -49,7 +49,7 @@ class RecordCamera(Stage):
         path = user_path(self.out)
         if path.suffix != ".mcap":
             raise BadInput(f"record: out={self.out:.100} is no .mcap; type out=camera.mcap")
-        capture = opened(self.device)
+        capture = opened(str(self.device))
         ctx.doing("recording; Ctrl-C ends it")
         try:
             written = self._record(ctx, capture, path)
@@ -83,12 +83,12 @@ class RecordCamera(Stage):
         until = time.monotonic() + WAIT_S
         while (pixels := read(capture)) is None:
             if time.monotonic() > until:
-                raise BadInput(f"camera {self.device:.100} gives no image; does another program use it?")
+                raise BadInput(f"camera {self.device!s:.100} gives no image; does another program use it?")
             time.sleep(0.05)
         return pixels
 
     def _camera(self, pixels: Pixels) -> Camera:
-        name = f"camera {self.device:.100}"
+        name = f"camera {self.device!s:.100}"
         if self.camera is None:
             camera, sentence = assumed_camera(name, pixels)
             print(f"assumed: {sentence}")
