@@ -380,5 +380,5 @@ def test_a_compressed_rosbag2_folder_is_read_within_limits(
     np.testing.assert_array_equal(recording.image(1), reference.image(1))
     monkeypatch.setattr(rosbag, "MAX_BYTES", 100)
     monkeypatch.setattr(rosbag, "MAX_RATIO", 1)
-    with pytest.raises(UnreadableRecording, match="not a readable bag|image"):
+    with pytest.raises(UnreadableRecording, match=r"not a readable bag|image"):
         open_recording(str(folder))
