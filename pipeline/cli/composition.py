@@ -30,7 +30,7 @@ from .words import read_flags
 
 OF_THE_VARIANT = ("variant", "inputs", "nodes", "wires", "artifacts", "saves")
 """What a variant's file says of itself; everything else in a configuration is a setting."""
-OF_THE_RUN = ("seed", "runs", "cache", "checkpoint_s", "validate", "record", "objective")
+OF_THE_RUN = ("seed", "runs", "cache", "checkpoint_s", "validate", "record", "objective", "plots")
 """Settings that every run reads, whatever its graph is."""
 UNSET = "(unset)"
 INTERPOLATION = re.compile(r"\$\{(?:oc\.select:|unless:(\w+),)?\s*(\w+)")

@@ -21,6 +21,7 @@ def test_a_sweep_runs_every_combination_and_has_one_page(omninav, shared_cache: 
     assert [m["status"] for m in manifests] == ["complete"] * 4
     assert manifests[0]["overrides"].startswith("match=selective seed=0")
     assert all((sweep / str(n) / "report.html").exists() for n in range(4))
+    assert not any("<figure id=" in (sweep / str(n) / "report.html").read_text() for n in range(4))
     page = next(sweep.glob("*.html")).read_text()
     assert all(m["overrides"].split()[0] in page for m in manifests)
 

@@ -186,6 +186,12 @@ def test_what_was_skipped_stands_above_the_results(tmp_path):
     assert said.index("source.duplicate frame: 7 (first: frame 12 <twice>)") < said.index("Position error")
 
 
+def test_ticks_in_which_a_stage_had_nothing_to_do_are_no_warning(tmp_path):
+    manifest = MANIFEST | {"dropped": {"skipped.match": {"count": 9, "first": ""}}, "warnings": ["guessed speed"]}
+    said = text_of(report(tmp_path, manifest=manifest))
+    assert said.index("guessed speed") < said.index("Position error") < said.index("skipped.match 9")
+
+
 def test_parameters_stand_beside_their_defaults_with_what_they_mean(tmp_path):
     class Smoothed(Stage):
         """Smooths."""
