@@ -300,3 +300,10 @@ def test_later_outputs_are_checked_only_where_asked_for():
     engine = Engine(graph_of(nodes, {"doubt": {"number": "source.number"}}))
     engine.run()
     assert engine.ticks == 20
+
+
+def test_a_source_knows_who_reads_it_on_the_way_to_a_delayed_wire(tmp_path: Path):
+    nodes = {**SUM, "aside": {"_target_": "Scale"}}
+    graph = graph_of(nodes, {**SUM_WIRES, "aside": {"number": "source.number"}})
+    engine = Engine(graph, {}, EngineOptions(0, tmp_path, tmp_path / "memory"))
+    assert engine.calls["source"].ctx.readers == {"number": ["sum"]}
