@@ -1,1 +1,5 @@
-"""What a third party tests its stages with."""
+"""What a third party tests its stages with: `from omninav.testing import check_stage`."""
+
+from omninav.pipeline.api.stage_check import check_stage
+
+__all__ = ["check_stage"]

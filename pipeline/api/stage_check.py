@@ -1,0 +1,124 @@
+"""What every stage promises, as one check that a stage's own tests call."""
+
+import inspect
+import types
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Union, get_args, get_origin
+
+import numpy as np
+
+from omninav.pipeline.engine.codec import BadEncoding, decode, encode, encode_state, restore_state
+from omninav.pipeline.graph.contents import wrong_output
+from omninav.pipeline.graph.signature import BadStage, Signature, first_line, signature
+from omninav.pipeline.graph.stage import Context, Stage, State
+from omninav.pipeline.graph.value import Value
+
+MAX_SUMMARY = 120
+"""Characters of a docstring's first line, which tables show."""
+
+
+def check_stage(
+    stage: type[Stage] | Stage, frames: Sequence[Mapping[str, Any]] = (), seed: int = 0
+) -> list[dict[str, Any]]:
+    """Check that a stage keeps what the framework relies on, and give its outputs for some frames.
+
+    The class: its ports and parameters can be read, its docstring begins with one line that says what it does, every
+    parameter says what it means, ports carry `Value`s, and its State can be saved. With `frames` (inputs of `step` by
+    name, one mapping a frame): outputs are what their types state, inputs are left as they were, the same seed gives
+    the same outputs, and the stage goes on from a saved State to the same outputs. Raises `AssertionError` with
+    everything that is wrong.
+    """
+    cls = stage if inspect.isclass(stage) else type(stage)
+    wrong = list(broken_promises(cls))
+    outputs: list[dict[str, Any]] = []
+    if not wrong and frames:
+        made = stage() if inspect.isclass(stage) else stage
+        wrong, outputs = _checked_steps(made, frames, seed)
+    if wrong:
+        raise AssertionError(f"{cls.__name__}:\n" + "\n".join(f"  {each}" for each in wrong))
+    return outputs
+
+
+def broken_promises(cls: type[Stage]) -> Iterator[str]:
+    """What is wrong with a stage class, as it is written."""
+    try:
+        read = signature(cls)
+    except BadStage as error:
+        yield str(error)
+        return
+    summary = first_line(cls)
+    if not (20 < len(summary) <= MAX_SUMMARY and summary.endswith(".")):
+        yield f"its docstring begins with {summary!r:.60}, expected a sentence on one line of at most {MAX_SUMMARY}"
+    for port in [*read.inputs.values(), *read.outputs.values()]:
+        if not all(inspect.isclass(kind) and issubclass(kind, Value) for kind in _kinds(port.type)):
+            yield f"port '{port.name}' is {port.type}, expected a class derived from Value"
+    for parameter in read.parameters.values():
+        if not parameter.meaning:
+            yield f"parameter '{parameter.name}' does not say what it means; write a docstring below it"
+    if read.state is not None:
+        try:
+            state = read.state[1]()
+            restore_state(state, decode(encode(encode_state(state))))
+        except (TypeError, BadEncoding) as error:
+            yield f"its State cannot be saved from the first tick on: {error}"
+
+
+def _kinds(kind: Any) -> list[Any]:
+    if get_origin(kind) in (Union, types.UnionType):
+        return [inner for option in get_args(kind) for inner in _kinds(option)]
+    return [inner for option in get_args(kind) if option is not ... for inner in _kinds(option)] or [kind]
+
+
+def _checked_steps(
+    stage: Stage, frames: Sequence[Mapping[str, Any]], seed: int
+) -> tuple[list[str], list[dict[str, Any]]]:
+    read, wrong = signature(type(stage)), []
+    before = [encode(dict(frame)) for frame in frames]
+    outputs = _steps(stage, read, frames, seed)
+    for number, out in enumerate(outputs):
+        for name, port in read.outputs.items():
+            what = wrong_output(out[name], port.type, port.optional)
+            if what is not None:
+                wrong.append(f"frame {number}: output '{name}' {what}")
+    if not any(port.type is not None and getattr(port.type, "in_place", False) for port in read.inputs.values()):
+        after = [encode(dict(frame)) for frame in frames]
+        wrong += [f"frame {n}: it changes its inputs" for n in range(len(frames)) if before[n] != after[n]]
+    if not wrong:
+        first = encode(outputs)
+        if encode(_steps(stage, read, frames, seed)) != first:
+            wrong.append("with the same seed it gives other outputs; randomness comes from ctx.rng, memory is a State")
+        elif encode(_steps(stage, read, frames, seed, again_at=len(frames) // 2)) != first:
+            wrong.append("after its State was saved and restored it gives other outputs; keep all of it in the State")
+    return wrong, outputs
+
+
+def _steps(
+    stage: Stage, read: Signature, frames: Sequence[Mapping[str, Any]], seed: int, again_at: int | None = None
+) -> list[dict[str, Any]]:
+    """The outputs for all frames; with `again_at` another copy of the stage goes on there with what was saved."""
+    ctx = _context(seed)
+    stage, state = _copy_of(stage, read, ctx)
+    outputs = []
+    for number, frame in enumerate(frames):
+        if number == again_at:
+            saved = encode([ctx.generator_state(), None if state is None else encode_state(state)])
+            ctx = _context(seed)
+            stage, state = _copy_of(stage, read, ctx)
+            generator, fields = decode(saved)
+            ctx.rng_unmarked().bit_generator.state = generator
+            if state is not None:
+                restore_state(state, fields)
+        scratch = {} if read.state is None else {read.state[0]: state}
+        out = stage.step(ctx, **frame, **scratch)
+        outputs.append({name: None if out is None else getattr(out, name) for name in read.outputs})
+    return outputs
+
+
+def _context(seed: int) -> Context:
+    return Context("checked", np.random.default_rng(seed))
+
+
+def _copy_of(stage: Stage, read: Signature, ctx: Context) -> tuple[Stage, State | None]:
+    copy = type(stage)(**{name: getattr(stage, name) for name in read.parameters})
+    copy.setup(ctx)
+    return copy, None if read.state is None else read.state[1]()
