@@ -72,6 +72,9 @@ class _Server:
         self.channels[topic] = channel
         return channel
 
+    def on_unsubscribe(self, client: Any, channel: Any) -> None:
+        """Called by the server where a client has seen enough of a topic."""
+
     def on_subscribe(self, client: Any, channel: Any) -> None:
         """Called by the server where a client begins to watch a topic."""
         if channel.id in self.last:
