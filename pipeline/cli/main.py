@@ -1,11 +1,12 @@
 """The command line: what is heavy is imported by the command that needs it."""
 
 import importlib
-import io
 import os
 import sys
 from collections.abc import Sequence
 from importlib.resources import files
+
+from .output import lost_output, mend_streams
 
 COMMANDS = (
     "check",
@@ -25,8 +26,18 @@ COMMANDS = (
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code: 0 well, 1 a stage failed, 2 the configuration or an input is wrong."""
-    arguments = list(sys.argv[1:] if argv is None else argv)
-    _mend_streams()
+    mend_streams()
+    code = _run(list(sys.argv[1:] if argv is None else argv))
+    try:
+        lost = lost_output()
+    except BrokenPipeError:
+        return code
+    if lost is not None:
+        print(f"standard output: {lost.strerror}; what was printed is lost, all else was done", file=sys.stderr)
+    return code if lost is None else code or 2
+
+
+def _run(arguments: list[str]) -> int:
     if arguments and arguments[0] in ("-h", "--help", "help"):
         print(files("omninav.conf").joinpath("help.txt").read_text(encoding="utf-8"), end="")
         return 0
@@ -72,16 +83,6 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         print(bad or error, file=sys.stderr)
         return 1 if bad is None else 2
-
-
-def _mend_streams() -> None:
-    """Where output is closed nothing is said, and what its encoding lacks is shown as "?"."""
-    for name in ("stdout", "stderr"):
-        stream = getattr(sys, name)
-        if stream is None:
-            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
-        elif isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")
 
 
 def _refuse_lost_folder() -> None:

@@ -34,7 +34,7 @@ _EMPTY_ROWS = 1 << 24
 def write_artifact(path: Path, value: Value, facts: dict[str, Any] | None = None) -> None:
     """Write a value as one file: a deflated zip of `.npy` arrays with a JSON header, its sha256 as comment.
 
-    Arrays go to the file piece by piece, so that a large map needs no memory twice. `numpy.load` opens it. The header
+    Arrays go to the file piece by piece, so that a large value needs no memory twice. `numpy.load` opens it. The header
     names the value's type, each field's array with its own sha256, and `facts` about how it was made. Top-level array
     fields are arrays of the file; everything else is encoded in one more.
     """

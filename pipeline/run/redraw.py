@@ -41,7 +41,7 @@ def redraw(folder: Path, plots: str, display: ProgressDisplay | None = None) -> 
         execute(again, planned, display)
         if _figures(place) != _figures(run.folder):
             raise BadInput(f"{folder}: it gives other figures now (the code has changed): start a new run")
-        write_whole(run.folder / REPORT, (place / REPORT).read_text())
+        write_whole(run.folder / REPORT, (place / REPORT).read_text(encoding="utf-8"))
     finally:
         shutil.rmtree(place, ignore_errors=True)
     run.manifest["files"][REPORT] = digest_file(run.folder / REPORT)
@@ -49,4 +49,4 @@ def redraw(folder: Path, plots: str, display: ProgressDisplay | None = None) -> 
 
 
 def _figures(folder: Path) -> object:
-    return json.loads((folder / "metrics.json").read_text())
+    return json.loads((folder / "metrics.json").read_text(encoding="utf-8"))

@@ -79,7 +79,7 @@ def _handed_over(hydra: Hydra, flags: Namespace, words: list[str], job: Callable
                 Path(page).parent / "optimization_results.yaml"
             )  # by Hydra's sweepers for Optuna, Ax and Nevergrad
             if optimum.is_file():
-                print(f"optimum: {shown(optimum)}\n{optimum.read_text().strip()}", flush=True)
+                print(f"optimum: {shown(optimum)}\n{optimum.read_text(encoding='utf-8').strip()}", flush=True)
         return max((int(code) for code, _, _ in ends), default=0)
     return 0
 

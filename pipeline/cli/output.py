@@ -1,0 +1,70 @@
+"""What is printed, where it cannot be written: the work goes on, and it is said at the end."""
+
+import io
+import os
+import sys
+from typing import Any
+
+
+class _Output(io.RawIOBase):
+    """Standard output that keeps the first error of a full disk instead of stopping whoever prints."""
+
+    def __init__(self, stream: io.TextIOWrapper, raw: io.FileIO) -> None:
+        self._stream, self._raw = stream, raw  # a stream that nobody holds closes its file
+        self.error: OSError | None = None
+
+    def writable(self) -> bool:
+        """It is."""
+        return True
+
+    def fileno(self) -> int:
+        """The descriptor below."""
+        return self._raw.fileno()
+
+    def isatty(self) -> bool:
+        """Whether it is a terminal."""
+        return self._raw.isatty()
+
+    def write(self, data: Any, /) -> int | None:
+        """Write, or keep why not. Raises BrokenPipeError: nobody reads any more."""
+        try:
+            return self._raw.write(data)
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            self.error = self.error or error
+            return len(data)
+
+
+def mend_streams() -> None:
+    """Where output is closed nothing is said, and what its encoding lacks is shown as "?"."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+    stream, raw = sys.stdout, _below(sys.stdout)
+    if isinstance(stream, io.TextIOWrapper) and isinstance(raw, io.FileIO):
+        mended: Any = _Output(stream, raw)
+        buffer = mended if stream.write_through else io.BufferedWriter(mended)
+        sys.stdout = io.TextIOWrapper(
+            buffer,
+            stream.encoding,
+            errors="replace",
+            line_buffering=stream.line_buffering,
+            write_through=stream.write_through,
+        )
+
+
+def lost_output() -> OSError | None:
+    """Why something printed could not be written; None where all was."""
+    sys.stdout.flush()
+    raw = _below(sys.stdout)
+    return raw.error if isinstance(raw, _Output) else None
+
+
+def _below(stream: Any) -> Any:
+    """What a stream's bytes go to in the end."""
+    buffer = getattr(stream, "buffer", None)
+    return getattr(buffer, "raw", buffer)
