@@ -3,10 +3,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format docs bench soak scale kills fuzz clean
+.PHONY: help ros2 demo test lint format docs bench soak scale kills fuzz clean
 
 help:  ## list these targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z0-9]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 demo: $(VENV)/.demo  ## simulate a small world, map it, localise a drive, write a report
 	$(BIN)/omninav
@@ -14,6 +14,7 @@ demo: $(VENV)/.demo  ## simulate a small world, map it, localise a drive, write 
 # Small matrix products are many times slower with several threads on busy cores.
 test: export OPENBLAS_NUM_THREADS = 1
 test: lint  ## lint, then run every test
+	-test -e .venv-ros2 || $(MAKE) --no-print-directory ros2
 	$(BIN)/pytest -n 2 --dist loadfile
 
 lint: $(VENV)/.installed  ## check style, types and the layers of the code
@@ -51,6 +52,8 @@ fuzz: export OPENBLAS_NUM_THREADS = 1
 fuzz: $(VENV)/.installed  ## read hostile inputs of every format on all cores (SECONDS=600 SEED=1)
 	PYTHONPATH=tests $(BIN)/python -m hostile.fuzz --seconds $(SECONDS) --seed $(SEED)
 
+ros2: .venv-ros2/.installed  ## real rclpy, for live tests (Python 3.11)
+
 clean:  ## remove the virtual environment and all build and check caches
 	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
 
@@ -58,6 +61,13 @@ $(VENV)/.demo: pyproject.toml
 	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "omninav needs Python 3.11: make PYTHON=python3.11 …"'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	touch $@
+
+# The wheels of rclpy are for Python 3.11 alone; the tests' other end runs there, with nothing of ours.
+.venv-ros2/.installed: pyproject.toml
+	python3.11 -m venv .venv-ros2
+	.venv-ros2/bin/python -m pip install --quiet --disable-pip-version-check 'ros-rclpy>=9.1' ros-rmw-fastrtps-cpp \
+		ros-sensor-msgs ros-nav-msgs ros-geometry-msgs ros-std-srvs ros-diagnostic-msgs
 	touch $@
 
 $(VENV)/.installed: $(VENV)/.demo

@@ -1,6 +1,7 @@
 """Real rclpy at the other end, in an environment of its own."""
 
 import base64
+import functools
 import itertools
 import json
 import os
@@ -99,10 +100,16 @@ def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     disconnect()
 
 
+@functools.cache
+def _has_rclpy() -> bool:
+    words = [str(ROS2_PYTHON), "-c", "import rclpy, std_srvs"]
+    return ROS2_PYTHON.exists() and subprocess.run(words, stderr=subprocess.DEVNULL, timeout=60).returncode == 0
+
+
 @pytest.fixture
 def other_end(domain: int) -> Iterator[OtherEnd]:
     """A node of real rclpy."""
-    if not ROS2_PYTHON.exists():
+    if not _has_rclpy():
         pytest.skip(f"no rclpy at {ROS2_PYTHON}: type `make ros2` (Python 3.11), or set OMNINAV_ROS2_PYTHON")
     end = OtherEnd(domain)
     yield end

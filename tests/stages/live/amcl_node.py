@@ -1,0 +1,32 @@
+"""omninav's end of the AMCL test, in rclpy's own Python: what it is told, it says on its output."""
+
+import sys
+
+import numpy as np
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.live.intake import Intake
+from omninav.stages.live.publish import Publish
+from omninav.stages.live.transport import connect, disconnect
+from omninav.stages.recordings.live_record import DriveSoFar, LiveHeader
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.pose import Pose
+
+transport = connect("rclpy")
+header = LiveHeader({"/initialpose": "initial_pose", "/reinitialize_global_localization": "restart"})
+drive = DriveSoFar(header)
+intake = Intake(transport, transport.status, header, drive, None, None, 1.0)
+intake.subscribe()
+intake.serve_restart("/reinitialize_global_localization")
+transport.status.live = True
+publish, ctx = Publish(transport="rclpy", pose="/amcl_pose", tf=None, particles=None), Context("publish")
+publish.setup(ctx)
+belief = Particles(np.array([[1.0, 2.0, 0.5]]), np.ones(1))
+print("ready", flush=True)
+for number in range(int(sys.argv[1])):
+    publish.step(ctx, Tick(number, number + 1), belief=belief, odometry=Pose(0.0, 0.0, 0.0))
+    intake.next(0.1)
+    made = drive.frame(number)
+    if made is not None and made[0].restart is not None:
+        print("restart", made[0].restart.at, flush=True)
+disconnect()
