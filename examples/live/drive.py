@@ -59,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         common = ("variant=topological_nav", "goal=kitchen", f"map={given.map}", "video=none")
         ends = ("nodes.source.rest_s=2", f"nodes.source.seconds={given.seconds}")
         node = subprocess.Popen(omninav("live", *common, *ends, f"camera={camera}", f"hydra.run.dir={run}"))
-        wait_for(run / "live.mcap.part")
+        wait_for(run / "live.mcap.unfinished")
         time.sleep(given.kill_after)
         node.send_signal(signal.SIGKILL)
         node.wait()

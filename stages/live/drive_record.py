@@ -15,7 +15,7 @@ from .transport import Arrival
 
 
 class DriveRecord:
-    """An MCAP file that grows as `live.mcap.part` and is `live.mcap` at its end.
+    """An MCAP file that grows as `live.mcap.unfinished` and is `live.mcap` at its end.
 
     Every message is a chunk of its own, with a checksum, and on disk after each `write`: a run that is killed has all
     of it. A record that is there already is copied first, without what its end may lack, and goes on.
@@ -23,7 +23,7 @@ class DriveRecord:
 
     def __init__(self, path: Path, header: LiveHeader, camera: Camera) -> None:
         self.path = path
-        self._part, before = path.with_name(f"{path.name}.part"), path.with_name(f"{path.name}.before")
+        self._part, before = path.with_name(f"{path.name}.unfinished"), path.with_name(f"{path.name}.before")
         if not before.exists() and self._part.exists():
             os.replace(self._part, before)
         self._part.unlink(missing_ok=True)
@@ -58,4 +58,4 @@ class DriveRecord:
 def unfinished(path: Path) -> Path:
     """The file of a record that has not ended: the one that is whole where a copy of it was under way."""
     before = path.with_name(f"{path.name}.before")
-    return before if before.exists() else path.with_name(f"{path.name}.part")
+    return before if before.exists() else path.with_name(f"{path.name}.unfinished")
