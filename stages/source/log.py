@@ -197,6 +197,13 @@ class LogSource(Source):
                 position.next += 1
             position.log, position.next, position.last = position.log + 1, 0, -1
             position.x = position.y = position.heading = 0.0
+        if not position.ticks:
+            lost = sum((recording.dropped for recording in self._opened), Counter[str]())
+            details = [detail for recording in self._opened for detail in recording.details.values()]
+            raise UnreadableRecording(
+                f"{self._opened[0].name}: not one of its images can be used "
+                f"({', '.join(f'{number} {kind}' for kind, number in sorted(lost.items()))}; {(details or [''])[-1]:.300})"
+            )
         return None
 
     def _out(

@@ -6,12 +6,14 @@ import pytest
 from golden_figures import RUNS, measured, read_golden
 
 VARIANTS = Path(__file__).resolve().parents[2] / "conf" / "variant"
+NO_FIGURES = {"camera_calibrate", "camera_look", "camera_record", "simulate_live"}
+"""They write files, or drive for somebody else; tests of their own run them."""
 RELATIVE = 0.01
 """On one machine figures are exactly equal; other versions of libraries round otherwise."""
 
 
 def test_every_variant_is_run():
-    assert sorted(RUNS) == sorted(path.stem for path in VARIANTS.glob("*.yaml"))
+    assert sorted({*RUNS, *NO_FIGURES}) == sorted(path.stem for path in VARIANTS.glob("*.yaml"))
     assert sorted(read_golden()) == sorted(RUNS)
 
 

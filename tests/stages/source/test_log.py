@@ -208,3 +208,11 @@ def test_made_up_odometry_does_not_notice_a_splice_either(tmp_path: Path) -> Non
 def test_a_cut_that_does_not_lead_onwards_is_refused(tmp_path: Path, cuts: tuple[tuple[int, int], ...]) -> None:
     with pytest.raises(UnreadableRecording, match="does not lead onwards"):
         drive(LogSource(log=str(write_mcap(tmp_path / "log.mcap")), cuts=cuts))
+
+
+def test_a_log_of_which_no_image_can_be_used_is_refused(tmp_path: Path) -> None:
+    for number in range(3):
+        (tmp_path / f"{number}.png").write_bytes(b"no picture")
+    (tmp_path / "camera.yaml").write_text("projection: donut\nimage: {width: 16, height: 16}\n")
+    with pytest.raises(UnreadableRecording, match=r"not one of its images can be used \(3 undecodable_image; .*0.png"):
+        drive(LogSource(log=str(tmp_path)))
