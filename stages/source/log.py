@@ -200,10 +200,10 @@ class LogSource(Source):
         if not position.ticks:
             lost = sum((recording.dropped for recording in self._opened), Counter[str]())
             details = [detail for recording in self._opened for detail in recording.details.values()]
-            raise UnreadableRecording(
-                f"{self._opened[0].name}: not one of its images can be used "
-                f"({', '.join(f'{number} {kind}' for kind, number in sorted(lost.items()))}; {(details or [''])[-1]:.300})"
-            )
+            counts = ", ".join(f"{number} {kind}" for kind, number in sorted(lost.items()))
+            first = (details or [""])[-1]
+            name = self._opened[0].name
+            raise UnreadableRecording(f"{name}: not one of its images can be used ({counts}; {first:.300})")
         return None
 
     def _out(
