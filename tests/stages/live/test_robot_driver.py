@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -159,6 +162,13 @@ def test_truth_and_collisions_have_the_stamps_of_the_driver(wire):
     stage.step(Context("truth"), Tick(0, 7_000_000_001), Pose(1.0, 2.0, 0.5), DriveTally(3, 10.0))
     assert stamp_of(wire.on("/ground_truth/pose")[0]) == 7_000_000_001
     assert wire.on("/collisions")[0].data == 3
+
+
+def test_the_simulator_is_a_robot_without_ros(domain, tmp_path):
+    camera = tmp_path / "robot.camera.yaml"
+    words = ["simulate", "live=dds", "real_time=false", f"camera={camera}", "nodes.source.seconds=0.6"]
+    subprocess.run([sys.executable, "-m", "omninav", *words], check=True, timeout=300)
+    assert read_camera(camera).projection == "hyperbolic"
 
 
 def test_a_node_of_ros_2_hears_the_robot_and_drives_it(other_end: OtherEnd):
