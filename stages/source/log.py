@@ -27,6 +27,7 @@ from omninav.stages.values.requests import GoalPoint, Restart
 from omninav.stages.values.scan import Scan
 
 from .cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames, thinned
+from .frozen_odometry import frozen_steps
 from .guessed_motion import VisualCompass, guessed_motion, settled_speed
 from .synthetic_odometry import add_odometry_noise
 
@@ -139,6 +140,11 @@ class LogSource(Source):
         for recording, kind, truth in zip(self._recordings, self._kinds, self._truth, strict=True):
             if kind == "synthetic":
                 ctx.warn(f"{recording.name} has no odometry: it was made of its true positions, with noise")
+            elif kind == "measured" and recording.odometry is not None and truth is not None:
+                steps, metres = frozen_steps(recording.odometry, truth)
+                if steps:
+                    still = f"odometry stands still at {steps} images, while ground truth moves {metres:.1f} m"
+                    ctx.warn(f"{recording.name}: {still}")
             elif kind == "guessed":
                 self._speed = settled_speed(ctx, recording.name, self.speed_m_s, truth is not None)
 

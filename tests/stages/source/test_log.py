@@ -11,6 +11,7 @@ import pytest
 from made_logs import FRAMES, IMAGE, ODOMETRY, START, TRUTH, Made, compressed, messages, write_mcap
 
 from omninav.pipeline import Context
+from omninav.pipeline.mcap.message_types import make_message
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import UnreadableRecording
@@ -216,3 +217,16 @@ def test_a_log_of_which_no_image_can_be_used_is_refused(tmp_path: Path) -> None:
     (tmp_path / "camera.yaml").write_text("projection: donut\nimage: {width: 16, height: 16}\n")
     with pytest.raises(UnreadableRecording, match=r"not one of its images can be used \(3 undecodable_image; .*0.png"):
         drive(LogSource(log=str(tmp_path)))
+
+
+def test_odometry_that_stands_still_while_ground_truth_moves_is_said(tmp_path: Path) -> None:
+    def stopped(made: Made) -> Made:
+        if made.topic == ODOMETRY:
+            made.content.pose.pose = make_message("geometry_msgs/msg/Pose", {"orientation": {"w": 1.0}})
+        return made
+
+    ctx = Context("source")
+    LogSource(log=str(write_mcap(tmp_path / "log.mcap", map(stopped, messages())))).setup(ctx)
+    assert [line.partition(": ")[2] for line in ctx.warnings] == [
+        "odometry stands still at 19 images, while ground truth moves 1.6 m"
+    ]
