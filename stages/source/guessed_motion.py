@@ -60,7 +60,7 @@ def guessed_motion(before: Strip | None, after: Strip | None, seconds: float, sp
     return GuessedMotion(way * math.cos(turn / 2), way * math.sin(turn / 2), turn, sigma_m, sigma_turn)
 
 
-def settled_speed(ctx: Context, name: str, speed: float | None, has_truth: bool) -> float:
+def settled_speed(ctx: Context, name: str, camera: Camera, speed: float | None, has_truth: bool) -> float:
     """The speed (m/s) by which a log without odometry and positions is driven, with a warning that says so.
 
     Where none is given, a nominal one, for drawing. Raises `UnreadableRecording` where a node reads motion tick by
@@ -83,7 +83,8 @@ def settled_speed(ctx: Context, name: str, speed: float | None, has_truth: bool)
         ctx.warn(f"{name} has no odometry: its path is drawn as if driven at {NOMINAL_SPEED:g} m/s (speed=… sets it)")
         return NOMINAL_SPEED
     path = f", and {_listed(maps)} places its references along that path" if maps else ""
-    ctx.warn(f"{name} has no odometry: {speed:g} m/s are guessed, turns are seen in the images{path}")
+    turns = "seen in the images" if _table(camera) else "not known, as its camera does not see the full circle"
+    ctx.warn(f"{name} has no odometry: {speed:g} m/s are guessed, turns are {turns}{path}")
     return speed
 
 

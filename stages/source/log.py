@@ -146,7 +146,7 @@ class LogSource(Source):
                     still = f"odometry stands still at {steps} images, while ground truth moves {metres:.1f} m"
                     ctx.warn(f"{recording.name}: {still}")
             elif kind == "guessed":
-                self._speed = settled_speed(ctx, recording.name, self.speed_m_s, truth is not None)
+                self._speed = settled_speed(ctx, recording.name, recording.camera, self.speed_m_s, truth is not None)
 
     def inputs_digest(self) -> str | None:
         """sha256 over the content of all logs, in their order."""
