@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from .pipeline.api.configuration import Configuration, check, compose
     from .pipeline.api.run import Run, open_run, run
     from .pipeline.api.session import Session, Step, open, resume
+    from .pipeline.api.sweep import Sweep, open_sweep, sweep
     from .pipeline.engine.artifact import read_artifact as load_map
     from .pipeline.engine.call import StageFailed
 
@@ -53,6 +54,7 @@ __all__ = [
     "StageFailed",
     "State",
     "Step",
+    "Sweep",
     "Table",
     "Tick",
     "Truth",
@@ -62,8 +64,10 @@ __all__ = [
     "load_map",
     "open",
     "open_run",
+    "open_sweep",
     "resume",
     "run",
+    "sweep",
     "testing",
 ]
 
@@ -72,6 +76,7 @@ _PLACES = {
     "Configuration check compose": "pipeline.api.configuration",
     "Run open_run run": "pipeline.api.run",
     "Session Step open resume": "pipeline.api.session",
+    "Sweep open_sweep sweep": "pipeline.api.sweep",
     "load_map": "pipeline.engine.artifact",
     "StageFailed": "pipeline.engine.call",
 }

@@ -8,12 +8,15 @@ from typing import Any
 
 from omninav.pipeline.files import write_whole
 
-from .quantities import best_of, head_of, headlines, numbers
+from .quantities import Number, best_of, head_of, headlines, numbers
 from .rendering import render
+from .sweep_table import Mean, conditions, write_sweep_tables
 
 
 def write_sweep_page(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
-    """Write `sweep.html`: a line per job with what it changed, how it ended, its main figures or its error.
+    """Write `sweep.html`: a line per job with what it changed, how it ended, its main figures or its error, and means.
+
+    Beside it lie the same numbers as tables (see `write_sweep_tables`).
 
     A row holds `job`, `folder` (the job's run folder), `manifest` (with `overrides`, `status`, `error`) and `metrics`
     (`Metrics`, None where the job has none).
@@ -37,6 +40,14 @@ def write_sweep_page(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
                 "log": _link(folder, own / "run.log"),
             }
         )
+    means: list[dict[str, Any]] = []
+    for condition in conditions(rows):
+        figures = [condition.means.get(path) for path in paths]
+        shown = [
+            "" if mean is None else _shown(mean, path, measured) for path, mean in zip(paths, figures, strict=True)
+        ]
+        settings = " ".join(f"{name}={value}" for name, value in condition.settings.items())
+        means.append({"settings": settings or "the defaults", "jobs": condition.jobs, "cells": shown})
     counts = Counter(str(line["status"]) for line in lines)
     page = render(
         "sweep.html",
@@ -44,10 +55,19 @@ def write_sweep_page(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
         counts=f"{len(lines)} jobs: " + ", ".join(f"{number} {status}" for status, number in sorted(counts.items())),
         columns=[head_of(path, measured) for path in paths],
         rows=lines,
+        means=means if any(condition["jobs"] > 1 for condition in means) else [],
     )
     path = folder / "sweep.html"
     write_whole(path, page)
+    write_sweep_tables(folder, rows)
     return path
+
+
+def _shown(mean: Mean, path: str, runs: Sequence[Mapping[str, Number]]) -> str:
+    entry = next(run[path] for run in runs if path in run).entry
+    if mean.low is None or mean.high is None:
+        return entry.text(mean.mean)
+    return f"{entry.text(mean.mean)} ± {entry.text((mean.high - mean.low) / 2)}"
 
 
 def _link(folder: Path, file: Path) -> str:

@@ -12,10 +12,10 @@ from omninav.pipeline.run.metrics_files import read_metrics
 
 def command(arguments: list[str]) -> int:
     """Print the figures of two or more runs, and what they differ in."""
-    if len(arguments) < 2:
+    if len([run for given in arguments for run in runs_in(given)]) < 2:
         raise BadInput("compare: give two or more run folders: omninav compare runs/A runs/B")
     runs = []
-    for word in arguments:
+    for word in (run for given in arguments for run in runs_in(given)):
         folder = Path(word)
         metrics = read_metrics(folder)
         config = read_yaml(folder / "config.yaml")
@@ -23,3 +23,12 @@ def command(arguments: list[str]) -> int:
         runs.append({"name": word.rstrip("/"), "metrics": metrics, "config": config, "manifest": manifest})
     show(compare_table(runs))
     return 0
+
+
+def runs_in(given: str) -> list[str]:
+    """The run folders that a word names: itself, or of a sweep's folder all jobs that ended."""
+    folder = Path(given)
+    if not (folder / "sweep.html").is_file():
+        return [given]
+    jobs = [file.parent for file in folder.glob("*/metrics.json")]
+    return [str(job) for job in sorted(jobs, key=lambda job: (len(job.name), job.name))]

@@ -15,6 +15,10 @@ def command(arguments: list[str]) -> int:
     folder = Path(named[0] if named else "runs/latest").absolute()
     if plots:
         _redraw(folder, plots[-1])
+    if (folder / "sweep.html").is_file():
+        print((folder / "sweep_means.csv").read_text(), end="")
+        print(f"sweep: {folder / 'sweep.html'}")
+        return 0
     if not (folder / "report.html").is_file():
         raise BadInput(f"{folder}: no report.html in it; `omninav resume {folder}` goes on with a run that did not end")
     show(results_table(read_metrics(folder)))

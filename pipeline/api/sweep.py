@@ -1,0 +1,80 @@
+"""Sweeps: many runs of settings in all combinations, and what came of them as tables."""
+
+import os
+import sys
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from omninav.pipeline.cli.commands.run import command
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.tables import read_table
+
+from .run import Run
+from .words import word_of, words_of
+
+
+class Sweep:
+    """A sweep's folder, as Python sees it. In a notebook it shows its means."""
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        self.folder = Path(os.path.realpath(folder))
+        """Where its jobs' folders lie."""
+        if not (self.folder / "sweep.parquet").is_file():
+            raise BadInput(f"{folder}: not a sweep's folder (no sweep.parquet); `ls runs` shows what there is")
+
+    @property
+    def jobs(self) -> Any:
+        """A row for every job: number, status, what it overrides, and all its figures by path.
+
+        A `pandas.DataFrame` where pandas is installed, else a `pyarrow.Table`.
+        """
+        return read_table(self.folder / "sweep.parquet")
+
+    @property
+    def means(self) -> Any:
+        """A row for every condition: what it overrides, how many jobs (seeds) ended well, and for each figure its
+        mean over them and the ends `.low` and `.high` of that mean's 95 % interval.
+        """
+        return read_table(self.folder / "sweep_means.parquet")
+
+    @property
+    def runs(self) -> list[Run]:
+        """Its runs, in the order of the jobs."""
+        folders = [file.parent for file in self.folder.glob("*/manifest.json")]
+        return [Run(folder) for folder in sorted(folders, key=lambda folder: (len(folder.name), folder.name))]
+
+    @property
+    def report(self) -> Path:
+        """The page that shows it."""
+        return self.folder / "sweep.html"
+
+    def __repr__(self) -> str:
+        return f"Sweep({str(self.folder)!r}: {len(self.runs)} jobs)"
+
+    def _repr_html_(self) -> str:
+        means = self.means
+        return str(means._repr_html_() if hasattr(means, "_repr_html_") else f"<pre>{means}</pre>")
+
+
+def sweep(*words: str, folder: str | os.PathLike[str] | None = None, **settings: Any) -> Sweep:
+    """Run all combinations: `sweep("some_variant", "match=selective,l2", seed=range(5))`.
+
+    A word with commas, and a keyword that is a list, tuple or range, stand for several values; everything else is as in
+    `compose`. `folder`: where its jobs are left; None: a new one in `runs`. A job that fails stands in the table as
+    failed, and the others go on.
+    """
+    fixed = {name: value for name, value in settings.items() if not isinstance(value, list | tuple | range)}
+    swept = [f"{name}={','.join(map(word_of, settings[name]))}" for name in settings if name not in fixed]
+    place = Path(folder or Path("runs") / f"{datetime.now():%Y-%m-%d_%H-%M-%S}_sweep")
+    before = sys.argv
+    try:
+        command(["-m", *words_of(words, fixed), *swept, f"hydra.sweep.dir={word_of(place)}"])
+    finally:
+        sys.argv = before  # it is what the manifests of jobs say
+    return Sweep(place)
+
+
+def open_sweep(folder: str | os.PathLike[str]) -> Sweep:
+    """A sweep that was run before, by its folder."""
+    return Sweep(folder)

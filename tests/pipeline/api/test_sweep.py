@@ -1,0 +1,40 @@
+import sys
+
+import pytest
+from conftest import DRIVE, TOUR
+
+import omninav
+from omninav.pipeline.cli.main import main
+
+
+@pytest.fixture(scope="module")
+def sweep(tmp_path_factory, shared_cache):
+    settings = {"tour": TOUR, "log": DRIVE, "cache": shared_cache, "nodes.source.stop": 12}
+    words = ("plain_matching", "match=selective,l2")
+    return omninav.sweep(*words, seed=range(2), folder=tmp_path_factory.mktemp("swept") / "sweep", **settings)
+
+
+def test_a_sweep_is_one_table_with_seeds_and_one_with_means_and_intervals(sweep):
+    jobs, means = sweep.jobs, sweep.means
+    assert jobs["status"].tolist() == ["complete"] * 4
+    assert jobs["match"].tolist() == ["selective", "selective", "l2", "l2"]
+    assert jobs["seed"].tolist() == [0, 1, 0, 1]
+    assert (means["match"].tolist(), means["jobs"].tolist()) == (["selective", "l2"], [2, 2])
+    figures = jobs.groupby("match")["position_error_m.median"].mean()
+    assert means.set_index("match")["position_error_m.median"].to_dict() == pytest.approx(figures.to_dict())
+    assert [run.metrics["frames"] for run in sweep.runs] == jobs["frames"].tolist()
+    assert "Means over seeds" in sweep.report.read_text()
+
+
+def test_a_sweep_is_opened_reported_and_compared_by_its_folder(sweep, capsys):
+    assert len(omninav.open_sweep(sweep.folder).runs) == 4
+    assert main(["report", str(sweep.folder)]) == 0
+    assert "selective" in capsys.readouterr().out
+    assert main(["compare", str(sweep.folder)]) == 0
+    assert "Position error" in capsys.readouterr().out
+    assert "pytest" in sys.argv[0]
+
+
+def test_what_is_no_sweep_is_said(tmp_path):
+    with pytest.raises(omninav.BadInput, match="not a sweep's folder"):
+        omninav.open_sweep(tmp_path)

@@ -1,0 +1,37 @@
+import csv
+
+import pytest
+from sample_metrics import measured
+
+from omninav.pipeline.report.sweep_table import conditions, mean_of, write_sweep_tables
+
+
+def rows(*losses):
+    return [
+        {"job": str(n), "folder": ".", "manifest": {"status": "complete", "overrides": f"gain={n // 3} seed={n % 3}"}}
+        | {"metrics": None if loss is None else measured(loss_rate=loss)}
+        for n, loss in enumerate(losses)
+    ]
+
+
+def test_the_interval_of_a_mean_is_students():
+    found = mean_of([1.0, 2.0, 3.0])
+    assert (found.mean, found.high - found.mean) == pytest.approx((2.0, 4.302653 / 3**0.5), abs=1e-5)
+    assert mean_of([5.0]) == type(found)(5.0, None, None)
+
+
+def test_means_are_over_the_seeds_of_each_condition_and_failed_jobs_are_left_out():
+    first, second = conditions(rows(0.1, 0.2, 0.3, 0.5, None, 0.7))
+    assert (first.settings, first.jobs, first.means["loss_rate"].mean) == ({"gain": "0"}, 3, pytest.approx(0.2))
+    assert (second.settings, second.jobs, second.means["loss_rate"].mean) == ({"gain": "1"}, 2, pytest.approx(0.6))
+
+
+def test_both_tables_are_files(tmp_path):
+    write_sweep_tables(tmp_path, rows(0.1, 0.2, 0.3, None))
+    jobs, means = (list(csv.DictReader((tmp_path / f"{name}.csv").open())) for name in ("sweep", "sweep_means"))
+    assert [(job["job"], job["gain"], job["seed"], job["loss_rate"]) for job in jobs][2:] == [
+        ("2", "0", "2", "0.3"),
+        ("3", "1", "0", ""),
+    ]
+    assert [(mean["gain"], mean["jobs"]) for mean in means] == [("0", "3"), ("1", "0")]
+    assert float(means[0]["loss_rate.low"]) < float(means[0]["loss_rate"]) < float(means[0]["loss_rate.high"])
