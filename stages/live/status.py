@@ -5,8 +5,8 @@ from collections import Counter, deque
 
 import numpy as np
 
-WINDOW = 100
-"""Ticks over which rate and latency are taken."""
+WINDOW = 1000
+"""Ticks over which latency is taken; the rate is that of the last hundred."""
 
 
 class LiveStatus:
@@ -18,7 +18,7 @@ class LiveStatus:
         self.live = False
         self.spread_m = float("nan")
         self._latencies: deque[float] = deque(maxlen=WINDOW)
-        self._ended: deque[float] = deque(maxlen=WINDOW)
+        self._ended: deque[float] = deque(maxlen=100)
 
     def note(self, what: str, trouble: str) -> None:
         """Say what is wrong with something, "" once it is well."""

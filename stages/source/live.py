@@ -195,6 +195,11 @@ class LiveSource(Source):
 
     def _leave(self, ctx: Context, intake: Intake) -> None:
         self._count_losses(ctx, intake)
+        status = self._transport.status
+        if status.latencies_ms is not None:
+            ctx.fact("latency_ms_median", round(status.latencies_ms[0], 1))
+            ctx.fact("latency_ms_p95", round(status.latencies_ms[1], 1))
+            ctx.fact("rate_hz", round(status.rate_hz, 2))
         self._write(intake, intake.recordable())
         if self._record is not None:
             self._record.close()
