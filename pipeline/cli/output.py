@@ -23,12 +23,12 @@ class _Output(io.RawIOBase):
 
     def isatty(self) -> bool:
         """Whether it is a terminal."""
-        return self._raw.isatty()
+        return not self._raw.closed and self._raw.isatty()
 
     def write(self, data: Any, /) -> int | None:
         """Write, or keep why not. Raises BrokenPipeError: nobody reads any more."""
         try:
-            return self._raw.write(data)
+            return len(data) if self._raw.closed else self._raw.write(data)
         except BrokenPipeError:
             raise
         except OSError as error:

@@ -13,7 +13,7 @@ import pytest
 def test_a_full_standard_output_is_said_and_stops_nothing(unbuffered: str) -> None:
     with open("/dev/full", "wb") as full:
         ended = subprocess.run(
-            [sys.executable, "-m", "omninav", "variants"],
+            [sys.executable, "-m", "omninav", "--version"],
             stdout=full,
             stderr=subprocess.PIPE,
             encoding="utf-8",
