@@ -19,6 +19,7 @@ PARTS = (
     "homing",
     "logs",
     "command_line",
+    "session",
 )
 
 

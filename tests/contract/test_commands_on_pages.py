@@ -31,7 +31,9 @@ def commands(page: Path) -> list[str]:
     return list(dict.fromkeys(re.split(r"\s+#", line)[0].strip() for line in found))
 
 
-CASES = {line: page for page in PAGES for line in commands(page) if "--config-dir" not in line and "edges" not in line}
+OTHERS = ("--config-dir", "edges", "brightness")
+"""In commands with stages that are not installed here."""
+CASES = {line: page for page in PAGES for line in commands(page) if not any(word in line for word in OTHERS)}
 """Line -> a page that it is on; without those of a stage that the reader writes."""
 
 
