@@ -16,7 +16,7 @@ def command(arguments: list[str]) -> int:
     if plots:
         _redraw(folder, plots[-1])
     if (folder / "sweep.html").is_file():
-        print((folder / "sweep_means.csv").read_text(), end="")
+        print((folder / "sweep_means.csv").read_text(encoding="utf-8"), end="")
         print(f"sweep: {folder / 'sweep.html'}")
         return 0
     if not (folder / "report.html").is_file():
