@@ -21,7 +21,7 @@ def omninav(*words: str, python: str = sys.executable) -> list[str]:
     return [python, "-m", "omninav", *words]
 
 
-def wait_for(path: Path, seconds: float = 120.0) -> None:
+def wait_for(path: Path, seconds: float = 600.0) -> None:
     """Until a file is there."""
     until = time.monotonic() + seconds
     while not path.exists():
