@@ -148,7 +148,7 @@ def _rendered(metrics: Metrics, html: bool) -> str:
 
     from rich.console import Console
 
-    console = Console(file=io.StringIO(), record=html, width=100)
+    console = Console(file=io.StringIO(), record=html, width=100, force_jupyter=False)
     console.print(results_table(metrics))
     if html:
         return console.export_html(inline_styles=True, code_format="<pre style='line-height:1.2'>{code}</pre>")
