@@ -17,7 +17,7 @@ from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 
 from .status import LiveStatus
-from .transport import Arrival, Transport, TransportError
+from .transport import Arrival, Transport
 
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 EMPTY = "std_msgs/msg/Empty"
@@ -32,8 +32,6 @@ TYPES: dict[Role, str] = {
     "restart": EMPTY,
 }
 """What each role's topic carries; an image's type follows from its topic."""
-NOTHING = b"\0\1\0\0\0"
-"""An Empty message in CDR."""
 SILENT_S = 1.0
 """A topic that has been heard and says nothing for so long is a trouble."""
 
@@ -82,18 +80,6 @@ class Intake:
             self.transport.subscribe(topic, type_on(topic, role), newest=role == "image")
         if self.camera is None and self.camera_info is not None:
             self.transport.subscribe(self.camera_info, CAMERA_INFO, newest=True)
-
-    def serve_restart(self, service: str) -> None:
-        """Where the transport has services, a call is as good as a message on the topic of that name."""
-
-        def answer(_: bytes) -> bytes:
-            self.transport.inbox.put(Arrival(service, EMPTY, time.time_ns(), NOTHING))
-            return NOTHING
-
-        try:
-            self.transport.serve(service, "std_srvs/srv/Empty", answer)
-        except TransportError as error:  # a ROS without std_srvs
-            self.status.note(service, str(error))
 
     def next(self, wait_s: float) -> Taken | None:
         """The newest image that can be used, of all that has come; None where none can within that time."""

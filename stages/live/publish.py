@@ -165,6 +165,8 @@ class PublishMessages(Stage):
     """As the source's."""
     topics: tuple[str, ...] = ("/estimate/path", "/map", "/grid", "/plan", "/homing")
     """Topics of `result.mcap` that are published, under their names there, latched."""
+    grid: str = "/grid"
+    """What `/grid` is published as: nav2 reads its map on `/map`."""
 
     class Out(Outputs):
         """Nothing: what is published is the result."""
@@ -178,7 +180,7 @@ class PublishMessages(Stage):
         if self._transport.status.live:
             for topic, msgtype, data in zip(messages.topics, messages.types, messages.data, strict=True):
                 if topic in self.topics:
-                    send(self._transport, topic, msgtype, data, latched=True)
+                    send(self._transport, self.grid if topic == "/grid" else topic, msgtype, data, latched=True)
         return self.Out()
 
 

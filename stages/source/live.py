@@ -15,6 +15,7 @@ from omninav.pipeline.files import user_path
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.live.amcl_services import serve_amcl, serve_restart
 from omninav.stages.live.diagnostics import publish_diagnostics
 from omninav.stages.live.drive_record import DriveRecord, unfinished
 from omninav.stages.live.intake import Intake
@@ -80,6 +81,8 @@ class LiveSource(Source):
     """Where somebody says where it is to go (PoseStamped)."""
     restart: str | None = "/reinitialize_global_localization"
     """Topic (Empty), and service of that name where the transport has services: the belief begins anew, uniform."""
+    amcl: str | None = None
+    """The name of nav2's AMCL node, to answer its other services too, where the transport has services."""
     camera: str | None = None
     """A camera.yaml; null: the robot's CameraInfo, which is waited for."""
     limits: MotionLimits = MotionLimits()
@@ -170,7 +173,9 @@ class LiveSource(Source):
         intake.subscribe()
         self._transport.status.live = True
         if self.restart is not None:
-            intake.serve_restart(self.restart)
+            serve_restart(self._transport, self.restart)
+        if self.amcl is not None:
+            serve_amcl(self._transport, self.amcl, self.initial_pose)
         if threading.current_thread() is threading.main_thread():
             for number in (signal.SIGINT, signal.SIGTERM):
                 self._handlers[number] = signal.signal(number, lambda *_: self._told_to_stop())

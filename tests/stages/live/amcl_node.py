@@ -5,6 +5,7 @@ import sys
 import numpy as np
 
 from omninav.pipeline import Context, Tick
+from omninav.stages.live.amcl_services import serve_amcl, serve_restart
 from omninav.stages.live.intake import Intake
 from omninav.stages.live.publish import Publish
 from omninav.stages.live.transport import connect, disconnect
@@ -17,7 +18,8 @@ header = LiveHeader({"/initialpose": "initial_pose", "/reinitialize_global_local
 drive = DriveSoFar(header)
 intake = Intake(transport, transport.status, header, drive, None, None, 1.0)
 intake.subscribe()
-intake.serve_restart("/reinitialize_global_localization")
+serve_restart(transport, "/reinitialize_global_localization")
+serve_amcl(transport, "amcl", "/initialpose")
 transport.status.live = True
 publish, ctx = Publish(transport="rclpy", pose="/amcl_pose", tf=None, particles=None), Context("publish")
 publish.setup(ctx)

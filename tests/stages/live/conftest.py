@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from omninav.pipeline.mcap.message_types import make_message, standard_types
-from omninav.stages.live.transport import disconnect
+from omninav.stages.live.transport import Transport, disconnect
 
 ROOT = Path(__file__).parents[3]
 ROS2_PYTHON = Path(os.environ.get("OMNINAV_ROS2_PYTHON", ROOT / ".venv-ros2/bin/python"))
@@ -33,6 +33,36 @@ def encode(msgtype: str, fields: dict[str, Any], stamp: int | None = None) -> by
 def decode(msgtype: str, data: bytes) -> Any:
     """A message of its CDR."""
     return standard_types().deserialize_cdr(data, msgtype)
+
+
+class Wire(Transport):
+    """A transport that keeps what is sent, and gives what a test puts into its inbox."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sent: list[tuple[str, object]] = []
+        self.there: dict[str, str] = {}
+
+    def subscribe(self, topic, msgtype, newest=False):
+        self.inbox.open(topic, newest)
+
+    def publish(self, topic, msgtype, data, latched=False):
+        self.sent.append((topic, decode(msgtype, data)))
+
+    def matched(self, topic):
+        return 1
+
+    def offered(self):
+        return self.there
+
+    def mismatched(self):
+        return {}
+
+    def close(self):
+        """Nothing is open."""
+
+    def on(self, topic):
+        return [message for each, message in self.sent if each == topic]
 
 
 class OtherEnd:

@@ -29,6 +29,12 @@ def qos_of(order: dict) -> QoSProfile:
     )
 
 
+def fill(message: object, fields: dict) -> object:
+    for name, value in fields.items():
+        setattr(message, name, fill(getattr(message, name), value) if isinstance(value, dict) else value)
+    return message
+
+
 def main() -> None:
     rclpy.init()
     node = rclpy.create_node("other_end")
@@ -58,7 +64,7 @@ def main() -> None:
             kind = type_of(order["type"])
             client = clients.setdefault(topic, node.create_client(kind, topic))
             there = client.wait_for_service(timeout_sec=5.0)
-            future = client.call_async(kind.Request(**order.get("request", {}))) if there else None
+            future = client.call_async(fill(kind.Request(), order.get("request", {}))) if there else None
             if future is None:
                 say(answer=None)
             else:

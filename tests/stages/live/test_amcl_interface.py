@@ -3,13 +3,16 @@
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from .conftest import ROOT, ROS2_PYTHON, OtherEnd, decode, encode, until
+from omninav.stages.live.amcl_services import serve_amcl
+from omninav.stages.live.transport import TransportError
+
+from .conftest import ROOT, ROS2_PYTHON, OtherEnd, Wire, decode, encode, until
 
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 PAGE = ROOT / "docs/live.md"
@@ -39,7 +42,7 @@ def line(node: "subprocess.Popen[str]") -> str:
     return node.stdout.readline().strip()
 
 
-def test_pose_initial_pose_and_global_localisation_are_answered(other_end: OtherEnd, node: "subprocess.Popen[str]"):
+def test_amcls_topics_and_services_are_answered(other_end: OtherEnd, node: "subprocess.Popen[str]"):
     other_end.order("subscribe", "/amcl_pose", type=POSE, durability="TRANSIENT_LOCAL")
     pose = decode(POSE, other_end.hear("/amcl_pose")).pose.pose
     assert (pose.position.x, pose.position.y) == (1.0, 2.0)
@@ -49,6 +52,18 @@ def test_pose_initial_pose_and_global_localisation_are_answered(other_end: Other
     assert "Empty_Response" in other_end.wait("answer")
     assert line(node) == "restart None"
 
+    services = [
+        ("/request_nomotion_update", "std_srvs/srv/Empty", {}, "Empty_Response()"),
+        ("/amcl/get_state", "lifecycle_msgs/srv/GetState", {}, "label='active'"),
+        ("/amcl/change_state", "lifecycle_msgs/srv/ChangeState", {"transition": {"id": 4}}, "success=True"),
+        ("/amcl/get_state", "lifecycle_msgs/srv/GetState", {}, "label='inactive'"),
+        ("/amcl/change_state", "lifecycle_msgs/srv/ChangeState", {"transition": {"id": 77}}, "success=False"),
+        ("/amcl/get_state", "lifecycle_msgs/srv/GetState", {}, "label='inactive'"),
+    ]
+    for name, kind, request, answer in services:
+        other_end.order("call", name, type=kind, request=request)
+        assert answer in other_end.wait("answer"), name
+
     other_end.order("advertise", "/initialpose", type=POSE)
     until(lambda: other_end.order("matched", "/initialpose") or other_end.wait("matched") == 1)
     where = {"pose": {"pose": {"position": {"x": 3.0}, "orientation": {"w": 1.0}}, "covariance": np.full(36, 0.25)}}
@@ -56,8 +71,45 @@ def test_pose_initial_pose_and_global_localisation_are_answered(other_end: Other
     assert line(node) == "restart (3.0, 0.0, 0.0, 0.5, 0.5)"
 
 
-@pytest.mark.parametrize("name", ["/amcl_pose", "/particle_cloud", "/initialpose", "/map", "/scan", "/tf"])
-def test_the_page_says_of_each_topic_whether_it_is_answered(name: str):
+class Services(Wire):
+    """A transport that has services, and no other end."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.answers: dict[str, Callable[[bytes], bytes]] = {}
+
+    def serve(self, service, srvtype, answer):
+        if srvtype.startswith("lifecycle_msgs"):
+            raise TransportError(f"transport=rclpy: {service}: the type {srvtype} is not installed")
+        self.answers[service] = answer
+        return True
+
+
+def test_a_pose_that_is_set_by_service_comes_as_one_by_topic_does():
+    transport = Services()
+    transport.inbox.open("/initialpose", newest=False)
+    serve_amcl(transport, "amcl", "/initialpose")
+    asked = encode(POSE, {"pose": {"pose": {"position": {"x": 3.0}}}, "header": {"frame_id": "map"}}, 7)
+    transport.answers["/set_initial_pose"](asked)  # a request is its one field
+    arrival = transport.take()
+    assert arrival is not None
+    assert (arrival.topic, arrival.msgtype, arrival.data) == ("/initialpose", POSE, asked)
+
+
+def test_a_service_whose_type_is_not_installed_is_a_trouble_in_words():
+    transport = Services()
+    serve_amcl(transport, "amcl", None)
+    assert sorted(transport.answers) == ["/request_nomotion_update"]
+    assert sorted(transport.status.troubles) == ["/amcl/change_state", "/amcl/get_state"]
+
+
+INTERFACE = ["/amcl_pose", "/particle_cloud", "/initialpose", "/map", "/scan", "/tf"]
+INTERFACE += ["/reinitialize_global_localization", "/request_nomotion_update", "/set_initial_pose"]
+INTERFACE += ["/amcl/get_state", "/amcl/change_state"]
+
+
+@pytest.mark.parametrize("name", INTERFACE)
+def test_the_page_says_of_each_topic_and_service_whether_it_is_answered(name: str):
     rows = [
         row for row in PAGE.read_text().partition("## In AMCL's place")[2].splitlines() if row.startswith(f"| `{name}`")
     ]

@@ -8,7 +8,7 @@ from omninav.pipeline import Context, Tick
 from omninav.stages.camera.cylindrical import Cylindrical
 from omninav.stages.live import publish_truth, robot_driver
 from omninav.stages.live.robot_driver import CameraStop, ClockJump, RobotDriver, RobotDriverState
-from omninav.stages.live.transport import Arrival, Transport, TransportError
+from omninav.stages.live.transport import Arrival, TransportError
 from omninav.stages.recordings.camera_yaml import read_camera
 from omninav.stages.values.command import Command
 from omninav.stages.values.drive_tally import DriveTally
@@ -16,42 +16,12 @@ from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
 
-from .conftest import OtherEnd, decode, encode, until
+from .conftest import OtherEnd, Wire, decode, encode, until
 
 TWIST, STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 CAMERA = Cylindrical(80, 20, 40.0, height=0.5)
 IMAGE = Image(np.zeros((20, 80, 3), np.uint8))
 SCAN = Scan(np.array([1.0, 2.0, np.inf]), -1.0, 1.0, 0.0, 5.0)
-
-
-class Wire(Transport):
-    """A transport that keeps what is sent, and gives what a test puts into its inbox."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.sent: list[tuple[str, object]] = []
-        self.there: dict[str, str] = {}
-
-    def subscribe(self, topic, msgtype, newest=False):
-        self.inbox.open(topic, newest)
-
-    def publish(self, topic, msgtype, data, latched=False):
-        self.sent.append((topic, decode(msgtype, data)))
-
-    def matched(self, topic):
-        return 1
-
-    def offered(self):
-        return self.there
-
-    def mismatched(self):
-        return {}
-
-    def close(self):
-        """Nothing is open."""
-
-    def on(self, topic):
-        return [message for each, message in self.sent if each == topic]
 
 
 @pytest.fixture
