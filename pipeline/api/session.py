@@ -45,6 +45,9 @@ class Step(Mapping[str, Any]):
             raise AttributeError(f"there is no output '{name}'; {suggest(name, short, 'outputs')}")
         return self._values[names[name]]
 
+    def __repr__(self) -> str:
+        return f"Step({', '.join(sorted(name for name in self._names if '.' not in name))})"
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
 
@@ -139,9 +142,9 @@ def open(*words: str | Configuration, folder: str | os.PathLike[str] | None = No
     Words and settings are those of `compose`, or a configuration comes first. `folder`: where the run's files are left;
     None: a new one in `runs`.
     """
-    made = configured(words, settings)
-    if PUSHED not in made.words:
-        made = made.with_(PUSHED)
+    typed = [each for word in words for each in (word.words if isinstance(word, Configuration) else (word,))]
+    pushed = PUSHED in typed or "source" in settings
+    made = configured(words if pushed else (*words, PUSHED), settings)
     place = None if folder is None else no_run_in(Path(folder))
     return Session(start(made.plan, ["omninav", *made.words], place), made.plan)
 

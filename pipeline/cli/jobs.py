@@ -108,7 +108,7 @@ def _run(config: Any, sweep: SweepJob | None, folder: Path | None) -> float | No
     if sweep is None:
         show(results_table(metrics))
         for sentence in warning_lines(run.manifest):
-            print(f"mind: {sentence}", file=sys.stderr, flush=True)
+            print(f"warning: {sentence}", file=sys.stderr, flush=True)
     print(f"report: {shown(run.folder / 'report.html')}", flush=True)
     return objective_of(metrics, settings["objective"]) if settings.get("objective") else None
 

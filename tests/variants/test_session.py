@@ -113,6 +113,12 @@ def test_motions_lead_where_the_odometry_leads(recording, camera, tmp_path):
     assert (out["source.odometry"].x, out["source.odometry"].y) == pytest.approx(tuple(expected[:2]))
 
 
+def test_the_map_of_a_session_is_learned_from_a_tour(recording, camera, shared_cache, tmp_path):
+    settings = {"tour": TOUR, "camera": camera, "cache": shared_cache, "folder": tmp_path / "toured"}
+    with omninav.open("plain_matching", **settings) as session:
+        assert "best_match" in repr(session.step(image=recording.image(0), stamp=1))
+
+
 def test_a_session_without_a_map_to_match_or_a_camera_is_refused(camera):
     with pytest.raises(omninav.ProblemsFound, match="needs a map"):
         omninav.open("omniview_mcl", camera=camera)
