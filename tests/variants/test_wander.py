@@ -28,7 +28,7 @@ def test_a_robot_wanders_without_a_contact_and_every_command_is_in_the_result(wh
     assert log.topics["/command"] == "geometry_msgs/msg/TwistStamped"
     report = (whole / "report.html").read_text()
     assert "Path driven" in report
-    assert "Images along the drive" in report
+    assert "Frame by frame" in report
 
 
 def test_a_killed_closed_loop_resumes_to_the_same_bytes(whole: Path, tmp_path: Path):
