@@ -69,7 +69,7 @@ def content(wheel: Path) -> dict[str, int]:
 def test_the_wheel_holds_every_module_every_option_and_the_templates_and_no_test(wheel: Path):
     kinds = {
         "pipeline": ("*.py", "py.typed", "templates/*"),
-        "stages": ("*.py", "py.typed"),
+        "stages": ("*.py", "py.typed", "*.json"),
         "conf": ("*.py", "*.yaml", "help.txt"),
     }
     expected = {
@@ -79,7 +79,9 @@ def test_the_wheel_holds_every_module_every_option_and_the_templates_and_no_test
         for path in (ROOT / folder).rglob(pattern)
     }
     assert "omninav/conf/config.yaml" in expected
-    assert set(content(wheel)) == expected | {"omninav/__init__.py", "omninav/__main__.py"}
+    assert set(content(wheel)) == expected | {
+        f"omninav/{name}" for name in ("__init__.py", "__main__.py", "testing.py", "py.typed")
+    }
 
 
 def test_the_sdist_builds_the_same_wheel(wheel: Path, sdist: Path, tmp_path: Path):
