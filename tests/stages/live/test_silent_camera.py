@@ -1,0 +1,64 @@
+"""A whole localiser on a robot whose camera stops on the way; the transport is the test's own."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import DRIVE, TOUR
+
+import omninav
+from omninav.pipeline.mcap.reader import LogReader
+from omninav.stages.live import publish
+from omninav.stages.live.transport import Arrival
+from omninav.stages.source import live
+
+from .conftest import Wire
+
+CAMERA = Path(__file__).parents[2] / "data/camera.yaml"
+IMAGE = "/camera/image/compressed"
+SILENT = range(20, 30)
+"""Images of the drive, one a second, that never come."""
+
+
+class Recorded(Wire):
+    """A robot that says what a recorded one said, one message whenever it is listened to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._script = self._messages()
+
+    def take(self, timeout_s: float = 0.0) -> Arrival | None:
+        return next(self._script, None)
+
+    def _messages(self) -> Iterator[Arrival | None]:
+        reader, images = LogReader(DRIVE), 0
+        types = reader.topics
+        for each in sorted(reader.scan({"/odom", "/ground_truth/pose", IMAGE}), key=lambda record: record.log_time):
+            images += each.topic == IMAGE
+            if each.topic == IMAGE and images - 1 in SILENT:
+                time.sleep(0.25)  # 2.5 s, instead of ten
+                continue
+            yield Arrival(each.topic, types[each.topic], each.log_time, bytes(each.data))
+            yield None
+
+
+def test_a_localiser_bridges_ten_seconds_without_images_by_odometry(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, shared_cache: Path
+):
+    robot = Recorded()
+    for module in (live, publish):
+        monkeypatch.setattr(module, "connect", lambda name, domain: robot)
+    monkeypatch.setattr(live, "disconnect", lambda: None)
+    words = ("omniview_mcl", "source=live", "publish=ros2", "log=live", f"tour={TOUR}", f"camera={CAMERA}")
+    settings = ("nodes.prior.number=200", "nodes.source.seconds=45", "nodes.source.patience_s=0.5")
+    run = omninav.run(*words, *settings, folder=tmp_path / "run", cache=shared_cache, progress=False)
+
+    said = {status.message for message in robot.on("/diagnostics") for status in message.status}
+    assert any(f"{IMAGE} has been silent for" in words for words in said), said
+    assert "running" in said
+    seconds = run.frames["stamp_ns"].to_numpy() / 1e9
+    (gap,) = np.flatnonzero(np.diff(seconds) > 1.5)
+    assert np.diff(seconds)[gap] == pytest.approx(len(SILENT) + 1)
+    assert run.frames["position_error_m"].to_numpy()[gap + 1 :].max() < 0.5
