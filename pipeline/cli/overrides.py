@@ -20,7 +20,7 @@ from omninav.pipeline.graph.problems import BadInput, Problem, nearest, shown, s
 from omninav.pipeline.graph.registry import UnknownStage, resolve
 from omninav.pipeline.graph.signature import BadStage, signature
 
-from .hydra_session import not_settable
+from .hydra_session import SETTABLE, not_settable
 
 MAX_JOBS = 100_000
 """Of a sweep."""
@@ -175,7 +175,8 @@ def _unknown_option(word: Override, options: Sequence[str]) -> Iterator[Problem]
 def _unknown_setting(word: Override, config: Mapping[str, Any], groups: list[str]) -> Iterator[Problem]:
     path = word.key_or_group
     if path.partition(".")[0].partition("/")[0] == "hydra":
-        yield not_settable(path)
+        if not path.replace("/", ".").startswith(tuple(name.replace("/", ".") for name in SETTABLE)):
+            yield not_settable(path)
         return
     value = str(word.input_line).partition("=")[2]
     parents, name, inside = _deepest(config, path)

@@ -1,6 +1,7 @@
 """What travels on a wire: small frozen dataclasses, each an array (or a few) and what it means."""
 
 import dataclasses
+import reprlib
 from typing import Any, ClassVar, dataclass_transform
 
 VALUE_TYPES: dict[str, type["Value"]] = {}
@@ -26,8 +27,24 @@ class Value:
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        dataclasses.dataclass(frozen=not cls.in_place, eq=False)(cls)
+        dataclasses.dataclass(frozen=not cls.in_place, eq=False, repr=False)(cls)
         VALUE_TYPES[value_name(cls)] = cls
+
+    def __repr__(self) -> str:
+        """Its fields; of a large array type and shape, so that a whole map is a line."""
+        fields = (field.name for field in dataclasses.fields(type(self)))  # type: ignore[arg-type]
+        return f"{type(self).__name__}({', '.join(f'{name}={_SHORT.repr(getattr(self, name))}' for name in fields)})"
+
+
+class _Short(reprlib.Repr):
+    def repr_ndarray(self, array: Any, level: int) -> str:
+        return repr(array) if array.size <= 9 else f"<{array.dtype} of {array.shape}>"
+
+    def repr_instance(self, thing: Any, level: int) -> str:
+        return repr(thing)
+
+
+_SHORT = _Short()
 
 
 def value_name(cls: type) -> str:

@@ -94,6 +94,7 @@ def test_a_log_of_ones_own_without_a_map_says_what_to_type(omninav, tmp_path: Pa
         ),
         (("nodes.mtch.headings=72",), "did you mean 'nodes.match.headings=72'?"),
         (("mach=l2",), "did you mean 'match=l2'?"),
+        (("mach=l2", "hydra.run.dir=there"), "1 problem:"),
         (("match=l3",), "match: there is no 'l3'\n      did you mean 'match=l2'?"),
         (("tuor=x", "sead=3"), "did you mean 'seed=3'?"),
         (("-m", "match=selective,l3", "seed=range(50)"), "did you mean 'match=l2'?"),
