@@ -108,5 +108,7 @@ def _is_tool(arguments: Sequence[str]) -> bool:
 def _unknown_command(name: str) -> int:
     from omninav.pipeline.graph.problems import suggest
 
-    print(f"'{name}' is no command. {suggest(name, COMMANDS, 'commands', prefix='omninav ')}", file=sys.stderr)
+    named = files("omninav.conf").joinpath(f"variant/{name}.yaml").is_file()
+    hint = f"type omninav variant={name}" if named else suggest(name, COMMANDS, "commands", prefix="omninav ")
+    print(f"'{name}' is no command. {hint}", file=sys.stderr)
     return 2

@@ -31,7 +31,7 @@ class Value:
         VALUE_TYPES[value_name(cls)] = cls
 
     def __repr__(self) -> str:
-        """Its fields; of a large array type and shape, so that a whole map is a line."""
+        """Its fields; of a large array type and shape, so that however much it holds is a line."""
         fields = (field.name for field in dataclasses.fields(type(self)))  # type: ignore[arg-type]
         return f"{type(self).__name__}({', '.join(f'{name}={_SHORT.repr(getattr(self, name))}' for name in fields)})"
 

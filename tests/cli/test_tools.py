@@ -23,6 +23,8 @@ def test_a_camera_is_looked_through(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_a_variant_that_runs_over_a_log_is_no_such_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["omniview", "mcl_map", "log=L"]) == 2
     assert main(["camera", "lok"]) == 2
+    assert main(["homing"]) == 2
     said = capsys.readouterr().err
     assert "type omninav variant=omniview_mcl_map" in said
     assert "'camera' is no command" in said
+    assert "'homing' is no command. type omninav variant=homing" in said
