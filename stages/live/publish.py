@@ -19,7 +19,7 @@ from omninav.stages.recordings.pose_messages import (
     ros_pose,
     transform,
 )
-from omninav.stages.values.belief import Belief, GaussianMixture, Particles
+from omninav.stages.values.belief import Belief, GaussianMixture, Particles, PoseEstimate
 from omninav.stages.values.command import Command
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.ros_messages import RosMessages
@@ -42,7 +42,7 @@ float64 weight
 
 
 class Publish(Stage):
-    """Publishes the pose, `map -> odom`, the belief and the command over ROS 2; changes nothing of the run.
+    """Publishes the pose, `map -> odom` and the command over ROS 2, before anything that can wait.
 
     The command is published as it was computed in this tick, zero where there was none, once more zero when the run
     ends, and by a watchdog thread when no tick has ended within two periods. A topic whose parameter is null is not
@@ -55,10 +55,6 @@ class Publish(Stage):
     """As the source's."""
     pose: str | None = "/estimate/pose"
     """The estimate (PoseWithCovarianceStamped, latched); `/amcl_pose` takes AMCL's place."""
-    particles: str | None = "/belief"
-    """The belief in few poses."""
-    particles_type: Literal["PoseArray", "ParticleCloud"] = "PoseArray"
-    """What it is published as: geometry_msgs/PoseArray, or nav2_msgs/ParticleCloud with weights."""
     tf: str | None = "/tf"
     """Where `map_frame -> odom_frame` is published: the estimate over the odometry."""
     tf_tolerance_s: Annotated[float, Bounds(ge=0)] = 1.0
@@ -88,24 +84,20 @@ class Publish(Stage):
         ctx: Context,
         tick: Tick,
         belief: Belief | None = None,
-        particles: Particles | GaussianMixture | None = None,
         odometry: Pose | None = None,
         command: Command | None = None,
     ) -> Out:
-        """Publish what there is. `particles`: the belief, thinned. Nothing while a record is made again."""
+        """Publish what there is. Nothing while a record is made again."""
         if not self._transport.status.live:
             return self.Out()
         if self.command is not None and (command is not None or self._watchdog is not None):
             self._drive(tick.stamp, command or Command(0.0, 0.0))
         if belief is not None:
-            self._publish_belief(tick.stamp, belief, odometry)
-        if self.particles is not None and particles is not None:
-            self._publish_particles(self.particles, tick.stamp, particles)
+            self._publish_estimate(tick.stamp, belief.estimate(), odometry)
         self._transport.status.published(tick.stamp)
         return self.Out()
 
-    def _publish_belief(self, stamp: int, belief: Belief, odometry: Pose | None) -> None:
-        estimate = belief.estimate()
+    def _publish_estimate(self, stamp: int, estimate: PoseEstimate, odometry: Pose | None) -> None:
         self._transport.status.spread_m = float(np.sqrt(max(0.0, np.trace(estimate.covariance[:2, :2]))))
         at = _row(estimate.pose)
         if self.pose is not None:
@@ -115,20 +107,6 @@ class Publish(Stage):
             until = stamp + round(self.tf_tolerance_s * 1e9)
             correction = compose(at, between(_row(odometry), np.zeros(3)))
             self._send(self.tf, TF, {"transforms": [transform(until, self.map_frame, self.odom_frame, correction)]})
-
-    def _publish_particles(self, topic: str, stamp: int, particles: Particles | GaussianMixture) -> None:
-        poses = pose_messages(particles.poses if isinstance(particles, Particles) else particles.means)
-        if self.particles_type == "PoseArray":
-            self._send(topic, POSE_ARRAY, {"header": header(stamp, self.map_frame), "poses": poses})
-            return
-        types = standard_types()
-        if PARTICLE_CLOUD not in types.fielddefs:  # nav2's messages do not come with ROS
-            from rosbags.typesys import get_types_from_msg
-
-            types.register(get_types_from_msg(NAV2, PARTICLE_CLOUD))
-        particle = types.types["nav2_msgs/msg/Particle"]
-        weighted = [particle(pose, weight) for pose, weight in zip(poses, particles.weights.tolist(), strict=True)]
-        self._send(topic, PARTICLE_CLOUD, {"header": header(stamp, self.map_frame), "particles": weighted})
 
     def _drive(self, stamp: int, command: Command) -> None:
         if self._watchdog is None:
@@ -154,6 +132,49 @@ class Publish(Stage):
 
     def _send(self, topic: str, msgtype: str, fields: Fields, latched: bool = False) -> None:
         send(self._transport, topic, msgtype, encode_message(msgtype, fields), latched)
+
+
+class PublishBelief(Stage):
+    """Publishes the belief in few poses over ROS 2, after the pose itself."""
+
+    transport: TransportName = "dds"
+    """As the source's."""
+    domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
+    """As the source's."""
+    topic: str | None = "/belief"
+    """The belief in few poses; null: it is not published."""
+    message: Literal["PoseArray", "ParticleCloud"] = "PoseArray"
+    """What it is published as: geometry_msgs/PoseArray, or nav2_msgs/ParticleCloud with weights."""
+    map_frame: str = MAP
+    """The map's frame."""
+
+    class Out(Outputs):
+        """Nothing: what is published is the result."""
+
+    def setup(self, ctx: Context) -> None:
+        """Join the domain."""
+        self._transport: Transport = connect(self.transport, self.domain)
+
+    def step(self, ctx: Context, tick: Tick, belief: Particles | GaussianMixture | None = None) -> Out:
+        """One tick. `belief`: thinned. Nothing while a record is made again."""
+        if self.topic is not None and belief is not None and self._transport.status.live:
+            kind, fields = self._message(belief)
+            content = encode_message(kind, {"header": header(tick.stamp, self.map_frame)} | fields)
+            send(self._transport, self.topic, kind, content)
+        return self.Out()
+
+    def _message(self, belief: Particles | GaussianMixture) -> tuple[str, Fields]:
+        poses = pose_messages(belief.poses if isinstance(belief, Particles) else belief.means)
+        if self.message == "PoseArray":
+            return POSE_ARRAY, {"poses": poses}
+        types = standard_types()
+        if PARTICLE_CLOUD not in types.fielddefs:  # nav2's messages do not come with ROS
+            from rosbags.typesys import get_types_from_msg
+
+            types.register(get_types_from_msg(NAV2, PARTICLE_CLOUD))
+        particle = types.types["nav2_msgs/msg/Particle"]
+        weighted = [particle(pose, weight) for pose, weight in zip(poses, belief.weights.tolist(), strict=True)]
+        return PARTICLE_CLOUD, {"particles": weighted}
 
 
 class PublishMessages(Stage):

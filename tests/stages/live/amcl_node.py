@@ -21,7 +21,7 @@ intake.subscribe()
 serve_restart(transport, "/reinitialize_global_localization")
 serve_amcl(transport, "amcl", "/initialpose")
 transport.status.live = True
-publish, ctx = Publish(transport="rclpy", pose="/amcl_pose", tf=None, particles=None), Context("publish")
+publish, ctx = Publish(transport="rclpy", pose="/amcl_pose", tf=None), Context("publish")
 publish.setup(ctx)
 belief = Particles(np.array([[1.0, 2.0, 0.5]]), np.ones(1))
 print("ready", flush=True)
