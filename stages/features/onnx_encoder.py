@@ -1,6 +1,8 @@
 """A network of the user's own describes the view."""
 
 import itertools
+import math
+import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,8 +12,9 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.files import digest_file, digest_text
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput, cut
 from omninav.pipeline.graph.small_files import read_small
+from omninav.stages.values.encoded_image import MAX_PIXELS
 from omninav.stages.values.features import SegmentDescriptors
 from omninav.stages.values.image import Panorama, Pixels
 
@@ -19,12 +22,30 @@ from .segments import segment_edges
 
 Floats = npt.NDArray[np.float32]
 PerChannel = tuple[float, float, float]
-Side = Annotated[int, Bounds(ge=1, le=4096)]
+MAX_SIDE = 4096
+Side = Annotated[int, Bounds(ge=1, le=MAX_SIDE)]
 
 MAX_MODEL_BYTES = 1 << 30
 """Of a network's file."""
 WEIGHTS_ELSEWHERE = b"\x0a\x08location\x12"
 """What an ONNX file holds (as protobuf writes it) that names a file of weights. No hash would cover that one."""
+MAX_MAGNITUDE = 1e15
+"""Of a number of a vector."""
+MAX_NUMBERS = 1 << 20
+"""Of the vector of an image."""
+LOOPS, RANDOM = (
+    ("Loop",),
+    (
+        "Bernoulli",
+        "Multinomial",
+        "RandomNormal",
+        "RandomNormalLike",
+        "RandomUniform",
+        "RandomUniformLike",
+    ),
+)
+REFUSED = re.compile(b"|".join(b"\x22%c%s" % (len(name), name.encode()) for name in (*LOOPS, *RANDOM)))
+"""Operators, as protobuf writes their names: with a loop a network may never end, and not even Ctrl-C stops it."""
 IMAGENET_MEAN, IMAGENET_DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 """Red, green, blue, of pixels in [0, 1]: what most networks for images were trained with."""
 
@@ -88,7 +109,8 @@ class OnnxEncoder(Stage):
         self._input, self._size, self._batch = self._read_input(session)
         names = [output.name for output in session.get_outputs()]
         if self.output is not None and self.output not in names:
-            raise BadInput(f"{self.model}: there is no output '{self.output}'; its outputs are: {', '.join(names)}")
+            known = cut(", ".join(names))
+            raise BadInput(f"{self.model}: there is no output '{self.output}'; its outputs are: {known}")
         self._output = self.output or names[0]
 
     def inputs_digest(self) -> str | None:
@@ -114,15 +136,23 @@ class OnnxEncoder(Stage):
             given = np.asarray(self._session.run([self._output], {self._input: images})[0])
         except Exception as error:  # onnxruntime's errors are of no common class of its own
             raise BadInput(
-                f"{self.model}: the network cannot run on images {list(images.shape)} ({self.layout}): {error!s:.200}"
+                f"{self.model}: the network cannot run on images {list(images.shape)} ({self.layout}): {_line(error)}"
             ) from None
-        if given.ndim < 2 or len(given) != len(images) or given.dtype.kind != "f":
+        if given.ndim < 2 or len(given) != len(images) or given.dtype.kind != "f" or not given.size:
             raise BadInput(
-                f"{self.model}: its output '{self._output}' is {list(given.shape)} of {given.dtype} for {len(images)} "
-                "images, expected one vector of floating-point numbers for each; name another: "
+                f"{self.model}: its output {cut(self._output)} is {list(given.shape)} of {given.dtype} for "
+                f"{len(images)} images, expected one vector of floating-point numbers for each; name another: "
                 "nodes.features.output=NAME"
             )
-        return np.asarray(given.reshape(len(images), -1), np.float32)
+        if given.size > MAX_NUMBERS * len(images):
+            raise BadInput(
+                f"{self.model}: its vectors have {given[0].size:,} numbers, at most {MAX_NUMBERS:,} are read"
+            )
+        with np.errstate(over="ignore"):
+            vectors = given.reshape(len(images), -1).astype(np.float32)
+        if not np.abs(vectors).max() <= MAX_MAGNITUDE:  # NaN too
+            raise BadInput(f"{self.model}: it gives vectors that are not finite, or larger than {MAX_MAGNITUDE:g}")
+        return vectors
 
     def _read_input(self, session: Any) -> tuple[str, tuple[int, int], int | None]:
         """Name of the input, rows and columns of an image, and how many images at once (None: any number)."""
@@ -132,13 +162,18 @@ class OnnxEncoder(Stage):
         batch, rows, columns, channels = [sizes[n] for n in order] if len(sizes) == 4 else [0] * 4
         if more or first.type != "tensor(float)" or channels not in (3, None):
             raise BadInput(
-                f"{self.model}: its input is {first.shape} of {first.type}, expected one of float32 with four "
+                f"{self.model}: its input is {cut(first.shape)} of {first.type}, expected one of float32 with four "
                 f"dimensions and three channels ({self.layout}); for channels last write nodes.features.layout=nhwc"
             )
         own = None if rows is None or columns is None else (rows, columns)
         size = own or self.size
         if size is None:
             raise BadInput(f"{self.model}: it says no size of its images; write nodes.features.size=[224,224]")
+        if max(size) > MAX_SIDE or self.segments * math.prod(size) > MAX_PIXELS:
+            raise BadInput(
+                f"{self.model}: {self.segments} images of {size[0]} x {size[1]} are too large, expected {MAX_SIDE} "
+                f"a side and {MAX_PIXELS:,} pixels in all; write fewer nodes.features.segments"
+            )
         if self.size not in (None, size):
             raise BadInput(f"{self.model}: its images are {size[0]} x {size[1]}; leave nodes.features.size away")
         if batch is not None and self.segments % batch:
@@ -161,6 +196,11 @@ def _session(path: Path) -> Any:
     runtime, content = _runtime(), read_small(path, MAX_MODEL_BYTES)
     if WEIGHTS_ELSEWHERE in content:
         raise BadInput(f"{path}: its weights lie in another file; save them in this one: onnx.save(onnx.load(…), …)")
+    found = REFUSED.search(content)
+    if found is not None:
+        name = found[0][2:].decode()
+        why = "may run for ever" if name in LOOPS else "gives other vectors each time"
+        raise BadInput(f"{path}: it has the operator {name}, and so {why}; expected a network without it")
     options = runtime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.use_deterministic_compute = True
@@ -168,4 +208,9 @@ def _session(path: Path) -> Any:
     try:
         return runtime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime's errors are of no common class of its own
-        raise BadInput(f"{path}: this is no network that onnxruntime can run: {error!s:.200}") from None
+        raise BadInput(f"{path}: this is no network that onnxruntime can run: {_line(error)}") from None
+
+
+def _line(error: Exception) -> str:
+    """What onnxruntime says, which may name what is in the file."""
+    return " ".join("".join(c if c.isprintable() else " " for c in str(error)[:200]).split())

@@ -37,6 +37,19 @@ def network(path: Path, batch: object = "N", sides: tuple = (16, 16), last: bool
     return path
 
 
+def after_means(path: Path, name: str, *constants: np.ndarray, **settings: object) -> Path:
+    """The encoder of `network` with another operator behind it."""
+    model = onnx.load(network(path))
+    inputs = ["means"] if name != "RandomNormal" else []
+    for number, values in enumerate(constants):
+        model.graph.initializer.append(onnx.numpy_helper.from_array(np.asarray(values), f"c{number}"))
+        inputs.append(f"c{number}")
+    model.graph.node.append(onnx.helper.make_node(name, inputs, ["after"], **settings))
+    model.graph.output.insert(0, onnx.helper.make_tensor_value_info("after", onnx.TensorProto.FLOAT, None))
+    onnx.save(model, path)
+    return path
+
+
 def described(**parameters: object) -> np.ndarray:
     stage, ctx = OnnxEncoder(**parameters), Context("features")
     stage.setup(ctx)
@@ -82,7 +95,13 @@ def test_pixels_are_normalised_by_channel():
         (lambda path: network(path, sides=("h", "w")), {}, r"write nodes.features.size=\[224,224\]"),
         (network, {"size": (8, 8)}, "its images are 16 x 16; leave nodes.features.size away"),
         (lambda path: network(path, batch=3), {}, "write nodes.features.segments=3 or a multiple"),
-        (network, {"output": "vector"}, "there is no output 'vector'; its outputs are: means, total"),
+        (lambda path: network(path, sides=(60_000, 3000)), {}, "8 images of 60000 x 3000 are too large"),
+        (lambda path: after_means(path, "Div", np.float32(0)), {}, "vectors that are not finite"),
+        (lambda path: after_means(path, "Slice", [0], [0], [1]), {}, r"'after' is \[8, 0\] of float32"),
+        (lambda path: after_means(path, "Tile", [1, 400_000]), {}, "1,200,000 numbers, at most 1,048,576 are read"),
+        (lambda path: after_means(path, "RandomNormal", shape=[8, 3]), {}, "RandomNormal, and so gives other vectors"),
+        (lambda path: path.write_bytes(b'"\x04Loop') and path, {}, "Loop, and so may run for ever"),
+        (network, {"output": "vector"}, "there is no output 'vector'; its outputs are: 'means, total'"),
         (network, {"output": "total"}, "expected one vector of floating-point numbers for each"),
     ],
 )
