@@ -9,6 +9,8 @@ import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Context, Outputs, Source, State, Tick
 from omninav.pipeline.files import digest_text, user_path
+from omninav.pipeline.graph.contents import wrong_output
+from omninav.pipeline.graph.problems import cut
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.camera_yaml import write_camera
@@ -22,6 +24,12 @@ from omninav.stages.values.scan import Scan
 Row = npt.NDArray[np.float64]
 INTERVAL_NS = 100_000_000
 """Between images that come without a time stamp."""
+MAX_STAMP_NS = 1 << 62
+"""A stamp lies within 146 years of 1970."""
+MAX_NUMBER = 1e8
+"""Of a pose, metres or radians: more than any map's coordinates."""
+MAX_MOTION_M = 1000.0
+"""Between two images: more than any robot drives unseen. A drive that begins elsewhere is a `new_log`."""
 
 
 class PushedFrame(NamedTuple):
@@ -101,10 +109,15 @@ class PushedSource(Source):
         """
         pixels = _pixels(image)
         if stamp is not None and (isinstance(stamp, bool) or not isinstance(stamp, int | np.integer)):
-            raise BadInput(f"step: stamp={stamp!r:.40}, expected whole nanoseconds; seconds are int(seconds * 1e9)")
+            raise BadInput(f"step: stamp={cut(stamp)}, expected whole nanoseconds; seconds are int(seconds * 1e9)")
+        if stamp is not None and abs(int(stamp)) > MAX_STAMP_NS:
+            raise BadInput(f"step: stamp={cut(stamp)}, expected nanoseconds within {MAX_STAMP_NS} of 1970")
+        if not isinstance(new_log, bool | np.bool_):
+            raise BadInput(f"step: new_log={cut(new_log)}, expected True or False")
+        _refuse_unsound_scan(scan)
         rows = {"motion": motion, "odometry": odometry, "truth": truth}
         found = {name: None if row is None else _row(name, row) for name, row in rows.items()}
-        self._frame = PushedFrame(Image(pixels), None if stamp is None else int(stamp), found, scan, new_log)
+        self._frame = PushedFrame(Image(pixels), None if stamp is None else int(stamp), found, scan, bool(new_log))
 
     def step(self, ctx: Context, position: PushedSourceState) -> Out | None:
         """The frame that was pushed; None without one."""
@@ -125,6 +138,12 @@ class PushedSource(Source):
             odometry = compose(before, motion) if motion is not None else before
         elif motion is None:
             motion = between(before, odometry)
+        driven = 0.0 if motion is None or first else float(np.hypot(motion[0], motion[1]))
+        if driven > MAX_MOTION_M:
+            raise BadInput(
+                f"step: {driven:g} m since the image before, expected at most {MAX_MOTION_M:g}; "
+                "leave it out, or begin anew with new_log=True"
+            )
         measured = rows["motion"] is not None or rows["odometry"] is not None
         if measured:
             ctx.fact("odometry", "measured")
@@ -172,13 +191,19 @@ def _pixels(image: Pixels | bytes) -> Pixels:
     return image
 
 
+def _refuse_unsound_scan(scan: Scan | None) -> None:
+    wrong = None if scan is None else wrong_output(scan, Scan, optional=True)
+    if wrong is not None:
+        raise BadInput(f"step: scan {wrong}")
+
+
 def _row(name: str, given: Sequence[float]) -> Row:
     try:
         row = np.array(given, dtype=np.float64)
     except (TypeError, ValueError):
         row = np.empty(0)
-    if row.shape != (3,) or not np.isfinite(row).all():
-        raise BadInput(f"step: {name}={given!r:.60}, expected three finite numbers (m, m, rad)")
+    if row.shape != (3,) or not (np.abs(row) <= MAX_NUMBER).all():  # NaN too
+        raise BadInput(f"step: {name}={cut(given)}, expected three finite numbers (m, m, rad) within {MAX_NUMBER:g}")
     return row
 
 

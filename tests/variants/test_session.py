@@ -90,11 +90,19 @@ def test_a_frame_that_is_refused_is_as_if_it_had_not_come(recording, camera, bat
             ({**second, "image": second["image"] / 255}, "expected uint8"),
             ({**second, "stamp": 12.5}, "expected whole nanoseconds"),
             ({**second, "motion": (1, 2)}, "expected three finite numbers"),
+            ({**second, "motion": (1e300, 0, 0)}, "expected three finite numbers"),
+            ({**second, "motion": (1e4, 0, 0)}, "10000 m since the image before"),
+            ({**second, "truth": "abc"}, "expected three finite numbers"),
+            ({**second, "stamp": 2**63}, "of 1970"),
+            ({**second, "stamp": "x" * 10_000}, "expected whole nanoseconds"),
+            ({**second, "scan": "x"}, "expected Scan"),
+            ({**second, "new_log": "yes"}, "expected True or False"),
             ({**second, "img": second["image"]}, "did you mean 'image'"),
             ({"stamp": 1}, "image=… is missing"),
         ):
-            with pytest.raises(omninav.BadInput, match=what):
+            with pytest.raises(omninav.BadInput, match=what) as refused:
                 session.step(**wrong)
+            assert len(str(refused.value)) < 300
         out = session.step(**second)
         assert session.steps == 2
     assert out.estimate.pose.x == batch.frames["estimate_x"].iloc[1]
@@ -124,6 +132,12 @@ def test_a_session_without_a_map_to_match_or_a_camera_is_refused(camera):
         omninav.open("omniview_mcl", camera=camera)
     with pytest.raises(omninav.BadInput, match="type camera=FILE"):
         omninav.open("omniview_cml")
+
+
+def test_a_map_is_learned_from_a_tour_before_the_first_frame(camera):
+    assert "source=pushed" in omninav.compose("omniview_mcl", "source=pushed", tour="tour.mcap", camera=camera).words
+    with pytest.raises(omninav.BadInput, match=r"nowhere\.mcap"):
+        omninav.open("omniview_mcl", tour="nowhere.mcap", camera=camera)
 
 
 def test_a_closed_session_takes_no_more_frames(recording, camera, tmp_path):
