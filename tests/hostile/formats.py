@@ -1,6 +1,6 @@
 """Every format that is read."""
 
-from . import command_words, map_files, mcap_files, recording_files, run_folders
+from . import command_words, map_files, mcap_files, recording_files, run_folders, video_files
 
 FORMATS = [
     mcap_files.BYTES,
@@ -11,6 +11,8 @@ FORMATS = [
     recording_files.IMAGE,
     recording_files.CAMERA,
     recording_files.GRID,
+    video_files.VIDEO,
+    video_files.TRUTH,
     map_files.BYTES,
     map_files.CONTENT,
     run_folders.RUN,
