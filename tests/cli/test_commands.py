@@ -59,7 +59,8 @@ def test_check_says_who_reads_the_truth(omninav):
     said = omninav("check", "variant=omniview_mcl", check=True).stdout
     assert "nothing wrong" in said
     readers = said.partition("ground truth is read by: ")[2].strip().split(", ")
-    assert sorted(readers) == ["drive", "prior"]  # prior only with start=truth
+    drawn = ["frames_plot", "messages", "trajectory_plot"]  # over the built-in world's floor plan
+    assert sorted(readers) == sorted(["drive", "prior", *drawn])  # prior only with start=truth
 
 
 def test_an_unknown_option_of_a_group_names_those_that_exist(omninav, tmp_path: Path):
@@ -108,7 +109,7 @@ def test_a_log_of_ones_own_without_a_map_says_what_to_type(omninav, tmp_path: Pa
         (("--config-dir=nowhere",), "there is no folder nowhere"),
         (
             ("variant=wander", "log=d.mcap"),
-            "variant=wander does not take it\n      leave log=… away; its `inputs` are: no input",
+            "variant=wander does not take it\n      leave log=… away; its `inputs` are: camera",
         ),
         (("variant=topological_nav",), "goal: variant=topological_nav needs it: where to go"),
         (("+artifacts.map.set={rout: tour}",), "did you mean 'route'?"),
@@ -208,6 +209,8 @@ def test_graph_draws_the_graph_and_that_of_its_map(omninav, tmp_path: Path):
         "omniview_mcl.mmd",
         "omniview_mcl.map.svg",
         "omniview_mcl.map.mmd",
+        "omniview_mcl.thumbnails.svg",
+        "omniview_mcl.thumbnails.mmd",
     }
 
 
@@ -217,6 +220,7 @@ def test_the_embedded_default_leaves_everything_a_run_should(demo: Path):
         ".hydra",
         ".lock",
         "config.yaml",
+        "foxglove_layout.json",
         "frames.csv",
         "frames.parquet",
         "graph.mmd",
@@ -228,6 +232,7 @@ def test_the_embedded_default_leaves_everything_a_run_should(demo: Path):
         "report.html",
         "result.mcap",
         "run.log",
+        "thumbnails.omap",
         "timing.json",
         "trajectory.tum",
     }

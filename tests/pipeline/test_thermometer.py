@@ -46,7 +46,7 @@ def test_the_error_of_a_constant_lag_is_as_worked_by_hand(tmp_path: Path):
 
 def test_the_report_shows_what_the_metric_states(run: Path):
     page = (run / "report.html").read_text()
-    tiles = page[page.index('class="tiles"') : page.index("<h2>Results")]
+    tiles = page[page.index('class="tiles"') : page.index("<h2>Details")]
     assert tiles.index("Error, mean") < tiles.index("Within half a degree")
     assert "Error (K)" in page
     assert "Largest errors" in page

@@ -117,7 +117,7 @@ def test_a_layout_from_a_users_folder_may_change_another(tmp_path: Path) -> None
         ("heading:", "heding:", "did you mean 'heading'"),
         ("images: pictures", "images: pics", "no frame can be used .*missing_image"),
         ("clock_offset: 10.0", "clock_offset: 99", "no frame can be used .*no_position"),
-        ("camera: {", "camera: {sense: left, ", "'sense' is 'left'"),
+        ("camera: {", "camera: {sense: left, ", "'sense': 'left'"),
         ("time: {column: Clock", "time: {column: File", "no_time"),
         ("unit: in", "unit: s", r"positions\.x\.unit: 's'"),
     ],
