@@ -1,7 +1,9 @@
 """Sweeps: many runs of settings in all combinations, and what came of them as tables."""
 
+import io
 import os
 import sys
+from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -57,19 +59,23 @@ class Sweep:
         return str(means._repr_html_() if hasattr(means, "_repr_html_") else f"<pre>{means}</pre>")
 
 
-def sweep(*words: str, folder: str | os.PathLike[str] | None = None, **settings: Any) -> Sweep:
+def sweep(*words: str, folder: str | os.PathLike[str] | None = None, progress: bool = True, **settings: Any) -> Sweep:
     """Run all combinations: `sweep("some_variant", "match=selective,l2", seed=range(5))`.
 
     A word with commas, and a keyword that is a list, tuple or range, stand for several values; everything else is as in
-    `compose`. `folder`: where its jobs are left; None: a new one in `runs`. A job that fails stands in the table as
-    failed, and the others go on.
+    `compose`. `folder`: where its jobs are left; None: a new one in `runs`. `progress`: whether it says how far it is.
+    A job that fails stands in the table as failed, and the others go on. Raises `BadInput` where none could begin.
     """
     fixed = {name: value for name, value in settings.items() if not isinstance(value, list | tuple | range)}
     swept = [f"{name}={','.join(map(word_of, settings[name]))}" for name in settings if name not in fixed]
     place = Path(folder or Path("runs") / f"{datetime.now():%Y-%m-%d_%H-%M-%S}_sweep")
     before = sys.argv
     try:
-        command(["-m", *words_of(words, fixed), *swept, f"hydra.sweep.dir={word_of(place)}"])
+        with ExitStack() as quiet:
+            if not progress:
+                quiet.enter_context(redirect_stdout(io.StringIO()))
+                quiet.enter_context(redirect_stderr(io.StringIO()))
+            command(["-m", *words_of(words, fixed), *swept, f"hydra.sweep.dir={word_of(place)}"])
     finally:
         sys.argv = before  # it is what the manifests of jobs say
     return Sweep(place)

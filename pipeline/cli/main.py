@@ -108,7 +108,12 @@ def _is_tool(arguments: Sequence[str]) -> bool:
 def _unknown_command(name: str) -> int:
     from omninav.pipeline.graph.problems import suggest
 
-    named = files("omninav.conf").joinpath(f"variant/{name}.yaml").is_file()
-    hint = f"type omninav variant={name}" if named else suggest(name, COMMANDS, "commands", prefix="omninav ")
+    variants = {file.name.removesuffix(".yaml") for file in files("omninav.conf").joinpath("variant").iterdir()}
+    longer = sorted(f"omninav {name} {one.removeprefix(f'{name}_')}" for one in variants if one.startswith(f"{name}_"))
+    hint = suggest(name, COMMANDS, "commands", prefix="omninav ")
+    if name in variants:
+        hint = f"type omninav variant={name}"
+    elif longer:
+        hint = f"there are: {', '.join(longer)}"
     print(f"'{name}' is no command. {hint}", file=sys.stderr)
     return 2
