@@ -156,6 +156,12 @@ class Engine:
         self._total = self._ticks_in_all()
         self._saved = time.monotonic()
 
+    def set_up_source(self) -> None:
+        """Set up the source alone: what it says of its inputs and of who reads them, it says now. Raises `BadInput`."""
+        source = self.graph.source
+        if source is not None and isinstance(source.stage, Source) and source.stage.repeatable:
+            source.stage.setup(self.calls[source.name].ctx)
+
     def tick(self) -> bool:
         """One turn of the loop. False where there is none: the source has ended."""
         if self.ended or self.graph.source is None:

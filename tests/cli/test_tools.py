@@ -28,3 +28,13 @@ def test_a_variant_that_runs_over_a_log_is_no_such_command(capsys: pytest.Captur
     assert "type omninav variant=omniview_mcl_map" in said
     assert "'camera' is no command. there are: omninav camera calibrate, omninav camera look" in said
     assert "'homing' is no command. type omninav variant=homing" in said
+
+
+def test_check_finds_what_images_alone_do_not_serve(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for number in range(3):
+        noise = np.random.default_rng(number).integers(0, 256, (40, 80, 3), dtype=np.uint8)
+        cv2.imwrite(str(tmp_path / f"{number}.png"), noise)
+    words = [f"tour={tmp_path}", f"log={tmp_path}", "camera=equirectangular"]
+    assert main(["check", "variant=omniview_mcl", *words]) == 2
+    assert "needed by 'mapping'; type speed=" in capsys.readouterr().err
+    assert main(["check", "variant=topological_localisation", *words]) == 0

@@ -8,6 +8,7 @@ from typing import Any
 from omninav.pipeline.cli.composition import complete, composed, read_words
 from omninav.pipeline.cli.experiments import condition_words, planned_experiment
 from omninav.pipeline.engine.artifact import read_artifact
+from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.experiment.conditions import open_inputs
 from omninav.pipeline.experiment.runner import ExperimentRun
 from omninav.pipeline.graph.graph import LIFETIMES
@@ -31,6 +32,8 @@ def command(arguments: list[str]) -> int:
         if artifact.file is not None:
             read_artifact(artifact.file)  # whole: what is in it may not fit its header
     _refuse_unwritable(planned.config)
+    for graph in (*(artifact.graph for artifact in planned.artifacts if artifact.graph is not None), planned.graph):
+        Engine(graph, {}, EngineOptions(planned.seed)).set_up_source()
     graph = planned.graph
     before, tick, after = (len(graph.of_lifetime(kind)) for kind in LIFETIMES)
     print(f"{planned.variant}: nothing wrong with it. {len(graph.nodes)} nodes, {len(graph.wires)} wires")
