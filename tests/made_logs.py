@@ -1,5 +1,6 @@
 """Small recordings for tests: textured pictures, odometry and truth on a circle, written as MCAP, rosbag2 or ROS 1."""
 
+import copy
 import functools
 import math
 from collections.abc import Callable, Iterator
@@ -56,7 +57,7 @@ def pose_fields(x: float, y: float, heading: float) -> dict[str, Any]:
 def messages(change: Callable[[Made], list[Made]] = lambda made: [made]) -> Iterator[Made]:
     """Pictures at 2 Hz between odometry and truth at 20 Hz; `change` may drop, replace or repeat each message."""
     for made in _untouched():
-        yield from change(made)
+        yield from change(made._replace(content=copy.deepcopy(made.content)))
 
 
 @functools.cache
