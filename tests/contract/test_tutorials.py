@@ -15,6 +15,7 @@ NOTEBOOKS = sorted(ROOT.glob("docs/tutorials/*.ipynb"))
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda notebook: notebook.stem)
 def test_a_notebook_runs_to_its_end(notebook: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.delenv("PYTHONSAFEPATH", raising=False)  # set by a command that another test ran in this process
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
     content = nbformat.read(notebook, as_version=4)
     assert not [cell for cell in content.cells if cell.get("outputs")], "cells are committed without their outputs"
