@@ -3,8 +3,10 @@
 import hashlib
 import re
 from collections import Counter
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,7 @@ from omninav.stages.values.encoded_image import MAX_FILE_BYTES, Undecodable, dec
 from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from, read_camera
+from .decode_ahead import DecodeAhead
 from .description import MAX_PATTERN, Description, find_layout, known_layouts, read_description
 from .messages import is_blank
 from .named_camera import assumed_camera, named_camera
@@ -64,15 +67,16 @@ class ImageFolder:
                 self._drop("impossible_motion", what)
         keep = self._usable(paths, times, truth)
         self._paths_kept = [paths[row] for row in keep]
+        self._images = DecodeAhead(lambda frame: partial(_image_at, self._paths_kept[frame]))
         self.stamps: Stamps = np.array([times[row] for row in keep], dtype=np.int64)
         self.truth: Array | None = None if truth is None else truth[keep]
         self.camera = self._find_camera(options.camera)
 
-    def image(self, frame: int) -> Pixels | None:
+    def image(self, frame: int, following: Sequence[int] = ()) -> Pixels | None:
         """The image of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
         path = self._paths_kept[frame]
         try:
-            pixels = decode_image(read_small(path, MAX_FILE_BYTES))
+            pixels = self._images.image(frame, following)
         except (Undecodable, BadInput) as error:
             self._drop("undecodable_image", f"{path}: {error}")
             return None
@@ -212,8 +216,12 @@ class ImageFolder:
     def _first_picture(self) -> Pixels:
         for path in self._paths_kept:
             with suppress(Undecodable, BadInput):
-                return decode_image(read_small(path, MAX_FILE_BYTES))
+                return _image_at(path)
         raise UnreadableRecording(f"{self._folder}: not one of its {len(self._paths_kept)} images can be decoded")
+
+
+def _image_at(path: Path) -> Pixels:
+    return decode_image(read_small(path, MAX_FILE_BYTES))
 
 
 def _is_file(path: Path) -> bool:

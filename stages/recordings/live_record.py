@@ -2,7 +2,7 @@
 
 import json
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -151,9 +151,10 @@ class LiveRecording(TopicRecording):
             except (BadMessage, ValueError, AttributeError) as error:
                 feed.drop("bad_message", f"{name}: a message on {record.topic}: {error!s:.160}")
 
-        def read_image(frame: int) -> Pixels:
+        def fetch_image(frame: int) -> Callable[[], Pixels]:
             topic, location = places[frame]
-            return pixels_of(feed.decode(topic, feed.fetch(location)))
+            message = feed.decode(topic, feed.fetch(location))
+            return lambda: pixels_of(message)
 
         frames = self._frames
         odometry = None if drive.odometry is None else np.array([frame.odometry for frame in frames]).reshape(-1, 3)
@@ -165,7 +166,7 @@ class LiveRecording(TopicRecording):
             truth=None if drive.truth is None else np.array([frame.truth for frame in frames]).reshape(-1, 3),
             unmeasured_s=np.array([frame.unmeasured_s for frame in frames]),
             feed=feed,
-            read_image=read_image,
+            fetch_image=fetch_image,
             files=files,
         )
 

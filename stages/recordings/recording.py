@@ -55,10 +55,11 @@ class Recording(Protocol):
     @property
     def assumed(self) -> Sequence[str]: ...
 
-    def image(self, frame: int) -> Pixels | None:
+    def image(self, frame: int, following: Sequence[int] = ()) -> Pixels | None:
         """The image of a frame, (height, width, 3) uint8 blue-green-red; None where it cannot be decoded or is blank.
 
         What is wrong with it is counted in `dropped` at that moment, under `undecodable_image` or `blank_image`.
+        `following`: the frames that will be asked for next; some may be decoded in the meantime.
         """
 
     def scan(self, frame: int) -> Scan | None:

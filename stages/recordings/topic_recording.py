@@ -16,6 +16,7 @@ from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
+from .decode_ahead import DecodeAhead
 from .messages import is_blank, scan_of
 
 Array = npt.NDArray[np.float64]
@@ -54,14 +55,14 @@ class TopicRecording:
         odometry: Array | None,
         truth: Array | None,
         feed: Feed,
-        read_image: Callable[[int], Pixels],
+        fetch_image: Callable[[int], Callable[[], Pixels]],
         files: Sequence[Path],
         scans: Sequence[Record] = (),
         unmeasured_s: Array | None = None,
     ) -> None:
         self.unmeasured_s = unmeasured_s
         self.name, self.camera, self.stamps, self.odometry, self.truth = name, camera, stamps, odometry, truth
-        self._feed, self._read_image, self._files, self._scans = feed, read_image, files, scans
+        self._feed, self._images, self._files, self._scans = feed, DecodeAhead(fetch_image), files, scans
         self._scan_stamps = np.array([record.stamp for record in scans], dtype=np.int64)
 
     @property
@@ -74,11 +75,11 @@ class TopicRecording:
         """The first case of each kind."""
         return self._feed.details
 
-    def image(self, frame: int) -> Pixels | None:
+    def image(self, frame: int, following: Sequence[int] = ()) -> Pixels | None:
         """The image of a frame; None (and counted) where it cannot be decoded, is blank or of another size."""
         where = f"{self.name}: image {frame} (stamp {self.stamps[frame] / 1e9:.3f} s)"
         try:
-            pixels = self._read_image(frame)
+            pixels = self._images.image(frame, following)
         except BadMessage as error:
             self._feed.drop("bad_message", str(error))
         except Undecodable as error:

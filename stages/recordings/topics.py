@@ -83,13 +83,14 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         lost = ", ".join(f"{count} {kind}" for kind, count in sorted(feed.dropped.items())) or "it is empty"
         raise UnreadableRecording(f"{name}: no image on {image_topic} can be used ({lost})")
 
-    def read_image(frame: int) -> Pixels:
-        return pixels_of(feed.decode(image_topic, feed.fetch(frames[frame].location)))
+    def fetch_image(frame: int) -> Callable[[], Pixels]:
+        message = feed.decode(image_topic, feed.fetch(frames[frame].location))
+        return lambda: pixels_of(message)
 
     def size() -> tuple[int, int]:
         for frame in range(len(frames)):
             with suppress(Undecodable, BadMessage):
-                return (pixels := read_image(frame)).shape[1], pixels.shape[0]
+                return (pixels := fetch_image(frame)()).shape[1], pixels.shape[0]
         raise UnreadableRecording(f"{name}: not one of its {len(frames)} images can be decoded")
 
     view, camera_files = find_camera(name, feed, options.camera, size, files, infos)
@@ -101,11 +102,11 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         truth=None if truth is None else poses_at(truth.stamps, truth.poses, stamps),
         unmeasured_s=None if odometry is None else seconds_within(odometry.gaps, stamps),
         feed=feed,
-        read_image=read_image,
+        fetch_image=fetch_image,
         files=[*files, *camera_files],
         scans=_scans(name, feed, topics.scan, found),
     )
-    _check_size(recording, read_image)
+    _check_size(recording, fetch_image)
     return recording
 
 
@@ -238,11 +239,11 @@ def _drop_frames(feed: Feed, name: str, kind: str, stamps: Stamps, lost: npt.NDA
         feed.drop(kind, f"{name}: image with stamp {stamp} ns lies {why}")
 
 
-def _check_size(recording: TopicRecording, read_image: Callable[[int], Pixels]) -> None:
+def _check_size(recording: TopicRecording, fetch_image: Callable[[int], Callable[[], Pixels]]) -> None:
     """Refuse a camera that does not belong to the images, by the first image that can be decoded."""
     for frame in range(len(recording.stamps)):
         try:
-            height, width = read_image(frame).shape[:2]
+            height, width = fetch_image(frame)().shape[:2]
         except (BadMessage, Undecodable):
             continue
         camera = recording.camera

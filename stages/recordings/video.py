@@ -4,6 +4,7 @@ import hashlib
 import os
 import re
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -71,7 +72,7 @@ class VideoRecording:
         self.camera = self._camera(options.camera)
         self._shape = (self.camera.height_px, self.camera.width)
 
-    def image(self, frame: int) -> Pixels | None:
+    def image(self, frame: int, following: Sequence[int] = ()) -> Pixels | None:
         """The image of a frame; None (and counted) where it cannot be decoded or is blank."""
         where = f"frame {frame} at {self.stamps[frame] / 1e9:.3f} s"
         pixels = self._decoded(frame)

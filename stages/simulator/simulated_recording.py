@@ -173,7 +173,7 @@ class SimulatedRecording:
     def _stream(self, purpose: str) -> np.random.Generator:
         return stream(self.world.seed, purpose, self.route, self.day)
 
-    def image(self, frame: int) -> Pixels:
+    def image(self, frame: int, following: Sequence[int] = ()) -> Pixels:
         """The image of a frame, (height, width, 3) uint8 blue-green-red, rendered now."""
         return self.image_of_shot(int(self._received[frame]))
 

@@ -14,6 +14,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
 from omninav.pipeline.files import digest_file, digest_text, user_path
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.recordings.decode_ahead import AHEAD
 from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.plausibility import MotionLimits
@@ -195,7 +196,7 @@ class LogSource(Source):
             while position.next < len(frames):
                 frame = int(frames[position.next])
                 known = recording.dropped.copy()
-                pixels = recording.image(frame)
+                pixels = recording.image(frame, frames[position.next + 1 :][:AHEAD].tolist())
                 if pixels is not None:
                     return self._out(ctx, position, recording, frames, Image(pixels))
                 for kind, number in sorted((Counter(recording.dropped) - known).items()):
