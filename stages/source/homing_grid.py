@@ -1,6 +1,7 @@
 """Views all around a target, one by one: what homing makes of each is a field of vectors."""
 
 import math
+from functools import cached_property
 from typing import Annotated, Protocol
 
 import numpy as np
@@ -74,19 +75,23 @@ class HomingGrid(Source):
 
     def setup(self, ctx: Context) -> None:
         """Build the world, or open the log, and choose the points."""
-        if self.log is None:
+        recording = self._recording
+        if recording is None:
             self._views: Views = RenderedViews(
                 self.world, self.day, self.target, self.spacing_m, self.radius_m, ctx.rng
             )
         else:
-            self._views = RecordedViews(open_recording(self.log, camera=self.camera), self.target, self.radius_m)
+            self._views = RecordedViews(recording, self.target, self.radius_m)
 
     def inputs_digest(self) -> str | None:
         """sha256 over the world and the code that simulates it, or over the log."""
-        known = (
-            simulation_digest(self.world) if self.log is None else open_recording(self.log, camera=self.camera).digest()
-        )
-        return digest_text("homing grid", known)
+        recording = self._recording
+        return digest_text("homing grid", simulation_digest(self.world) if recording is None else recording.digest())
+
+    @cached_property
+    def _recording(self) -> Recording | None:
+        """The log, opened once."""
+        return None if self.log is None else open_recording(self.log, camera=self.camera)
 
     def length(self) -> int | None:
         """Views in all."""

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
+from omninav.pipeline import Bounds, Context, Source, State, Tick
 from omninav.pipeline.files import user_path
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.camera.model import Camera
@@ -28,9 +28,8 @@ from omninav.stages.recordings.topics import IMAGE_TOPICS
 from omninav.stages.values.command import Command
 from omninav.stages.values.image import Image, Pixels
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.pose import BridgedMotion, Motion, Pose
-from omninav.stages.values.requests import GoalPoint, Restart
-from omninav.stages.values.scan import Scan
+
+from .outputs import DriveOutputs, motion_of, pose_of
 
 Array = npt.NDArray[np.float64]
 RECORD = "live.mcap"
@@ -96,16 +95,8 @@ class LiveSource(Source):
     rest_s: Annotated[float, Bounds(ge=0)] | None = None
     """Ends this long after the planned route has: the robot has arrived, or given up; null: it waits for a new goal."""
 
-    class Out(Outputs):
-        tick: Tick
-        image: Image
-        camera: Camera
-        odometry: Pose | None = None
-        motion: Motion | None = None
-        truth: Pose | None = None
-        scan: Scan | None = None
-        restart: Restart | None = None
-        goal: GoalPoint | None = None
+    class Out(DriveOutputs):
+        """What is known at an image."""
 
     def setup(self, ctx: Context) -> None:
         """Join the domain, so that endpoints match while the rest is made ready; find what was recorded before."""
@@ -253,9 +244,9 @@ class LiveSource(Source):
             tick=tick,
             image=Image(pixels),
             camera=camera,
-            odometry=_pose(frame.odometry),
+            odometry=pose_of(frame.odometry),
             motion=motion,
-            truth=_pose(frame.truth),
+            truth=pose_of(frame.truth),
             scan=frame.scan,
             restart=frame.restart,
             goal=frame.goal,
@@ -269,16 +260,6 @@ class LiveSource(Source):
         roles[self.topics.scan if scan else None] = "scan"
         roles[self.initial_pose], roles[self.goal], roles[self.restart] = "initial_pose", "goal", "restart"
         return {topic: role for topic, role in roles.items() if topic is not None}
-
-
-def motion_of(increment: Array, unmeasured_s: float = 0.0) -> Motion:
-    """An increment (3,) as a value; a bridged one where some of it was not measured."""
-    x, y, turn = (float(value) for value in increment)
-    return BridgedMotion(x, y, turn, unmeasured_s) if unmeasured_s else Motion(x, y, turn)
-
-
-def _pose(row: Array | None) -> Pose | None:
-    return None if row is None or not np.isfinite(row).all() else Pose(*(float(value) for value in row))
 
 
 def _recorded(path: Path) -> LiveRecording | None:

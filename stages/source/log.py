@@ -5,14 +5,13 @@ import math
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Source, State, Tick
+from omninav.pipeline import Bounds, Context, Source, State, Tick
 from omninav.pipeline.files import digest_file, digest_text, user_path
-from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.decode_ahead import AHEAD
 from omninav.stages.recordings.live_record import LiveRecording
@@ -23,17 +22,16 @@ from omninav.stages.recordings.truth_file import truth_from
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.values.image import Image
-from omninav.stages.values.pose import BridgedMotion, Motion, Pose
-from omninav.stages.values.requests import GoalPoint, Restart
-from omninav.stages.values.scan import Scan
+from omninav.stages.values.pose import Motion
 
-from .cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames, thinned
+from .cuts import Cut
 from .frozen_odometry import frozen_steps
 from .guessed_motion import VisualCompass, guessed_motion, settled_speed
+from .log_parts import LogPart, Selection, parts_of, simulated_drives
+from .outputs import DriveOutputs, motion_of, pose_of
 from .synthetic_odometry import add_odometry_noise
 
 Array = npt.NDArray[np.float64]
-OdometryKind = Literal["measured", "synthetic", "guessed"]
 DRIVE = "drive.mcap"
 """A simulated drive in the folder of its recording."""
 
@@ -117,16 +115,8 @@ class LogSource(Source):
     synthetic_turn_noise_deg_per_rad: Annotated[float, Bounds(ge=0.0)] = 3.0
     """Standard deviation that a turn of one radian adds to it."""
 
-    class Out(Outputs):
-        tick: Tick
-        image: Image
-        camera: Camera
-        odometry: Pose | None = None
-        motion: Motion | None = None
-        truth: Pose | None = None
-        scan: Scan | None = None
-        restart: Restart | None = None
-        goal: GoalPoint | None = None
+    class Out(DriveOutputs):
+        """What is known at an image."""
 
     def setup(self, ctx: Context) -> None:
         """Open all logs; what is lost by then is counted."""
@@ -134,19 +124,20 @@ class LogSource(Source):
         for recording, lost in zip(self._opened, self._lost, strict=True):
             for kind, number in sorted(lost.items()):
                 ctx.count(kind, number, recording.details.get(kind, ""))
-        ctx.fact("odometry", ", ".join(dict.fromkeys(self._kinds)))
+        ctx.fact("odometry", ", ".join(dict.fromkeys(part.kind for part in self._parts)))
         assumed = [sentence for recording in self._opened for sentence in recording.assumed]
         if assumed:
             ctx.fact("assumed", "; ".join(assumed))
-        for recording, kind, truth in zip(self._recordings, self._kinds, self._truth, strict=True):
-            if kind == "synthetic":
+        for part in self._parts:
+            recording, truth = part.recording, part.truth
+            if part.kind == "synthetic":
                 ctx.warn(f"{recording.name} has no odometry: it was made of its true positions, with noise")
-            elif kind == "measured" and recording.odometry is not None and truth is not None:
+            elif part.kind == "measured" and recording.odometry is not None and truth is not None:
                 steps, metres = frozen_steps(recording.odometry, truth)
                 if steps:
                     still = f"odometry stands still at {steps} images, while ground truth moves {metres:.1f} m"
                     ctx.warn(f"{recording.name}: {still}")
-            elif kind == "guessed":
+            elif part.kind == "guessed":
                 self._speed = settled_speed(ctx, recording.name, recording.camera, self.speed_m_s, truth is not None)
 
     def inputs_digest(self) -> str | None:
@@ -162,7 +153,7 @@ class LogSource(Source):
     def length(self) -> int | None:
         """Ticks to come if every image can be decoded."""
         self._open()
-        return sum(len(frames) for frames in self._frames)
+        return sum(len(part.frames) for part in self._parts)
 
     def recording_key(self) -> str | None:
         """The hash of a simulated drive; None for a recording."""
@@ -191,14 +182,15 @@ class LogSource(Source):
 
     def step(self, ctx: Context, position: LogSourceState) -> Out | None:
         """The next image that can be used; None after the last."""
-        while position.log < len(self._recordings):
-            recording, frames = self._recordings[position.log], self._frames[position.log]
+        while position.log < len(self._parts):
+            part = self._parts[position.log]
+            recording, frames = part.recording, part.frames
             while position.next < len(frames):
                 frame = int(frames[position.next])
                 known = recording.dropped.copy()
                 pixels = recording.image(frame, frames[position.next + 1 :][:AHEAD].tolist())
                 if pixels is not None:
-                    return self._out(ctx, position, recording, frames, Image(pixels))
+                    return self._out(ctx, position, part, Image(pixels))
                 for kind, number in sorted((Counter(recording.dropped) - known).items()):
                     ctx.count(kind, number, recording.details.get(kind, ""))
                 position.next += 1
@@ -213,9 +205,8 @@ class LogSource(Source):
             raise UnreadableRecording(f"{name}: not one of its images can be used ({counts}; {first:.300})")
         return None
 
-    def _out(
-        self, ctx: Context, position: LogSourceState, recording: Recording, frames: npt.NDArray[np.int64], image: Image
-    ) -> Out:
+    def _out(self, ctx: Context, position: LogSourceState, part: LogPart, image: Image) -> Out:
+        recording, frames, measured = part.recording, part.frames, part.driven
         frame, first = int(frames[position.next]), position.last < 0
         last = None if first else int(frames[position.last])
         tick = Tick(
@@ -225,20 +216,18 @@ class LogSource(Source):
             frame=frame,
             first_of_log=first,
         )
-        true_poses = self._truth[position.log]
-        truth = None if true_poses is None else true_poses[frame]
+        truth = None if part.truth is None else part.truth[frame]
         odometry, motion = None, None
-        measured = self._odometry[position.log]
         if recording.odometry is not None:
             odometry = measured[frame]
             if last is not None:
                 gap = 0.0 if recording.unmeasured_s is None else float(np.ptp(recording.unmeasured_s[[last, frame]]))
-                motion = _motion(between(measured[last], odometry), gap)
+                motion = motion_of(between(measured[last], odometry), gap)
         else:
-            if self._kinds[position.log] == "guessed":
+            if part.kind == "guessed":
                 motion = self._guessed(position, recording, image, last, frame)
             elif last is not None:
-                motion = _motion(self._synthetic(ctx, between(measured[last], measured[frame])))
+                motion = motion_of(self._synthetic(ctx, between(measured[last], measured[frame])))
             if motion is not None:
                 moved = compose((position.x, position.y, position.heading), (motion.x, motion.y, motion.turn))
                 position.x, position.y, position.heading = (float(value) for value in moved)
@@ -248,9 +237,9 @@ class LogSource(Source):
             tick=tick,
             image=image,
             camera=recording.camera,
-            odometry=_pose(odometry),
+            odometry=pose_of(odometry),
             motion=motion,
-            truth=_pose(truth),
+            truth=pose_of(truth),
             scan=recording.scan(frame) if ctx.is_read("scan") else None,
             restart=recording.restart(frame) if isinstance(recording, LiveRecording) else None,
             goal=recording.goal(frame) if isinstance(recording, LiveRecording) else None,
@@ -272,15 +261,6 @@ class LogSource(Source):
         seconds = float(recording.stamps[frame] - recording.stamps[last]) / 1e9
         return guessed_motion(before, position.view, seconds, self._speed)
 
-    def _read_truth(self, recording: Recording, file: Path) -> Array:
-        return truth_from(recording, file, self.truth_clock_offset_s, self.truth_max_gap_s, self.limits)
-
-    def _odometry_kind(self, recording: Recording, truth: Array | None) -> OdometryKind:
-        if recording.odometry is not None:
-            return "measured"
-        whole = truth is not None and np.isfinite(truth).all()
-        return "synthetic" if self.speed_m_s is None and whole else "guessed"
-
     def _synthetic(self, ctx: Context, increment: Array) -> Array:
         return add_odometry_noise(
             increment,
@@ -293,61 +273,27 @@ class LogSource(Source):
     def _open(self) -> None:
         if getattr(self, "_opened", None) is not None:
             return
-        names = (self.log,) if isinstance(self.log, str) or self.log is None else self.log
-        recordings: list[Recording]
-        if self.log is None and self.route is not None:
-            from omninav.stages.simulator.simulated_recording import (  # brings the compiler, which a log does not need
-                SimulatedRecording,
-                in_order,
-            )
-
-            days = in_order(self.day)
-            recordings = [SimulatedRecording(self.world, self.route, day, self.kidnappings) for day in days]
-        elif not names or None in names:
-            raise UnreadableRecording("no recording is named; type log=PATH")
-        else:
-            topics = self.topics
-            if self.truth is not None and self._truth_file is None:
-                topics = replace(topics, truth=self.truth)
-            recordings = [
-                open_recording(str(name), topics, self.camera, self.layout_folders, self.limits, self.rate_hz)
-                for name in names
-            ]
-        self._recordings, self._frames, self._odometry, self._truth = [], [], [], []
-        self._kinds: list[OdometryKind] = []
-        self._compass = VisualCompass()
+        recordings = self._recordings()
+        selection = Selection(self.first, self.stop, self.stride, self.cuts, self.rate_hz, self.new_log_after_s)
+        self._parts: list[LogPart] = []
         for recording in recordings:
-            check_cuts(self.cuts, len(recording.stamps), recording.name)
-            frames = remaining_frames(self.cuts, len(recording.stamps))[self.first : self.stop : self.stride]
-            frames = thinned(frames, recording.stamps, self.rate_hz)
-            if not len(frames):
-                raise UnreadableRecording(
-                    f"{recording.name}: first={self.first}, stop={self.stop} leaves none of its frames; "
-                    "type nodes.source.first=0 nodes.source.stop=null"
-                )
-            truth = recording.truth if self._truth_file is None else self._read_truth(recording, self._truth_file)
-            poses = truth if recording.odometry is None else recording.odometry
-            unaware = np.empty((0, 3)) if poses is None else as_if_driven(poses, self.cuts)
-            pauses = np.diff(recording.stamps[frames]) > self.new_log_after_s * 1e9
-            pauses &= ~crossed(self.cuts, frames)
-            if isinstance(
-                recording, LiveRecording
-            ):  # its run went on after pauses, and not where its clock was set back
-                pauses = np.diff(recording.stamps[frames]) <= 0
-            for part in np.split(frames, np.flatnonzero(pauses) + 1):
-                self._recordings.append(recording)
-                self._truth.append(truth)
-                self._kinds.append(self._odometry_kind(recording, truth))
-                self._frames.append(part)
-                self._odometry.append(unaware)
+            truth, file = recording.truth, self._truth_file
+            if file is not None:
+                truth = truth_from(recording, file, self.truth_clock_offset_s, self.truth_max_gap_s, self.limits)
+            self._parts += parts_of(recording, truth, selection, guess=self.speed_m_s is not None)
+        self._compass = VisualCompass()
         self._opened = recordings
         self._lost = [recording.dropped.copy() for recording in recordings]
 
-
-def _motion(increment: Array, unmeasured_s: float = 0.0) -> Motion:
-    x, y, turn = (float(value) for value in increment)
-    return BridgedMotion(x, y, turn, unmeasured_s) if unmeasured_s else Motion(x, y, turn)
-
-
-def _pose(row: Array | None) -> Pose | None:
-    return None if row is None or not np.isfinite(row).all() else Pose(*(float(value) for value in row))
+    def _recordings(self) -> list[Recording]:
+        if self.log is None and self.route is not None:
+            return simulated_drives(self.world, self.route, self.day, self.kidnappings)
+        names = (self.log,) if isinstance(self.log, str) else self.log
+        if not names or None in names:
+            raise UnreadableRecording("no recording is named; type log=PATH")
+        topics = self.topics
+        if self.truth is not None and self._truth_file is None:
+            topics = replace(topics, truth=self.truth)
+        return [
+            open_recording(name, topics, self.camera, self.layout_folders, self.limits, self.rate_hz) for name in names
+        ]

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import BadInput, Context, Outputs, Source, State, Tick
+from omninav.pipeline import BadInput, Context, Source, State, Tick
 from omninav.pipeline.files import digest_text, user_path
 from omninav.pipeline.graph.contents import wrong_output
 from omninav.pipeline.graph.problems import cut
@@ -18,8 +18,9 @@ from omninav.stages.recordings.messages import is_blank
 from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.values.encoded_image import Undecodable, decode_image
 from omninav.stages.values.image import Image, Pixels
-from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.scan import Scan
+
+from .outputs import DriveOutputs, motion_of, pose_of
 
 Row = npt.NDArray[np.float64]
 INTERVAL_NS = 100_000_000
@@ -65,14 +66,8 @@ class PushedSource(Source):
     camera: str | None = None
     """A camera.yaml, or the name of a camera (equirectangular, fisheye, …), of the images."""
 
-    class Out(Outputs):
-        tick: Tick
-        image: Image
-        camera: Camera
-        odometry: Pose | None = None
-        motion: Motion | None = None
-        truth: Pose | None = None
-        scan: Scan | None = None
+    class Out(DriveOutputs):
+        """What is known at an image."""
 
     def setup(self, ctx: Context) -> None:
         """Open the camera's file."""
@@ -154,9 +149,9 @@ class PushedSource(Source):
             tick=tick,
             image=image,
             camera=camera,
-            odometry=_pose(odometry) if measured else None,
-            motion=None if motion is None or first else Motion(*(float(number) for number in motion)),
-            truth=_pose(rows["truth"]),
+            odometry=pose_of(odometry) if measured else None,
+            motion=None if motion is None or first else motion_of(motion),
+            truth=pose_of(rows["truth"]),
             scan=scan,
         )
 
@@ -205,7 +200,3 @@ def _row(name: str, given: Sequence[float]) -> Row:
     if row.shape != (3,) or not (np.abs(row) <= MAX_NUMBER).all():  # NaN too
         raise BadInput(f"step: {name}={cut(given)}, expected three finite numbers (m, m, rad) within {MAX_NUMBER:g}")
     return row
-
-
-def _pose(row: Row | None) -> Pose | None:
-    return None if row is None else Pose(*(float(number) for number in row))

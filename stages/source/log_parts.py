@@ -1,0 +1,89 @@
+"""The logs that a run goes through: opened, and cut into drives of the frames that are used."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.recordings.live_record import LiveRecording
+from omninav.stages.recordings.recording import Recording, UnreadableRecording
+from omninav.stages.simulator.config import Kidnapping, WorldConfig
+
+from .cuts import Cut, as_if_driven, check_cuts, crossed, remaining_frames, thinned
+
+Array = npt.NDArray[np.float64]
+OdometryKind = Literal["measured", "synthetic", "guessed"]
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which frames of a log are used; see the parameters of the same names of `LogSource`."""
+
+    first: int
+    stop: int | None
+    stride: int
+    cuts: Sequence[Cut]
+    rate_hz: float | None
+    new_log_after_s: float
+
+
+@dataclass(frozen=True)
+class LogPart:
+    """One drive of a recording: between two pauses, or all of it.
+
+    `frames`: those that are used. `driven` (N, 3): at all frames the odometry, or the truth where there is none, as if
+    what was cut out had not been driven. `truth` (N, 3) or None. `kind`: where motion comes from.
+    """
+
+    recording: Recording
+    frames: npt.NDArray[np.int64]
+    driven: Array
+    truth: Array | None
+    kind: OdometryKind
+
+
+def simulated_drives(
+    world: WorldConfig, route: str, day: int | tuple[int, ...], kidnappings: tuple[Kidnapping, ...]
+) -> list[Recording]:
+    """Drives through a simulated world, one for each day."""
+    from omninav.stages.simulator.simulated_recording import (  # brings the compiler, which a log does not need
+        SimulatedRecording,
+        in_order,
+    )
+
+    return [SimulatedRecording(world, route, each, kidnappings) for each in in_order(day)]
+
+
+def parts_of(recording: Recording, truth: Array | None, selection: Selection, guess: bool) -> list[LogPart]:
+    """The drives of a recording. `guess`: motion is guessed where none is measured, though positions may be known.
+
+    Raises `UnreadableRecording` where no frame is left.
+    """
+    cuts, stamps = selection.cuts, recording.stamps
+    check_cuts(cuts, len(stamps), recording.name)
+    frames = remaining_frames(cuts, len(stamps))[selection.first : selection.stop : selection.stride]
+    frames = thinned(frames, stamps, selection.rate_hz)
+    if not len(frames):
+        raise UnreadableRecording(
+            f"{recording.name}: first={selection.first}, stop={selection.stop} leaves none of its frames; "
+            "type nodes.source.first=0 nodes.source.stop=null"
+        )
+    poses = truth if recording.odometry is None else recording.odometry
+    driven = np.empty((0, 3)) if poses is None else as_if_driven(poses, cuts)
+    steps = np.diff(stamps[frames])
+    if isinstance(recording, LiveRecording):
+        ends = steps <= 0  # its run went on after pauses, and not where its clock was set back
+    else:
+        ends = (steps > selection.new_log_after_s * 1e9) & ~crossed(cuts, frames)
+    kind = _odometry_kind(recording, truth, guess)
+    return [LogPart(recording, part, driven, truth, kind) for part in np.split(frames, np.flatnonzero(ends) + 1)]
+
+
+def _odometry_kind(recording: Recording, truth: Array | None, guess: bool) -> OdometryKind:
+    if recording.odometry is not None:
+        return "measured"
+    if guess or isinstance(recording, LiveRecording):  # which knew no true pose before its time
+        return "guessed"
+    return "synthetic" if truth is not None and np.isfinite(truth).all() else "guessed"

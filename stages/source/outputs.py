@@ -1,0 +1,38 @@
+"""What a source of drives gives at every tick, whether they are recorded, happen now or are pushed."""
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Outputs, Tick
+from omninav.stages.camera.model import Camera
+from omninav.stages.values.image import Image
+from omninav.stages.values.pose import BridgedMotion, Motion, Pose
+from omninav.stages.values.requests import GoalPoint, Restart
+from omninav.stages.values.scan import Scan
+
+Array = npt.NDArray[np.float64]
+
+
+class DriveOutputs(Outputs):
+    """An image, how it is to be read, and what else is known at its time."""
+
+    tick: Tick
+    image: Image
+    camera: Camera
+    odometry: Pose | None = None
+    motion: Motion | None = None
+    truth: Pose | None = None
+    scan: Scan | None = None
+    restart: Restart | None = None
+    goal: GoalPoint | None = None
+
+
+def motion_of(increment: Array, unmeasured_s: float = 0.0) -> Motion:
+    """An increment (3,) as a value; a bridged one where some of it was not measured."""
+    x, y, turn = (float(value) for value in increment)
+    return BridgedMotion(x, y, turn, unmeasured_s) if unmeasured_s else Motion(x, y, turn)
+
+
+def pose_of(row: Array | None) -> Pose | None:
+    """A pose (3,) as a value; None where it is not known."""
+    return None if row is None or not np.isfinite(row).all() else Pose(*(float(value) for value in row))
