@@ -1,32 +1,33 @@
 """Similarity as the mean intersection of the segments' histograms."""
 
+import numpy as np
+import numpy.typing as npt
+
 from omninav.pipeline import Context, Stage
 from omninav.stages.geometry.appearance.segments import similarities
-from omninav.stages.values.belief import Particles
-from omninav.stages.values.features import SegmentHistograms
-from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.candidates import Candidates
+from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.similarity import Similarities
 
-from .candidates import NearBelief, check_same_kind
+from .reference_match import ReferenceMatch
 
 
-class HistogramIntersection(NearBelief, Stage):
+class HistogramIntersection(ReferenceMatch, Stage):
     """Similarity as the mean intersection of all segments' histograms; no segment is left out.
 
     The non-selective alternative of Gross & Koenig 2004, section 2. Raises BadInput where the map has other features.
     """
 
-    def step(
-        self,
-        ctx: Context,
-        features: SegmentHistograms,
-        map: ReferenceGraph,
-        near: Particles | None = None,
-        length_scale: LengthScale | None = None,
-    ) -> NearBelief.Out:
+    def step(  # type: ignore[override]
+        self, ctx: Context, features: SegmentHistograms, map: ReferenceGraph, candidates: Candidates | None = None
+    ) -> ReferenceMatch.Out:
         """Compare one view."""
-        check_same_kind(features, map)
-        chosen, sampling_weight = self.candidates(ctx, map, near, length_scale)
-        values = similarities(map.features, features.values, self.headings, True, False, chosen=chosen)
-        return self.Out(similarities=Similarities(values, chosen, sampling_weight, exponent=0.0))
+        return super().step(ctx, features, map, candidates)
+
+    def _compare(
+        self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
+    ) -> npt.NDArray[np.float32]:
+        return similarities(map.features, features.values, self.headings, True, False, chosen=chosen)
+
+    def _how_compared(self, features: SegmentFeatures) -> tuple[float | None, float | None]:
+        return 0.0, None

@@ -1,32 +1,23 @@
 """Similarity by the Euclidean distance of whole views."""
 
-from omninav.pipeline import Context, Stage
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Stage
 from omninav.stages.geometry.appearance.segments import euclidean_similarities
-from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures
-from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.similarity import Similarities
 
-from .candidates import NearBelief, check_same_kind
+from .reference_match import ReferenceMatch
 
 
-class L2Match(NearBelief, Stage):
+class L2Match(ReferenceMatch, Stage):
     """Similarity by the L2 norm of the whole difference vector: 1 is equal, 0 the largest possible difference.
 
     The non-selective method of Gross & Koenig 2004, section 2. Raises BadInput where the map has other features.
     """
 
-    def step(
-        self,
-        ctx: Context,
-        features: SegmentFeatures,
-        map: ReferenceGraph,
-        near: Particles | None = None,
-        length_scale: LengthScale | None = None,
-    ) -> NearBelief.Out:
-        """Compare one view."""
-        kind = check_same_kind(features, map)
-        chosen, sampling_weight = self.candidates(ctx, map, near, length_scale)
-        values = euclidean_similarities(map.features, features.values, self.headings, kind, chosen)
-        return self.Out(similarities=Similarities(values, chosen, sampling_weight))
+    def _compare(
+        self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
+    ) -> npt.NDArray[np.float32]:
+        return euclidean_similarities(map.features, features.values, self.headings, features.kind, chosen)

@@ -6,18 +6,17 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Stage
+from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import LANES, turned_views
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.values.belief import Particles
+from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentHistograms
-from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Answers, Similarities
 
-from .candidates import NearBelief, check_same_kind
+from .reference_match import check_same_kind
 
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
@@ -98,7 +97,7 @@ def window_turns(directions: npt.NDArray[np.float64]) -> Ints:
     return windows
 
 
-class Retrieval(NearBelief, Stage):
+class Retrieval(Stage):
     """Similarity of image retrieval: the intersection of histograms divided by the query's sum.
 
     Wolf, Burgard & Burkhardt 2005, section IV, equation 5: sum min(q, d) / sum q, the mean over a panorama's segments,
@@ -107,23 +106,19 @@ class Retrieval(NearBelief, Stage):
     BadInput where the map has other features.
     """
 
-    radius: Annotated[float, Bounds(ge=0)] = 0.0
-    """Distance from a particle, in length scales, within which references are compared; 0: all, as in the paper."""
+    headings: Annotated[int, Bounds(ge=1)] = 36
+    """Headings at which each reference is compared, evenly spaced over the circle."""
     best: Annotated[int, Bounds(ge=1)] = 9
     """References in `answers`, each at its best heading."""
 
-    class Out(NearBelief.Out):
+    class Out(Outputs):
         """Similarities of view and references, and the most similar references."""
 
+        similarities: Similarities
         answers: Answers | None = None
 
     def step(
-        self,
-        ctx: Context,
-        features: SegmentHistograms,
-        map: ReferenceGraph,
-        near: Particles | None = None,
-        length_scale: LengthScale | None = None,
+        self, ctx: Context, features: SegmentHistograms, map: ReferenceGraph, candidates: Candidates | None = None
     ) -> Out:
         """Query the map with one view."""
         if features.directions is None:
@@ -133,9 +128,9 @@ class Retrieval(NearBelief, Stage):
         else:
             check_same_kind(SegmentHistograms(features.values[:1]), map)
             queries = features.values[window_turns(features.directions), None]
-        chosen, sampling_weight = self.candidates(ctx, map, near, length_scale)
-        values = normalised_intersections(map.features, queries, features.scales, chosen)
-        similarities = Similarities(values, chosen, sampling_weight)
+        candidates = candidates or Candidates()
+        values = normalised_intersections(map.features, queries, features.scales, candidates.references)
+        similarities = Similarities(values, candidates.references, candidates.sampling_weight)
         if not len(map) or not ctx.is_read("answers"):
             return self.Out(similarities=similarities)
         return self.Out(similarities=similarities, answers=best_answers(similarities, self.best))

@@ -2,18 +2,18 @@
 
 from typing import Annotated, Literal
 
-from omninav.pipeline import Bounds, Context, Stage
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Stage
 from omninav.stages.geometry.appearance.segments import EXPONENTS, MAX_COLOUR_DISTANCE, MAX_DISTANCES, similarities
-from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures
-from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.similarity import Similarities
 
-from .candidates import NearBelief, check_same_kind
+from .reference_match import ReferenceMatch
 
 
-class SelectiveMatch(NearBelief, Stage):
+class SelectiveMatch(ReferenceMatch, Stage):
     """Similarity of the k best segments only, so that occluded ones do not count.
 
     Gross & Koenig 2004, section 2: S = max_k (sum of the k largest s_j) sqrt(1 / (k n)) over all k (erratum 21 in
@@ -29,19 +29,13 @@ class SelectiveMatch(NearBelief, Stage):
     """Difference of mean colours (blue-green-red, 0..255) at which segments have similarity 0; by default the largest
     possible, sqrt(3) 255, which leaves no segment out (experiment omniview_mcl/colour_scale)."""
 
-    def step(
-        self,
-        ctx: Context,
-        features: SegmentFeatures,
-        map: ReferenceGraph,
-        near: Particles | None = None,
-        length_scale: LengthScale | None = None,
-    ) -> NearBelief.Out:
-        """Compare one view."""
-        kind = check_same_kind(features, map)
-        chosen, sampling_weight = self.candidates(ctx, map, near, length_scale)
-        exponent, scale = EXPONENTS[self.penalty], self.colour_scale if kind == "colours" else MAX_DISTANCES[kind]
-        values = similarities(
-            map.features, features.values, self.headings, kind == "histograms", True, exponent, chosen, scale
-        )
-        return self.Out(similarities=Similarities(values, chosen, sampling_weight, exponent, scale))
+    def _compare(
+        self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
+    ) -> npt.NDArray[np.float32]:
+        exponent, scale = self._how_compared(features)
+        histograms = features.kind == "histograms"
+        return similarities(map.features, features.values, self.headings, histograms, True, exponent, chosen, scale)
+
+    def _how_compared(self, features: SegmentFeatures) -> tuple[float, float]:
+        kind = features.kind
+        return EXPONENTS[self.penalty], self.colour_scale if kind == "colours" else MAX_DISTANCES[kind]

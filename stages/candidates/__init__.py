@@ -1,0 +1,1 @@
+"""Which views of the map are compared with the present one."""

@@ -1,0 +1,61 @@
+"""Selects the references near a belief, and a sample of the others."""
+
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.plane.point_cells import sort_into_cells, within
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.candidates import Candidates
+from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.maps import ReferenceGraph
+
+from .background import with_background
+
+
+class NearBelief(Stage):
+    """Selects the references within a radius of any particle, and a sample of the others as background.
+
+    Around recovery particles only the nearest references are taken: they lie all over the map, and only the nearest
+    matter to them. All references are compared where there is no belief, where none is near it, and in a small map.
+    Radii are in appearance length scales (port `length_scale`).
+    """
+
+    radius: Annotated[float, Bounds(ge=0)] = 4.5
+    """Distance from a particle, in length scales, within which references are compared; 0: all. A sensor that looks
+    farther misses some."""
+    recovery_radius: Annotated[float, Bounds(ge=0)] = 1.0
+    """The same around recovery particles."""
+    background_references: Annotated[int, Bounds(ge=0)] = 256
+    """References compared of all others, a different sample at each image."""
+    compare_all_up_to: Annotated[int, Bounds(ge=0)] = 1000
+    """References of a map up to which all are compared."""
+    length_scale_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """Appearance length scale where the port `length_scale` is not wired."""
+
+    class Out(Outputs):
+        """The references to compare with the view."""
+
+        candidates: Candidates
+
+    def setup(self, ctx: Context) -> None:
+        """Forget the cells of an earlier map."""
+        self._map: ReferenceGraph | None = None
+        self._length = 0
+
+    def step(
+        self, ctx: Context, map: ReferenceGraph, near: Particles | None = None, length_scale: LengthScale | None = None
+    ) -> Out:
+        """Select the references for one view."""
+        if near is None or self.radius <= 0.0 or len(map) <= self.compare_all_up_to:
+            return self.Out(candidates=Candidates())
+        unit = self.length_scale_m if length_scale is None else length_scale.metres
+        if map is not self._map or len(map) != self._length:
+            self._cells = sort_into_cells(map.poses, self.radius * unit)
+            self._map, self._length = map, len(map)
+        tracked = len(near.poses) - near.recovery_particles
+        around = within(self._cells, near.poses[:tracked], self.radius * unit)
+        recovering = within(self._cells, near.poses[tracked:], self.recovery_radius * unit)
+        chosen = np.union1d(around, recovering)
+        return self.Out(candidates=with_background(chosen, len(map), self.background_references, ctx.tick.index))

@@ -1,0 +1,65 @@
+"""What all comparisons of a view with the references of a map have in common."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.values.candidates import Candidates
+from omninav.stages.values.features import SegmentFeatures
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.similarity import Similarities
+
+
+@dataclass(kw_only=True, eq=False)
+class ReferenceMatch(ABC):
+    """Compares a view with a map's references at all headings: a mixin, beside `Stage`.
+
+    Without `candidates` all references are compared.
+    """
+
+    headings: Annotated[int, Bounds(ge=1)] = 36
+    """Headings at which each reference is compared, evenly spaced over the circle."""
+
+    class Out(Outputs):
+        """Similarities of view and references."""
+
+        similarities: Similarities
+
+    def step(
+        self, ctx: Context, features: SegmentFeatures, map: ReferenceGraph, candidates: Candidates | None = None
+    ) -> Out:
+        """Compare one view."""
+        check_same_kind(features, map)
+        candidates = candidates or Candidates()
+        values = self._compare(map, features, candidates.references)
+        return self.Out(
+            similarities=Similarities(
+                values, candidates.references, candidates.sampling_weight, *self._how_compared(features)
+            )
+        )
+
+    @abstractmethod
+    def _compare(
+        self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
+    ) -> npt.NDArray[np.float32]:
+        """Similarities to the chosen references, None for all: (chosen, headings)."""
+
+    def _how_compared(self, features: SegmentFeatures) -> tuple[float | None, float | None]:
+        """`exponent` and `colour_scale` of the similarities."""
+        return None, None
+
+
+def check_same_kind(features: SegmentFeatures, map: ReferenceGraph) -> None:
+    """Raises BadInput where view and map are described by different features."""
+    kind = features.kind
+    shape = tuple(map.features.shape[1:])
+    if len(map) and (map.kind != kind or shape != features.values.shape):
+        raise BadInput(
+            f"map: its views are {map.kind} of {shape[0]} segments x {shape[1]} bins, the current one is {kind} of "
+            f"{features.values.shape[0]} x {features.values.shape[1]}; learn the map anew with these features"
+        )

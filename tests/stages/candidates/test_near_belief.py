@@ -1,0 +1,134 @@
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.candidates.near_belief import NearBelief
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.candidates import Candidates
+from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.maps import ReferenceGraph
+
+
+def a_map(number: int = 400, spacing: float = 0.1) -> ReferenceGraph:
+    rng = np.random.default_rng(0)
+    poses = np.column_stack([spacing * np.arange(number), np.zeros(number), rng.uniform(-3, 3, number)])
+    return ReferenceGraph(
+        poses, np.zeros((number, 1, 1), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth"
+    )
+
+
+def particles_at(x: float, y: float = 0.0, number: int = 50) -> Particles:
+    poses = np.random.default_rng(1).normal((x, y, 0.0), (0.05, 0.05, 0.1), (number, 3))
+    return Particles(poses, np.full(number, 1 / number))
+
+
+def gaps_to(map: ReferenceGraph, belief: Particles) -> np.ndarray:
+    return np.hypot(*(map.poses[:, None, :2] - belief.poses[:, :2]).transpose(2, 0, 1)).min(axis=1)
+
+
+def near(
+    map: ReferenceGraph, belief: Particles, radius: float, recovery: float = 0.0, background: int = 20, turn: int = 3
+) -> Candidates:
+    stage = NearBelief(
+        radius=radius,
+        recovery_radius=recovery,
+        background_references=background,
+        compare_all_up_to=0,
+        length_scale_m=1.0,
+    )
+    ctx = Context("candidates")
+    ctx.tick = Tick(index=turn, stamp=0)
+    stage.setup(ctx)
+    return stage.step(ctx, map, belief).candidates
+
+
+def chosen(candidates: Candidates) -> tuple[np.ndarray, np.ndarray]:
+    assert candidates.references is not None
+    assert candidates.sampling_weight is not None
+    return candidates.references, candidates.sampling_weight
+
+
+@pytest.mark.parametrize("radius", [0.4, 1.0, 3.0])
+def test_near_a_belief_every_reference_within_the_radius_is_compared_for_itself(radius: float) -> None:
+    map, belief = a_map(), particles_at(8.0)
+    references, weight = chosen(near(map, belief, radius))
+    gap = gaps_to(map, belief)
+    inside = np.flatnonzero(gap <= radius)
+    assert set(inside) <= set(references)
+    assert (weight[np.isin(references, inside)] == 1).all()
+    assert (gap[references] > 1.36 * radius).sum() <= 20
+    assert (np.diff(references) > 0).all()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_references_scattered_over_the_plane_are_found_by_their_distance(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    map = a_map(3000)
+    map.poses[:, :2] = rng.normal(0, 30, (3000, 2))
+    belief = Particles(np.concatenate([rng.normal(0, 20, (40, 2)), np.zeros((40, 1))], axis=1), np.full(40, 1 / 40))
+    references, _ = chosen(near(map, belief, 2.0, background=0))
+    gap = gaps_to(map, belief)
+    assert set(np.flatnonzero(gap <= 2.0)) <= set(references)
+    assert gap[references].max() <= 1.36 * 2.0
+
+
+def test_around_recovery_particles_only_the_nearest_references_are_compared() -> None:
+    map, tracked, hypotheses = a_map(), particles_at(8.0), particles_at(30.0)
+    poses = np.concatenate([tracked.poses, hypotheses.poses])
+    belief = Particles(poses, np.full(len(poses), 1 / len(poses)), recovery_particles=len(hypotheses.poses))
+    references, weight = chosen(near(map, belief, 3.0, 0.5, background=0))
+    inside = (gaps_to(map, tracked) <= 3.0) | (gaps_to(map, hypotheses) <= 0.5)
+    assert set(np.flatnonzero(inside)) <= set(references)
+    farther = (gaps_to(map, tracked) <= 1.36 * 3.0) | (gaps_to(map, hypotheses) <= 1.36 * 0.5)
+    assert set(references) <= set(np.flatnonzero(farther))
+    assert (weight == 1).all()
+    alone, _ = chosen(near(map, belief, 3.0, 0.0, background=0))
+    without, _ = chosen(near(map, tracked, 3.0, 0.5, background=0))
+    assert set(alone) == set(without)
+
+
+def test_background_references_represent_the_whole_map_and_all_come_up() -> None:
+    map, belief = a_map(), particles_at(8.0)
+    seen: set[int] = set()
+    value = np.random.default_rng(0).random(400)
+    sums = []
+    for turn in range(200):
+        references, weight = chosen(near(map, belief, 1.0, turn=turn))
+        assert weight.sum() == pytest.approx(400)
+        seen |= set(references)
+        sums.append((value[references] * weight).sum())
+    assert len(seen) == 400
+    # A sum over the map, estimated turn by turn, is right on average.
+    assert np.mean(sums) == pytest.approx(value.sum(), rel=0.005)
+
+
+def test_all_are_compared_where_none_is_near_and_without_a_belief() -> None:
+    assert near(a_map(), particles_at(500.0), 2.0).references is None
+    assert NearBelief(compare_all_up_to=0).step(Context("candidates"), a_map()).candidates.references is None
+
+
+def test_the_radius_is_in_length_scales_of_the_map() -> None:
+    map, belief = a_map(800), particles_at(30.0)
+    compared = []
+    for metres in (0.1, 0.5, 2.0):
+        stage, ctx = NearBelief(background_references=10, compare_all_up_to=0), Context("candidates")
+        stage.setup(ctx)
+        references, _ = chosen(stage.step(ctx, map, belief, LengthScale(metres)).candidates)
+        assert set(np.flatnonzero(gaps_to(map, belief) <= 4.5 * metres)) <= set(references)
+        compared.append(len(references))
+    assert compared[0] < 40 < compared[1] < 130 < compared[2]
+
+
+def test_small_maps_are_always_compared_whole() -> None:
+    stage = NearBelief(compare_all_up_to=400)
+    assert stage.step(Context("candidates"), a_map(), particles_at(8.0)).candidates.references is None
+
+
+def test_references_added_to_a_map_are_found() -> None:
+    map, belief, ctx = a_map(), particles_at(8.0), Context("candidates")
+    stage = NearBelief(radius=1.0, background_references=0, compare_all_up_to=0, length_scale_m=1.0)
+    stage.setup(ctx)
+    before, _ = chosen(stage.step(ctx, map, belief).candidates)
+    map.append("poses", np.array([8.0, 0.5, 0.0]))
+    after, _ = chosen(stage.step(ctx, map, belief).candidates)
+    assert set(after) - set(before) == {400}
