@@ -68,7 +68,8 @@ def make_message(msgtype: str, fields: Mapping[str, Any], stamp: int | None = No
     for name in fields:
         if name not in definitions:
             raise LogError(f"{msgtype}: no field '{name}'{_nearest(name, definitions)}")
-    values = {name: _make_field(definition, fields.get(name)) for name, definition in definitions.items()}
+    kinds = _kinds()
+    values = {name: _make_field(definition, fields.get(name), kinds) for name, definition in definitions.items()}
     if stamp is not None and "header" in definitions:
         seconds, nanoseconds = divmod(stamp, 1_000_000_000)
         values["header"].stamp.sec, values["header"].stamp.nanosec = (
@@ -78,24 +79,31 @@ def make_message(msgtype: str, fields: Mapping[str, Any], stamp: int | None = No
     return store.types[msgtype](**values)
 
 
-def _make_field(definition: Any, value: Any) -> Any:
+@cache
+def _kinds() -> Any:
     from rosbags.interfaces import Nodetype
 
+    return Nodetype
+
+
+def _make_field(definition: Any, value: Any, kinds: Any) -> Any:
     kind, detail = definition
-    if kind == Nodetype.NAME:
+    if kind == kinds.NAME:
         return make_message(detail, value or {}) if value is None or isinstance(value, Mapping) else value
-    if kind == Nodetype.BASE:
+    if kind == kinds.BASE:
         name = detail[0]
         empty: Any = "" if name in ("string", "wstring") else False if name == "bool" else 0
         return empty if value is None else value
     inner, count = detail
-    if inner[0] == Nodetype.BASE and inner[1][0] not in ("string", "wstring"):
+    if inner[0] == kinds.BASE and inner[1][0] not in ("string", "wstring"):
         dtype = np.dtype({"octet": "uint8", "byte": "uint8", "char": "uint8"}.get(inner[1][0], inner[1][0]))
         if value is None:
-            return np.zeros(count if kind == Nodetype.ARRAY else 0, dtype)
+            return np.zeros(count if kind == kinds.ARRAY else 0, dtype)
         return np.frombuffer(value, dtype) if isinstance(value, (bytes, memoryview)) else np.asarray(value, dtype)
-    length = count if kind == Nodetype.ARRAY else 0
-    return [_make_field(inner, item) for item in (value if value is not None else [None] * length)]
+    if value and inner[0] == kinds.NAME and not isinstance(value[0], Mapping):  # message objects already
+        return value
+    length = count if kind == kinds.ARRAY else 0
+    return [_make_field(inner, item, kinds) for item in (value if value is not None else [None] * length)]
 
 
 def _nearest(name: str, names: Collection[str]) -> str:

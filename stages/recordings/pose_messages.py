@@ -44,7 +44,12 @@ def pose_messages(poses: Array) -> list[Any]:
 
 def path_message(stamps: Sequence[int], poses: Array, now: int) -> Fields:
     """A nav_msgs/Path in the map frame: poses (N, 3) at stamps (N,); `now` is its own stamp (ns)."""
-    rows = [{"header": header(stamp), "pose": ros_pose(pose)} for stamp, pose in zip(stamps, poses, strict=True)]
+    types = standard_types().types
+    stamped, head, time = (
+        types[name] for name in ("geometry_msgs/msg/PoseStamped", "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
+    )
+    heads = [head(time(*divmod(stamp, 10**9)), MAP) for stamp in stamps]
+    rows = [stamped(at, pose) for at, pose in zip(heads, pose_messages(poses), strict=True)]
     return {"header": header(now), "poses": rows}
 
 

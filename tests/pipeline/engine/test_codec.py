@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as arrays
 import toys
 from omninav.pipeline.engine.artifact import read_artifact, read_header, write_artifact
 from omninav.pipeline.engine.codec import BadEncoding, decode, encode, seal, unseal
-from omninav.pipeline.engine.disk_sequence import DiskSequence
+from omninav.pipeline.engine.disk_sequence import DiskSequence, Present
 from omninav.pipeline.graph.problems import BadInput
 
 plain = st.recursive(
@@ -85,6 +85,21 @@ def test_a_spool_is_read_lazily_and_cut_back_to_a_length(tmp_path: Path):
     assert len(again) == 5
     with pytest.raises(BadEncoding, match="shorter than its checkpoint"):
         again.cut(size + 1)
+
+
+def test_a_spool_that_was_read_is_cut_and_goes_on(tmp_path: Path):
+    spool = DiskSequence(tmp_path / "arrays.spool")
+    sizes = []
+    for number in range(6):  # each longer than a block
+        sizes.append(spool.size)
+        spool.append(toys.Big(np.full((1, 100_000), number)) if number % 2 else None)
+    assert list(spool.present()) == [1, 3, 5]
+    assert [int(big.array[0, -1]) for big in Present(spool)] == [1, 3, 5]
+    spool.cut(sizes[5])
+    spool.append(toys.Big(np.full((1, 100_000), 7)))
+    spool.append(None)
+    assert [int(big.array[0, 0]) for big in Present(spool)] == [1, 3, 7]
+    spool.verify(7)
 
 
 def test_an_artifact_comes_back_with_its_facts_and_opens_in_numpy(tmp_path: Path):

@@ -1,12 +1,14 @@
 import numpy as np
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from result_of import write_result
+from result_of import messages_of, write_result
 from rosbags.highlevel import AnyReader
 from small_run import collected, small_run
 
 from omninav.pipeline import Context, Tick
+from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.plots.result_log import ResultLog
 from omninav.stages.plots.thin_belief import ThinBelief, thin
 from omninav.stages.plots.trajectory_file import TrajectoryFile
 from omninav.stages.recordings.pose_messages import covariance_6x6
@@ -92,6 +94,17 @@ def test_the_same_run_gives_the_same_log_byte_for_byte(tmp_path):
     (tmp_path / "b").mkdir()
     first, second = (write_result(tmp_path / name, small_run(frames=5)) for name in "ab")
     assert first.read_bytes() == second.read_bytes()
+
+
+def test_a_long_run_keeps_every_pose_and_some_views(tmp_path):
+    run = small_run(frames=7)
+    ResultLog(max_views=3).step(Context("log", folder=tmp_path), run.drive, messages_of(run))
+    stamps: dict[str, list[int]] = {}
+    for record in LogReader(tmp_path / "result.mcap").scan():
+        stamps.setdefault(record.topic, []).append(record.log_time)
+    every = [tick.stamp for tick in run.ticks]
+    assert stamps["/tf"] == stamps["/ground_truth/pose"] == every
+    assert stamps["/belief"] == every[::3]
 
 
 def test_a_covariance_stands_where_ros_wants_it():
