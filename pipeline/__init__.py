@@ -3,6 +3,7 @@
 from .graph.problems import BadInput, Problem, ProblemsFound
 from .graph.results import Figure, Metrics, Quantity, Table
 from .graph.stage import Bounds, Context, Outputs, Source, Stage, State, Truth
+from .graph.stored_rows import StoredRows
 from .graph.value import Tick, Value
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "Source",
     "Stage",
     "State",
+    "StoredRows",
     "Table",
     "Tick",
     "Truth",

@@ -74,7 +74,7 @@ def compose(*words: str, **settings: Any) -> Configuration:
 
 def check(*words: str, **settings: Any) -> Configuration:
     """`compose`, and open every file that the run would read, so that nothing is found to be missing later."""
-    from omninav.pipeline.engine.artifact import read_artifact
+    from omninav.pipeline.engine.artifact import check_artifact
     from omninav.pipeline.run.inputs import refuse_missing
     from omninav.pipeline.run.plan import input_digests
 
@@ -83,7 +83,7 @@ def check(*words: str, **settings: Any) -> Configuration:
     input_digests(made.plan)
     for artifact in made.plan.artifacts:
         if artifact.file is not None:
-            read_artifact(artifact.file)
+            check_artifact(artifact.file)
     return made
 
 

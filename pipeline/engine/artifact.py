@@ -15,28 +15,32 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.files import whole_file
-from omninav.pipeline.graph.contents import misfit
+from omninav.pipeline.graph.contents import misfit, stored_fields
 from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.stored_rows import StoredRows
 from omninav.pipeline.graph.value import VALUE_TYPES, Value, value_name
 
+from .chunks import Front, Unfit, parse_npy_head, sums_of, write_front, write_npy
 from .codec import BadEncoding, decode, encode, field_names
 
-FORMAT = 1
+FORMAT = 2
+"""The newest; 1, which is the same without a front, is read and, of values without one, written too."""
 OWN_PACKAGE = __name__.partition(".")[0]
-_HEADER, _REST, _SUM = "header.json", "rest.npy", "sha256:"
+_HEADER, _SUM = "header.json", "sha256:"
 UNPACKED_BYTES, UNPACKED_RATIO = 1 << 26, 64
 """How many bytes a file may unpack to: that many, or that many times its own."""
-_NPY_HEAD, _STEP = 1 << 16, 1 << 20
-_EMPTY_ROWS = 1 << 24
-"""Rows that an array without any bytes may have: whoever goes through them row by row comes to an end."""
+_FRONT, _SUMS = "front:", "chunk_sums"
+_SUM_BYTES, _FRONT_BYTES = len(_SUM) + 64, len(_FRONT) + 16
+_NPY_HEAD, _STEP, _ROWS = 1 << 16, 1 << 20, 1 << 12
 
 
 def write_artifact(path: Path, value: Value, facts: dict[str, Any] | None = None) -> None:
-    """Write a value as one file: a deflated zip of `.npy` arrays with a JSON header, its sha256 as comment.
+    """Write a value as one file: a zip of `.npy` arrays with a JSON header, its sha256 as comment.
 
     Arrays go to the file piece by piece, so that a large value needs no memory twice. `numpy.load` opens it. The header
     names the value's type, each field's array with its own sha256, and `facts` about how it was made. Top-level array
-    fields are arrays of the file; everything else is encoded in one more.
+    fields are arrays of the file; everything else is encoded in one more. Arrays are deflated. Those of a value of
+    which a field may be `StoredRows` are not: they lie in the front of the file, summed in chunks (see `chunks`).
     """
     with whole_file(path) as part, part.open("w+b") as file:
         _write(file, value, facts)
@@ -51,27 +55,34 @@ def artifact_bytes(value: Value, facts: dict[str, Any] | None = None) -> bytes:
 
 def _write(file: BinaryIO, value: Value, facts: dict[str, Any] | None) -> None:
     fields = {name: getattr(value, name) for name in field_names(value)}
-    arrays = {name: np.ascontiguousarray(field) for name, field in fields.items() if isinstance(field, np.ndarray)}
+    arrays = {name: field for name, field in fields.items() if isinstance(field, np.ndarray | StoredRows)}
     rest = {name: field for name, field in fields.items() if name not in arrays}
-    arrays["rest"] = np.frombuffer(encode(rest), dtype=np.uint8)
-    header = {
-        "format": FORMAT,
+    front = arrays if stored_fields(type(value)) else {}
+    packed = {name: np.ascontiguousarray(array) for name, array in arrays.items() if name not in front}
+    packed["rest"] = np.frombuffer(encode(rest), dtype=np.uint8)
+    header: dict[str, Any] = {
+        "format": FORMAT if front else FORMAT - 1,
         "type": value_name(type(value)),
         "facts": facts or {},
-        "arrays": {name: hashlib.sha256(_bytes_of(array)).hexdigest() for name, array in arrays.items()},
+        "arrays": {name: hashlib.sha256(_bytes_of(array)).hexdigest() for name, array in packed.items()},
+        **({"front": sorted(front)} if front else {}),
     }
+    end = 0
     with zipfile.ZipFile(file, "w") as archive:
+        if front:
+            end = write_front(archive, front)
+            packed[_SUMS] = sums_of(file, end)
+            header["arrays"] |= {_SUMS: hashlib.sha256(_bytes_of(packed[_SUMS])).hexdigest()}
         archive.writestr(zipfile.ZipInfo(_HEADER), json.dumps(header, indent=1, sort_keys=True))
-        for name, content in sorted(arrays.items()):
+        for name, content in sorted(packed.items()):
             entry = zipfile.ZipInfo(f"{name}.npy")
             entry.compress_type = zipfile.ZIP_DEFLATED
             with archive.open(entry, "w") as member:
-                np.lib.format.write_array_header_1_0(member, np.lib.format.header_data_from_array_1_0(content))
-                for start in range(0, content.nbytes, _STEP):
-                    member.write(_bytes_of(content)[start : start + _STEP])
-        archive.comment = b" " * (len(_SUM) + 64)
-    left, whole = file.seek(0, io.SEEK_END) - len(archive.comment), hashlib.sha256()
-    file.seek(0)
+                write_npy(member, content)
+        stated = f"{_FRONT}{end:0{_FRONT_BYTES - len(_FRONT)}}".encode() if front else b""
+        archive.comment = stated + b" " * _SUM_BYTES
+    left, whole = file.seek(0, io.SEEK_END) - _SUM_BYTES - end, hashlib.sha256()
+    file.seek(end)
     while left > 0:
         whole.update(piece := file.read(min(left, _STEP)))
         left -= len(piece)
@@ -85,57 +96,68 @@ def _bytes_of(array: npt.NDArray[Any]) -> memoryview:
 
 def read_header(path: Path) -> dict[str, Any]:
     """The header of an artifact file. Raises `BadInput` naming the file where it is missing, cut, changed or none."""
-    with _opened(path) as archive:
+    with _opened(path) as (archive, _):
         return _header(archive)
 
 
 def type_of(path: Path) -> type[Value]:
     """The type of the value in an artifact file. Raises `BadInput` where this version knows no such type."""
-    with _opened(path) as archive:
+    with _opened(path) as (archive, _):
         return _type(_header(archive))
 
 
-def read_artifact(path: Path) -> Value:
+def read_artifact(path: Path, whole: bool = False) -> Value:
     """The value in an artifact file, checked against what its fields state (see `graph.contents`).
 
+    A large array in the front of the file is read, and checked, where it is needed (`StoredRows`), or now with `whole`.
     Raises `BadInput` naming the file where it is missing, cut or changed, and where its content is no such value.
     """
-    with _opened(path) as archive:
+    with _opened(path) as (archive, end):
         header = _header(archive)
-        cls, fields = _type(header), {}
+        cls = _type(header)
+        fields: dict[str, Any] = {}
         for name, digest in header["arrays"].items():
             fields[name], found = _array(archive, f"{name}.npy")
             if found != digest:
-                raise _Unfit(f"the array '{name:.40}' is damaged (sha256 differs)")
+                raise Unfit(f"the array '{name:.40}' is damaged (sha256 differs)")
+        if end:
+            front, stored = Front(path, end, fields.pop(_SUMS)), stored_fields(cls)
+            for name in header.get("front", ()):
+                fields[name] = front.array(archive.getinfo(f"{name}.npy"), whole or name not in stored)
         try:
             value = cls(**fields | decode(fields.pop("rest").tobytes()))
         except (BadEncoding, TypeError) as error:
-            raise _Unfit(f"does not fit {cls.__name__} of this version ({error!s:.160})") from None
+            raise Unfit(f"does not fit {cls.__name__} of this version ({error!s:.160})") from None
         wrong = misfit(value)
         if wrong is not None:
-            raise _Unfit(f"it is no sound {cls.__name__}: {wrong}")
+            raise Unfit(f"it is no sound {cls.__name__}: {wrong}")
         return value
 
 
-class _Unfit(Exception):
-    """What is wrong with an artifact's content, without its file's name."""
+def check_artifact(path: Path) -> None:
+    """Read all of an artifact file once, and raise `BadInput` for whatever `read_artifact` would sooner or later."""
+    value = read_artifact(path)
+    for name in stored_fields(type(value)):
+        rows = getattr(value, name)
+        for start in range(0, len(rows), _ROWS) if isinstance(rows, StoredRows) else ():
+            rows[start : start + _ROWS]
 
 
 def _header(archive: zipfile.ZipFile) -> dict[str, Any]:
     header = json.loads(archive.read(_HEADER), parse_float=_finite, parse_constant=_finite)
-    if not isinstance(header, dict) or header.get("format") != FORMAT:
+    if not isinstance(header, dict) or header.get("format") not in (FORMAT - 1, FORMAT):
         found = header.get("format") if isinstance(header, dict) else None
-        raise _Unfit(f"written in format {found!r:.20}, this version reads {FORMAT}")
+        raise Unfit(f"written in format {found!r:.20}, this version reads up to {FORMAT}")
     for key, kind in (("type", str), ("arrays", dict), ("facts", dict)):
         if not isinstance(header.get(key), kind):
-            raise _Unfit(f"its header says no {key}")
+            raise Unfit(f"its header says no {key}")
     return header
 
 
 def _finite(text: str) -> float:
-    """A number of a header. Raises `_Unfit` where it is none that can be reckoned with."""
+    """A number of a header. Raises `Unfit` where it is none that can be reckoned with."""
     if not math.isfinite(float(text)):
-        raise _Unfit(f"its header holds {text:.20}")
+        raise Unfit(f"its header holds {text:.20}")
     return float(text)
 
 
@@ -147,9 +169,9 @@ def _type(header: Mapping[str, Any]) -> type[Value]:
             with suppress(ImportError):
                 importlib.import_module(".".join(parts[:-1]))
         if name not in VALUE_TYPES:
-            raise _Unfit(f"made with an older omninav (its '{name:.80}' is no longer known)")
+            raise Unfit(f"made with an older omninav (its '{name:.80}' is no longer known)")
     if name not in VALUE_TYPES:
-        raise _Unfit(f"holds a '{name:.80}', which is no value known here; load the stage that made it, or")
+        raise Unfit(f"holds a '{name:.80}', which is no value known here; load the stage that made it, or")
     return VALUE_TYPES[name]
 
 
@@ -161,40 +183,53 @@ def _array(archive: zipfile.ZipFile, name: str) -> tuple[npt.NDArray[Any], str]:
         while number := file.readinto(content[read : read + _STEP]):  # type: ignore[attr-defined]
             read += number
     head = io.BytesIO(content[:_NPY_HEAD])
-    if np.lib.format.read_magic(head) != (1, 0):
-        raise _Unfit("an array is in another format than 1.0")
-    shape, by_column, dtype = np.lib.format.read_array_header_1_0(head)
+    shape, dtype = parse_npy_head(head, read)
     data, count = content[head.tell() : read], math.prod(shape)
-    if dtype.hasobject or by_column or min(shape, default=0) < 0 or count * dtype.itemsize != len(data):
-        raise _Unfit("an array is not as long as it says")
-    if not data.nbytes and max(shape, default=0) > _EMPTY_ROWS:
-        raise _Unfit(f"an array of nothing has {max(shape)} rows")
     array = np.frombuffer(data, dtype, count).reshape(shape) if count else np.empty(shape, dtype)
     return array, hashlib.sha256(data).hexdigest()
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
-    """The zip in an artifact file, once its sum has been checked. What is wrong inside becomes `BadInput` too."""
+def _opened(path: Path) -> Iterator[tuple[zipfile.ZipFile, int]]:
+    """The zip in an artifact file, and where its front ends (0: it has none), once the sum of what follows is checked.
+
+    What is wrong inside becomes `BadInput` too.
+    """
     if not path.is_file():
         raise BadInput(f"{path}: there is no such file")
-    content = path.read_bytes()
-    size = len(_SUM) + 64
-    whole, comment = memoryview(content)[:-size], content[-size:]
-    if not comment.startswith(_SUM.encode()):
+    with path.open("rb") as file:
+        end, size = _checked_sum(path, file)
+        try:
+            with zipfile.ZipFile(file) as archive:
+                unpacked = sum(member.file_size for member in archive.infolist())
+                if unpacked > max(UNPACKED_BYTES, UNPACKED_RATIO * size):
+                    raise Unfit(f"it would unpack {size} bytes to {unpacked}")
+                yield archive, end
+        except Unfit as unfit:
+            raise BadInput(f"{path}: {unfit}; make it again") from None
+        except BadInput:
+            raise
+        except (
+            Exception
+        ) as error:  # a sum that is right says nothing of the content: it raises whatever it makes readers raise
+            said = " ".join(str(error).split()).strip("'\"") or type(error).__name__
+            raise BadInput(f"{path}: no sound artifact ({said:.160}); make it again") from None
+
+
+def _checked_sum(path: Path, file: BinaryIO) -> tuple[int, int]:
+    """Where an artifact file's front ends, and its size. Raises `BadInput` where the sum of the rest is wrong."""
+    size = file.seek(0, io.SEEK_END)
+    file.seek(max(0, size - _SUM_BYTES - _FRONT_BYTES))
+    front, stated = (ends := file.read())[:-_SUM_BYTES], ends[-_SUM_BYTES:]
+    if not stated.startswith(_SUM.encode()):
         raise BadInput(f"{path}: not an artifact file, or cut off at its end; make it again")
-    if comment[len(_SUM) :].decode("ascii", "replace") != hashlib.sha256(whole).hexdigest():
+    number = front.removeprefix(_FRONT.encode())
+    end = int(number) if len(number) == _FRONT_BYTES - len(_FRONT) and number.isdigit() else 0
+    whole, left = hashlib.sha256(), size - _SUM_BYTES - end
+    file.seek(end)
+    while left > 0 and (piece := file.read(min(left, _STEP))):
+        whole.update(piece)
+        left -= len(piece)
+    if stated[len(_SUM) :].decode("ascii", "replace") != whole.hexdigest():
         raise BadInput(f"{path}: damaged, its sha256 does not fit its content; make it again")
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            unpacked = sum(member.file_size for member in archive.infolist())
-            if unpacked > max(UNPACKED_BYTES, UNPACKED_RATIO * len(content)):
-                raise _Unfit(f"it would unpack {len(content)} bytes to {unpacked}")
-            yield archive
-    except _Unfit as unfit:
-        raise BadInput(f"{path}: {unfit}; make it again") from None
-    except (
-        Exception
-    ) as error:  # a sum that is right says nothing of the content: it raises whatever it makes readers raise
-        said = " ".join(str(error).split()).strip("'\"") or type(error).__name__
-        raise BadInput(f"{path}: no sound artifact ({said:.160}); make it again") from None
+    return end, size

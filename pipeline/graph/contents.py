@@ -14,6 +14,7 @@ import numpy as np
 
 from .ports import type_name
 from .stage import Bounds
+from .stored_rows import StoredRows
 from .value import Value
 
 MAX_MAGNITUDE = 1e15
@@ -111,6 +112,12 @@ def _annotations(cls: type[Any]) -> dict[str, Any]:
     return {field.name: hints[field.name] for field in dataclasses.fields(cls)}
 
 
+def stored_fields(cls: type[Any]) -> set[str]:
+    """The fields of a value class that may be `StoredRows`: they are read from its file where they are needed."""
+    kinds = {name: _split(annotation)[0] for name, annotation in _annotations(cls).items()}  # type: ignore[arg-type]
+    return {name for name, kind in kinds.items() if any(get_origin(one) is StoredRows for one in get_args(kind))}
+
+
 def _split(annotation: Any) -> tuple[Any, tuple[Any, ...]]:
     if get_origin(annotation) is Annotated:
         return get_args(annotation)[0], get_args(annotation)[1:]
@@ -128,6 +135,8 @@ def _is(thing: Any, kind: Any) -> bool:
     if origin is np.ndarray:
         wanted = get_args(arguments[1])[0] if len(arguments) > 1 and get_args(arguments[1]) else np.generic
         return isinstance(thing, np.ndarray) and thing.dtype.isnative and _is_number(thing.dtype, wanted)
+    if origin is StoredRows:
+        return isinstance(thing, StoredRows) and thing.dtype.isnative and _is_number(thing.dtype, arguments[0])
     if origin is tuple and Ellipsis not in arguments:
         return isinstance(thing, tuple) and len(thing) == len(arguments) and all(map(_is, thing, arguments))
     if origin in (tuple, list, Sequence):
@@ -149,13 +158,13 @@ def _is_number(dtype: np.dtype[Any], wanted: Any) -> bool:
 
 
 def _shown(thing: Any) -> str:
-    if isinstance(thing, np.ndarray):
+    if isinstance(thing, np.ndarray | StoredRows):
         return f"an array of {thing.dtype}"[:60]
     return type(thing).__name__ if isinstance(thing, Value | list | tuple | dict | bytes) else f"{thing!r:.40}"
 
 
 def _wrong_shape(name: str, thing: Any, shape: Shape, sizes: dict[str, int]) -> Iterator[str]:
-    given = thing.shape if isinstance(thing, np.ndarray) else (len(thing),)
+    given = thing.shape if isinstance(thing, np.ndarray | StoredRows) else (len(thing),)
     expected = f"expected {shape}"
     fits = len(given) == len(shape.sizes)
     for size, stated in zip(given, shape.sizes, strict=False):

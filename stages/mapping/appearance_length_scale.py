@@ -76,11 +76,10 @@ class AppearanceLengthScale(Stage):
             return self.default_m
         chosen = np.unique(np.linspace(0, len(map) - 1, min(self.samples, len(map))).astype(np.int64))
         histograms, scale = map.kind == "histograms", MAX_DISTANCES[map.kind]
+        views = map.features[:]
         similarity = np.stack(
             [
-                similarities(
-                    map.features, map.features[n], self.headings, histograms, False, 0.0, max_distance=scale
-                ).max(axis=1)
+                similarities(views, views[n], self.headings, histograms, False, 0.0, max_distance=scale).max(axis=1)
                 for n in chosen
             ]
         ).astype(np.float64)

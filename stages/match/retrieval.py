@@ -9,7 +9,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.geometry.appearance.segments import LANES, turned_views
+from omninav.stages.geometry.appearance.segments import LANES, Rows, turned_views
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentHistograms
@@ -23,12 +23,12 @@ Ints = npt.NDArray[np.int64]
 
 
 @compiled(nogil=True)
-def _intersect(references: Floats, chosen: Ints, query: Floats, sums: Floats, held: Ints, out: Floats) -> None:
+def _intersect(references: Floats, query: Floats, sums: Floats, held: Ints, out: Floats) -> None:
     # Turns of the query are the innermost axis: each loop over them is vector instructions.
     scales, segments, bins, lanes = query.shape
     common, total, best = np.empty(lanes, np.float32), np.empty(lanes, np.float32), np.empty(lanes, np.float32)
-    for n in range(len(chosen)):
-        reference = references[chosen[n]]
+    for n in range(len(references)):
+        reference = references[n]
         best[:] = np.float32(0)
         for own in range(scales):
             # One of the two is always taken at its first scale: scales of both at once would cancel.
@@ -50,9 +50,7 @@ def _intersect(references: Floats, chosen: Ints, query: Floats, sums: Floats, he
             out[n, h] = best[h]
 
 
-def normalised_intersections(
-    references: Floats, queries: Floats, scales: int = 1, chosen: Ints | None = None
-) -> Floats:
+def normalised_intersections(references: Rows, queries: Floats, scales: int = 1, chosen: Ints | None = None) -> Floats:
     """Similarity of a query at some turns to references: (chosen, turns) float32 in [0, 1].
 
     sum_k min(q_k, d_k) / sum_k q_k of a query's histogram q and a reference's d, in this order (Wolf, Burgard &
@@ -61,7 +59,7 @@ def normalised_intersections(
     first scale against each of the reference's, and the other way round. A segment whose query holds nothing counts as
     0. `chosen`: indices of the references to compare; None: all.
     """
-    chosen = np.arange(len(references)) if chosen is None else chosen
+    some = references[:] if chosen is None else references[chosen]
     turns, segments, length = queries.shape
     query = np.zeros((scales, segments, length // scales, -(-turns // LANES) * LANES), np.float32)
     query[..., :turns] = queries.reshape(turns, segments, scales, -1).transpose(2, 1, 3, 0)
@@ -71,8 +69,8 @@ def normalised_intersections(
     for own, j in np.ndindex(scales, segments):
         bins = np.flatnonzero(query[own, j].any(axis=1))
         held[own, j, 0], held[own, j, 1 : 1 + len(bins)] = len(bins), bins
-    out = np.empty((len(chosen), turns), np.float32)
-    _intersect(np.ascontiguousarray(references, np.float32), chosen, query, weights, held, out)
+    out = np.empty((len(some), turns), np.float32)
+    _intersect(np.ascontiguousarray(some, np.float32), query, weights, held, out)
     return np.minimum(out, np.float32(1.0))
 
 

@@ -173,7 +173,7 @@ class ExpectedObservation(NearReferences):
         return similarity_of_expected(
             poses,
             map.poses,
-            map.features,
+            map.features[:],
             self._view.values,
             isinstance(self._view, SegmentHistograms),
             self._cells,

@@ -4,6 +4,7 @@ import functools
 import hashlib
 import io
 import json
+import re
 import tempfile
 import zipfile
 from collections.abc import Sequence
@@ -15,6 +16,7 @@ import numpy as np
 from made_values import made_values
 
 from omninav.pipeline.engine.artifact import read_artifact, read_header, write_artifact
+from omninav.pipeline.engine.chunks import sums_of
 from omninav.pipeline.engine.codec import encode
 
 from .harness import Format
@@ -38,7 +40,7 @@ def samples() -> Sequence[Files]:
 
 
 def read(folder: Path, files: Files) -> Any:
-    """Header and value."""
+    """Header and value, of which large arrays stay in the file until they are searched."""
     return read_header(folder / MAP)["facts"], read_artifact(folder / MAP)
 
 
@@ -51,25 +53,40 @@ def entries_of(data: bytes) -> dict[str, bytes]:
 def sealed(entries: dict[str, bytes], level: int = 1) -> bytes:
     """A map of some files, all sums right where there is something to sum."""
     header = _plain(entries.get("header.json", b""))
-    if isinstance(header, dict) and isinstance(header.get("arrays"), dict):
-        for name in list(header["arrays"]):
-            try:
-                array = np.load(io.BytesIO(entries[f"{name}.npy"]), allow_pickle=False)
-                header["arrays"][name] = hashlib.sha256(array.tobytes()).hexdigest()
-            except Exception:
-                continue
-        entries = entries | {"header.json": json.dumps(header).encode()}
-    buffer = io.BytesIO()
+    names = header.get("front", []) if isinstance(header, dict) else []
+    front = [f"{name}.npy" for name in names if f"{name}.npy" in entries] if isinstance(names, list) else []
+    buffer, end = io.BytesIO(), 0
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=level) as archive:
+        for name in front:
+            archive.writestr(zipfile.ZipInfo(name), entries[name])
+        if front:
+            end = buffer.tell()
+            summed = io.BytesIO()
+            np.lib.format.write_array(summed, sums_of(io.BytesIO(buffer.getvalue()), end))
+            entries = entries | {"chunk_sums.npy": summed.getvalue()}
+        if isinstance(header, dict) and isinstance(header.get("arrays"), dict):
+            entries = entries | {"header.json": json.dumps(_with_sums(header, entries)).encode()}
         for name, content in entries.items():
-            archive.writestr(name, content)
-        archive.comment = b" " * (len(_SUM) + 64)
-    return summed(buffer.getvalue()[: -len(_SUM) - 64])
+            if name not in front:
+                archive.writestr(name, content)
+        archive.comment = (f"front:{end:016}" if front else "").encode() + b" " * (len(_SUM) + 64)
+    return _summed(buffer.getvalue()[: -len(_SUM) - 64], end)
 
 
-def summed(whole: bytes) -> bytes:
-    """Bytes with their sum behind them."""
-    return whole + _SUM.encode() + hashlib.sha256(whole).hexdigest().encode()
+def _with_sums(header: dict[str, Any], entries: dict[str, bytes]) -> dict[str, Any]:
+    sums = dict(header["arrays"])
+    for name in sums:
+        try:
+            array = np.load(io.BytesIO(entries[f"{name}.npy"]), allow_pickle=False)
+            sums[name] = hashlib.sha256(array.tobytes()).hexdigest()
+        except Exception:
+            continue
+    return header | {"arrays": sums}
+
+
+def _summed(whole: bytes, end: int) -> bytes:
+    """Bytes with the sum of those from `end` on behind them."""
+    return whole + _SUM.encode() + hashlib.sha256(whole[end:]).hexdigest().encode()
 
 
 def _plain(data: bytes) -> Any:
@@ -81,7 +98,18 @@ def _plain(data: bytes) -> Any:
 
 def zip_bytes(random: Random, files: Files) -> Files:
     """Damage to the zip, its sum right."""
-    return files | {MAP: summed(random.choice(BINARY)(random, files[MAP][: -len(_SUM) - 64]))}
+    whole = random.choice(BINARY)(random, files[MAP][: -len(_SUM) - 64])
+    stated = re.search(rb"front:(\d{16})$", whole)
+    return files | {MAP: _summed(whole, int(stated[1]) if stated else 0)}
+
+
+def chunks(random: Random, files: Files) -> Files:
+    """Damage to a map's front: its arrays, or what the zip says of them."""
+    data = files[MAP]
+    stated = re.search(rb"front:(\d{16})$", data[: -len(_SUM) - 64])
+    end = int(stated[1]) if stated else 0
+    damaged = random.choice(BINARY)(random, data[:end])
+    return files | {MAP: damaged[:end].ljust(end, b"\0") + data[end:]}
 
 
 def arrays(random: Random, files: Files) -> Files:
@@ -197,5 +225,5 @@ def _entries(files: Files) -> dict[str, bytes]:
         return {}
 
 
-BYTES = Format("map bytes", samples, [on(BINARY), zip_bytes, zip_bytes], read, cases=200)
+BYTES = Format("map bytes", samples, [on(BINARY), zip_bytes, zip_bytes, chunks], read, cases=200)
 CONTENT = Format("map content", samples, [arrays, arrays, arrays, members, rest, header], read, cases=400)

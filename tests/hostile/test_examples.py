@@ -46,7 +46,7 @@ def replaced(name: str, content: bytes) -> bytes:
         (without("header.json"), "no sound artifact"),
         (replaced("header.json", b"[1]"), "written in format None"),
         (replaced("edges.npy", b""), "no sound artifact"),
-        (replaced("edges.npy", bytes(10**9)), "would unpack"),
+        (replaced("rest.npy", bytes(10**9)), "would unpack"),
     ],
 )
 def test_a_map_whose_sum_is_right_over_wrong_content_is_refused_by_name(tmp_path: Path, content: bytes, said: str):

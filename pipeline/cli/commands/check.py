@@ -7,7 +7,7 @@ from typing import Any
 
 from omninav.pipeline.cli.composition import complete, composed, read_words
 from omninav.pipeline.cli.experiments import condition_words, planned_experiment
-from omninav.pipeline.engine.artifact import read_artifact
+from omninav.pipeline.engine.artifact import check_artifact
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.experiment.conditions import open_inputs
 from omninav.pipeline.experiment.runner import ExperimentRun
@@ -30,7 +30,7 @@ def command(arguments: list[str]) -> int:
     input_digests(planned)  # opens every file that the run reads
     for artifact in planned.artifacts:
         if artifact.file is not None:
-            read_artifact(artifact.file)  # whole: what is in it may not fit its header
+            check_artifact(artifact.file)
     _refuse_unwritable(planned.config)
     for graph in (*(artifact.graph for artifact in planned.artifacts if artifact.graph is not None), planned.graph):
         Engine(graph, {}, EngineOptions(planned.seed)).set_up_source()

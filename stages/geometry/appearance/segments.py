@@ -7,8 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.pipeline.graph.stored_rows import StoredRows
 
 Floats = npt.NDArray[np.float32]
+Rows = Floats | StoredRows[np.float32]
+"""Views of a map, in memory or in its file."""
 Ints = npt.NDArray[np.int64]
 
 LANES = 8
@@ -75,7 +78,6 @@ def penalties(segments: int, exponent: float) -> Floats:
 @compiled(nogil=True)
 def _compare(
     references: Floats,
-    chosen: Ints,
     query: Floats,
     histograms: bool,
     network: Ints,
@@ -89,8 +91,8 @@ def _compare(
     alike = np.empty((segments, lanes), np.float32)
     total = np.empty(lanes, np.float32)
     best = np.empty(lanes, np.float32)
-    for n in range(len(chosen)):
-        reference = references[chosen[n]]
+    for n in range(len(references)):
+        reference = references[n]
         for j in range(segments):
             row = alike[j]
             row[:] = np.float32(0)
@@ -128,7 +130,7 @@ def _compare(
 
 
 def similarities(
-    references: Floats,
+    references: Rows,
     view: Floats,
     headings: int,
     histograms: bool,
@@ -146,8 +148,8 @@ def similarities(
     means all.
     Column h is a robot heading 2 pi h / headings more than the reference's own.
     """
-    chosen = np.arange(len(references)) if chosen is None else chosen
-    out = np.empty((len(chosen), headings), np.float32)
+    some = references[:] if chosen is None else references[chosen]
+    out = np.empty((len(some), headings), np.float32)
     query = np.zeros((*view.shape, -(-headings // LANES) * LANES), np.float32)
     query[..., :headings] = turned_views(view, headings).transpose(1, 2, 0)
     segments = len(view)
@@ -158,7 +160,7 @@ def similarities(
         factors = np.zeros(segments, np.float32)
         factors[-1] = 1.0 / segments
     scale = np.float32(max_distance)
-    _compare(np.ascontiguousarray(references, np.float32), chosen, query, histograms, network, factors, scale, out)
+    _compare(np.ascontiguousarray(some, np.float32), query, histograms, network, factors, scale, out)
     return np.minimum(out, np.float32(1.0))
 
 
@@ -199,14 +201,14 @@ def _compare_many(expected: Floats, observed: Floats, network: Ints, factors: Fl
 
 
 def euclidean_similarities(
-    references: Floats, view: Floats, headings: int, kind: FeatureKind, chosen: Ints | None = None
+    references: Rows, view: Floats, headings: int, kind: FeatureKind, chosen: Ints | None = None
 ) -> Floats:
     """1 - |difference| / the largest possible one, over whole views: (chosen, headings) float32 in [0, 1].
 
     The non-selective comparison by the L2 norm of the difference vector (Gross & Koenig 2004, section 2). The largest
     difference is sqrt(2 n) for n histograms, sqrt(3 n) 255 for n colours, and 2 sqrt(n) for n unit vectors.
     """
-    some = references if chosen is None else references[chosen]
+    some = references[:] if chosen is None else references[chosen]
     query = turned_views(view, headings).reshape(headings, -1)
     flat = np.ascontiguousarray(some, np.float32).reshape(len(some), -1)
     # |a - b|^2 = a.a + b.b - 2 a.b
@@ -216,12 +218,12 @@ def euclidean_similarities(
     return np.clip(alike, 0.0, 1.0)
 
 
-def cosine_similarities(references: Floats, view: Floats, headings: int, chosen: Ints | None = None) -> Floats:
+def cosine_similarities(references: Rows, view: Floats, headings: int, chosen: Ints | None = None) -> Floats:
     """Cosine of the angle between whole views as vectors, not below 0: (chosen, headings) float32 in [0, 1].
 
     `references` (R, segments, bins), `view` (segments, bins), of any kind and length; a view of zeros is like nothing.
     """
-    some = references if chosen is None else references[chosen]
+    some = references[:] if chosen is None else references[chosen]
     query = turned_views(view, headings).reshape(headings, -1)
     flat = np.ascontiguousarray(some, np.float32).reshape(len(some), -1)
     lengths = np.linalg.norm(flat, axis=1)[:, None] * np.linalg.norm(query, axis=1)

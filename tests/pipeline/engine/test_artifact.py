@@ -68,7 +68,7 @@ def test_a_value_and_how_it_was_made_come_back(file: Path):
         ({"type": "omninav.stages.values.maps.OldMap"}, "made with an older omninav"),
         ({"type": "elsewhere.Map"}, "holds a 'elsewhere.Map', which is no value known here; load the stage"),
         ({"type": "toys.Word"}, "does not fit Word of this version"),
-        ({"format": 0}, "written in format 0, this version reads 1; make it again"),
+        ({"format": 0}, "written in format 0, this version reads up to 2; make it again"),
         ({"facts": {"variant": float("inf")}}, "its header holds Infinity"),
     ],
 )
