@@ -11,6 +11,7 @@ from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels
 
+from .grey_world import UnderGreyWorld
 from .segments import segment_edges
 
 Floats = npt.NDArray[np.float32]
@@ -81,7 +82,7 @@ def colour_histograms(
     return counted
 
 
-class ColourHistogram(Stage):
+class ColourHistogram(UnderGreyWorld, Stage):
     """Describes a panorama by a histogram of a colour space's channels per segment.
 
     Gross & Koenig 2004, section 2: the authors "experimentally studied several color spaces" before they settled on HSV
@@ -116,5 +117,6 @@ class ColourHistogram(Stage):
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:
         """Describe one panorama."""
-        histograms = colour_histograms(panorama.pixels, self.segments, self.space, self.bins, self.joint, self.ranges)
+        pixels = self.constant(panorama.pixels)
+        histograms = colour_histograms(pixels, self.segments, self.space, self.bins, self.joint, self.ranges)
         return self.Out(features=SegmentHistograms(histograms))

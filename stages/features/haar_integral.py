@@ -14,6 +14,7 @@ from omninav.stages.geometry.appearance.haar_integrals import AngularWeights, Ke
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels, Windows
 
+from .grey_world import UnderGreyWorld
 from .segments import segment_edges
 
 Array = npt.NDArray[np.float64]
@@ -100,7 +101,7 @@ def usable_pixels(shape: tuple[int, int], by: int, crop_rows: bool, crop_columns
     return usable
 
 
-class HaarIntegral(Stage):
+class HaarIntegral(UnderGreyWorld, Stage):
     """Describes a view by histograms of Haar integrals, invariant to rotation and shift.
 
     Wolf, Burgard & Burkhardt 2005, section IV. A kernel (r1, r2) is f = M(0, r1) M(r2, at 90 degrees); it is averaged
@@ -156,12 +157,13 @@ class HaarIntegral(Stage):
         if isinstance(panorama, Windows):
             seen = [None] * len(panorama.pixels) if panorama.seen is None else list(panorama.seen)
             values = [
-                self._described(ctx, pixels, 1, self._binning(8), part, errors)[0]
+                self._described(ctx, self.constant(pixels, circle=False), 1, self._binning(8), part, errors)[0]
                 for pixels, part in zip(panorama.pixels, seen, strict=True)
             ]
             features = SegmentHistograms(np.stack(values), panorama.headings, len(self.scales))
         else:
-            described = self._described(ctx, panorama.pixels, self.segments, self._binning(5), None, errors, True)
+            pixels = self.constant(panorama.pixels)
+            described = self._described(ctx, pixels, self.segments, self._binning(5), None, errors, True)
             features = SegmentHistograms(described, scales=len(self.scales))
         if not errors:
             return self.Out(features=features)

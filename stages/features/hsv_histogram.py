@@ -11,6 +11,7 @@ from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.image import Panorama, Pixels
 
+from .grey_world import UnderGreyWorld
 from .segments import segment_edges
 
 Floats = npt.NDArray[np.float32]
@@ -97,7 +98,7 @@ def hsv_histograms(
     )
 
 
-class HsvHistogram(Stage):
+class HsvHistogram(UnderGreyWorld, Stage):
     """Describes a panorama by a histogram of hue and brightness per segment.
 
     Gross & Koenig 2004, section 2. Pixels without a hue count by their value alone. Each segment sums to 1, so that
@@ -126,7 +127,7 @@ class HsvHistogram(Stage):
     def step(self, ctx: Context, panorama: Panorama) -> Out:
         """Describe one panorama."""
         histograms = hsv_histograms(
-            panorama.pixels,
+            self.constant(panorama.pixels),
             self.segments,
             self.hue_bins,
             self.value_bins,

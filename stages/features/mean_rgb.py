@@ -9,6 +9,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.values.features import SegmentColours
 from omninav.stages.values.image import Panorama, Pixels
 
+from .grey_world import UnderGreyWorld
 from .segments import segment_edges
 
 
@@ -21,7 +22,7 @@ def mean_colours(pixels: Pixels, segments: int) -> npt.NDArray[np.float32]:
     return means
 
 
-class MeanRgb(Stage):
+class MeanRgb(UnderGreyWorld, Stage):
     """Describes a panorama by the mean colour of each segment (blue-green-red, 0..255).
 
     Gross & Koenig 2004, section 2: "mean RGB", the feature used before the histograms.
@@ -37,4 +38,4 @@ class MeanRgb(Stage):
 
     def step(self, ctx: Context, panorama: Panorama) -> Out:
         """Describe one panorama."""
-        return self.Out(features=SegmentColours(mean_colours(panorama.pixels, self.segments)))
+        return self.Out(features=SegmentColours(mean_colours(self.constant(panorama.pixels), self.segments)))

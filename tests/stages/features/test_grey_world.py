@@ -1,0 +1,71 @@
+"""Colour constancy by the grey-world assumption."""
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.stages.features.colour_histogram import ColourHistogram
+from omninav.stages.features.grey_world import LEVEL, grey_world_pixels
+from omninav.stages.features.haar_integral import HaarIntegral
+from omninav.stages.features.hsv_histogram import HsvHistogram
+from omninav.stages.features.mean_rgb import MeanRgb
+from omninav.stages.perturbation.changed_light import changed_light
+from omninav.stages.values.image import Panorama, Windows
+
+CTX = Context("features", np.random.default_rng(0))
+SCENE = np.random.default_rng(0).integers(20, 120, (40, 360, 3), dtype=np.uint8)
+WARM = changed_light(SCENE, 1.0, (0.6, 1.0, 1.3), 0.0, 0.0)
+DARK = changed_light(SCENE, 1.0, (0.7, 0.7, 0.7), 0.0, 0.0)
+FROM_ONE_SIDE = changed_light(SCENE, 1.0, (1.0, 1.0, 1.0), 0.5, 1.0)
+
+
+@pytest.mark.parametrize("light", [WARM, DARK])
+@pytest.mark.parametrize("window", [0.25, 1.0])
+def test_exposure_and_colour_of_the_light_are_removed(light, window):
+    gap = grey_world_pixels(light, window).astype(int) - grey_world_pixels(SCENE, window)
+    assert np.abs(gap).max() <= 3  # of levels that were rounded
+
+
+def test_light_from_one_side_is_removed_in_a_window_and_not_over_the_whole_view():
+    def mean_gap(window):
+        gap = grey_world_pixels(FROM_ONE_SIDE, window).astype(int) - grey_world_pixels(SCENE, window)
+        return float(np.abs(gap).mean())
+
+    assert mean_gap(0.25) < 6 < 20 < mean_gap(1.0)
+
+
+def test_the_mean_becomes_the_level():
+    assert grey_world_pixels(SCENE, 1.0).mean(axis=(0, 1)) == pytest.approx([LEVEL] * 3, abs=0.5)
+
+
+def test_the_window_goes_around_the_circle():
+    turned = grey_world_pixels(np.roll(SCENE, 100, axis=1), 0.25)
+    assert np.abs(turned.astype(int) - np.roll(grey_world_pixels(SCENE, 0.25), 100, axis=1)).max() <= 1
+
+
+def test_black_stays_black_and_what_is_too_bright_is_cut():
+    assert not grey_world_pixels(np.zeros_like(SCENE), 0.25).any()
+    view = np.zeros_like(SCENE)
+    view[:, ::10] = 200
+    assert set(np.unique(grey_world_pixels(view, 0.25))) == {0, 255}
+
+
+@pytest.mark.parametrize("stage", [HsvHistogram, ColourHistogram, MeanRgb, HaarIntegral])
+def test_features_of_two_lights_agree(stage):
+    def gap(grey_world):
+        described = [
+            stage(segments=36, grey_world=grey_world).step(CTX, Panorama(light)).features.values
+            for light in (SCENE, WARM)
+        ]
+        return float(np.abs(described[0] - described[1]).mean())
+
+    assert gap("local") < 0.25 * gap("none")
+    assert gap("whole") < 0.25 * gap("none")
+
+
+def test_windows_have_a_gain_each():
+    stage = HaarIntegral(grey_world="local")
+    described = [
+        stage.step(CTX, Windows(light[None, :, :60], np.zeros(1), 1.0)).features.values for light in (SCENE, WARM)
+    ]
+    assert np.abs(described[0] - described[1]).mean() < 0.01
