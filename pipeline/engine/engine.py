@@ -156,6 +156,12 @@ class Engine:
         self._total = self._ticks_in_all()
         self._saved = time.monotonic()
 
+    def check_source(self) -> None:
+        """Have the source refuse now what it can never give to those who read it. Raises `BadInput`."""
+        source = self.graph.source
+        if source is not None and isinstance(source.stage, Source):
+            source.stage.check(self.calls[source.name].ctx)
+
     def set_up_source(self) -> None:
         """Set up the source alone: what it says of its inputs and of who reads them, it says now. Raises `BadInput`."""
         source = self.graph.source

@@ -200,6 +200,9 @@ class Source(Stage):
 
     repeatable: ClassVar[bool] = True
 
+    def check(self, ctx: Context) -> None:
+        """Raise `BadInput` where it can never give what is read of it (`ctx.readers`), before anything is run."""
+
     def length(self) -> int | None:
         """Number of ticks to come in all, where it is known (for the progress line). Called after `setup`."""
         return None

@@ -15,7 +15,7 @@ from typing import Any
 from omninav.pipeline.engine.artifact import write_artifact
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.call import StageFailed
-from omninav.pipeline.engine.engine import Engine
+from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix
 from omninav.pipeline.files import digest_file, open_itself, whole_file, write_whole
 from omninav.pipeline.graph.problems import BadInput
@@ -67,6 +67,7 @@ def running(run: RunFolder, planned: Plan, display: ProgressDisplay | None = Non
 
 def _running(run: RunFolder, planned: Plan, display: ProgressDisplay | None) -> Iterator[Engine]:
     config = planned.config
+    Engine(planned.graph, {}, EngineOptions(planned.seed)).check_source()  # before a map is learned in vain
     cache = Cache(Path(str(config["cache"]))) if config.get("cache") else None
     execution = Execution(
         run, planned.seed, cache, float(config.get("checkpoint_s", 5.0)), display, bool(config.get("validate", False))

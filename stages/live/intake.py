@@ -12,6 +12,7 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.recordings.camera_yaml import camera_from_info
 from omninav.stages.recordings.live_record import DriveSoFar, Frame, LiveHeader, Role
 from omninav.stages.recordings.messages import IMAGE_TYPES, SCAN_TYPE, is_blank, pixels_of
+from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.recordings.plausibility import EXCURSION_S
 from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
@@ -59,7 +60,8 @@ class Intake:
     status: LiveStatus
     header: LiveHeader
     drive: DriveSoFar
-    camera: Camera | None
+    camera: Camera | str | None
+    """A projection's name says enough with the first image; None: the robot's CameraInfo does."""
     camera_info: str | None
     patience_s: float
     last_stamp: int | None = None
@@ -112,6 +114,7 @@ class Intake:
                 trouble = f"{topic} carries {offered[topic]:.80}, not {kind}"
             elif heard is None:
                 trouble = f"nothing on {topic} yet" + ("" if self.transport.matched(topic) else ", nobody publishes it")
+                trouble += " (a robot without odometry: speed=0.5)" if kind == TYPES["odometry"] else ""
             elif now - heard > max(SILENT_S, self.patience_s):
                 trouble = f"{topic} has been silent for {now - heard:.0f} s"
             self.status.note(topic, trouble)
@@ -193,7 +196,7 @@ class Intake:
         speaks = now - self._received.get(topic, -1e9) < self.patience_s
         return speaks and truth.last is not None and truth.last < image.stamp
 
-    def _use(self, image: _Pending, camera: Camera) -> Taken | None:
+    def _use(self, image: _Pending, camera: Camera | str) -> Taken | None:
         where = f"{image.arrival.topic}: the image of {image.stamp / 1e9:.3f} s"
         if not self._follows(image.stamp):
             self._drop("backward_stamp", f"{where} comes after one of {(self.last_stamp or 0) / 1e9:.3f} s")
@@ -207,6 +210,8 @@ class Intake:
         except Exception as error:  # as above
             self._drop("bad_message", f"{where} is no sound {image.arrival.msgtype} ({error!s:.120})")
             return None
+        if isinstance(camera, str):
+            camera = self.camera = named_camera(camera, lambda: pixels.shape[1::-1])[0]
         size = (camera.height_px, camera.width)
         if pixels.shape[:2] != size:
             is_not = f"{pixels.shape[1]} x {pixels.shape[0]}, its camera {size[1]} x {size[0]}"

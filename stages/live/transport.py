@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeVar
 
 from omninav.pipeline.graph.problems import BadInput
 
@@ -112,12 +112,18 @@ class Transport(ABC):
         """How many messages of each topic were overtaken by later ones before they were taken."""
         return self.inbox.overtaken
 
+    @property
+    def ended(self) -> bool:
+        """Whether nothing will come any more. A robot may always say something."""
+        return False
+
     @abstractmethod
     def close(self) -> None:
         """Leave the domain. Nothing can be received or sent any more."""
 
 
-_OPEN: dict[tuple[str, int], Transport] = {}
+Opened = TypeVar("Opened", bound=Transport)
+_OPEN: dict[tuple[str, int | str], Transport] = {}
 
 
 def connect(transport: TransportName, domain: int | None = None) -> Transport:
@@ -126,11 +132,22 @@ def connect(transport: TransportName, domain: int | None = None) -> Transport:
     `domain`: the ROS domain; None: `ROS_DOMAIN_ID`, else 0. Raises `TransportError` where its library is missing.
     """
     number = _domain() if domain is None else domain
-    key = (transport, number)
+    module = importlib.import_module(f"{__package__}.{transport}_transport")
+    made: Transport = opened((transport, number), lambda: module.open_transport(number))
+    return made
+
+
+def opened(key: tuple[str, int | str], make: Callable[[], Opened]) -> Opened:
+    """The transport of this process by that key, made when it is first asked for.
+
+    All of a process have one status: what is known of a run is known to whatever publishes it.
+    """
     if key not in _OPEN:
-        module = importlib.import_module(f"{__package__}.{transport}_transport")
-        _OPEN[key] = module.open_transport(number)
-    return _OPEN[key]
+        made = make()
+        for other in _OPEN.values():
+            made.status = other.status
+        _OPEN[key] = made
+    return _OPEN[key]  # type: ignore[return-value]  # a key names its class
 
 
 def disconnect() -> None:

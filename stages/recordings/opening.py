@@ -28,8 +28,8 @@ def open_recording(
     options = OpenOptions(topics or Topics(), camera, tuple(layout_folders), limits or MotionLimits(), rate)
     if log.startswith("camera:"):
         raise UnreadableRecording(
-            f"log={log:.60}: a camera that is plugged in is recorded first: omninav camera record "
-            f"device={log.partition(':')[2]:.40} out=camera.mcap"
+            f"log={log:.60}: a camera that is plugged in runs live: omninav live log={log:.60}; or is recorded first: "
+            f"omninav camera record device={log.partition(':')[2]:.40}"
         )
     formats, path = log_formats(), user_path(log)
     meant = next((one for one in formats if one.opens(log)), None)

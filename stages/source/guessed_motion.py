@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -10,10 +11,11 @@ from omninav.pipeline import BadInput, Context
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.rays import unit_vectors
 from omninav.stages.geometry.appearance.visual_compass import Strip, turn_between
+from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.unwarp.table import RemapTable, remap_table
 from omninav.stages.values.image import Image, column_azimuths
-from omninav.stages.values.pose import GuessedMotion
+from omninav.stages.values.pose import GuessedMotion, Motion
 
 COLUMNS, ROWS = 360, 24
 """Of the panoramas that the compass compares."""
@@ -50,6 +52,36 @@ class VisualCompass:
         return np.asarray(cv2.GaussianBlur(around, (0, 0), BLUR_PX)[:, ends:-ends], np.float32)
 
 
+class Reckoned(Protocol):
+    """Where a source is by guesses (m, rad), and what the compass keeps of the last image."""
+
+    x: float
+    y: float
+    heading: float
+    view: Strip | None
+
+
+def reckon(
+    compass: VisualCompass, speed: float, position: Reckoned, image: Image, camera: Camera, seconds: float | None
+) -> GuessedMotion | None:
+    """The guessed motion to an image, with which `position` goes on; None at the first image of a log.
+
+    `speed`: m/s. `seconds`: since the image before; None: there is none.
+    """
+    before, position.view = position.view, compass.view(image, camera)
+    if seconds is None:
+        return None
+    motion = guessed_motion(before, position.view, seconds, speed)
+    advance(position, motion)
+    return motion
+
+
+def advance(position: Reckoned, motion: Motion) -> None:
+    """Add a motion to where a source is."""
+    moved = compose((position.x, position.y, position.heading), (motion.x, motion.y, motion.turn))
+    position.x, position.y, position.heading = (float(value) for value in moved)
+
+
 def guessed_motion(before: Strip | None, after: Strip | None, seconds: float, speed: float) -> GuessedMotion:
     """Straight on by a guessed speed (m/s) for some seconds, with half of the turn before and half of it after."""
     turn, sigma_turn = 0.0, BLIND_SIGMA * seconds
@@ -60,9 +92,10 @@ def guessed_motion(before: Strip | None, after: Strip | None, seconds: float, sp
     return GuessedMotion(way * math.cos(turn / 2), way * math.sin(turn / 2), turn, sigma_m, sigma_turn)
 
 
-def settled_speed(ctx: Context, name: str, camera: Camera, speed: float | None, has_truth: bool) -> float:
+def settled_speed(ctx: Context, name: str, camera: Camera | None, speed: float | None, has_truth: bool) -> float:
     """The speed (m/s) by which a log without odometry and positions is driven, with a warning that says so.
 
+    `name`: of the log. `camera`: None where it is not known yet.
     Where none is given, a nominal one, for drawing. Raises `UnreadableRecording` where a node reads motion tick by
     tick and none is given, or one makes a map of positions and the speed is 0, naming it and what to type.
     """
@@ -83,7 +116,8 @@ def settled_speed(ctx: Context, name: str, camera: Camera, speed: float | None, 
         ctx.warn(f"{name} has no odometry: its path is drawn as if driven at {NOMINAL_SPEED:g} m/s (speed=… sets it)")
         return NOMINAL_SPEED
     path = f", and {_listed(maps)} places its references along that path" if maps else ""
-    turns = "seen in the images" if _table(camera) else "not known, as its camera does not see the full circle"
+    around = camera is None or _table(camera) is not None
+    turns = "seen in the images" if around else "not known, as its camera does not see the full circle"
     ctx.warn(f"{name} has no odometry: {speed:g} m/s are guessed, turns are {turns}{path}")
     return speed
 

@@ -4,22 +4,21 @@ import signal
 import threading
 import time
 from collections import Counter
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-import numpy as np
-import numpy.typing as npt
-
-from omninav.pipeline import Bounds, Context, Source, State, Tick
+from omninav.pipeline import BadInput, Bounds, Context, Source
 from omninav.pipeline.files import user_path
 from omninav.pipeline.mcap.reader import LogReader
-from omninav.stages.camera.model import Camera
-from omninav.stages.geometry.plane.se2 import between
+from omninav.stages.camera.model import Camera, camera_models
 from omninav.stages.live.amcl_services import serve_amcl, serve_restart
+from omninav.stages.live.camera_device import TOPIC, device_camera
+from omninav.stages.live.camera_transport import connect_camera
 from omninav.stages.live.diagnostics import publish_diagnostics
 from omninav.stages.live.drive_record import DriveRecord, unfinished
 from omninav.stages.live.intake import Intake
-from omninav.stages.live.transport import TransportName, connect, disconnect
+from omninav.stages.live.transport import Transport, TransportName, connect, disconnect
 from omninav.stages.recordings.camera_yaml import read_camera
 from omninav.stages.recordings.live_record import HEADER, DriveSoFar, Frame, LiveHeader, LiveRecording, Role
 from omninav.stages.recordings.plausibility import MotionLimits
@@ -28,34 +27,25 @@ from omninav.stages.recordings.topics import IMAGE_TOPICS
 from omninav.stages.values.command import Command
 from omninav.stages.values.image import Image, Pixels
 from omninav.stages.values.planned_route import PlannedRoute
+from omninav.stages.values.pose import Pose
 
-from .outputs import DriveOutputs, motion_of, pose_of
+from .guessed_motion import VisualCompass, reckon, settled_speed
+from .live_position import Guess, LiveSourceState
+from .outputs import DriveOutputs, pose_of
 
-Array = npt.NDArray[np.float64]
+LIVE, DEVICE = "live", "camera:"
+"""As `log`: a robot, and what a camera of this computer begins with."""
 RECORD = "live.mcap"
 """The record in the run's folder."""
 WATCH_S = 1.0
 """How often diagnostics and the terminal say how it goes."""
 
 
-class LiveSourceState(State):
-    """Ticks made, logs begun (a clock that is set back begins one), and of the last tick the stamp (ns), the odometry
-    pose (m, rad) and the seconds of odometry not believed. `first` and `ended`: stamps of the first tick, and of that
-    at which the planned route ended (0: it has not)."""
-
-    ticks: int = 0
-    log: int = 0
-    stamp: int = 0
-    x: float = 0.0
-    y: float = 0.0
-    heading: float = 0.0
-    unmeasured_s: float = 0.0
-    first: int = 0
-    ended: int = 0
-
-
 class LiveSource(Source):
     """A robot that runs now, over ROS 2: one tick for the newest image whose stamp lies between two odometry messages.
+
+    Or a camera that is plugged into this computer: it says images alone. Without odometry, turns are those that a
+    visual compass sees, and the speed is a guess (`speed_m_s`), as of a video.
 
     Images that were overtaken meanwhile are counted and never queued. Whatever a tick was made of is written to
     `live.mcap` in the run's folder, as it came: the same graph over that file (`log=live.mcap`) gives the same bytes.
@@ -68,6 +58,11 @@ class LiveSource(Source):
 
     repeatable: ClassVar[bool] = False
 
+    log: str | None = LIVE
+    """`live`: a robot over ROS 2. `camera:0`: a camera by its number, or by its file as camera:/dev/video0."""
+    speed_m_s: Annotated[float, Bounds(ge=0, le=100)] | None = None
+    """The guessed speed of a robot without odometry; then none is read. It may be off by as much, or by 0.5 m/s where
+    that is more. Null: odometry is waited for."""
     transport: TransportName = "dds"
     """`dds` needs no ROS: CycloneDDS. `rclpy` needs a sourced ROS 2, and answers services too."""
     domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
@@ -83,7 +78,7 @@ class LiveSource(Source):
     amcl: str | None = None
     """The name of nav2's AMCL node, to answer its other services too, where the transport has services."""
     camera: str | None = None
-    """A camera.yaml; null: the robot's CameraInfo, which is waited for."""
+    """A camera.yaml, or a projection (`equirectangular`, …); null: the robot's CameraInfo, which is waited for."""
     limits: MotionLimits = MotionLimits()
     """What the robot can do: odometry and truth beyond it are doubted until they have gone on so for a second."""
     patience_s: Annotated[float, Bounds(gt=0)] = 1.0
@@ -98,11 +93,24 @@ class LiveSource(Source):
     class Out(DriveOutputs):
         """What is known at an image."""
 
+    def check(self, ctx: Context) -> None:
+        """Refuse a variant that needs odometry, where there is none and no speed is stated; and what is not there."""
+        if self._odometry_topic() is None:
+            self._settled_speed(ctx)
+        self._connect()
+
     def setup(self, ctx: Context) -> None:
         """Join the domain, so that endpoints match while the rest is made ready; find what was recorded before."""
-        self._camera = None if self.camera is None else read_camera(user_path(self.camera))
-        self._header = LiveHeader(self._roles(ctx.is_read("scan")), self.limits)
-        self._transport = connect(self.transport, self.domain)
+        device = self._device()
+        roles = self._roles(ctx.is_read("scan")) if device is None else dict[str, Role]({TOPIC: "image"})
+        self._header = LiveHeader(roles, self.limits)
+        self._guess: Guess | None = None
+        if self._odometry_topic() is None:
+            self._guess = partial(reckon, VisualCompass(), self._settled_speed(ctx))
+        ctx.fact("odometry", "guessed" if self._guess else "measured")
+        self._transport, assumed = self._connect()
+        if assumed:
+            ctx.fact("assumed", assumed)
         self._path = None if ctx.folder is None else ctx.folder / RECORD
         self._before = None if self._path is None else _recorded(self._path)
         self._intake: Intake | None = None
@@ -129,7 +137,7 @@ class LiveSource(Source):
             self._watch(ctx, self._intake)
             if taken is not None:
                 self._write(self._intake, taken.arrivals)
-                assert self._intake.camera is not None
+                assert isinstance(self._intake.camera, Camera)
                 return self._out(position, taken.stamp, self._intake.camera, taken.pixels, taken.frame)
             if len(self._intake.unrecorded) > 256 and self._record is not None:
                 self._write(self._intake, self._intake.recordable())
@@ -181,7 +189,7 @@ class LiveSource(Source):
             signal.signal(*self._handlers.popitem())
 
     def _ends(self, position: LiveSourceState, route: PlannedRoute | None) -> bool:
-        if self._stop.is_set():
+        if self._stop.is_set() or self._transport.ended:
             return True
         ended = route is not None and route.state in ("arrived", "gave up")
         position.ended = (position.ended or position.stamp) if ended else 0
@@ -203,7 +211,7 @@ class LiveSource(Source):
         disconnect()
 
     def _write(self, intake: Intake, arrivals: list[Any]) -> None:
-        if self._path is None or intake.camera is None:
+        if self._path is None or not isinstance(intake.camera, Camera):
             return
         if self._record is None:
             self._record = DriveRecord(self._path, self._header, intake.camera)
@@ -229,34 +237,56 @@ class LiveSource(Source):
         self._counted = counts
 
     def _out(self, position: LiveSourceState, stamp: int, camera: Camera, pixels: Pixels, frame: Frame) -> Out:
-        first = position.ticks == 0 or stamp <= position.stamp
-        position.log += first and position.ticks > 0
-        motion = None
-        if frame.odometry is not None and not first:
-            moved = between(np.array([position.x, position.y, position.heading]), frame.odometry)
-            motion = motion_of(moved, abs(frame.unmeasured_s - position.unmeasured_s))
-        tick = Tick(index=position.ticks, stamp=stamp, log=position.log, frame=position.ticks, first_of_log=first)
-        position.ticks, position.stamp, position.unmeasured_s = position.ticks + 1, stamp, frame.unmeasured_s
-        position.first = position.first or stamp
-        if frame.odometry is not None:
-            position.x, position.y, position.heading = frame.odometry.tolist()
+        image = Image(pixels)
+        tick, since = position.turn(stamp)
+        motion = position.move(self._guess, image, camera, since, frame)
         return self.Out(
             tick=tick,
-            image=Image(pixels),
+            image=image,
             camera=camera,
-            odometry=pose_of(frame.odometry),
             motion=motion,
+            odometry=Pose(position.x, position.y, position.heading),
             truth=pose_of(frame.truth),
             scan=frame.scan,
             restart=frame.restart,
             goal=frame.goal,
         )
 
+    def _device(self) -> str | None:
+        """The camera of this computer that takes the robot's place; None: a robot does. Raises `BadInput`."""
+        log = self.log or LIVE
+        if log != LIVE and not log.startswith(DEVICE):
+            raise BadInput(
+                f"log={log:.100}: what runs now is log=live (a robot over ROS 2) or log=camera:0 (a camera that is "
+                f"plugged in); a recorded drive is read without live: omninav log={log:.100}"
+            )
+        return log.removeprefix(DEVICE) if log.startswith(DEVICE) else None
+
+    def _connect(self) -> tuple[Transport, str]:
+        """The transport, and what was assumed of its camera; `_camera` is what is known of that."""
+        self._camera: Camera | str | None = self.camera
+        device = self._device()
+        if device is not None:
+            plugged_in = connect_camera(device)
+            self._camera, assumed = device_camera(device, self.camera, plugged_in.first)
+            return plugged_in, assumed
+        if self.camera is not None and (user_path(self.camera).exists() or self.camera not in camera_models()):
+            self._camera = read_camera(user_path(self.camera))
+        return connect(self.transport, self.domain), ""
+
+    def _odometry_topic(self) -> str | None:
+        return self.topics.odometry if self._device() is None and self.speed_m_s is None else None
+
+    def _settled_speed(self, ctx: Context) -> float:
+        name = "the robot" if self._device() is None else f"log={self.log}"
+        return settled_speed(ctx, name, None, self.speed_m_s, has_truth=False)
+
     def _roles(self, scan: bool) -> dict[str, Role]:
         roles: dict[str | None, Role] = dict.fromkeys(
             [self.topics.image] if self.topics.image else IMAGE_TOPICS, "image"
         )
-        roles[self.topics.odometry], roles[self.topics.truth] = "odometry", "truth"
+        roles[self._odometry_topic()] = "odometry"
+        roles[self.topics.truth] = "truth"
         roles[self.topics.scan if scan else None] = "scan"
         roles[self.initial_pose], roles[self.goal], roles[self.restart] = "initial_pose", "goal", "restart"
         return {topic: role for topic, role in roles.items() if topic is not None}

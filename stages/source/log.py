@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Source, State, Tick
 from omninav.pipeline.files import digest_file, digest_text, user_path
-from omninav.stages.geometry.plane.se2 import between, compose
+from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.decode_ahead import AHEAD
 from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.opening import open_recording
@@ -26,7 +26,7 @@ from omninav.stages.values.pose import Motion
 
 from .cuts import Cut
 from .frozen_odometry import frozen_steps
-from .guessed_motion import VisualCompass, guessed_motion, settled_speed
+from .guessed_motion import VisualCompass, advance, reckon, settled_speed
 from .log_parts import LogPart, Selection, parts_of, simulated_drives
 from .outputs import DriveOutputs, motion_of, pose_of
 from .synthetic_odometry import add_odometry_noise
@@ -138,7 +138,14 @@ class LogSource(Source):
                     still = f"odometry stands still at {steps} images, while ground truth moves {metres:.1f} m"
                     ctx.warn(f"{recording.name}: {still}")
             elif part.kind == "guessed":
-                self._speed = settled_speed(ctx, recording.name, recording.camera, self.speed_m_s, truth is not None)
+                self._speed = self._settled_speed(ctx, part)
+
+    def check(self, ctx: Context) -> None:
+        """Refuse a variant that needs odometry over a log that has none, where no speed is stated."""
+        self._open()
+        for part in self._parts:
+            if part.kind == "guessed":
+                self._settled_speed(ctx, part)
 
     def inputs_digest(self) -> str | None:
         """sha256 over the content of all logs, in their order."""
@@ -217,7 +224,7 @@ class LogSource(Source):
             first_of_log=first,
         )
         truth = None if part.truth is None else part.truth[frame]
-        odometry, motion = None, None
+        motion: Motion | None = None
         if recording.odometry is not None:
             odometry = measured[frame]
             if last is not None:
@@ -225,12 +232,11 @@ class LogSource(Source):
                 motion = motion_of(between(measured[last], odometry), gap)
         else:
             if part.kind == "guessed":
-                motion = self._guessed(position, recording, image, last, frame)
+                seconds = None if last is None else float(recording.stamps[frame] - recording.stamps[last]) / 1e9
+                motion = reckon(self._compass, self._speed, position, image, recording.camera, seconds)
             elif last is not None:
                 motion = motion_of(self._synthetic(ctx, between(measured[last], measured[frame])))
-            if motion is not None:
-                moved = compose((position.x, position.y, position.heading), (motion.x, motion.y, motion.turn))
-                position.x, position.y, position.heading = (float(value) for value in moved)
+                advance(position, motion)
             odometry = np.array([position.x, position.y, position.heading])
         position.last, position.next, position.ticks = position.next, position.next + 1, position.ticks + 1
         return self.Out(
@@ -252,14 +258,9 @@ class LogSource(Source):
             return None
         return user_path(self.truth)
 
-    def _guessed(
-        self, position: LogSourceState, recording: Recording, image: Image, last: int | None, frame: int
-    ) -> Motion | None:
-        before, position.view = position.view, self._compass.view(image, recording.camera)
-        if last is None:
-            return None
-        seconds = float(recording.stamps[frame] - recording.stamps[last]) / 1e9
-        return guessed_motion(before, position.view, seconds, self._speed)
+    def _settled_speed(self, ctx: Context, part: LogPart) -> float:
+        placed = part.truth is not None and not isinstance(part.recording, LiveRecording)
+        return settled_speed(ctx, part.recording.name, part.recording.camera, self.speed_m_s, placed)
 
     def _synthetic(self, ctx: Context, increment: Array) -> Array:
         return add_odometry_noise(

@@ -33,7 +33,9 @@ def command(arguments: list[str]) -> int:
             check_artifact(artifact.file)
     _refuse_unwritable(planned.config)
     for graph in (*(artifact.graph for artifact in planned.artifacts if artifact.graph is not None), planned.graph):
-        Engine(graph, {}, EngineOptions(planned.seed)).set_up_source()
+        engine = Engine(graph, {}, EngineOptions(planned.seed))
+        engine.check_source()
+        engine.set_up_source()
     graph = planned.graph
     before, tick, after = (len(graph.of_lifetime(kind)) for kind in LIFETIMES)
     print(f"{planned.variant}: nothing wrong with it. {len(graph.nodes)} nodes, {len(graph.wires)} wires")

@@ -224,7 +224,7 @@ def test_while_a_robot_says_nothing_what_is_missing_is_noted(robot: Loopback, tm
     assert drive.source._intake is not None
     drive.source._intake.watch()
     assert robot.status.troubles == {
-        "/odom": "nothing on /odom yet",
+        "/odom": "nothing on /odom yet (a robot without odometry: speed=0.5)",
         "/camera/image/compressed": "nothing on /camera/image/compressed yet",
     }
     drive.feed(robot, said())

@@ -37,12 +37,12 @@ def test_images_that_come_too_fast_are_left_out(tmp_path: Path, device: str) -> 
 
 def test_what_cannot_be_recorded_is_said(tmp_path: Path, device: str) -> None:
     for stage, what in (
-        (RecordCamera(device="/dev/none"), "there is no camera /dev/none; type device=0"),
+        (RecordCamera(device="/dev/none"), "there is no camera /dev/none; type its number"),
         (RecordCamera(device="987"), "camera 987 cannot be opened"),
         (RecordCamera(device=device, out="drive.avi"), "type out=camera.mcap"),
         (RecordCamera(device=device, out=str(tmp_path / "x.mcap")), "nothing says how its images of 80 x 64"),
     ):
         with pytest.raises(BadInput, match=what):
             stage.step(Context("record"))
-    with pytest.raises(BadInput, match=r"log=camera:0: .*omninav camera record device=0"):
+    with pytest.raises(BadInput, match=r"log=camera:0: .*omninav live log=camera:0; .*omninav camera record device=0"):
         open_recording("camera:0")

@@ -1,0 +1,67 @@
+"""A camera of this computer in the place of a robot, stood for by a video; and a robot without odometry."""
+
+import math
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from omninav.pipeline import BadInput, Context
+from omninav.stages.recordings.recording import Topics
+from omninav.stages.source.live import LiveSource, LiveSourceState
+from omninav.stages.source.log import LogSource, LogSourceState
+
+FRAMES = 8
+
+
+@pytest.fixture
+def device(tmp_path: Path) -> str:
+    """A video of equirectangular images, 20 a second, of a camera that turns to the left by 5 degrees each time."""
+    scene = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 256, (72, 144, 3)).astype(np.uint8), (0, 0), 2)
+    writer = cv2.VideoWriter(str(tmp_path / "turn.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 20.0, (144, 72))
+    for number in range(FRAMES + 1):
+        writer.write(np.roll(scene, 2 * number, axis=1))
+    writer.release()
+    return str(tmp_path / "turn.avi")
+
+
+def ticks(source: LiveSource | LogSource, state: LiveSourceState | LogSourceState, ctx: Context) -> list:
+    source.setup(ctx)
+    outs = []
+    while (out := source.step(ctx, state)) is not None:
+        outs.append(out)
+        time.sleep(0.06)  # a stage's work: images are overtaken
+    return outs
+
+
+def test_a_camera_that_is_plugged_in_is_a_live_run_whose_record_gives_the_same(device: str, tmp_path: Path):
+    ctx = Context("source", folder=tmp_path)
+    live = ticks(LiveSource(log=f"camera:{device}", speed_m_s=0.5, diagnostics=None), LiveSourceState(), ctx)
+    assert len(live) + ctx.counts["overtaken_image"] == FRAMES
+    assert ctx.facts["odometry"] == "guessed"
+    assert "equirectangular" in ctx.facts["assumed"]
+    turned = math.degrees(live[-1].odometry.heading - live[0].odometry.heading)
+    assert turned % 5.0 == pytest.approx(0.0, abs=0.7) or turned % 5.0 == pytest.approx(5.0, abs=0.7)
+    assert turned > 4.0
+    log = ticks(LogSource(log=str(tmp_path / "live.mcap"), speed_m_s=0.5), LogSourceState(), Context("source"))
+    assert len(log) == len(live)
+    for one, other in zip(live, log, strict=True):
+        assert vars(one.tick) == vars(other.tick)
+        assert one.image.pixels.tobytes() == other.image.pixels.tobytes()
+        assert vars(one.odometry) == vars(other.odometry)
+        assert one.motion is other.motion is None or vars(one.motion) == vars(other.motion)
+
+
+def test_what_cannot_be_a_live_run_is_refused_before_it_starts(device: str):
+    ctx = Context("source")
+    ctx.readers = {"motion": ["motion"]}
+    for source, why in (
+        (LiveSource(log=f"camera:{device}"), r"log=camera:.*needed by 'motion'; type speed=0\.5"),
+        (LiveSource(topics=Topics(odometry=None)), r"the robot: .*needed by 'motion'; type speed=0\.5"),
+        (LiveSource(log="camera:/dev/none", speed_m_s=0.5), "there is no camera /dev/none"),
+        (LiveSource(log="drive.mcap"), r"log=drive\.mcap: .*omninav log=drive\.mcap"),
+    ):
+        with pytest.raises(BadInput, match=why):
+            source.check(ctx)
