@@ -1,18 +1,25 @@
-"""Jobs for the tests of the process pool."""
+"""Jobs for the tests of engines."""
 
 import os
 import signal
+import time
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.experiment.process_pool import Send
+from omninav.pipeline.jobs.job import Send
 
 
-def count(given: Mapping[str, Any], send: Send) -> None:
+def count(given: Mapping[str, Any], send: Send) -> int:
     """Sends as many messages as it is given."""
     for number in range(given["messages"]):
         send({"number": number})
     print("counted")
+    return int(given["messages"])
+
+
+def nothing(given: Mapping[str, Any], send: Send) -> None:
+    """Takes no time."""
 
 
 def fail(given: Mapping[str, Any], send: Send) -> None:
@@ -20,4 +27,32 @@ def fail(given: Mapping[str, Any], send: Send) -> None:
 
 
 def die(given: Mapping[str, Any], send: Send) -> None:
+    print("dying")
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def die_once(given: Mapping[str, Any], send: Send) -> None:
+    """Dies at the first attempt, at which the file `mark` is not there."""
+    mark = Path(given["mark"])
+    if not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def take(given: Mapping[str, Any], send: Send) -> None:
+    """Takes memory (MB) and time (s), and leaves its process's number in a file."""
+    taken = bytearray(given["megabytes"] * 1_000_000)
+    for page in range(0, len(taken), 4096):
+        taken[page] = 1
+    Path(given["mark"]).write_text(str(os.getpid()))
+    time.sleep(given["seconds"])
+
+
+def threads(given: Mapping[str, Any], send: Send) -> list[int]:
+    """How many threads the libraries use."""
+    import cv2
+    import numba
+    import threadpoolctl
+
+    pools = [int(each["num_threads"]) for each in threadpoolctl.threadpool_info()]
+    return [cv2.getNumThreads(), numba.get_num_threads(), *pools]

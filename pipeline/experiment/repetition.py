@@ -29,15 +29,14 @@ from omninav.pipeline.graph.graph import Graph, Node
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.value import Value
+from omninav.pipeline.jobs.job import Send
+from omninav.pipeline.jobs.progress import Heartbeat
 from omninav.pipeline.report.quantities import numbers
 from omninav.pipeline.run.artifacts import Execution, obtain
 from omninav.pipeline.run.plan import ArtifactPlan, Plan, plan
 from omninav.pipeline.run.results import notes_of, results_of
 from omninav.pipeline.run.run_folder import RunFolder
 from omninav.pipeline.run.timing import stage_times
-
-from .job_progress import Heartbeat
-from .process_pool import Send
 
 SHARED = "shared"
 """The sequence that the first repetition writes for the others."""
@@ -129,30 +128,39 @@ def repeat(given: Mapping[str, Any], send: Send) -> None:
 
     Without `shared` nothing but artifacts comes from the cache or from the repetition before, so that all is timed.
 
-    `given`: `config` (plain; its artifacts are files by now), `folder`, `key`, `code`, `seeds`, `shared`, `groups` (of
-    stages whose time together is measured). Raises `BadInput` where the code has changed since the experiment was
-    started.
+    `given`: `config` (plain; its artifacts are files by now), `folder` of the condition, `part` (a name of its own
+    for this job), `key`, `code`, `seeds`, `shared`, `groups` (of stages whose time together is measured). Seeds whose
+    results an earlier attempt left are not run again. Raises `BadInput` where the code has changed since the experiment
+    was started.
     """
-    with locked(Path(given["folder"]) / ".lock"):  # a job whose experiment was killed lives on for a moment
-        _repeat(given, send)
+    part = Path(given["folder"]) / str(given["part"])
+    with locked(part.with_name(f".{part.name}.lock")):  # a job whose experiment was killed lives on for a moment
+        shutil.rmtree(part, ignore_errors=True)
+        _repeat(given, RunFolder(part), send)
+        shutil.rmtree(part, ignore_errors=True)
 
 
-def _repeat(given: Mapping[str, Any], send: Send) -> None:
-    folder, seeds = Path(given["folder"]), list(given["seeds"])
+def _repeat(given: Mapping[str, Any], run: RunFolder, send: Send) -> None:
+    folder = Path(given["folder"])
     planned = plan(given["config"])
     if planned.digest != given["code"]:
         raise BadInput("the code has changed while the experiment ran; type the same command again")
     cache = Cache(Path(str(planned.config["cache"]))) if planned.config.get("cache") else None
     graph = measured(planned.graph)
-    run = RunFolder(folder)
-    shutil.rmtree(run.memory, ignore_errors=True)
+    known = finished(folder, given["key"], given["seeds"], cache if given["shared"] else None)
+    for seed in known:
+        send({"seed": seed})
+    seeds = [seed for seed in given["seeds"] if seed not in known]
+    if not seeds:
+        return
+    run.folder.mkdir(parents=True)
     execution = Execution(run, BASE_SEED, cache, math.inf, Heartbeat(send))
     artifacts: dict[str, Value] = {}
     facts: dict[str, Any] = {}
     for artifact in planned.artifacts:
         artifacts[artifact.name], made = obtain(execution, artifact)
         facts[artifact.name] = made
-        (folder / f"{artifact.name}.omap").unlink(missing_ok=True)  # the cache keeps it
+        (run.folder / f"{artifact.name}.omap").unlink(missing_ok=True)  # the cache keeps it
     shared: PrefixReplay | None = None
     for number, seed in enumerate(seeds):
         place = run.memory / f"seed_{seed}"
@@ -174,7 +182,6 @@ def _repeat(given: Mapping[str, Any], send: Send) -> None:
         for path in _results(folder, given["key"], seed, cache if given["shared"] else None):
             write_json(path, result)
         send({"seed": seed})
-    shutil.rmtree(run.memory, ignore_errors=True)
 
 
 def run_repetition(

@@ -1,8 +1,9 @@
 """Running an experiment: recordings, artifacts, repetitions and the page; what was finished before is found again."""
 
+import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,10 @@ import yaml
 from omninav.pipeline.engine.code_version import LIBRARIES, version
 from omninav.pipeline.files import Damaged, Taken, locked, read_json, write_json, write_whole
 from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.jobs.executors import EngineSettings, read_engine
+from omninav.pipeline.jobs.job import Job, Outcome
+from omninav.pipeline.jobs.progress import JobProgress
+from omninav.pipeline.jobs.run import Workers
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.run.provenance import git_commit
 
@@ -25,11 +30,9 @@ from .conditions import (
     results_by_condition,
     timed_groups,
 )
-from .job_progress import JobProgress
 from .page import PageContent, made_with, write_page
-from .process_pool import Job, run_jobs
 from .repetition import finished
-from .shared_inputs import Recording, artifacts_of, recordings_of
+from .shared_inputs import Recording, artifacts_of, modules_of, recordings_of
 from .specification import Experiment, read_experiment
 
 STATE = "experiment.json"
@@ -48,13 +51,9 @@ class ExperimentRun:
     argv: Sequence[str]
     conditions: list[ConditionRun]
     references: list[list[ConditionRun]]
+    engine: EngineSettings = field(default_factory=EngineSettings)
     recordings: list[Recording] = field(default_factory=list)
     started: datetime = field(default_factory=datetime.now)
-
-    @property
-    def cores(self) -> int:
-        """Jobs at a time."""
-        return self.experiment.cores or len(os.sched_getaffinity(0))
 
     @property
     def all_runs(self) -> list[ConditionRun]:
@@ -64,18 +63,18 @@ class ExperimentRun:
     def run(self) -> bool:
         """All phases. Returns whether every job came to its end. Raises `BadInput` where another process runs it."""
         try:
-            with locked(self.folder / ".lock", wait=False):
-                return self._run()
+            with locked(self.folder / ".lock", wait=False), Workers(self.engine, self.folder) as workers:
+                return self._run(workers)
         except Taken as taken:
             raise BadInput(f"{self.folder}: {taken} is running it; wait until it has ended") from None
 
-    def _run(self) -> bool:
+    def _run(self, workers: Workers) -> bool:
         write_whole(self.folder / "experiment.yaml", self.file)
         self._write_state("running")
-        self._record()
+        self._record(workers)
         find_results(self.experiment, self.all_runs)
-        self._make_artifacts()
-        self._repeat()
+        self._make_artifacts(workers)
+        self._repeat(workers)
         well = not any(run.error for run in self.all_runs)
         self._write_state("complete" if well else "failed")
         self.write_page()
@@ -90,10 +89,10 @@ class ExperimentRun:
         )
         return write_page(page, results, self.folder)
 
-    def _record(self) -> None:
+    def _record(self, workers: Workers) -> None:
         self.recordings = recordings_of(self.all_runs, self.folder)
         jobs = [each.job(self.folder / "recordings") for each in self.recordings if not each.made]
-        failed = self._run_jobs(jobs, "recordings")
+        failed = self._run_jobs(workers, jobs, "recordings")
         for each in self.recordings:
             if each.name in failed:
                 for run, _ in each.readers:
@@ -101,18 +100,19 @@ class ExperimentRun:
             else:
                 each.use()
 
-    def _make_artifacts(self) -> None:
+    def _make_artifacts(self, workers: Workers) -> None:
         artifacts = artifacts_of([run for run in self.all_runs if run.unfinished], self.folder)
-        failed = self._run_jobs([each.job() for each in artifacts if not each.made], "artifacts")
+        failed = self._run_jobs(workers, [each.job() for each in artifacts if not each.made], "artifacts")
         for each in artifacts:
             if each.name in failed:
                 for run, name in each.readers:
                     run.error = f"its {name} could not be made: {failed[each.name]}"
             each.use()
 
-    def _repeat(self) -> None:
-        runs = {str(number): run for number, run in enumerate(run for run in self.all_runs if run.unfinished)}
-        jobs = [self._repetitions(number, run) for number, run in runs.items()]
+    def _repeat(self, workers: Workers) -> None:
+        runs = [run for run in self.all_runs if run.unfinished]
+        parts = max(1, workers.number // max(1, len(runs)))  # a condition's seeds share more in one job than in several
+        jobs = {job.name: (job, run) for run in runs for job in self._repetitions(run, parts)}
         total = sum(len(run.seeds) for run in self.all_runs)
 
         def done() -> int:
@@ -122,33 +122,42 @@ class ExperimentRun:
 
             def on_message(job: Job, message: Any) -> None:
                 if "seed" in message:
-                    run = runs[job.name]
+                    run = jobs[job.name][1]
                     run.results |= finished(run.folder, run.key, [message["seed"]])
                     progress.update(self.experiment.name, done(), total)
 
-            def on_end(job: Job, error: str | None) -> None:
-                run = runs[job.name]
-                run.error = error or ""
-                if error:
-                    print(f"{run.name}: {error}", flush=True)
+            def on_end(job: Job, outcome: Outcome) -> None:
+                run = jobs[job.name][1]
+                if outcome.error:
+                    run.error = outcome.error
+                    print(f"{run.name}: {outcome.error}", flush=True)
                 self.write_page()
 
             progress.begin(self.experiment.name, done(), total)
-            run_jobs(jobs, self.cores, on_message, on_end)
+            workers.run([job for job, _ in jobs.values()], on_message, on_end)
 
-    def _repetitions(self, number: str, run: ConditionRun) -> Job:
-        given = {
-            "config": run.config,
-            "folder": str(run.folder),
-            "key": run.key,
-            "code": run.planned.digest if run.planned is not None else "",
-            "seeds": run.missing,
-            "shared": run.shared,
-            "groups": timed_groups(self.experiment),
-        }
-        return Job(number, "omninav.pipeline.experiment.repetition:repeat", given, run.folder / "run.log")
+    def _repetitions(self, run: ConditionRun, parts: int) -> list[Job]:
+        """The jobs of a condition: its seeds, in some parts."""
+        size = math.ceil(len(run.missing) / parts)
+        chunks = [run.missing[begin : begin + size] for begin in range(0, len(run.missing), size)]
+        found = []
+        for seeds in chunks:
+            several = f"_{seeds[0]}" if len(chunks) > 1 else ""
+            given = {
+                "config": run.config,
+                "folder": str(run.folder),
+                "part": f"seeds{several}",
+                "key": run.key,
+                "code": run.planned.digest if run.planned is not None else "",
+                "seeds": seeds,
+                "shared": run.shared,
+                "groups": timed_groups(self.experiment),
+            }
+            function, log = "omninav.pipeline.experiment.repetition:repeat", run.folder / f"run{several}.log"
+            found.append(Job(f"{run.folder.name}{several}", function, given, log, modules_of(run.config)))
+        return found
 
-    def _run_jobs(self, jobs: Sequence[Job], what: str) -> dict[str, str]:
+    def _run_jobs(self, workers: Workers, jobs: Sequence[Job], what: str) -> dict[str, str]:
         """Run jobs whose frames are counted. Returns the errors by the jobs' names."""
         if not jobs:
             return {}
@@ -163,15 +172,16 @@ class ExperimentRun:
                 frames.on_message(job.name, message)
                 show()
 
-            def on_end(job: Job, error: str | None) -> None:
-                frames.end(job.name, not error)
-                if error:
-                    print(f"{job.name}: {error}", flush=True)
+            def on_end(job: Job, outcome: Outcome) -> None:
+                frames.end(job.name, not outcome.error)
+                if outcome.error:
+                    print(f"{job.name}: {outcome.error}", flush=True)
                 show()
 
             progress.say(f"{self.experiment.name}: {len(jobs)} {what} to make")
             progress.begin(name, 0)
-            return run_jobs(jobs, self.cores, on_message, on_end)
+            ended = workers.run(jobs, on_message, on_end)
+            return {name: outcome.error for name, outcome in ended.items() if outcome.error}
 
     def _write_state(self, status: str) -> None:
         manifest = {
@@ -184,7 +194,8 @@ class ExperimentRun:
             "started": self.started.isoformat(timespec="seconds"),
             "written": datetime.now().isoformat(timespec="seconds"),
             "git_commit": git_commit(),
-            "cores": self.cores,
+            "engine": self.engine.name,
+            "workers": self.engine.workers,
             "libraries": {name: version(name) for name in LIBRARIES},
         }
         write_json(self.folder / STATE, manifest)
@@ -208,9 +219,12 @@ def plan_experiment(
     profile = str(config.get("profile") or "paper")
     experiment = read_experiment(config["experiment"], profile)
     file = yaml.safe_dump(dict(config["experiment"]), sort_keys=False, allow_unicode=True, width=120)
+    engine = read_engine(config.get("engine"))
+    if experiment.cores is not None:
+        engine = replace(engine, workers=experiment.cores)
     folder = (Path(str(config.get("runs", "runs"))) / f"{experiment.name}_{profile}").resolve()
     conditions = condition_runs(experiment, folder, overrides)
     references = reference_runs(experiment, folder, overrides)
-    run = ExperimentRun(experiment, profile, file, folder, argv, conditions, references)
+    run = ExperimentRun(experiment, profile, file, folder, argv, conditions, references, engine)
     check(experiment, run.all_runs, compose)
     return run

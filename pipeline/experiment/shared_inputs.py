@@ -16,13 +16,13 @@ from omninav.pipeline.graph.graph import Node
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.recordable import Recordable
 from omninav.pipeline.graph.stage import Context
+from omninav.pipeline.jobs.job import Job, Send
+from omninav.pipeline.jobs.progress import Heartbeat
 from omninav.pipeline.run.artifacts import Execution, obtain
 from omninav.pipeline.run.plan import Plan, plan
 from omninav.pipeline.run.run_folder import RunFolder
 
 from .conditions import ConditionRun
-from .job_progress import Heartbeat
-from .process_pool import Job, Send
 from .repetition import BASE_SEED, artifact_key
 
 FACTS = "facts.json"
@@ -60,7 +60,8 @@ class Recording:
             "key": self.key,
             "folder": str(self.folder),
         }
-        return Job(self.name, f"{__name__}:record", given, folder / f"{self.folder.name}.log")
+        log = folder / f"{self.folder.name}.log"
+        return Job(self.name, f"{__name__}:record", given, log, modules_of(self.readers[0][0].config))
 
     def use(self) -> None:
         """Let all its readers replay it."""
@@ -171,7 +172,8 @@ class SharedArtifact:
         """The job that makes it."""
         run, name = self.readers[0]
         given = {"config": run.config, "name": name, "folder": str(self.folder)}
-        return Job(self.name, f"{__name__}:make_artifact", given, self.folder.with_suffix(".log"))
+        log = self.folder.with_suffix(".log")
+        return Job(self.name, f"{__name__}:make_artifact", given, log, modules_of(run.config))
 
     def use(self) -> None:
         """Let all its readers load it."""
@@ -193,6 +195,16 @@ def artifacts_of(runs: Sequence[ConditionRun], folder: Path) -> list[SharedArtif
             shared = found.setdefault(name, SharedArtifact(name, folder / "artifacts" / name.replace(" ", "_")))
             shared.readers.append((run, artifact.name))
     return list(found.values())
+
+
+def modules_of(config: Mapping[str, Any]) -> tuple[str, ...]:
+    """The modules of the stages that a configuration names: a job that runs it imports them."""
+    graphs = [config, *(each.get("graph") or {} for each in (config.get("artifacts") or {}).values())]
+    targets = [
+        str(node.get("_target_", "")) for graph in graphs for node in (graph.get("nodes") or {}).values() if node
+    ]
+    names = (target.rpartition(".")[0] for target in targets if ":" not in target)
+    return tuple(sorted({name for name in names if name.startswith("omninav.") and ":" not in name}))
 
 
 def make_artifact(given: Mapping[str, Any], send: Send) -> None:

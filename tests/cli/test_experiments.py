@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from background_runs import kill, start
 
-from omninav.pipeline.experiment.job_progress import JobProgress
+from omninav.pipeline.jobs.progress import JobProgress
 
 STAGES = '''
 import time

@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import Any
 
-from .process_pool import Send
+from .job import Send
 
 
 class Heartbeat:
-    """Sends a job's progress to its experiment at some frames: a job whose experiment was killed then ends soon."""
+    """Sends how far a job is, at some frames."""
 
     def __init__(self, send: Send) -> None:
         self._send = send

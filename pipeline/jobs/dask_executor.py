@@ -1,0 +1,115 @@
+"""Engines by Dask: a scheduler that runs already, or workers that a batch system such as Slurm starts."""
+
+import logging
+import re
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from typing import Any, TypeVar
+
+import dask
+from distributed import Client
+
+from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
+
+from .executors import EngineSettings
+
+START_S = 60.0
+"""How long it waits for a scheduler to answer."""
+WORKER_MEMORY = 1_000_000_000
+"""What a worker takes beside its job (bytes)."""
+JOB_MEMORY = 4_000_000_000
+"""What a batch system is asked for where nobody says how much a job takes (bytes)."""
+T = TypeVar("T")
+WORD = re.compile(r"[\w.,:@/+-]{1,200}")
+"""What may be written into a batch script."""
+
+
+class DaskExecutor(Executor):
+    """Dask's own executor, which ends with what was started for it."""
+
+    def __init__(self, client: Any, cluster: Any = None) -> None:
+        self._client, self._cluster = client, cluster
+        self._executor = client.get_executor(pure=False)
+
+    @property
+    def workers(self) -> int:
+        """How many jobs run at a time, by what is connected now."""
+        return sum(int(each["nthreads"]) for each in self._client.scheduler_info(n_workers=-1)["workers"].values())
+
+    def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> "Future[T]":
+        """As every executor's. Raises `RuntimeError` where the scheduler is gone."""
+        if self._client.status != "running":
+            raise RuntimeError("its scheduler is gone")
+        future: Future[T] = self._executor.submit(fn, *args, **kwargs)
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the connection, and what was started for it."""
+        self._executor.shutdown(wait and not cancel_futures)
+        self._client.close(timeout=5)
+        if self._cluster is not None:
+            self._cluster.close(timeout=10)
+
+
+def dask_cluster(settings: EngineSettings) -> DaskExecutor:
+    """`engine=dask`: the scheduler at `engine.address`, with whatever workers it has."""
+    options = _options(settings, ("address",))
+    if "address" not in options:
+        raise BadInput("engine=dask: where is its scheduler? type engine.address=tcp://HOST:8786")
+    return DaskExecutor(_client(options["address"]))
+
+
+def slurm(settings: EngineSettings) -> DaskExecutor:
+    """`engine=slurm`: each worker is a batch job of one core; one that dies is started again."""
+    from dask_jobqueue import SLURMCluster
+
+    options = _options(settings, ("partition", "time", "account", "interface", "logs"))
+    workers = settings.workers or 4
+    memory = (settings.memory or JOB_MEMORY) + WORKER_MEMORY
+    _quiet()
+    cluster = SLURMCluster(
+        cores=1,
+        processes=1,
+        memory=f"{memory}B",
+        job_name="omninav",
+        queue=options.get("partition"),
+        walltime=options.get("time", "12:00:00"),
+        account=options.get("account"),
+        interface=options.get("interface"),
+        log_directory=options.get("logs"),
+        scheduler_options={"dashboard": False, "dashboard_address": None},
+    )
+    try:
+        cluster.adapt(minimum=workers, maximum=workers)
+        return DaskExecutor(_client(cluster), cluster)
+    except BaseException:
+        cluster.close()
+        raise
+
+
+def _options(settings: EngineSettings, known: tuple[str, ...]) -> dict[str, str]:
+    problems = []
+    given = {name: str(value) for name, value in settings.options.items() if value is not None}
+    for name, value in given.items():
+        if name not in known:
+            hint = suggest(name, ("workers", "memory", *known), "settings")
+            problems.append(Problem(f"engine.{name}", f"the engine '{settings.name}' has no such setting", hint))
+        elif not WORD.fullmatch(value):
+            problems.append(Problem(f"engine.{name}", f"{value!r:.40}, expected a word without spaces"))
+    if problems:
+        raise ProblemsFound(problems)
+    return given
+
+
+def _client(where: Any) -> Any:
+    _quiet()
+    try:
+        return Client(where, timeout=START_S if not isinstance(where, str) else 5, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise BadInput(f"engine.address={where}: no scheduler answers there ({error!s:.200})") from None
+
+
+def _quiet() -> None:
+    """Keep Dask's own log to what nobody here says better."""
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    dask.config.set({"logging.distributed": "critical"})

@@ -1,0 +1,100 @@
+"""Engines: where jobs are placed. Each is a factory that gives a `concurrent.futures.Executor`, found by its name."""
+
+import os
+import re
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any
+
+from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
+
+ENTRY_POINTS = "omninav.engines"
+"""The group in which installed packages offer engines of their own."""
+BUILT_IN = {
+    "local": "omninav.pipeline.jobs.executors:local",
+    "slurm": "omninav.pipeline.jobs.dask_executor:slurm",
+    "dask": "omninav.pipeline.jobs.dask_executor:dask_cluster",
+}
+
+
+@dataclass(frozen=True)
+class EngineSettings:
+    """What `engine.…` says."""
+
+    name: str = "local"
+    workers: int | None = None
+    """Jobs at a time. None: local, one for each core; dask, as many as the cluster has; slurm, 4."""
+    memory: int | None = None
+    """Bytes that a job may take; None: as many as there are."""
+    options: Mapping[str, Any] = field(default_factory=dict)
+    """Whatever else stands there, for the engine itself."""
+
+
+Factory = Callable[[EngineSettings], Executor]
+
+
+def read_engine(plain: Any, where: str = "engine") -> EngineSettings:
+    """The settings of an engine, as a configuration has them. Raises `ProblemsFound`."""
+    given: dict[str, Any] = {"name": plain} if isinstance(plain, str) else dict(plain or {})
+    name, workers, memory = (given.pop(key, None) for key in ("name", "workers", "memory"))
+    name = "local" if name is None else name
+    problems = []
+    known = _factories()
+    if name not in known:
+        problems.append(Problem(where, f"there is no engine '{name!s:.40}'", suggest(str(name), known, "engines")))
+    if workers is not None and (not isinstance(workers, int) or isinstance(workers, bool) or not 1 <= workers <= 1e5):
+        hint = f"type {where}.workers=4"
+        problems.append(Problem(f"{where}.workers", f"{workers!r:.40}, expected a whole number >= 1", hint))
+    size = None if memory is None else _bytes(memory)
+    if memory is not None and size is None:
+        hint = f"type {where}.memory=4GB"
+        problems.append(Problem(f"{where}.memory", f"{memory!r:.40}, expected a size with its unit", hint))
+    if problems:
+        raise ProblemsFound(problems)
+    return EngineSettings(name, workers, size, given)
+
+
+def _bytes(text: Any) -> int | None:
+    found = re.fullmatch(r"(\d{1,6}(?:\.\d{1,3})?) ?([KMGT])i?B?", str(text), re.IGNORECASE)
+    return int(float(found[1]) * 1000 ** ("KMGT".index(found[2].upper()) + 1)) if found else None
+
+
+def executor_of(settings: EngineSettings) -> Executor:
+    """The executor that settings describe. Raises `BadInput` where it cannot be had."""
+    target = _factories()[settings.name]
+    module, _, name = target.partition(":")
+    try:
+        factory: Factory = getattr(import_module(module), name)
+    except ImportError as error:
+        raise BadInput(f"engine={settings.name}: {error}; {_to_install(settings.name)}") from None
+    return factory(settings)
+
+
+def _to_install(name: str) -> str:
+    return f"pip install 'omninav[{name}]'" if name in BUILT_IN else f"install what the engine '{name}' needs"
+
+
+def _factories() -> dict[str, str]:
+    return {**{each.name: each.value for each in entry_points(group=ENTRY_POINTS)}, **BUILT_IN}
+
+
+def cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def local(settings: EngineSettings) -> Executor:
+    """Threads of this process, each of which waits for the process of one job."""
+    if settings.options:
+        raise ProblemsFound([_unknown(name, settings) for name in settings.options])
+    return ThreadPoolExecutor(settings.workers or cores(), "job")
+
+
+def _unknown(name: str, settings: EngineSettings) -> Problem:
+    known = [each for each in ("workers", "memory") if each not in settings.options]
+    return Problem(
+        f"engine.{name}", f"the engine '{settings.name}' has no such setting", suggest(name, known, "settings")
+    )

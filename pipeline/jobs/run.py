@@ -1,0 +1,168 @@
+"""Running many jobs: one that fails is reported, one that dies is tried again, and neither stops the others."""
+
+import json
+import queue
+import secrets
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import CancelledError, Executor, Future
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from omninav.pipeline.files import write_whole
+from omninav.pipeline.graph.problems import BadInput
+
+from .executors import EngineSettings, cores, executor_of
+from .job import Job, Outcome
+from .perform import perform, release
+
+ATTEMPTS = 3
+"""How often a job is started whose process dies."""
+RENEW_S = 5.0
+"""How often the client says that it lives."""
+LOOK_S = 0.2
+"""How often messages are looked for."""
+Ends = queue.SimpleQueue[tuple[Job, int, Future[dict[str, Any]]]]
+"""Jobs that have ended, each with the number of the attempt."""
+
+
+class Workers:
+    """Those who run jobs, as an engine's settings describe them; a context manager.
+
+    The engine is started with the first job. `folder` must be seen by all of its machines.
+    """
+
+    def __init__(self, settings: EngineSettings, folder: Path) -> None:
+        self.settings = settings
+        self._lease = folder / ".client"
+        self._token = secrets.token_hex(16)
+        self._executor: Executor | None = None
+        self._over = threading.Event()
+
+    def __enter__(self) -> "Workers":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._over.set()
+        self._lease.unlink(missing_ok=True)  # jobs that still run end at this
+        if self._executor is not None:
+            self._executor.shutdown(wait=kind is None, cancel_futures=True)
+        release()
+
+    @property
+    def number(self) -> int:
+        """How many jobs run at a time, as far as it is known before they start."""
+        default = {"local": cores(), "slurm": 4}.get(self.settings.name, 8)
+        return self.settings.workers or int(getattr(self._executor, "workers", 0)) or default
+
+    def run(
+        self,
+        jobs: Sequence[Job],
+        on_message: Callable[[Job, Any], None] = lambda job, message: None,
+        on_end: Callable[[Job, Outcome], None] = lambda job, outcome: None,
+    ) -> dict[str, Outcome]:
+        """Run jobs. Returns how each ended, by name. Raises `BadInput` where the engine itself is gone.
+
+        `on_message` gets every message of a job, `on_end` how it ended.
+        """
+        if not jobs:
+            return {}
+        if self._executor is None:
+            write_whole(self._lease, self._token)
+            self._executor = executor_of(self.settings)
+            threading.Thread(target=self._renew, daemon=True).start()
+        outcomes: dict[str, Outcome] = {}
+        ends: Ends = queue.SimpleQueue()
+        mailbox = _Mailbox(on_message)
+        for job in jobs:
+            job.log.parent.mkdir(parents=True, exist_ok=True)
+            job.messages.unlink(missing_ok=True)
+        for job in jobs:
+            self._submit(job, 0, ends)
+        open_jobs = {job.name: job for job in jobs}
+        while open_jobs:
+            with suppress(queue.Empty):
+                job, attempt, future = ends.get(timeout=mailbox.pause)
+                outcome = _outcome(future)
+                mailbox.read(job)
+                if outcome.died and attempt + 1 < ATTEMPTS:
+                    print(f"{job.name}: {outcome.error}; it is started again", flush=True)
+                    self._submit(job, attempt + 1, ends)
+                    continue
+                del open_jobs[job.name]
+                mailbox.close(job)
+                outcomes[job.name] = outcome
+                on_end(job, outcome)
+            mailbox.look(open_jobs.values())
+        return outcomes
+
+    def _submit(
+        self, job: Job, attempt: int, ends: "queue.SimpleQueue[tuple[Job, int, Future[dict[str, Any]]]]"
+    ) -> None:
+        assert self._executor is not None
+        try:
+            future = self._executor.submit(perform, job.text(attempt, self._lease, self._token, self.settings.memory))
+        except Exception as error:
+            message = f"engine={self.settings.name}: it takes no more jobs ({error}); the same command goes on"
+            raise BadInput(message) from error
+        future.add_done_callback(lambda done: ends.put((job, attempt, done)))
+
+    def _renew(self) -> None:
+        while not self._over.wait(RENEW_S):
+            with suppress(OSError):  # gone, or a full disk
+                self._lease.touch() if self._lease.exists() else None
+
+
+def _outcome(future: Future[dict[str, Any]]) -> Outcome:
+    try:
+        return Outcome(**future.result())
+    except CancelledError:
+        return Outcome("its worker was lost", died=True)
+    except Exception as error:
+        return Outcome(f"its worker was lost ({type(error).__name__}: {error!s:.200})", died=True)
+
+
+class _Mailbox:
+    """What jobs send, as it comes. Looking for it takes at most a twentieth of the time, however slow the disk is."""
+
+    def __init__(self, on_message: Callable[[Job, Any], None]) -> None:
+        self._on_message = on_message
+        self._read: dict[str, int] = {}
+        self._due = 0.0
+
+    @property
+    def pause(self) -> float:
+        """Seconds until it looks again."""
+        return max(0.0, self._due - time.monotonic())
+
+    def look(self, jobs: Iterable[Job]) -> None:
+        """Read what jobs have sent, if it is time to."""
+        begun = time.monotonic()
+        if begun < self._due:
+            return
+        for job in list(jobs):
+            self.read(job)
+        now = time.monotonic()
+        self._due = now + max(LOOK_S, 20 * (now - begun))
+
+    def read(self, job: Job) -> None:
+        """Read what a job has sent since."""
+        try:
+            with job.messages.open("rb") as file:
+                file.seek(self._read.get(job.name, 0))
+                lines = file.read()
+        except FileNotFoundError:
+            return
+        whole = lines[: lines.rfind(b"\n") + 1]
+        self._read[job.name] = self._read.get(job.name, 0) + len(whole)
+        for line in whole.splitlines():
+            self._on_message(job, json.loads(line))
+
+    def close(self, job: Job) -> None:
+        """The job has ended."""
+        job.messages.unlink(missing_ok=True)

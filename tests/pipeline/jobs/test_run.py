@@ -1,0 +1,138 @@
+"""Jobs in processes of their own, by several engines: messages, errors, deaths, memory and orphans."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound
+from omninav.pipeline.jobs.executors import EngineSettings, read_engine
+from omninav.pipeline.jobs.job import Job
+from omninav.pipeline.jobs.run import Workers
+
+TESTS = str(Path(__file__).resolve().parents[2])
+
+
+def job(name: str, folder: Path, **given: object) -> Job:
+    return Job(name, f"pool_jobs:{name.partition(' ')[0]}", given, folder / f"{name}.log")
+
+
+def test_a_job_that_fails_or_dies_is_reported_and_the_others_finish(tmp_path: Path):
+    jobs = [job(name, tmp_path, messages=3, mark=str(tmp_path / "mark")) for name in ("die", "fail", "count")]
+    jobs.append(job("die_once", tmp_path, mark=str(tmp_path / "mark")))
+    messages, ended = [], {}
+    with Workers(EngineSettings(workers=2), tmp_path) as workers:
+        outcomes = workers.run(
+            jobs,
+            lambda job, message: messages.append((job.name, message["number"])),
+            lambda job, outcome: ended.update({job.name: outcome}),
+        )
+    assert outcomes == ended
+    assert outcomes["fail"].error == "ValueError: no such number"
+    assert outcomes["die"].error.startswith("its process was ended by SIGKILL; it had taken ")
+    assert outcomes["die_once"].error is None
+    assert (outcomes["count"].error, outcomes["count"].value) == (None, 3)
+    assert messages == [("count", 0), ("count", 1), ("count", 2)]
+    assert (tmp_path / "count.log").read_text() == "counted\n"
+    assert "Traceback" in (tmp_path / "fail.log").read_text()
+    assert len((tmp_path / "die.log").read_text().splitlines()) == 3  # attempts
+    assert {path.suffix for path in tmp_path.iterdir()} == {".log", ""}
+
+
+def test_a_job_that_takes_too_much_memory_is_ended_and_named_with_what_it_took(tmp_path: Path):
+    greedy = job("take", tmp_path, megabytes=300, seconds=60, mark=str(tmp_path / "mark"))
+    with Workers(EngineSettings(workers=1, memory=200_000_000), tmp_path) as workers:
+        outcome = workers.run([greedy])["take"]
+    assert re.fullmatch(r"it took 3\d\d MB of memory, more than engine.memory=200 MB allows", outcome.error)
+    wait_for(lambda: not lives(int((tmp_path / "mark").read_text())))
+
+
+CLIENT = """
+import sys
+from pathlib import Path
+sys.path.append({tests!r})
+from omninav.pipeline.jobs.executors import EngineSettings
+from omninav.pipeline.jobs.job import Job
+from omninav.pipeline.jobs.run import Workers
+folder = Path(sys.argv[1])
+given = {{"megabytes": 1, "seconds": 60, "mark": str(folder / "mark")}}
+with Workers(EngineSettings(workers=1), folder) as workers:
+    workers.run([Job("take", "pool_jobs:take", given, folder / "take.log")])
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_jobs_end_soon_after_whoever_started_them(tmp_path: Path, how: signal.Signals):
+    client = subprocess.Popen([sys.executable, "-c", CLIENT.format(tests=TESTS), str(tmp_path)], stderr=-3)
+    wait_for((tmp_path / "mark").exists)
+    time.sleep(0.1)
+    job_process = int((tmp_path / "mark").read_text())
+    assert lives(job_process)
+    client.send_signal(how)
+    client.wait()
+    wait_for(lambda: not lives(job_process))
+
+
+def test_a_job_uses_one_thread(tmp_path: Path):
+    pytest.importorskip("threadpoolctl")
+    with Workers(EngineSettings(workers=1), tmp_path) as workers:
+        outcome = workers.run([job("threads", tmp_path)])["threads"]
+    assert outcome.error is None, outcome.error
+    assert set(outcome.value) == {1}
+
+
+def test_jobs_run_on_a_cluster_of_dask_as_they_do_here(tmp_path: Path):
+    distributed = pytest.importorskip("distributed", reason="pip install 'omninav[dask]'")
+    jobs = [job(name, tmp_path, messages=3, mark=str(tmp_path / "mark")) for name in ("fail", "die_once", "count")]
+    messages = []
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        settings = EngineSettings("dask", options={"address": cluster.scheduler_address})
+        with Workers(settings, tmp_path) as workers:
+            outcomes = workers.run(jobs, lambda job, message: messages.append(message["number"]))
+            assert workers.number == 2
+    errors = {name: outcome.error for name, outcome in outcomes.items()}
+    assert errors == {"fail": "ValueError: no such number", "die_once": None, "count": None}
+    assert messages == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("slrum", r"engine: there is no engine 'slrum'\n +did you mean 'slurm'"),
+        ({"name": "local", "workers": 0}, "engine.workers: 0, expected a whole number >= 1"),
+        ({"name": "local", "memory": "4"}, "engine.memory: '4', expected a size with its unit"),
+    ],
+)
+def test_settings_of_an_engine_that_make_no_sense_are_refused(given: object, message: str):
+    with pytest.raises(ProblemsFound, match=message):
+        read_engine(given)
+
+
+def test_an_engine_that_cannot_be_reached_is_one_line(tmp_path: Path):
+    pytest.importorskip("distributed", reason="pip install 'omninav[dask]'")
+    settings = EngineSettings("dask", options={"address": "tcp://127.0.0.1:9"})
+    with pytest.raises(BadInput, match=r"tcp://127.0.0.1:9: no scheduler answers"), Workers(settings, tmp_path) as w:
+        w.run([job("nothing", tmp_path)])
+
+
+def lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return "\nState:\tZ" not in Path(f"/proc/{process}/status").read_text()
+
+
+def wait_for(condition: Callable[[], bool], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
