@@ -11,6 +11,7 @@ import argparse
 import json
 import multiprocessing
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -64,13 +65,17 @@ def main() -> None:
     given, words = parser.parse_known_args()
     os.environ["ROS_DOMAIN_ID"] = str(100 + os.getpid() % 100)
     run = Path("runs/live_benchmark").absolute() / str(os.getpid())
+    command = [sys.executable, "-m", "omninav", "live", f"map={given.map}", f"hydra.run.dir={run}", *words]
+    camera = [] if any(word.startswith("camera=") for word in words) else [f"camera={camera_of(given.log, run)}"]
     player = multiprocessing.get_context("spawn").Process(target=play, args=(given.log, given.rate, given.seconds))
     player.start()
-    ends = f"nodes.source.seconds={given.seconds - 2}"
-    command = [sys.executable, "-m", "omninav", "live", f"map={given.map}", ends, f"hydra.run.dir={run}", *words]
-    camera = [] if any(word.startswith("camera=") for word in words) else [f"camera={camera_of(given.log, run)}"]
-    subprocess.run([*command, "nodes.prior.number=500", *camera], check=True, stdout=subprocess.DEVNULL)
+    robot = subprocess.Popen([*command, "nodes.prior.number=500", *camera], stdout=subprocess.DEVNULL)
+    while player.is_alive() and robot.poll() is None:  # a log may be shorter than --seconds, and a word wrong
+        time.sleep(0.1)
     player.terminate()
+    robot.send_signal(signal.SIGINT)
+    if robot.wait():
+        sys.exit(robot.returncode)
     manifest = json.loads((run / "manifest.json").read_text())
     facts, dropped = manifest["facts"], manifest["dropped"]
     overtaken = sum(entry["count"] for kind, entry in dropped.items() if "overtaken" in kind)

@@ -4,7 +4,7 @@ import json
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from omninav.pipeline.files import locked, write_json
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input, suggest
 from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.run.execution import execute
-from omninav.pipeline.run.plan import plan
+from omninav.pipeline.run.plan import Plan, plan
 from omninav.pipeline.run.run_folder import start
 
 from .composition import complete
@@ -41,7 +41,12 @@ class SweepJob:
     overrides: str
 
 
-def run_job(config: Any, arguments: Sequence[str], run_experiment: Callable[[Any, Sequence[str]], int]) -> float | None:
+def run_job(
+    config: Any,
+    arguments: Sequence[str],
+    run_experiment: Callable[[Any, Sequence[str]], int],
+    check: Callable[[Mapping[str, Any]], Plan] = plan,
+) -> float | None:
     """Run what a configuration describes, and return its objective, if one is named (see `_run`).
 
     In a sweep the other jobs go on; the exit code is left in a file. A job that fails returns None, which Optuna counts
@@ -56,7 +61,7 @@ def run_job(config: Any, arguments: Sequence[str], run_experiment: Callable[[Any
         if of_experiment:
             code = run_experiment(config, arguments)
         else:
-            objective = _run(config, sweep, folder)
+            objective = _run(config, sweep, folder, check)
     except (ProblemsFound, BadInput) as wrong:
         code, error = 2, str(wrong)
     except StageFailed as failed:
@@ -89,7 +94,9 @@ def run_job(config: Any, arguments: Sequence[str], run_experiment: Callable[[Any
     return objective
 
 
-def _run(config: Any, sweep: SweepJob | None, folder: Path | None) -> float | None:
+def _run(
+    config: Any, sweep: SweepJob | None, folder: Path | None, check: Callable[[Mapping[str, Any]], Plan]
+) -> float | None:
     """Run a configuration. Returns its `objective`, None where none is named."""
     from omninav.pipeline.report.progress import Progress
     from omninav.pipeline.report.terminal_tables import results_table
@@ -98,7 +105,7 @@ def _run(config: Any, sweep: SweepJob | None, folder: Path | None) -> float | No
     settings = complete(config)
     if sweep is not None and settings.get("plots") == "auto":
         settings["plots"] = "none"
-    planned = plan(settings)
+    planned = check(settings)
     if sweep is None and folder is not None:
         no_run_in(folder)
     argv = ["omninav", *(sweep.overrides.split() if sweep else sys.argv[1:])]

@@ -61,7 +61,7 @@ def results(metrics: Metrics, details: bool = True) -> Results:
             quantities.append(Measured(several[0].title, several[0].unit, rows))
         else:
             singles += [_single(entry) for entry in several]
-    return Results(columns, tuple(quantities), tuple(singles))
+    return Results(columns, tuple(quantities), tuple(dict.fromkeys(singles)))  # two stages may have measured the same
 
 
 def _row(entry: Entry, columns: tuple[str, ...]) -> ResultRow:

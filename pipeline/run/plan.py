@@ -1,7 +1,8 @@
 """A configuration, checked: the graph, where its artifacts come from, and what is to be saved."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -106,13 +107,21 @@ def plan(config: Mapping[str, Any]) -> Plan:
                 problems.append(_no_output(f"saves.{name}", str(origin), graph))
         problems += _unrecordable(graph, config.get("record") or ())
     if problems or graph is None:
-        raise ProblemsFound(dict.fromkeys(problems))
+        raise ProblemsFound(_once(problems))
     record = tuple(dict.fromkeys(config.get("record") or ()))
     graph = with_plots(graph, plots, [str(origin).partition(".")[0] for origin in (*saves.values(), *record)])
     read = {origin for wire in graph.wires for origin in (wire.origin, wire.initial)}
     artifacts = [made for made in artifacts if f"{ARTIFACTS}.{made.name}" in read or specs[made.name].required]
     artifacts.sort(key=lambda made: not specs[made.name].required)  # what comes with another one follows it
     return Plan(config, graph, tuple(artifacts), saves, record)
+
+
+def _once(problems: Sequence[Problem]) -> Iterable[Problem]:
+    """Each problem once: a setting that this graph shares with those of its artifacts is wrong in all of them."""
+    found: dict[tuple[str, str], Problem] = {}
+    for problem in sorted(problems, key=lambda problem: problem.where.startswith(f"{ARTIFACTS}.")):
+        found.setdefault((re.sub(rf"^{ARTIFACTS}\.[^.]+\.", "", problem.where), problem.what), problem)
+    return found.values()
 
 
 def _unrecordable(graph: Graph, origins: Any) -> Iterator[Problem]:

@@ -1,5 +1,9 @@
 """How a robot fared that drove by itself."""
 
+from typing import Any
+
+import numpy as np
+
 from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.values.drive import Drive
 
@@ -11,7 +15,10 @@ QUANTITIES = {
 
 
 class DriveSummary(Stage):
-    """Measures how long and how far a robot drove in a closed loop, and how often it touched something."""
+    """Measures how long and how far a robot drove by itself, and in a simulated world how often it touched something.
+
+    Of a real robot nobody tallies contacts, and the distance is that of its odometry.
+    """
 
     class Out(Outputs):
         """`metrics`: the entry `drive` of metrics.json."""
@@ -20,9 +27,10 @@ class DriveSummary(Stage):
 
     def step(self, ctx: Context, drive: Drive) -> Out:
         """The whole run at once."""
-        values = {
-            "collisions": int(drive.collisions[-1]) if len(drive) else 0,
-            "distance_m": float(drive.distance[-1]) if len(drive) else 0.0,
-            "duration_s": float(drive.seconds[-1]) if len(drive) else 0.0,
-        }
+        values: dict[str, Any] = {"duration_s": float(drive.seconds[-1]) if len(drive) else 0.0}
+        tallied = np.flatnonzero(np.isfinite(drive.distance))
+        if len(tallied):
+            values |= {"collisions": int(drive.collisions[-1]), "distance_m": float(drive.distance[tallied[-1]])}
+        else:
+            values["distance_m"] = float(np.nansum(np.hypot(drive.motion[:, 0], drive.motion[:, 1])))
         return self.Out(metrics=Metrics({"frames": len(drive), "drive": values}, QUANTITIES, ("drive.collisions",)))

@@ -1,9 +1,9 @@
 """A run, watched while it goes on: a WebSocket server that Foxglove connects to."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from omninav.pipeline import BadInput, Context, Outputs, Stage
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
 from omninav.pipeline.mcap.message_types import standard_types
 from omninav.stages.values.ros_messages import RosMessages
 
@@ -22,7 +22,7 @@ class FoxgloveServer(Stage):
     process goes on with the same server. Raises `BadInput` where foxglove-sdk is missing or the port is taken.
     """
 
-    port: bool | int = False
+    port: bool | Annotated[int, Bounds(ge=1, le=65535)] = False
     """Port to listen on; true: 8765; false: nothing is served."""
     host: str = "127.0.0.1"
     """Address to listen on: this machine alone; 0.0.0.0: every machine that reaches this one may watch."""

@@ -1,6 +1,11 @@
 """`omninav live`: a variant whose frames come now, until it is told to stop."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from omninav.pipeline.cli.commands.run import command as run
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound
+from omninav.pipeline.run.plan import Plan, plan
 
 SETTINGS = ("source=live", "publish=ros2", "log=live")
 """What makes a run live, each where nothing else is typed."""
@@ -11,4 +16,18 @@ def command(arguments: list[str]) -> int:
     typed = dict(word.split("=", 1) for word in arguments if "=" in word)
     if typed.get("log", "live") != "live":
         typed.setdefault("publish", "")  # what is plugged into this computer has nobody to tell it to
-    return run([*(word for word in SETTINGS if word.partition("=")[0] not in typed), *arguments])
+    return run([*(word for word in SETTINGS if word.partition("=")[0] not in typed), *arguments], plan_live)
+
+
+def plan_live(settings: Mapping[str, Any]) -> Plan:
+    """Check a configuration. Raises `BadInput` where its variant is none of what runs live."""
+    try:
+        return plan(settings)
+    except ProblemsFound as found:
+        if not all(problem.where.startswith("wires.") for problem in found.problems):
+            raise
+        first = found.problems[0]
+        raise BadInput(
+            f"variant={settings.get('variant')} does not run live ({first.where}: {first.what}); "
+            "take another: omninav variants"
+        ) from None

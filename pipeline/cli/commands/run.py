@@ -4,7 +4,7 @@ import os
 import sys
 import tempfile
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -23,10 +23,11 @@ from omninav.pipeline.cli.terminal import shown
 from omninav.pipeline.cli.words import read_flags
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.graph.small_files import read_yaml
+from omninav.pipeline.run.plan import Plan, plan
 
 
-def command(arguments: list[str]) -> int:
-    """Run one job, or all of a sweep. Hydra composes the configurations."""
+def command(arguments: list[str], check: Callable[[Mapping[str, Any]], Plan] = plan) -> int:
+    """Run one job, or all of a sweep. Hydra composes the configurations, and `check` makes a plan of each."""
     flags = read_flags(arguments)
     if flags.help:
         print(files("omninav.conf").joinpath("help.txt").read_text(encoding="utf-8"), end="")
@@ -41,7 +42,7 @@ def command(arguments: list[str]) -> int:
             _refuse_other_sweep(listed)
 
         def job(config: Any) -> float | None:
-            return run_job(config, arguments, run_experiment)
+            return run_job(config, arguments, run_experiment, check)
 
         of_conditions = condition_words(listed)
         typed = [word for word in listed if word not in of_conditions]

@@ -1,0 +1,24 @@
+import pytest
+from small_run import collected, small_run
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.metrics.drive_summary import DriveSummary
+from omninav.stages.values.drive_tally import DriveTally
+
+
+def summary(drive):
+    return DriveSummary().step(Context("summary"), drive).metrics.values["drive"]
+
+
+def test_a_simulated_robot_is_measured_by_its_tally():
+    drive = collected([Tick(0, 0), Tick(1, 10**9)], [None, None], tallies=[DriveTally(0, 0.0), DriveTally(2, 0.5)])
+    assert summary(drive) == {"collisions": 2, "distance_m": 0.5, "duration_s": 1.0}
+
+
+def test_a_real_robot_is_measured_by_its_odometry_and_no_contact_is_claimed():
+    run = small_run(frames=12)
+    found = summary(run.drive)
+    assert "collisions" not in found
+    assert found["distance_m"] == pytest.approx(
+        sum((motion.x**2 + motion.y**2) ** 0.5 for motion in run.motion if motion)
+    )
