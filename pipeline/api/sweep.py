@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from omninav.pipeline.cli.commands.run import command
+from omninav.pipeline.cli.words import word_of
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.tables import read_table
 
 from .run import Run
-from .words import word_of, words_of
+from .words import words_of
 
 
 class Sweep:

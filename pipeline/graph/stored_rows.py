@@ -1,6 +1,7 @@
 """Rows of an array that lie in a file, for arrays that are larger than memory."""
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -34,15 +35,15 @@ class StoredRows(Generic[T]):
     @property
     def ndim(self) -> int:
         """As of the array."""
-        return self._array.ndim
+        return len(self.shape)
 
     @property
     def nbytes(self) -> int:
         """Bytes of the whole array, read or not."""
-        return self._array.nbytes
+        return math.prod(self.shape) * self.dtype.itemsize
 
     def __len__(self) -> int:
-        return len(self._array)
+        return self.shape[0]
 
     def __getitem__(self, index: Any) -> npt.NDArray[T]:
         self._check(self._rows(index[0] if isinstance(index, tuple) and index else index))
@@ -65,3 +66,31 @@ class StoredRows(Generic[T]):
         if rows.size and not (int(rows.min()) >= -count and int(rows.max()) < count):
             raise IndexError(f"there is no row {rows.max() if rows.max() >= count else rows.min()}, of {count}")
         return np.asarray(np.where(rows < 0, rows + count, rows).ravel(), np.int64)
+
+
+class GatheredRows(StoredRows[T]):
+    """Some rows of some arrays, one after the other: gathered where they are needed, as when they are written."""
+
+    def __init__(self, parts: Sequence[tuple[npt.NDArray[T] | StoredRows[T], npt.NDArray[np.int64]]]) -> None:
+        """`parts`: an array and the numbers of its rows. All arrays are of one type, and their rows of one shape."""
+        self._parts = parts
+        self._starts = np.cumsum([0, *(len(rows) for _, rows in parts)])
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """As of one array of these rows."""
+        return (int(self._starts[-1]), *self._parts[0][0].shape[1:])
+
+    @property
+    def dtype(self) -> np.dtype[T]:
+        """As of the arrays."""
+        return self._parts[0][0].dtype
+
+    def __getitem__(self, index: Any) -> npt.NDArray[T]:
+        first, *more = index if isinstance(index, tuple) else (index,)
+        rows = self._rows(first)
+        found = np.empty((len(rows), *self.shape[1:]), self.dtype)
+        for (array, chosen), start in zip(self._parts, self._starts[:-1], strict=True):
+            own = (rows >= start) & (rows < start + len(chosen))
+            found[own] = array[chosen[rows[own] - start]]
+        return found[(0 if isinstance(first, int | np.integer) else slice(None), *more)]

@@ -1,12 +1,17 @@
 """Commands that variants without a source are: two words, one file."""
 
+import json
 from pathlib import Path
 
 import cv2
+import made_places
 import numpy as np
 import pytest
+from small_run import reference_graph
 
 from omninav.pipeline.cli.main import main
+from omninav.pipeline.engine.artifact import read_artifact, write_artifact
+from omninav.stages.values.projection import Projection
 
 
 def test_a_camera_is_looked_through(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -38,3 +43,81 @@ def test_check_finds_what_images_alone_do_not_serve(tmp_path: Path, capsys: pyte
     assert main(["check", "variant=omniview_mcl", *words]) == 2
     assert "needed by 'mapping'; type speed=" in capsys.readouterr().err
     assert main(["check", "variant=topological_localisation", *words]) == 0
+
+
+def map_of(file: Path, count: int, **fields: object) -> Path:
+    map = reference_graph(count)
+    map.put(**fields)
+    write_artifact(file, map, {"variant": "made", "stages": {"features": {"_target_": "x.Colours", "bins": 4}}})
+    return file
+
+
+def test_maps_are_joined_thinned_cut_and_shown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    map_of(tmp_path / "it's a map.omap", 40)
+    map_of(tmp_path / "b.omap", 30)
+    assert main(["map", "join", "it's a map.omap", "b.omap", "out=c.omap"]) == 0
+    assert main(["map", "thin", "c.omap", "spacing=2", "out=d.omap"]) == 0
+    assert main(["map", "cut", "d.omap", "area=[0,-4,8,4]", "out=e.omap"]) == 0
+    assert main(["map", "show", "c.omap", "e.omap"]) == 0
+    said = capsys.readouterr().out
+    assert "c.omap: 70 references of 2 maps (40 + 30)" in said
+    assert "of 70 references, at least 2 m apart" in said
+    assert "features     Colours, bins=4" in said
+    assert "made by      cut area=[0.0, -4.0, 8.0, 4.0]" in said
+    assert cv2.imread(str(tmp_path / "map.png")) is not None
+    first = (tmp_path / "d.omap").read_bytes()
+    assert main(["map", "thin", "c.omap", "spacing=2", "out=d.omap"]) == 0
+    assert (tmp_path / "d.omap").read_bytes() == first
+
+
+def test_maps_that_do_not_join_are_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    map_of(tmp_path / "a.omap", 5)
+    map_of(tmp_path / "drift.omap", 5, pose_source="odometry")
+    map_of(tmp_path / "other.omap", 5)
+    write_artifact(tmp_path / "other.omap", reference_graph(5), {"stages": {"features": {"_target_": "x.Colours"}}})
+    write_artifact(tmp_path / "places.omap", made_places.made_map([(0, 0), (1, 0)], {(0, 1): 1}))
+    write_artifact(tmp_path / "projection.omap", Projection(np.eye(3, 12, dtype=np.float32), np.array([0.5, 0.3, 0.1])))
+    refused = {
+        ("join", "a.omap"): "maps: 1 files are given, expected at least 2 maps",
+        ("join", "a.omap", "drift.omap"): "type same_frame=true if it is",
+        ("join", "a.omap", "other.omap"): "were made with other features than a.omap's (bins=None and 4)",
+        ("join", "a.omap", "places.omap"): "maps of one kind can be joined",
+        ("join", "a.omap", "projection.omap"): "projection.omap: it holds a Projection",
+        ("thin", "a.omap", "out=./a.omap"): "this map is read; type another name",
+        ("thin", "a.omap", "out=b.txt"): "type out=NAME.omap",
+        ("thin", "a.omap", "b.omap"): "maps: 2 files are given, expected 1 map",
+        ("cut", "a.omap"): "type area=[x0,y0,x1,y1]",
+        ("cut", "a.omap", "area=[90,90,91,91]"): "nothing of a.omap lies there; it goes from [",
+        ("show", "projection.omap"): "it holds a Projection, no map",
+        ("show", "none.omap"): "none.omap: there is no such file",
+    }
+    for words, said in refused.items():
+        assert main(["map", *words]) == 2
+        lines = [line for line in capsys.readouterr().err.splitlines() if not line.startswith("{")]
+        assert said in lines[-1], lines
+        assert len(lines) == 1
+    assert main(["map", "join", "a.omap", "drift.omap", "same_frame=true"]) == 0
+    assert read_artifact(tmp_path / "joined.omap").pose_source == "odometry"  # type: ignore[attr-defined]
+
+
+def test_a_drive_is_localised_in_a_joined_and_in_a_thinned_map(
+    omninav, demo: Path, shared_cache: Path, tmp_path: Path
+) -> None:
+    whole = demo / "map.omap"
+    for side, area in (("left", "[-99,-99,5,99]"), ("right", "[5,-99,99,99]")):
+        omninav("map", "cut", str(whole), f"area={area}", f"out={side}.omap", check=True)
+    omninav("map", "join", "left.omap", "right.omap", "out=both.omap", check=True)
+    omninav("map", "thin", "both.omap", "spacing=0.6", "out=few.omap", check=True)
+    for name in ("both", "few"):
+        words = (f"map={name}.omap", f"cache={shared_cache}", "nodes.source.stop=40", "plots=none")
+        omninav(*words, f"hydra.run.dir=runs/{name}", check=True)
+        metrics = json.loads((tmp_path / "runs" / name / "metrics.json").read_text())
+        assert metrics["position_error_m"]["median"] < 0.5
+        assert metrics["map"]["references"] <= len(read_artifact(whole))  # type: ignore[arg-type]
+    assert metrics["map"]["references"] < 0.8 * len(read_artifact(whole))  # type: ignore[arg-type]

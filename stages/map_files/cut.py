@@ -1,0 +1,63 @@
+"""Cuts a saved map to an area."""
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import BadInput, Context, Outputs, Stage
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Coordinate
+
+from .places import cut_places
+from .references import cut_references
+from .saved import MapOfPlaces, read_saved, target, write_saved
+
+Area = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
+
+
+class CutMap(Stage):
+    """Writes the part of a map that lies in an area: its references or places, and the edges or links between them.
+
+    Raises BadInput where the file is no such map, or nothing of it lies there.
+    """
+
+    maps: str | tuple[str, ...] | None = None
+    """The map (.omap)."""
+    area: Area | None = None
+    """x0, y0, x1, y1 (m): two opposite corners, in the map's frame."""
+    out: str = "cut.omap"
+    """The file to write."""
+
+    class Out(Outputs):
+        """Nothing: it writes a file."""
+
+    def step(self, ctx: Context) -> Out:
+        """Cut the map."""
+        (source,) = read_saved(self.maps, at_most=1)
+        path, whole = target(self.out, [source]), source.map
+        if self.area is None:
+            raise BadInput("area: none is given; type area=[x0,y0,x1,y1], two opposite corners in metres")
+        poses = poses_of(whole)
+        inside = within_area(poses, self.area)
+        if not inside.any():
+            edges = (edge(poses[:, :2], axis=0).round(1).tolist() for edge in (np.min, np.max)) if len(poses) else ()
+            where = f"it goes from {' to '.join(map(str, edges))}" if len(poses) else "it is empty"
+            raise BadInput(f"area={list(self.area)}: nothing of {source.path} lies there; {where}")
+        left = cut_references(whole, inside) if isinstance(whole, ReferenceGraph) else cut_places(whole, inside)
+        write_saved(path, left, [source], f"cut area={list(self.area)}")
+        what = "references" if isinstance(whole, ReferenceGraph) else "places"
+        print(f"{path}: {len(left)} of {len(whole)} {what}")
+        return self.Out()
+
+
+def poses_of(map: MapOfPlaces) -> npt.NDArray[np.float64]:
+    """Where references, or places, were taken: (N, 3)."""
+    return map.poses if isinstance(map, ReferenceGraph) else map.poses[map.places]
+
+
+def within_area(poses: npt.NDArray[np.float64], area: Area) -> npt.NDArray[np.bool_]:
+    """Which poses (N, 3) lie in an area, its edges included: (N,)."""
+    corners = np.array(area).reshape(2, 2)
+    inside: npt.NDArray[np.bool_] = ((poses[:, :2] >= corners.min(axis=0)) & (poses[:, :2] <= corners.max(axis=0))).all(
+        axis=1
+    )
+    return inside
