@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from importlib.resources import files
 
+from .help import asks_for_help, help_text
 from .output import lost_output, mend_streams
 
 COMMANDS = (
@@ -42,8 +43,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
-    if arguments and arguments[0] in ("-h", "--help", "help"):
-        print(files("omninav.conf").joinpath("help.txt").read_text(encoding="utf-8"), end="")
+    if asks_for_help(arguments):
+        print(help_text(arguments), end="")
         return 0
     if arguments and arguments[0] == "--version":
         from importlib.metadata import version

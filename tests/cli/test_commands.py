@@ -6,8 +6,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
+
+from omninav.pipeline.cli.main import COMMANDS, main
 
 ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.parametrize("words", [*COMMANDS, "camera look", "camera record", "camera calibrate"])
+def test_every_command_explains_itself(words, capsys):
+    main([*words.split(), "--help"])
+    told = capsys.readouterr().out
+    assert told.startswith(f"omninav {words} ")
+    assert "{" not in told.replace("[{at", "")
+    file = ROOT / "conf" / "variant" / f"{words.replace(' ', '_')}.yaml"
+    settings = yaml.safe_load(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    missing = [name for name in settings.get("inputs", {}) if f"  {name}=" not in told]
+    assert not missing
 
 
 def test_help_and_version_answer_without_configuration(omninav):

@@ -70,7 +70,7 @@ def test_the_wheel_holds_every_module_every_option_and_the_templates_and_no_test
     kinds = {
         "pipeline": ("*.py", "py.typed", "templates/*"),
         "stages": ("*.py", "py.typed", "*.json"),
-        "conf": ("*.py", "*.yaml", "help.txt"),
+        "conf": ("*.py", "*.yaml", "*.txt"),
     }
     expected = {
         f"omninav/{path.relative_to(ROOT)}"

@@ -5,7 +5,6 @@ import sys
 import tempfile
 from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +28,6 @@ from omninav.pipeline.run.plan import Plan, plan
 def command(arguments: list[str], check: Callable[[Mapping[str, Any]], Plan] = plan) -> int:
     """Run one job, or all of a sweep. Hydra composes the configurations, and `check` makes a plan of each."""
     flags = read_flags(arguments)
-    if flags.help:
-        print(files("omninav.conf").joinpath("help.txt").read_text(encoding="utf-8"), end="")
-        return 0
     words, folders = flags.overrides, [flags.config_dir] if flags.config_dir else []
     offer_plugins()  # which parameters there are depends on the stages that are offered
     with hydra_started(folders) as hydra:
