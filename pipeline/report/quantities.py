@@ -17,6 +17,7 @@ UNITS = {
     "_ms": "ms",
     "_px": "px",
     "_frames": "frames",
+    "_m2": "m²",
     "_m": "m",
     "_s": "s",
 }

@@ -4,6 +4,7 @@ import base64
 import json
 import shlex
 from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,7 @@ def write_report(
     from markupsafe import Markup
 
     shown_figures = [_figure(figure) for figure in sorted(figures, key=lambda figure: (figure.order, figure.name))]
+    _stand_side_by_side(shown_figures)
     shown_tables = [
         {"title": t.title, "caption": t.caption, "columns": t.columns, "rows": [[_cell(c) for c in r] for r in t.rows]}
         for t in sorted(tables, key=lambda table: (table.order, table.name))
@@ -85,6 +87,15 @@ def _figure(figure: Figure) -> dict[str, Any]:
     video = figure.media_type.startswith("video/") and figure.per_second
     shown |= {"media_type": figure.media_type, "base64": base64.b64encode(figure.content).decode()}
     return shown | ({"kind": "video", "per_second": figure.per_second} if video else {})
+
+
+def _stand_side_by_side(figures: Sequence[dict[str, Any]]) -> None:
+    """Put charts that follow each other in pairs; one that is left over stands beside its caption."""
+    charts = 0
+    for figure, following in zip_longest(figures, figures[1:]):
+        charts = charts + 1 if figure["kind"] == "chart" else 0
+        ends = following is None or following["kind"] != "chart"
+        figure["place"] = "" if not charts else "alone" if ends and charts % 2 else "half"
 
 
 def _slides(slides: Sequence[Slide]) -> str:

@@ -18,11 +18,9 @@ def skipped(manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def warning_lines(manifest: Mapping[str, Any]) -> list[str]:
-    """A line for each warning, and one for each kind of skipped data but ticks in which a stage had nothing to do."""
+    """A line for each warning, and one for each kind of skipped data with its first case. Mere counts are none."""
     lines = [str(warning) for warning in manifest.get("warnings") or ()]
     for row in skipped(manifest):
-        if row["kind"].startswith("skipped."):
-            continue
-        first = f" (first: {row['first']})" if row["first"] else ""
-        lines.append(f"{row['kind']}: {row['count']}{first}")
+        if row["first"]:
+            lines.append(f"{row['kind']}: {row['count']} (first: {row['first']})")
     return lines

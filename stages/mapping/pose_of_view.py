@@ -5,7 +5,7 @@ from typing import Literal
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.pose import Pose, PoseSource
+from omninav.stages.values.pose import SOURCE_WORDS, Pose, PoseSource, frame_of
 
 Supervised = Literal["auto", "truth", "odometry"]
 
@@ -19,13 +19,14 @@ def pose_of_view(
     Raises BadInput where `supervised` is truth and there is none, and where a second log follows one whose poses are
     odometry.
     """
-    if ctx.tick.first_of_log and ctx.tick.log and len(map) and map.pose_source == "odometry":
+    if ctx.tick.first_of_log and ctx.tick.log and len(map) and map.pose_source in ("odometry", "guess"):
         raise BadInput(
             "mapping: each log's odometry has a frame of its own, so several logs without ground truth make no "
             "one map; give one tour, or tours with ground truth"
         )
     if not len(map):
-        source: PoseSource = "truth" if truth is not None and supervised != "odometry" else "odometry"
+        known = truth is not None and supervised != "odometry"
+        source: PoseSource = "truth" if known else frame_of(odometry)
         if supervised == "truth" and truth is None:
             raise BadInput(
                 "mapping: the tour has no ground truth for its first image; "
@@ -35,5 +36,5 @@ def pose_of_view(
         ctx.fact("map_poses", source)
     pose = truth if map.pose_source == "truth" else odometry
     if pose is None:
-        ctx.count("view_without_pose", detail=f"mapping: images without {map.pose_source} are not mapped")
+        ctx.count("view_without_pose", detail=f"mapping: images without {SOURCE_WORDS[map.pose_source]} are not mapped")
     return pose

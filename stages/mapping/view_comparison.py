@@ -18,7 +18,7 @@ from omninav.stages.geometry.appearance.visual_distance import (
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.drive import pose_row
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, VerticalSegments, view_features
-from omninav.stages.values.pose import Pose, PoseSource
+from omninav.stages.values.pose import Pose, PoseSource, frame_of
 from omninav.stages.values.topological_map import TopologicalMap
 
 from .pose_of_view import Supervised
@@ -82,7 +82,7 @@ class ViewComparison(Stage):
         known: TopologicalMap | None = None,
     ) -> Out:
         """The whole tour at once."""
-        source = self._pose_source(ctx, truth, known)
+        source = self._pose_source(ctx, odometry, truth, known)
         poses = truth if source == "truth" else odometry
         views = [] if known is None else known_views(known)
         frame = 1 + max((view.frame for view in views), default=-1)
@@ -151,14 +151,21 @@ class ViewComparison(Stage):
                 chosen.append(row)
         return chosen
 
-    def _pose_source(self, ctx: Context, truth: Sequence[Pose | None], known: TopologicalMap | None) -> PoseSource:
+    def _pose_source(
+        self,
+        ctx: Context,
+        odometry: Sequence[Pose | None],
+        truth: Sequence[Pose | None],
+        known: TopologicalMap | None,
+    ) -> PoseSource:
         there = any(pose is not None for pose in truth)
         if self.supervised == "truth" and not there:
             raise BadInput(
                 "mapping: the tour has no ground truth; use a tour with it (tour_settings.truth=FILE), or "
                 "nodes.views.supervised=auto"
             )
-        source: PoseSource = "truth" if there and self.supervised != "odometry" else "odometry"
+        first = next((pose for pose in odometry if pose is not None), None)
+        source: PoseSource = "truth" if there and self.supervised != "odometry" else frame_of(first)
         if known is not None and len(known) and known.pose_source != source:
             raise BadInput(
                 f"mapping: the known map's poses are from {known.pose_source}, the tour's from {source}: they have "

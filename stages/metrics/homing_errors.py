@@ -14,7 +14,7 @@ from omninav.stages.values.homing import HomingVector, PathProgress
 QUANTITIES = {
     "homing.end_error_m": Quantity(title="Distance to the target at the end", better="lower"),
     "homing.end_turn_deg": Quantity(title="Heading error at the end", better="lower"),
-    "homing.arrived": Quantity(title="Arrived", better="higher"),
+    "homing.arrived": Quantity(title="Arrived", unit="%", better="higher"),
     "homing.time_s": Quantity(title="Time until it arrived", better="lower", absent="never"),
     "homing.lost_rate": Quantity(title="Target lost", better="lower"),
     "homing.direction_error_deg": Quantity(title="Error of the homing direction", better="lower"),

@@ -17,6 +17,19 @@ Array = npt.NDArray[np.float64]
 QUANTITIES = {
     "spacing.between_views.unevenness": Quantity(title="Unevenness of the map among views", better="lower"),
     "spacing.between_places_m.unevenness": Quantity(title="Unevenness of the map on the floor", better="lower"),
+    **{
+        f"spacing.{between}.{key}": Quantity(title=f"{title}, {word}", unit=unit)
+        for between, title, unit in (
+            ("between_places_m", "Distance of a place to the nearest one", "m"),
+            ("between_views", "Distance of a view to the nearest one (its own measure)", None),
+        )
+        for key, word in (
+            ("mean", "mean"),
+            ("median", "median"),
+            ("p10", "10th percentile"),
+            ("p90", "90th percentile"),
+        )
+    },
 }
 
 

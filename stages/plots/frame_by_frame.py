@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 
 from omninav.pipeline import Context, Figure, Outputs, Stage
@@ -17,9 +16,10 @@ from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.map_places import AnyMap, map_poses
 from omninav.stages.values.thumbnails import Thumbnails
 from omninav.stages.values.topological_map import TopologicalMap
-from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 
 from .belief_spread import spread_m
+from .best_match_picture import first_seen, picture_of_reference, picture_of_view
 from .drawing import extent_of
 from .panorama_snapshot import EncodedPanorama
 from .plan_chart import draw_surroundings, jumps, plan_chart
@@ -34,7 +34,8 @@ class FrameByFrame(Stage):
     """Shows up to 60 frames of the last log, at even steps: what the robot saw, and where it believed to be.
 
     The reference (or place) of the map that looked most like the image is ringed; with `thumbnails` its image stands
-    below the robot's, turned as the robot is turned against it.
+    below the robot's, turned as the robot is turned against it. Of a map that is learned on the way the image is one of
+    the drive's own `panoramas`, by the map's `events`, and the ring is where the robot was when it saw it.
     """
 
     class Out(Outputs):
@@ -52,8 +53,11 @@ class FrameByFrame(Stage):
         thumbnails: Thumbnails | None = None,
         grid: OccupancyGrid | None = None,
         plan: FloorPlan | None = None,
+        events: Sequence[ViewEvent | None] | None = None,
+        panoramas: Sequence[EncodedPanorama | None] | None = None,
     ) -> Out:
         """The whole run at once."""
+        ticks = first_seen(events or ())
         last = drive.last_log
         shown = {frame for frame in even_frames(int(last.frames[-1]) + 1)} if len(last) else set()
         rows = [n for n, frame in enumerate(last.frames.tolist()) if frame in shown]
@@ -67,17 +71,25 @@ class FrameByFrame(Stage):
             tick = int(last.row[n])
             layer, belief = chart.layer(), None if beliefs is None else beliefs[tick]
             spot, snapshot = _spot(last, n, map), snapshots[tick]
+            seen = ticks.get(int(last.reference[n]))
+            if seen is not None:
+                spot = _pose_at(drive, seen)
             _draw_now(layer, belief, last, path, n, spot)
             photographs = [] if snapshot is None else [("image", snapshot.jpeg)]
-            if photographs and last.reference[n] >= 0:
-                photographs += _reference_picture(last, n, map, thumbnails)
+            picture = None
+            if photographs and seen is not None and panoramas is not None:
+                picture = picture_of_view(panoramas[seen], last.reference_turn[n])
+            elif photographs and last.reference[n] >= 0:
+                picture = picture_of_reference(last.reference[n], last.reference_turn[n], map, thumbnails)
+            if picture is not None:
+                photographs.append(("best match in the map", picture))
             label = f"frame {int(last.frames[n])} · {last.seconds[n]:.1f} s"
             slides.append(Slide(label, layer.svg, tuple(photographs), tuple(_facts(last, n, belief, spot))))
         words = [f"{len(slides)} of {len(last)} frames."]
         if beliefs is not None:
             chart.name("belief", "pink", "dot")
             chart.name("estimate", "blue", "line")
-        if not isinstance(map, ViewMixtures) and (last.reference >= 0).any():
+        if (ticks or not isinstance(map, ViewMixtures)) and (last.reference >= 0).any():
             chart.name("best reference", "green", "ring")
         words += _what_images_show(snapshots[int(last.row[rows[0]])])
         return self.Out(
@@ -154,24 +166,12 @@ def _spot(drive: Drive, n: int, map: AnyMap | None) -> Array | None:
     return spot
 
 
-def _reference_picture(
-    drive: Drive, n: int, map: AnyMap | None, thumbnails: Thumbnails | None
-) -> list[tuple[str, bytes]]:
-    """The best reference's image, turned as the robot is turned against it."""
-    image = int(drive.reference[n])
-    if isinstance(map, TopologicalMap):
-        image = int(map.places[image])
-    if thumbnails is None or image >= len(thumbnails) or thumbnails.ends[image] == thumbnails.ends[image + 1]:
-        return []
-    kept = thumbnails.image(image)
-    if kept.shape[1] > 2 * kept.shape[0]:  # a panorama, not a mirror's disc
-        kept = np.roll(kept, _columns(drive.reference_turn[n], kept.shape[1]), axis=1)
-    jpeg = cv2.imencode(".jpg", kept, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes()
-    return [("best match in the map", jpeg)]
-
-
-def _columns(turn: float, width: int) -> int:
-    return round(float(np.nan_to_num(turn)) / (2 * math.pi) * width)
+def _pose_at(drive: Drive, tick: int) -> Array | None:
+    """The true pose in a tick of any log, without truth the estimated one; None where neither is known."""
+    poses = drive.truth if drive.has_truth else drive.estimate
+    row = int(np.searchsorted(drive.row, tick))
+    there = row < len(drive) and drive.row[row] == tick and known(poses[row : row + 1]).all()
+    return poses[row] if there else None
 
 
 def _facts(drive: Drive, n: int, belief: Shown | None, spot: Array | None) -> list[tuple[str, str]]:

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from omninav.pipeline import Context, Figure, Outputs, Stage
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.floor_plan import FloorPlan
+from omninav.stages.values.pose import SOURCE_WORDS
 from omninav.stages.values.topological_map import LOOP, LoopHypotheses, TopologicalMap
 
 from .drawing import (
@@ -51,10 +52,10 @@ class ShowLoopHypotheses(Stage):
                 name="loop_hypotheses",
                 title="Loop hypotheses and the topological map",
                 caption=f"Left: the {len(hypotheses.poses)} images of the tour that took part, where each was taken "
-                f"(from {hypotheses.pose_source}); {accepted} of {number} hypotheses that two views show one place "
-                f"were accepted, the others rejected. Right: {len(map)} places at their medoids, {len(map.links)} "
-                f"links, and the path images between them: {len(map.views)} views in all. It was made from images "
-                "alone.",
+                f"(from {SOURCE_WORDS[hypotheses.pose_source]}); {accepted} of {number} hypotheses that two views show "
+                f"one place were accepted, the others rejected. Right: {len(map)} places at their medoids, "
+                f"{len(map.links)} links, and the path images between them: {len(map.views)} views in all. It was made "
+                "from images alone.",
                 content=_draw(hypotheses, map, plan),
                 order=9,
             )
@@ -80,10 +81,9 @@ def _draw(found: LoopHypotheses, map: TopologicalMap, plan: FloorPlan | None) ->
         _draw_places(right, map)
         for axes in (left, right):
             plan_axes(axes, extent)
-            axes.legend(
-                loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=4, fontsize=7, frameon=False,
-                columnspacing=1.0, handletextpad=0.4,
-            )  # fmt: skip
+        legends = [axes.get_legend_handles_labels() for axes in (left, right)]
+        named = {label: handle for legend in legends for handle, label in zip(*legend, strict=True)}
+        drawn.canvas.legend(named.values(), named.keys(), loc="outside lower center", ncols=len(named))
     return drawn.content
 
 

@@ -9,6 +9,7 @@ from omninav.pipeline import Bounds, Context, Figure, Outputs, Stage
 from omninav.pipeline.report.chart import Colour
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.floor_plan import FloorPlan
+from omninav.stages.values.pose import SOURCE_WORDS
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 from .drawing import extent_of
@@ -54,7 +55,7 @@ class MapEllipses(Stage):
                 title="The map",
                 caption=f"{size} Each place is an ellipse of {self.sigmas:g} sigma, the fainter the "
                 f"less it weighs. The line is the {'true path' if true else 'estimate'}. "
-                f"The first pose came from {map.pose_source}.",
+                f"The first pose was taken from {SOURCE_WORDS[map.pose_source]}.",
                 content=_draw(map, paths, plan if true else None, self.sigmas, true),
                 media_type="image/svg+xml",
                 order=12,

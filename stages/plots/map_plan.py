@@ -4,6 +4,7 @@ from omninav.pipeline import Context, Figure, Outputs, Stage
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import SOURCE_WORDS
 
 from .drawing import extent_of
 from .plan_chart import draw_surroundings, plan_chart
@@ -26,7 +27,8 @@ class MapPlot(Stage):
                 name="map_plan",
                 title="The map",
                 caption=f"{len(map)} reference views and {len(map.edges)} edges, from {len(drive)} frames. Arrows "
-                f"point along the robot's heading when the view was taken. The poses are taken from {map.pose_source}.",
+                f"point along the robot's heading when the view was taken. "
+                f"The poses are taken from {SOURCE_WORDS[map.pose_source]}.",
                 content=_draw(map, plan),
                 media_type="image/svg+xml",
                 order=8,

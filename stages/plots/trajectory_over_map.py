@@ -10,6 +10,7 @@ from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.map_places import AnyMap, map_poses
+from omninav.stages.values.pose import SOURCE_WORDS
 from omninav.stages.values.topological_map import TopologicalMap
 
 from .drawing import extent_of
@@ -53,7 +54,9 @@ class TrajectoryOverMap(Stage):
         earlier = Figure(
             name="trajectory_over_map_earlier",
             title="Trajectories of the earlier logs",
-            caption=f"The {len(logs) - 1} log(s) before the last one, in their order.",
+            caption="The log before the last one."
+            if len(logs) == 2
+            else f"The {len(logs) - 1} logs before the last one.",
             content=_draw(logs[:-1], map, grid, plan),
             media_type="image/svg+xml",
             order=13,
@@ -70,10 +73,12 @@ def _caption(drive: Drive, map: AnyMap | None) -> str:
     if isinstance(map, TopologicalMap) and len(map):
         words.append(
             f"Grey: {len(map)} places at their medoids, joined along the images between them, all poses taken from "
-            f"{map.pose_source}: the estimate is the most probable place's, turned as the view is."
+            f"{SOURCE_WORDS[map.pose_source]}: the estimate is the most probable place's, turned as the view is."
         )
     elif map is not None and len(map):
-        words.append(f"Grey: {len(map)} reference views, their poses taken from {map.pose_source}.")
+        words.append(
+            f"Grey: the {len(map)} reference views of the map, their poses taken from {SOURCE_WORDS[map.pose_source]}."
+        )
     return " ".join(words).replace(" ;", ";")
 
 

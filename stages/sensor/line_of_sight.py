@@ -13,6 +13,7 @@ from omninav.pipeline.graph.results import Metrics
 from omninav.stages.geometry.plane.grid_rays import cells_along
 from omninav.stages.values.grid import FREE, OCCUPIED, Cells, FreeSpace, OccupancyGrid
 from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import SOURCE_WORDS
 from omninav.stages.values.visibility import VisibilityAreas
 
 Array = npt.NDArray[np.float64]
@@ -242,7 +243,7 @@ class LineOfSight(Stage):
         if none == areas.target.size:
             raise BadInput(
                 "grid: no reference of the map sees an occupied cell in it; are both in the same frame? The map's "
-                f"poses come from {map.pose_source}"
+                f"poses come from {SOURCE_WORDS[map.pose_source]}"
             )
         if none:
             ctx.count("view_without_area", none, "areas: the view hits no occupied cell of the grid")

@@ -110,7 +110,7 @@ class HomingGrid(Source):
                     camera=self._views.camera,
                     truth=Pose(*(float(number) for number in self._views.poses[row])),
                 )
-            ctx.count("undecodable_image")
+            ctx.count("undecodable_image", detail=f"view {row}")
         return None
 
 

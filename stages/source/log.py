@@ -22,7 +22,7 @@ from omninav.stages.recordings.truth_file import truth_from
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.values.image import Image
-from omninav.stages.values.pose import Motion
+from omninav.stages.values.pose import GuessedPose, Motion, Pose
 
 from .cuts import Cut
 from .frozen_odometry import frozen_steps
@@ -243,7 +243,7 @@ class LogSource(Source):
             tick=tick,
             image=image,
             camera=recording.camera,
-            odometry=pose_of(odometry),
+            odometry=pose_of(odometry, GuessedPose if part.kind == "guessed" else Pose),
             motion=motion,
             truth=pose_of(truth),
             scan=recording.scan(frame) if ctx.is_read("scan") else None,

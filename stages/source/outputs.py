@@ -33,6 +33,6 @@ def motion_of(increment: Array, unmeasured_s: float = 0.0) -> Motion:
     return BridgedMotion(x, y, turn, unmeasured_s) if unmeasured_s else Motion(x, y, turn)
 
 
-def pose_of(row: Array | None) -> Pose | None:
+def pose_of(row: Array | None, of: type[Pose] = Pose) -> Pose | None:
     """A pose (3,) as a value; None where it is not known."""
-    return None if row is None or not np.isfinite(row).all() else Pose(*(float(value) for value in row))
+    return None if row is None or not np.isfinite(row).all() else of(*(float(value) for value in row))

@@ -60,5 +60,21 @@ class UncertainMotion(Value):
     sigmas: tuple[float, float, float]
 
 
-PoseSource = Literal["truth", "odometry", "estimate"]
-"""Where a stored pose comes from: the log's ground truth, its odometry, or the system's own estimate."""
+class GuessedPose(Pose):
+    """A pose that guessed motions led to, in a frame of its own."""
+
+
+PoseSource = Literal["truth", "odometry", "guess", "estimate"]
+"""Where a stored pose comes from: the log's ground truth, its odometry, a guess, or the system's own estimate."""
+SOURCE_WORDS: dict[PoseSource, str] = {
+    "truth": "ground truth",
+    "odometry": "odometry",
+    "guess": "guessed motion",
+    "estimate": "the robot's own estimates",
+}
+"""Each source, as a sentence has it."""
+
+
+def frame_of(odometry: Pose | None) -> PoseSource:
+    """The source of poses that are stored where there is no ground truth."""
+    return "guess" if isinstance(odometry, GuessedPose) else "odometry"

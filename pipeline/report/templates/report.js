@@ -60,7 +60,11 @@ const large = document.getElementById("large");  // a click on a picture enlarge
 document.addEventListener("click", (event) => {
   if (large.open) { large.close(); return; }
   const picture = event.target.closest(".paper > img, .photographs img, .drawing > svg, .drawn > svg");
-  if (picture) { large.replaceChildren(picture.cloneNode(true)); large.showModal(); }
+  if (!picture) return;
+  const copy = picture.cloneNode(true);
+  copy.classList.toggle("lines", picture.parentElement.classList.contains("lines"));
+  large.replaceChildren(copy);
+  large.showModal();
 });
 for (const table of document.querySelectorAll("table.sortable")) {  // a click on a column's head sorts by it
   table.tHead.addEventListener("click", (event) => {

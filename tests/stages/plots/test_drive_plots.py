@@ -21,6 +21,7 @@ from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.floor_plan import plan_of
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.similarity import Similarities
+from omninav.stages.values.view_mixtures import ViewEvent
 
 CTX = Context("view")
 
@@ -109,6 +110,22 @@ def test_a_slide_shows_image_error_belief_and_best_match_of_its_frame():
     assert facts["best match"].startswith("number 7, similarity 90 %, taken")
     assert [words for words, _ in slides[4].photographs] == ["image", "best match in the map"]
     assert slides[4].overlay != slides[5].overlay
+
+
+def test_the_best_match_in_a_map_that_is_learned_on_the_way_is_an_image_of_the_drive():
+    run = small_run(frames=30)
+    drive = dataclasses.replace(run.drive, reference=np.full(30, 7), reference_turn=np.full(30, np.pi / 2))
+    none = np.empty(0, np.int64)
+    learned = ViewEvent(1, 1, np.array([7]), np.array([2]), none, "", none, np.empty(0), np.empty((0, 2)), none)
+    seen = list(panoramas(run))
+    figure = FrameByFrame().step(CTX, drive, seen, run.beliefs, events=[None] * 29 + [learned], panoramas=seen).figure
+    words, shown = figure.slides[20].photographs[1]
+    assert words == "best match in the map"
+    image, then = (cv2.imdecode(np.frombuffer(data, np.uint8), 1) for data in (shown, seen[2].jpeg))
+    quarter = np.roll(cv2.resize(then, image.shape[1::-1], interpolation=cv2.INTER_AREA), image.shape[1] // 4, axis=1)
+    assert np.abs(image.astype(int) - quarter).mean() < 20 < np.abs(image.astype(int) - np.roll(quarter, 60, 1)).mean()
+    gap = np.hypot(*(drive.truth[2] - drive.truth[20])[:2])
+    assert dict(figure.slides[20].facts)["best match"] == f"number 7, taken {gap:.2f} m away"
 
 
 def test_slides_of_a_long_drive_are_at_most_sixty_at_even_steps_and_all_have_their_image():
