@@ -120,15 +120,15 @@ class _Lease:
         return time.monotonic() - self._since > LEASE_S
 
 
-_idle: list[_Server] = []
+_free: list[_Server] = []
 _lock = threading.Lock()
 
 
 @contextmanager
 def _server() -> Iterator[_Server]:
-    """A process that forks: one that is idle, or a new one."""
+    """A process that forks: one that waits for a job, or a new one."""
     with _lock:
-        server = _idle.pop() if _idle else None
+        server = _free.pop() if _free else None
     if server is None or not server.ready:
         server = _Server()
     try:
@@ -137,15 +137,15 @@ def _server() -> Iterator[_Server]:
         server.close()
         raise
     with _lock:
-        _idle.append(server)
+        _free.append(server)
 
 
 def release() -> None:
-    """End the processes that are idle."""
+    """End the processes that wait for a job."""
     with _lock:
-        idle = _idle[:]
-        _idle.clear()
-    for server in idle:
+        free = _free[:]
+        _free.clear()
+    for server in free:
         server.close()
 
 
