@@ -22,6 +22,7 @@ LIBRARIES = (
     "numba",
     "llvmlite",
     "poselib",
+    "faiss-cpu",
     "networkx",
     "hydra-core",
     "mcap",

@@ -109,6 +109,7 @@ class Engine:
             self.sequences = {name: DiskSequence(options.memory / f"{name}.sequence") for name in names}
         self.ticks = 0
         self.ended = False
+        self._given: set[str] = set()
         self._ticking: list[Call] = []
         self._total: int | None = None
         self._saved = 0.0
@@ -136,6 +137,13 @@ class Engine:
             pass
         return self.finish()
 
+    def give(self, origin: str, value: Any, notes: Mapping[str, Any]) -> None:
+        """Take a value from before the loop, the only output of its node, as it was made in an earlier run."""
+        node = origin.partition(".")[0]
+        self.values[origin] = value
+        self.calls[node].ctx.restore_notes(dict(notes))
+        self._given.add(node)
+
     def begin(self) -> None:
         """Set up what runs, run what comes before the loop, and go back to the last checkpoint where there is one."""
         replayed = self.replay.nodes if self.replay is not None else frozenset()
@@ -143,7 +151,7 @@ class Engine:
             if name not in replayed:
                 call.node.stage.setup(call.ctx)
         for node in self.graph.of_lifetime("before"):
-            if node.name not in replayed:
+            if node.name not in replayed and node.name not in self._given:
                 self.calls[node.name].run(self.values)
         if self.replay is not None:
             self.values.update(self.replay.before)

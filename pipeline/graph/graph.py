@@ -76,7 +76,7 @@ class Graph:
             return Port(name, self.artifact_types[name]) if name in self.artifact_types else None
         return self.nodes[node].signature.outputs.get(name) if node in self.nodes else None
 
-    def is_marked(self, origin: str, mark: Literal["in_place", "bulky", "is_truth", "reported"]) -> bool:
+    def is_marked(self, origin: str, mark: Literal["in_place", "bulky", "costly", "is_truth", "reported"]) -> bool:
         """Whether the values of an output are of a type that is marked so (see `Value`)."""
         port = self.port(origin)
         return port is not None and bool(getattr(port.type, mark, False))

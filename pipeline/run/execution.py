@@ -23,6 +23,7 @@ from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.value import Value
 
 from .artifacts import Execution, ProgressDisplay, companions, identity, obtain, provenance
+from .costly_values import costly_values
 from .metrics_files import MANIFEST, read_metrics, write_metrics
 from .plan import Plan
 from .results import notes_of, results_of
@@ -88,7 +89,8 @@ def _running(run: RunFolder, planned: Plan, display: ProgressDisplay | None) -> 
             planned.graph, artifacts, options, wanted=wanted, replay=replay, recorded=recorded, kept=planned.record
         )
         try:
-            engine.begin()
+            with costly_values(engine, cache, {name: facts["sha256"] for name, facts in made.items()}, planned.seed):
+                engine.begin()
             yield engine
             last = engine.finish()
         except BaseException:

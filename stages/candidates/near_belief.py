@@ -3,6 +3,7 @@
 from typing import Annotated
 
 import numpy as np
+import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.plane.point_cells import sort_into_cells, within
@@ -12,6 +13,8 @@ from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 
 from .background import with_background
+
+Ints = npt.NDArray[np.int64]
 
 
 class NearBelief(Stage):
@@ -50,12 +53,15 @@ class NearBelief(Stage):
         """Select the references for one view."""
         if near is None or self.radius <= 0.0 or len(map) <= self.compare_all_up_to:
             return self.Out(candidates=Candidates())
+        chosen = self._around(map, near, length_scale)
+        return self.Out(candidates=with_background(chosen, len(map), self.background_references, ctx.tick.index))
+
+    def _around(self, map: ReferenceGraph, near: Particles, length_scale: LengthScale | None) -> Ints:
+        """The references near the belief: ascending indices."""
         unit = self.length_scale_m if length_scale is None else length_scale.metres
         if map is not self._map or len(map) != self._length:
-            self._cells = sort_into_cells(map.poses, self.radius * unit)
+            self._cells = sort_into_cells(map.poses, max(self.radius, self.recovery_radius) * unit or 1.0)
             self._map, self._length = map, len(map)
         tracked = len(near.poses) - near.recovery_particles
         around = within(self._cells, near.poses[:tracked], self.radius * unit)
-        recovering = within(self._cells, near.poses[tracked:], self.recovery_radius * unit)
-        chosen = np.union1d(around, recovering)
-        return self.Out(candidates=with_background(chosen, len(map), self.background_references, ctx.tick.index))
+        return np.union1d(around, within(self._cells, near.poses[tracked:], self.recovery_radius * unit))

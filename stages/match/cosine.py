@@ -17,7 +17,7 @@ class CosineMatch(ReferenceMatch, Stage):
     1 is the same direction; 0 a right angle or more. Raises BadInput where the map has other features.
     """
 
-    def _compare(
+    def compare(
         self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
     ) -> npt.NDArray[np.float32]:
         return cosine_similarities(map.features, features.values, self.headings, chosen)

@@ -24,10 +24,10 @@ class HistogramIntersection(ReferenceMatch, Stage):
         """Compare one view."""
         return super().step(ctx, features, map, candidates)
 
-    def _compare(
+    def compare(
         self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
     ) -> npt.NDArray[np.float32]:
         return similarities(map.features, features.values, self.headings, True, False, chosen=chosen)
 
-    def _how_compared(self, features: SegmentFeatures) -> tuple[float | None, float | None]:
+    def how_compared(self, features: SegmentFeatures) -> tuple[float | None, float | None]:
         return 0.0, None

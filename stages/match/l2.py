@@ -17,7 +17,7 @@ class L2Match(ReferenceMatch, Stage):
     The non-selective method of Gross & Koenig 2004, section 2. Raises BadInput where the map has other features.
     """
 
-    def _compare(
+    def compare(
         self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
     ) -> npt.NDArray[np.float32]:
         return euclidean_similarities(map.features, features.values, self.headings, features.kind, chosen)

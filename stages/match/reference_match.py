@@ -36,20 +36,20 @@ class ReferenceMatch(ABC):
         """Compare one view."""
         check_same_kind(features, map)
         candidates = candidates or Candidates()
-        values = self._compare(map, features, candidates.references)
+        values = self.compare(map, features, candidates.references)
         return self.Out(
             similarities=Similarities(
-                values, candidates.references, candidates.sampling_weight, *self._how_compared(features)
+                values, candidates.references, candidates.sampling_weight, *self.how_compared(features)
             )
         )
 
     @abstractmethod
-    def _compare(
+    def compare(
         self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
     ) -> npt.NDArray[np.float32]:
         """Similarities to the chosen references, None for all: (chosen, headings)."""
 
-    def _how_compared(self, features: SegmentFeatures) -> tuple[float | None, float | None]:
+    def how_compared(self, features: SegmentFeatures) -> tuple[float | None, float | None]:
         """`exponent` and `colour_scale` of the similarities."""
         return None, None
 

@@ -29,13 +29,13 @@ class SelectiveMatch(ReferenceMatch, Stage):
     """Difference of mean colours (blue-green-red, 0..255) at which segments have similarity 0; by default the largest
     possible, sqrt(3) 255, which leaves no segment out (experiment omniview_mcl/colour_scale)."""
 
-    def _compare(
+    def compare(
         self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
     ) -> npt.NDArray[np.float32]:
-        exponent, scale = self._how_compared(features)
+        exponent, scale = self.how_compared(features)
         histograms = features.kind == "histograms"
         return similarities(map.features, features.values, self.headings, histograms, True, exponent, chosen, scale)
 
-    def _how_compared(self, features: SegmentFeatures) -> tuple[float, float]:
+    def how_compared(self, features: SegmentFeatures) -> tuple[float, float]:
         kind = features.kind
         return EXPONENTS[self.penalty], self.colour_scale if kind == "colours" else MAX_DISTANCES[kind]

@@ -1,0 +1,69 @@
+"""Values that take long to make before the loop: kept in the cache, by the content of all that they follow from."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+
+from omninav.pipeline.engine.artifact import read_artifact, write_artifact
+from omninav.pipeline.engine.cache import Cache, seeded
+from omninav.pipeline.engine.code_version import graph_digest
+from omninav.pipeline.engine.engine import Engine
+from omninav.pipeline.files import digest_text
+from omninav.pipeline.graph.graph import ARTIFACTS, Graph
+from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.value import Value
+
+from .plan import digests_of
+
+SUFFIX = ".value"
+
+
+@contextmanager
+def costly_values(engine: Engine, cache: Cache | None, artifacts: Mapping[str, str], seed: int) -> Iterator[None]:
+    """Around `engine.begin`: what it would take long to make is found in the cache, and what it makes is put there.
+
+    `artifacts`: the content hash of each artifact. Others who want the same value wait until it is there.
+    """
+    origins = [] if cache is None else sorted(_costly(engine.graph))
+    with ExitStack() as held:
+        made = {}
+        for origin in origins:
+            assert cache is not None
+            key = _key(engine.graph, origin, artifacts)
+            held.enter_context(cache.lock(key))
+            if not _give(engine, origin, cache, key, seed):
+                made[origin] = key
+        yield
+        for origin, key in made.items():
+            value, ctx = engine.values.get(origin), engine.calls[origin.partition(".")[0]].ctx
+            if isinstance(value, Value) and cache is not None:
+                with cache.keep(seeded(key, seed) if ctx.drew else key, SUFFIX, ctx.notes()) as part:
+                    write_artifact(part, value)
+
+
+def _costly(graph: Graph) -> Iterator[str]:
+    """The outputs before the loop that take long to make, of nodes that give nothing else."""
+    for node in graph.of_lifetime("before"):
+        origins = [f"{node.name}.{port}" for port in node.signature.outputs]
+        if len(origins) == 1 and graph.is_marked(origins[0], "costly"):
+            yield origins[0]
+
+
+def _key(graph: Graph, origin: str, artifacts: Mapping[str, str]) -> str:
+    part = graph.leading_to([origin])
+    read = {wire.from_port for wire in part.wires if wire.from_node == ARTIFACTS}
+    contents = [f"{name} {artifacts[name]}" for name in sorted(read)]
+    return digest_text("value", graph_digest(part), origin, *digests_of(part).values(), *contents)
+
+
+def _give(engine: Engine, origin: str, cache: Cache, key: str, seed: int) -> bool:
+    """Give the engine a value from the cache. False where there is none, or no sound one."""
+    for candidate in (key, seeded(key, seed)):
+        found = cache.find(candidate, SUFFIX)
+        if found is None:
+            continue
+        try:
+            engine.give(origin, read_artifact(found[0]), found[1])
+            return True
+        except BadInput as unfit:
+            cache.discard(candidate, SUFFIX, str(unfit))
+    return False

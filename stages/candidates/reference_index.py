@@ -1,0 +1,61 @@
+"""Builds an index of a map's references by appearance."""
+
+from typing import Annotated
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.reference_index import ReferenceIndex
+
+from .inverted_file import build, faiss_or_none
+
+
+class BuildReferenceIndexState(State):
+    """How many references the index was built from."""
+
+    references: int = 0
+
+
+class BuildReferenceIndex(Stage):
+    """Builds an index that finds the references similar to a view, at any heading, without comparing them all.
+
+    Views become short vectors: the square roots of their histograms, on the principal axes of the map. They lie in an
+    inverted file, with four bits for each two dimensions (faiss; Jégou, Douze & Schmid 2011). That of a finished map is
+    kept in the cache. That of a map that grows is built anew when the map has grown by `rebuild_growth`; until then
+    references are appended to it. Needs `pip install 'omninav[index]'`; without it the output is absent.
+    """
+
+    dimensions: Annotated[int, Bounds(ge=2)] = 128
+    """Numbers that are kept of each reference."""
+    min_references: Annotated[int, Bounds(ge=16)] = 1000
+    """References that a map needs to have an index."""
+    rebuild_growth: Annotated[float, Bounds(gt=1)] = 2.0
+    """Growth of a map, as a factor, at which its index is built anew."""
+
+    class Out(Outputs):
+        """The index; absent for a small map, and where faiss is not installed."""
+
+        index: ReferenceIndex | None = None
+
+    def setup(self, ctx: Context) -> None:
+        """Forget the index of an earlier map."""
+        self._index: ReferenceIndex | None = None
+        self._map: ReferenceGraph | None = None
+
+    def step(self, ctx: Context, map: ReferenceGraph, state: BuildReferenceIndexState) -> Out:
+        """Give the map's index."""
+        if len(map) < self.min_references:
+            return self.Out()
+        faiss = faiss_or_none()
+        if faiss is None:
+            ctx.warn(
+                "candidates=index compares references as candidates=near_belief does, because faiss is not installed; "
+                "pip install 'omninav[index]'"
+            )
+            return self.Out()
+        if len(map) >= self.rebuild_growth * state.references:
+            state.references, self._index = len(map), None
+        if self._index is None or map is not self._map:
+            ctx.doing("indexing the map's references")
+            self._index = build(faiss, map, state.references, self.dimensions, ctx.progress)
+            self._map = map
+        return self.Out(index=self._index)

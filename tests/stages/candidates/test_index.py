@@ -1,0 +1,192 @@
+import builtins
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.pipeline.engine.artifact import read_artifact, write_artifact
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.candidates.index import IndexedCandidates
+from omninav.stages.candidates.near_belief import NearBelief
+from omninav.stages.candidates.reference_index import BuildReferenceIndex, BuildReferenceIndexState
+from omninav.stages.geometry.appearance.segments import similarities, turned_view
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.candidates import Candidates
+from omninav.stages.values.features import SegmentHistograms
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.reference_index import ReferenceIndex
+
+faiss = pytest.importorskip("faiss")
+
+SEGMENTS, BINS, SPACING = 12, 16, 0.25
+FIELDS = ("mean", "axes", "centroids", "codebooks", "lists", "codes")
+
+
+def views(number: int, seed: int = 0) -> np.ndarray:
+    """Views along a way: each is a mixture of the places before and after it, a dozen views apart."""
+    rng = np.random.default_rng(seed)
+    places = rng.random((number // 12 + 2, SEGMENTS, BINS)) ** 4
+    at = np.arange(number) / 12
+    part = (at % 1)[:, None, None]
+    mixed = places[at.astype(int)] * (1 - part) + places[at.astype(int) + 1] * part
+    return (mixed / mixed.sum(axis=2, keepdims=True)).astype(np.float32)
+
+
+def a_map(number: int = 4000) -> ReferenceGraph:
+    poses = np.column_stack([SPACING * np.arange(number), np.zeros((number, 2))])
+    return ReferenceGraph(poses, views(number), "histograms", np.zeros((0, 2), np.int64), "truth")
+
+
+MAP = a_map()
+
+
+def index_of(map: ReferenceGraph, state: BuildReferenceIndexState | None = None) -> ReferenceIndex:
+    stage, ctx = BuildReferenceIndex(dimensions=64), Context("reference_index")
+    stage.setup(ctx)
+    index = stage.step(ctx, map, state or BuildReferenceIndexState()).index
+    assert index is not None
+    return index
+
+
+@pytest.fixture(scope="module")
+def index() -> ReferenceIndex:
+    return index_of(MAP)
+
+
+def selected(
+    index: ReferenceIndex | None, view: np.ndarray, map: ReferenceGraph = MAP, near: Particles | None = None, **kw: Any
+) -> Candidates:
+    stage, ctx = IndexedCandidates(headings=SEGMENTS, **{"global_references": 200, **kw}), Context("candidates")
+    ctx.tick = Tick(index=1, stamp=0)
+    stage.setup(ctx)
+    return stage.step(ctx, SegmentHistograms(view), map, index, near).candidates
+
+
+def near_belief(near: Particles) -> Candidates:
+    stage, ctx = NearBelief(), Context("candidates")
+    ctx.tick = Tick(index=1, stamp=0)
+    stage.setup(ctx)
+    return stage.step(ctx, MAP, near).candidates
+
+
+def chosen(candidates: Candidates) -> np.ndarray:
+    assert candidates.references is not None
+    assert candidates.sampling_weight is not None
+    return candidates.references[candidates.sampling_weight == 1.0]
+
+
+def particles_at(x: float, spread: float = 0.05) -> Particles:
+    poses = np.random.default_rng(1).normal((x, 0, 0), (spread, 0.05, 0.1), (200, 3))
+    return Particles(poses, np.full(200, 1 / 200))
+
+
+def test_what_is_most_similar_at_any_heading_is_found(index: ReferenceIndex) -> None:
+    rng, found = np.random.default_rng(3), []
+    for place in rng.integers(0, len(MAP), 20):
+        noisy = MAP.features[place] * rng.uniform(0.8, 1.2, (SEGMENTS, BINS)).astype(np.float32)
+        view = turned_view(noisy / noisy.sum(axis=1, keepdims=True), float(rng.uniform(-3, 3)))
+        exact = np.argsort(-similarities(MAP.features, view, SEGMENTS, True, True).max(axis=1))[:10]
+        among = chosen(selected(index, view))
+        found.append(np.isin(exact, among).mean())
+        assert exact[0] in among
+        assert len(among) <= 200
+    assert np.mean(found) > 0.95
+
+
+def test_the_index_is_the_same_in_every_run(index: ReferenceIndex) -> None:
+    again = index_of(a_map())
+    assert all(getattr(index, name).tobytes() == getattr(again, name).tobytes() for name in FIELDS)
+    one, other = (chosen(selected(each, MAP.features[5])).tobytes() for each in (index, again))
+    assert one == other
+
+
+def test_others_are_sampled_so_that_the_whole_map_is_represented(index: ReferenceIndex) -> None:
+    candidates = selected(index, MAP.features[7])
+    assert candidates.sampling_weight is not None
+    assert candidates.sampling_weight.sum() == pytest.approx(len(MAP))
+
+
+def test_a_known_place_is_looked_after_and_a_kidnapped_robot_is_found(index: ReferenceIndex) -> None:
+    near = particles_at(100.0)
+    around = chosen(near_belief(near))
+    among = chosen(selected(index, MAP.features[3000], near=near, recovery_references=20))
+    assert set(around) <= set(among)
+    assert 3000 in among
+    assert len(among) <= len(around) + 20
+
+
+def test_a_belief_spread_over_the_map_is_as_none(index: ReferenceIndex) -> None:
+    view = MAP.features[1234]
+    assert np.array_equal(chosen(selected(index, view, near=particles_at(500.0, 200.0))), chosen(selected(index, view)))
+
+
+def test_references_that_a_map_has_learned_since_are_found(index: ReferenceIndex) -> None:
+    map = a_map()
+    for n, view in enumerate(views(50, seed=9)):
+        map.insert(Pose(-1.0 - n, 0.0, 0.0), view, "histograms")
+    assert 4030 in chosen(selected(index, map.features[4030], map))
+
+
+def test_an_index_is_built_anew_when_its_map_has_doubled_and_is_the_same_after_a_kill() -> None:
+    map, state, ctx = a_map(1200), BuildReferenceIndexState(), Context("reference_index")
+    stage = BuildReferenceIndex(dimensions=64)
+    stage.setup(ctx)
+    sizes = []
+    for n, view in enumerate(views(1300, seed=5)):
+        if n % 100 == 0:
+            sizes.append(len(stage.step(ctx, map, state).index or ()))
+        map.insert(Pose(float(n), 5.0, 0.0), view, "histograms")
+    assert sizes == [1200] * 12 + [2400]
+    grown, resumed = stage.step(ctx, map, state).index, index_of(map, BuildReferenceIndexState(references=2400))
+    assert all(getattr(grown, name).tobytes() == getattr(resumed, name).tobytes() for name in FIELDS)
+
+
+def test_small_maps_are_compared_whole() -> None:
+    stage, ctx = BuildReferenceIndex(), Context("reference_index")
+    stage.setup(ctx)
+    assert stage.step(ctx, a_map(500), BuildReferenceIndexState()).index is None
+    assert selected(None, MAP.features[0], a_map(500)).references is None
+
+
+def test_without_faiss_the_search_goes_on_and_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    real = builtins.__import__
+
+    def without(name: str, *args: Any, **kw: Any) -> Any:
+        if name == "faiss":
+            raise ImportError(name)
+        return real(name, *args, **kw)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    stage, ctx = BuildReferenceIndex(), Context("reference_index")
+    stage.setup(ctx)
+    for _ in range(2):
+        assert stage.step(ctx, MAP, BuildReferenceIndexState()).index is None
+    assert len(ctx.warnings) == 1
+    assert "pip install 'omninav[index]'" in ctx.warnings[0]
+    assert selected(None, MAP.features[0]).references is None
+    near = particles_at(100.0)
+    assert np.array_equal(chosen(selected(None, MAP.features[0], near=near)), chosen(near_belief(near)))
+
+
+def test_an_index_of_another_map_is_refused(index: ReferenceIndex) -> None:
+    with pytest.raises(BadInput, match=r"index is of another map; wire reference_index\.map"):
+        selected(index, MAP.features[0], a_map(3000))
+
+
+def test_codes_that_name_no_list_are_refused(tmp_path: Path, index: ReferenceIndex) -> None:
+    lists = index.lists.copy()
+    lists[7] = len(index.centroids)
+    broken = ReferenceIndex(index.mean, index.axes, index.centroids, index.codebooks, lists, index.codes)
+    write_artifact(tmp_path / "index.omap", broken)
+    with pytest.raises(BadInput, match="no sound ReferenceIndex: 'lists'"):
+        read_artifact(tmp_path / "index.omap")
+
+
+@pytest.mark.parametrize("shape", [(1, 5), (1, 1), (36, 3)])
+def test_views_of_few_numbers_have_an_index_too(shape: tuple[int, int]) -> None:
+    features = np.random.default_rng(0).random((1500, *shape)).astype(np.float32) * 255
+    map = ReferenceGraph(np.zeros((1500, 3)), features, "colours", np.zeros((0, 2), np.int64), "truth")
+    assert len(index_of(map)) == 1500
