@@ -36,7 +36,7 @@ def settings_left_open() -> list[str]:
     """The settings that are null until they are given: what a run may be of. A variant names those that it takes."""
     import yaml
 
-    settings = yaml.safe_load(files(CONF).joinpath("config.yaml").read_text(encoding="utf-8"))
+    settings = yaml.load(files(CONF).joinpath("config.yaml").read_text(encoding="utf-8"), yaml.CSafeLoader)
     return [name for name, value in settings.items() if value is None and name not in ("variant", "objective")]
 
 
@@ -55,7 +55,7 @@ def _options() -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for folder in sorted(files(CONF).iterdir(), key=lambda folder: folder.name):
         for file in group_files(folder.name) if folder.is_dir() else ():
-            target = (yaml.safe_load(file.read_text(encoding="utf-8")) or {}).get("_target_")
+            target = (yaml.load(file.read_text(encoding="utf-8"), yaml.CSafeLoader) or {}).get("_target_")
             if target:
                 found.setdefault(target, []).append(f"{folder.name}={file.name.removesuffix('.yaml')}")
     return found

@@ -124,7 +124,12 @@ def _read(file: Path, name: str) -> tuple[str, tuple[str, ...]]:
 
 
 def _imported(text: str, package: str) -> Iterator[str]:
-    for node in ast.walk(ast.parse(text)):
+    statements: list[ast.AST] = [ast.parse(text)]
+    while statements:
+        node = statements.pop()
+        for part in ("body", "orelse", "finalbody", "handlers", "cases"):
+            inner = getattr(node, part, ())
+            statements += inner if isinstance(inner, list) else ()
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

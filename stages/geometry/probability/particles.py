@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import KDTree
 
 from omninav.pipeline.engine.compiled import compiled
 
@@ -198,6 +197,8 @@ def occupied_cells(poses: Array, cell: float, angle: float) -> int:
 
 def uniform_around(centres: Array, radius: float, number: int, rng: np.random.Generator) -> Array:
     """Poses (number, 3) uniform over the area within `radius` metres of any centre (R, >= 2), all headings alike."""
+    from scipy.spatial import KDTree  # slow to import, and seldom needed
+
     tree: Any = KDTree(centres[:, :2])  # type: ignore[no-untyped-call]
     low, high = centres[:, :2].min(axis=0) - radius, centres[:, :2].max(axis=0) + radius
     cell = radius / 2
