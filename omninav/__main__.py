@@ -1,11 +1,18 @@
-"""`python -m omninav` is the command `omninav`."""
+"""The command `omninav`, which is also `python -m omninav`."""
 
+import os
 import sys
 
-folder = __file__.rpartition("/omninav/")[0]
-if not sys.flags.safe_path and sys.path[0] != folder:  # Python puts the working directory first; nothing there is ours
-    del sys.path[0]
+if __name__ == "__main__":
+    folder = __file__.rpartition("/omninav/")[0]
+    if not sys.flags.safe_path and sys.path[0] != folder:  # Python puts the working directory first; nothing is ours
+        del sys.path[0]
+
+for threads in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    # Read as numpy is loaded. Several threads make products of small matrices five times slower, and round differently.
+    os.environ.setdefault(threads, "1")
 
 from omninav.pipeline.cli.main import main  # noqa: E402
 
-raise SystemExit(main())
+if __name__ == "__main__":
+    raise SystemExit(main())
