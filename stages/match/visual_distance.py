@@ -7,12 +7,8 @@ import numpy as np
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.geometry.appearance.visual_distance import (
-    ComparisonOptions,
-    ViewFeatures,
-    colour_distances,
-    compare,
-)
+from omninav.stages.geometry.appearance.many_views import ManyViews
+from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, colour_distances
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, VerticalSegments, view_features
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
@@ -47,7 +43,7 @@ class MatchPlaces(Stage):
     def setup(self, ctx: Context) -> None:
         """No map yet."""
         self._map: TopologicalMap | None = None
-        self._places: list[ViewFeatures] = []
+        self._places = ManyViews([])
 
     def step(
         self,
@@ -59,7 +55,7 @@ class MatchPlaces(Stage):
     ) -> Out:
         """Compare one view with all places."""
         if self._map is not map:
-            self._places = [map.views.view_features(int(view)) for view in map.places]
+            self._places = ManyViews([map.views.view_features(int(view)) for view in map.places])
             self._map = map
         if len(features) and features.descriptors.shape[1] != map.views.descriptors.shape[1]:
             raise BadInput(
@@ -77,8 +73,8 @@ class MatchPlaces(Stage):
         close = colour_distances(map.views.moments[map.places], descriptor.values) <= self.max_global_distance
         distances, turns = np.full(len(map), math.inf), np.zeros(len(map))
         matches = np.zeros(len(map), np.int64)
-        for place in np.flatnonzero(close):
-            found = compare(self._places[place], here, options)
+        compared = np.flatnonzero(close)
+        for place, found in zip(compared, self._places.compare(compared, here, options), strict=True):
             distances[place], turns[place], matches[place] = found.distance, found.turn, found.matches
         if not np.isfinite(distances).any():
             ctx.count("nothing_in_common", detail="match: an image that has too little in common with every place")

@@ -117,10 +117,20 @@ def compare(one: ViewFeatures, other: ViewFeatures, by: ComparisonOptions, part:
     `part`: only some features of the first view are known, those that a map keeps. The second is then counted as if it
     had as many.
     """
-    angles, first, second = [np.empty(0)], 0, 0
+    angles: Array | None = None
     if one.patches is not None and other.patches is not None:
         pairs = match_patches(one.patches, other.patches, by)
-        angles.append(other.patches.azimuths[pairs.second] - one.patches.azimuths[pairs.first])
+        angles = other.patches.azimuths[pairs.second] - one.patches.azimuths[pairs.first]
+    return compared(one, other, angles, by, part)
+
+
+def compared(
+    one: ViewFeatures, other: ViewFeatures, matched: Array | None, by: ComparisonOptions, part: bool = False
+) -> Comparison:
+    """`compare` of views whose patches match at the angles `matched` (M,); None: one of them has no patches."""
+    angles, first, second = [np.empty(0)], 0, 0
+    if matched is not None and one.patches is not None and other.patches is not None:
+        angles.append(matched)
         first, second = len(one.patches.azimuths), len(other.patches.azimuths)
     if one.segments is not None and other.segments is not None:
         pairs = mahalanobis_matches(one.segments.descriptors, other.segments.descriptors, by.segment_ratio)
