@@ -1,6 +1,7 @@
 """Sessions: a graph that is pushed one frame at a time, by the engine that runs logs."""
 
 import os
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 from omninav.pipeline.cli.jobs import no_run_in
 from omninav.pipeline.engine.engine import Engine
 from omninav.pipeline.graph.graph import Graph
-from omninav.pipeline.graph.problems import BadInput, suggest
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound, suggest
 from omninav.pipeline.graph.pushed import Pushed, push
 from omninav.pipeline.graph.registry import only_listed
 from omninav.pipeline.run.execution import execute, running
@@ -22,6 +23,11 @@ from .configuration import Configuration, configured
 from .run import Run
 
 PUSHED = "source=pushed"
+NOT_PUSHED = {
+    "log": "a session has the frames that step() is given; omninav.run reads a log",
+    "objective": "a session has all figures in close().metrics; omninav.run and sweeps return one",
+}
+"""Settings that say nothing to a session, and what to use."""
 
 
 class Step(Mapping[str, Any]):
@@ -74,6 +80,7 @@ class Session(AbstractContextManager["Session"]):
         self._engine: Engine = self._stack.enter_context(running(run, planned))
         self._given = self._engine.calls[source.name].times
         self._over: str | None = None
+        self._warned: set[str] = set()
 
     @property
     def folder(self) -> Path:
@@ -101,7 +108,16 @@ class Session(AbstractContextManager["Session"]):
             if len(self._given) > given:  # the source took it, so some stages have run and others not
                 self._over = "a stage failed; omninav.resume goes on from the last checkpoint"
             raise
+        self._say_warnings()
         return Step(self._engine.values, self._names)
+
+    def _say_warnings(self) -> None:
+        """Say each warning of a stage when it is first given: its caller waits for no report."""
+        for call in self._engine.calls.values():
+            for sentence in call.ctx.warnings:
+                if sentence not in self._warned:
+                    self._warned.add(sentence)
+                    warnings.warn(f"{self.folder.name}: {sentence}", stacklevel=3)
 
     def save(self) -> Path:
         """Write a checkpoint, from which `resume` goes on; gives the run's folder."""
@@ -140,11 +156,21 @@ def open(*words: str | Configuration, folder: str | os.PathLike[str] | None = No
     """Begin a session: `with omninav.open("some_variant") as session: out = session.step(…)`.
 
     Words and settings are those of `compose`, or a configuration comes first. `folder`: where the run's files are left;
-    None: a new one in `runs`.
+    None: a new one in `runs`. Raises `BadInput` where the variant is no session, or a setting is not one of sessions.
     """
     typed = [each for word in words for each in (word.words if isinstance(word, Configuration) else (word,))]
     pushed = PUSHED in typed or "source" in settings
-    made = configured(words if pushed else (*words, PUSHED), settings)
+    names = {word.partition("=")[0] for word in typed} | set(settings)
+    for name, instead in NOT_PUSHED.items():
+        if name in names:
+            raise BadInput(f"{name}=…: {instead}")
+    try:
+        made = configured(words if pushed else (*words, PUSHED), settings)
+    except ProblemsFound as found:
+        if pushed or not all(problem.where.startswith("wires.") for problem in found.problems):
+            raise
+        why = f"{found.problems[0].where}: {found.problems[0].what}"
+        raise BadInput(f"{' '.join(typed):.80}: nothing can be pushed into it ({why}); use omninav.run") from None
     place = None if folder is None else no_run_in(Path(folder))
     return Session(start(made.plan, ["omninav", *made.words], place), made.plan)
 

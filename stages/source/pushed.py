@@ -16,8 +16,10 @@ from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.recordings.messages import is_blank
 from omninav.stages.recordings.named_camera import named_camera
+from omninav.stages.values.command import Command
 from omninav.stages.values.encoded_image import Undecodable, decode_image
 from omninav.stages.values.image import Image, Pixels
+from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.scan import Scan
 
 from .outputs import DriveOutputs, motion_of, pose_of
@@ -114,8 +116,14 @@ class PushedSource(Source):
         found = {name: None if row is None else _row(name, row) for name, row in rows.items()}
         self._frame = PushedFrame(Image(pixels), None if stamp is None else int(stamp), found, scan, bool(new_log))
 
-    def step(self, ctx: Context, position: PushedSourceState) -> Out | None:
-        """The frame that was pushed; None without one."""
+    def step(
+        self,
+        ctx: Context,
+        position: PushedSourceState,
+        command: Command | None = None,
+        route: PlannedRoute | None = None,
+    ) -> Out | None:
+        """The frame that was pushed; None without one. `command` and `route` are the caller's to obey."""
         frame, self._frame = self._frame, None
         if frame is None:
             return None
@@ -142,6 +150,10 @@ class PushedSource(Source):
         measured = rows["motion"] is not None or rows["odometry"] is not None
         if measured:
             ctx.fact("odometry", "measured")
+        elif not first and ctx.readers.get("motion"):
+            reader = ctx.readers["motion"][0]
+            ctx.count("no_motion", detail=f"frame {position.ticks} came without motion, which '{reader}' reads")
+            ctx.warn(f"frames came without motion, which '{reader}' reads: push motion=(x, y, turn), or odometry=")
         tick = Tick(position.ticks, stamp, position.log, position.frame, first)
         position.ticks, position.frame, position.stamp = position.ticks + 1, position.frame + 1, stamp
         position.x, position.y, position.heading = (float(number) for number in odometry)

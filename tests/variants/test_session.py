@@ -1,5 +1,6 @@
 """Frames that a program pushes one at a time lead to what a run over their log gives."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -146,3 +147,32 @@ def test_a_closed_session_takes_no_more_frames(recording, camera, tmp_path):
     session.close()
     with pytest.raises(omninav.BadInput, match="the session is closed"):
         session.step(**next(frames_of(recording)))
+
+
+def test_motion_that_is_needed_and_missing_is_said_once_and_counted(recording, camera, tmp_path):
+    session = omninav.open("omniview_cml", camera=camera, folder=tmp_path / "run")
+    session.step(image=recording.image(0))
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        session.step(image=recording.image(1))
+        session.step(image=recording.image(2))
+    assert sum("came without motion, which" in str(warning.message) for warning in said) == 1
+    assert session.close().manifest["dropped"]["source.no_motion"]["count"] == 2
+
+
+def test_what_a_session_does_not_take_is_refused_by_name(camera):
+    for words, why in (
+        ({"log": "drive.mcap"}, r"log=…: .*omninav\.run reads a log"),
+        ({"objective": "nonsense"}, r"objective=…: .*close\(\)\.metrics"),
+    ):
+        with pytest.raises(omninav.BadInput, match=why):
+            omninav.open("omniview_mcl", camera=camera, **words)
+    with pytest.raises(omninav.BadInput, match=r"two_views: nothing can be pushed into it .*use omninav\.run"):
+        omninav.open("two_views")
+
+
+def test_a_variant_that_drives_gives_its_caller_the_command(recording, camera, tmp_path):
+    with omninav.open("homing", camera=camera, folder=tmp_path / "run") as session:
+        for k in range(3):
+            out = session.step(image=recording.image(k), motion=(0.1, 0.0, 0.0), stamp=recording.stamps[k])
+    assert abs(out.command.speed) + abs(out.command.turning) > 0.0  # its target lies behind it
