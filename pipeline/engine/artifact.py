@@ -100,6 +100,17 @@ def read_header(path: Path) -> dict[str, Any]:
         return _header(archive)
 
 
+def artifact_digest(path: Path) -> str:
+    """The sha256 that stands for an artifact file's content: its last 64 characters, checked.
+
+    It is that of the whole file before it, or where the file has a front, of the sums of its chunks and what follows.
+    """
+    with path.open("rb") as file:
+        _checked_sum(path, file)
+        file.seek(-64, io.SEEK_END)
+        return file.read().decode("ascii")
+
+
 def type_of(path: Path) -> type[Value]:
     """The type of the value in an artifact file. Raises `BadInput` where this version knows no such type."""
     with _opened(path) as (archive, _):

@@ -3,6 +3,8 @@
 import hashlib
 import io
 import math
+import os
+import weakref
 import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -81,63 +83,69 @@ class Front:
         """`end`: where the front ends. Raises `Unfit` where the sums are not those of that many bytes."""
         if sums.dtype != np.uint8 or sums.shape != (-(-end // CHUNK), SUM):
             raise Unfit(f"its front of {end} bytes has sums of the shape {sums.shape!s:.40}")
-        self.path, self._sums = path, sums
-        self._bytes: npt.NDArray[np.uint8] = np.asarray(np.memmap(path, np.uint8, "r", shape=(end,)))
-        self._checked = np.zeros(len(sums), bool)
+        self.path, self._sums, self._end = path, sums, end
+        self._file = os.open(path, os.O_RDONLY)  # chunks are read to be checked: what is mapped counts as memory
+        weakref.finalize(self, os.close, self._file)
+        self._mapped: npt.NDArray[np.uint8] = np.asarray(np.memmap(path, np.uint8, "r", shape=(end,)))
 
     def array(self, entry: zipfile.ZipInfo, whole: bool) -> npt.NDArray[Any] | StoredRows[Any]:
         """An array of the front; all of it in memory where it is to be `whole`, or is small.
 
         Raises `BadInput` where a chunk that is read is damaged, and `Unfit` where the file in the zip is no array.
         """
-        name = entry.filename.removesuffix(".npy")
-        end, size = len(self._bytes), entry.file_size
-        at = entry.header_offset
-        self._check(np.arange(max(at, 0) // CHUNK, -(-min(at + _NPY_HEAD, end) // CHUNK)), name)
-        local = self._bytes[at : at + 30].tobytes() if at >= 0 else b""
-        begin = at + 30 + int.from_bytes(local[26:28], "little") + int.from_bytes(local[28:30], "little")
-        stored = entry.compress_type == zipfile.ZIP_STORED and entry.compress_size == size
-        if len(local) < 30 or not stored or begin + size > end:
+        name, size = entry.filename.removesuffix(".npy"), entry.file_size
+        local = self._read(entry.header_offset, 30, name)
+        begin = entry.header_offset + 30 + sum(int.from_bytes(local[at : at + 2], "little") for at in (26, 28))
+        if entry.compress_type != zipfile.ZIP_STORED or len(local) < 30 or begin + size > self._end:
             raise Unfit(f"the array '{name:.40}' does not lie in its front")
-        self._check(np.arange(begin // CHUNK, -(-min(begin + _NPY_HEAD, end) // CHUNK)), name)
-        head = io.BytesIO(self._bytes[begin : begin + min(size, _NPY_HEAD)].tobytes())
+        head = io.BytesIO(self._read(begin, min(size, _NPY_HEAD), name))
         shape, dtype = parse_npy_head(head, size)
-        begin += head.tell()
-        flat = self._bytes[begin : begin + math.prod(shape) * dtype.itemsize]
-        array = np.frombuffer(flat, dtype).reshape(shape) if flat.size else np.empty(shape, dtype)
-        if whole or array.nbytes <= IN_MEMORY or not array.size:
-            self._check(np.arange(begin // CHUNK, -(-(begin + array.nbytes) // CHUNK)), name)
-            return np.array(array)
+        begin, size = begin + head.tell(), size - head.tell()
+        if whole or size <= IN_MEMORY or not shape:
+            content = self._read(begin, size, name)
+            return np.frombuffer(content, dtype).reshape(shape) if size else np.empty(shape, dtype)
+        if begin % dtype.itemsize:
+            raise Unfit(f"the array '{name:.40}' is not aligned")
+        array = np.frombuffer(self._mapped[begin : begin + size], dtype).reshape(shape)
         return StoredRows(array, self._row_check(name, begin, array))
 
+    def _read(self, begin: int, size: int, name: str) -> bytearray:
+        """Bytes of the front, checked; as many as there are."""
+        begin = max(begin, 0)
+        end = min(begin + size, self._end)
+        found = bytearray()
+        for chunk in range(begin // CHUNK, -(-end // CHUNK)):
+            content, start = self._checked_chunk(chunk, name), chunk * CHUNK
+            found += content[max(begin - start, 0) : end - start]
+        return found
+
     def _row_check(self, name: str, begin: int, array: npt.NDArray[Any]) -> Callable[[npt.NDArray[np.int64]], None]:
-        width, item, numbers = array.nbytes // len(array), array.dtype.itemsize, array.reshape(-1)
+        width = array.nbytes // len(array)
         sound = np.zeros(len(self._sums), bool)
 
         def check(rows: npt.NDArray[np.int64]) -> None:
             first, last = (begin + rows * width) // CHUNK, (begin + (rows + 1) * width - 1) // CHUNK
             more = int((last - first).max(initial=0)) + 1
             chunks = np.minimum(first[:, None] + np.arange(more), last[:, None]).ravel()
-            chunks = chunks[~sound[chunks]]
-            if not len(chunks):
-                return
-            self._check(chunks, name)
-            for chunk in np.unique(chunks).tolist() if array.dtype.kind == "f" else ():
-                start = max(chunk * CHUNK - begin, 0) // item
-                part = numbers[start : max((chunk + 1) * CHUNK - begin, 0) // item]
-                if part.size and not float(np.abs(part).max()) <= MAX_MAGNITUDE:
+            for chunk in np.unique(chunks[~sound[chunks]]).tolist():
+                content, start = self._checked_chunk(chunk, name), chunk * CHUNK
+                own = content[max(begin - start, 0) : begin + array.nbytes - start]
+                if array.dtype.kind == "f" and not _are_finite(np.frombuffer(own, array.dtype)):
                     raise BadInput(f"{self._place(chunk, name)} holds numbers that are not finite; make it again")
-            sound[chunks] = True
+                sound[chunk] = True
 
         return check
 
-    def _check(self, chunks: npt.NDArray[np.int64], name: str) -> None:
-        new = chunks[~self._checked[chunks]]
-        for chunk in np.unique(new).tolist():
-            content = self._bytes[chunk * CHUNK : (chunk + 1) * CHUNK]
-            if hashlib.sha256(content.data).digest() != self._sums[chunk].tobytes():
-                raise BadInput(f"{self._place(chunk, name)} is damaged, its sha256 differs; make it again")
-            self._checked[chunk] = True
+    def _checked_chunk(self, chunk: int, name: str) -> bytes:
+        start = chunk * CHUNK
+        content = os.pread(self._file, min(CHUNK, self._end - start), start)
+        if hashlib.sha256(content).digest() != self._sums[chunk].tobytes():
+            raise BadInput(f"{self._place(chunk, name)} is damaged, its sha256 differs; make it again")
+        return content
 
     def _place(self, chunk: int, name: str) -> str:
         return f"{self.path}: chunk {chunk} of the array '{name:.40}' (from byte {chunk * CHUNK})"
+
+
+def _are_finite(numbers: npt.NDArray[Any]) -> bool:
+    return not numbers.size or float(np.abs(numbers).max()) <= MAX_MAGNITUDE

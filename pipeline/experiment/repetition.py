@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from omninav.pipeline.engine.artifact import artifact_digest
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.code_version import graph_digest, module_version
 from omninav.pipeline.engine.damage import say_damaged
@@ -24,7 +25,7 @@ from omninav.pipeline.engine.prefix import (
     keep_prefix,
     prefix_nodes,
 )
-from omninav.pipeline.files import Damaged, digest_file, digest_text, locked, read_json, write_json
+from omninav.pipeline.files import Damaged, digest_text, locked, read_json, write_json
 from omninav.pipeline.graph.graph import Graph, Node
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
@@ -76,7 +77,7 @@ def artifact_key(artifact: ArtifactPlan) -> str:
     """The hash of everything that decides an artifact's content. Its inputs must be there."""
     if artifact.graph is None:
         assert artifact.file is not None
-        return digest_file(artifact.file)
+        return artifact_digest(artifact.file)
     return digest_text("artifact", graph_digest(artifact.graph), artifact.origin, *known_digests(artifact.graph))
 
 

@@ -1,17 +1,19 @@
 """Artifacts: loaded from their files, found in the cache, or made by running their graphs."""
 
+import os
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from omninav.pipeline.engine.artifact import read_artifact, read_header, write_artifact
+from omninav.pipeline.engine.artifact import artifact_digest, read_artifact, read_header, write_artifact
 from omninav.pipeline.engine.cache import Cache, seeded
+from omninav.pipeline.engine.chunks import IN_MEMORY
 from omninav.pipeline.engine.code_version import graph_digest
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix
-from omninav.pipeline.files import digest_file, digest_text, whole_file
+from omninav.pipeline.files import digest_text, whole_file
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.value import Value
@@ -75,7 +77,7 @@ def obtain(
     if artifact.file is not None:
         value = read_artifact(artifact.file)
         _copy(artifact.file, target)
-        loaded = {"file": str(artifact.file), "sha256": digest_file(target), "reason": "loaded from a file"}
+        loaded = {"file": str(artifact.file), "sha256": artifact_digest(target), "reason": "loaded from a file"}
         return value, {**loaded, **read_header(artifact.file)["facts"]}
     cache = execution.cache or Cache(run.memory / "artifacts")
     key = _key(artifact)
@@ -88,7 +90,7 @@ def obtain(
             file, value = _into(cache, seed, _make(execution, [artifact, *together]))
             reason = "made: code, parameters or log are new to the cache"
         _copy(file, target)
-    made = {"variant": artifact.variant, "output": artifact.origin, "sha256": digest_file(target), "reason": reason}
+    made = {"variant": artifact.variant, "output": artifact.origin, "sha256": artifact_digest(target), "reason": reason}
     return value, {**made, **read_header(target)["facts"]}
 
 
@@ -117,8 +119,18 @@ def _into(
 
 
 def _copy(file: Path, target: Path) -> None:
+    """Copy a file, or link it where it is one of those that stay on disk: no program of ours changes it in place."""
     with whole_file(target) as part:
-        shutil.copyfile(file, part)
+        if file.stat().st_size <= IN_MEMORY or not _is_linked(file, part):
+            shutil.copyfile(file, part)
+
+
+def _is_linked(file: Path, link: Path) -> bool:
+    try:
+        os.link(file.resolve(), link)
+    except OSError:  # another disk, or a file system without links
+        return False
+    return True
 
 
 def _key(artifact: ArtifactPlan) -> str:

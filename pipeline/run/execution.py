@@ -12,7 +12,7 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.engine.artifact import write_artifact
+from omninav.pipeline.engine.artifact import artifact_digest, write_artifact
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.engine.engine import Engine, EngineOptions
@@ -102,7 +102,7 @@ def _running(run: RunFolder, planned: Plan, display: ProgressDisplay | None) -> 
         if isinstance(value, Value):
             file = run.folder / f"{name}.omap"
             write_artifact(file, value, provenance(planned.graph.leading_to([origin]), engine, planned.variant))
-            saved = {"file": file.name, "bytes": file.stat().st_size, "sha256": digest_file(file)}
+            saved = {"file": file.name, "bytes": file.stat().st_size, "sha256": artifact_digest(file)}
             run.manifest.setdefault("saved", {})[name] = saved
     for origin in planned.record:
         with whole_file(run.folder / recorded_name(origin)) as part:

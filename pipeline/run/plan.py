@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.engine.artifact import OWN_PACKAGE, read_header, type_of
+from omninav.pipeline.engine.artifact import OWN_PACKAGE, artifact_digest, read_header, type_of
 from omninav.pipeline.engine.code_version import graph_digest
-from omninav.pipeline.files import digest_file
 from omninav.pipeline.graph.builder import build
 from omninav.pipeline.graph.graph import ARTIFACTS, Graph
 from omninav.pipeline.graph.ports import convert
@@ -229,7 +228,7 @@ def input_digests(planned: Plan) -> dict[str, str]:
         if artifact.graph is not None:
             digests |= {f"{artifact.name}.{name}": digest for name, digest in digests_of(artifact.graph).items()}
         elif artifact.file is not None:
-            digests[artifact.name] = digest_file(artifact.file)
+            digests[artifact.name] = artifact_digest(artifact.file)
     return digests
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from omninav.pipeline import BadInput
-from omninav.pipeline.engine.artifact import read_artifact, read_header, write_artifact
-from omninav.pipeline.files import digest_file, user_path
+from omninav.pipeline.engine.artifact import artifact_digest, read_artifact, read_header, write_artifact
+from omninav.pipeline.files import user_path
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.topological_map import TopologicalMap
 
@@ -61,7 +61,7 @@ def write_saved(path: Path, map: MapOfPlaces, sources: Sequence[SavedMap], how: 
     if isinstance(stages, dict):
         alike = [name for name in stages if all(_stage(other, name) == stages[name] for other in sources)]
         same["stages"] = {name: stages[name] for name in alike}
-    made_of = [{"file": source.path.name, "sha256": digest_file(source.path)} for source in sources]
+    made_of = [{"file": source.path.name, "sha256": artifact_digest(source.path)} for source in sources]
     write_artifact(path, map, {**same, "made_of": made_of, "made_by": how})
 
 

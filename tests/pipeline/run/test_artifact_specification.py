@@ -6,10 +6,11 @@ from typing import Any
 import pytest
 
 import toys
-from omninav.pipeline.engine.artifact import write_artifact
+from omninav.pipeline.engine.artifact import artifact_digest, write_artifact
 from omninav.pipeline.engine.codec import decode, encode, seal, unseal
 from omninav.pipeline.files import digest_file, write_whole
 from omninav.pipeline.graph.problems import ProblemsFound
+from omninav.pipeline.run import artifacts
 from omninav.pipeline.run.artifact_specification import read_specifications, without_companions
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import plan
@@ -99,7 +100,7 @@ def test_a_damaged_map_in_the_cache_is_made_again_and_is_the_same(
     planned = plan(two_of_one_graph(tmp_path))
     first, again = start(planned, ["toys"]), start(planned, ["toys"])
     execute(first, planned)
-    cached = next(file for file in (tmp_path / "cache").glob("*.omap") if digest_file(file) == sum_of(first))
+    cached = next(file for file in (tmp_path / "cache").glob("*.omap") if artifact_digest(file) == sum_of(first))
     content = cached.read_bytes()
     if damage == "a bit":
         cached.write_bytes(content[:70] + bytes([content[70] ^ 1]) + content[71:])
@@ -195,3 +196,15 @@ def test_problems_of_the_graph_that_makes_it_are_at_its_own_path_unless_the_node
         with pytest.raises(ProblemsFound) as found:
             plan(config)
         assert [problem.where for problem in found.value.problems] == [where]
+
+
+def test_a_large_file_of_an_artifact_is_linked_into_the_run_and_a_small_one_copied(tmp_path: Path, monkeypatch):
+    file = tmp_path / "known.omap"
+    write_artifact(file, toys.Number(3.0))
+    for limit, linked in ((1 << 26, False), (0, True)):
+        monkeypatch.setattr(artifacts, "IN_MEMORY", limit)
+        planned = plan(configuration("other", file) | {"runs": str(tmp_path / "runs")})
+        run = start(planned, ["toys"])
+        execute(run, planned)
+        assert (run.folder / "map.omap").samefile(file) is linked
+        assert sum_of(run) == artifact_digest(file)
