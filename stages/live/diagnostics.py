@@ -19,6 +19,7 @@ def publish_diagnostics(transport: Transport, topic: str) -> None:
     if status.latencies_ms is not None:
         values["latency_ms.median"], values["latency_ms.p95"] = (f"{each:.1f}" for each in status.latencies_ms)
     values |= {kind: str(number) for kind, number in sorted(status.counts.items())}
+    values |= {f"left out: {what}": why for what, why in sorted(status.left_out.items())}
     state = {
         "level": WARN if troubles else OK,
         "name": "omninav",

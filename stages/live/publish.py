@@ -206,13 +206,13 @@ class PublishMessages(Stage):
 
 
 def send(transport: Transport, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:
-    """Publish a message; where that cannot be, note it and leave the topic out from then on."""
-    if topic in transport.status.troubles:
+    """Publish a message; where that cannot be, say why and leave the topic out from then on."""
+    if topic in transport.status.left_out:
         return
     try:
         transport.publish(topic, msgtype, data, latched)
     except TransportError as error:
-        transport.status.note(topic, str(error))
+        transport.status.leave_out(topic, str(error))
 
 
 def _row(pose: Pose) -> Array:

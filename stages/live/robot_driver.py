@@ -229,5 +229,6 @@ class RobotDriver(Stage):
         if now - then > NOTE_S:
             speed = f", {(seconds - before) / (now - then):.2f} times real time" if then else ""
             obeys = f"obeys {self.command_topic}" if self._subscribed else f"nobody publishes {self.command_topic}"
-            ctx.doing("; ".join([f"{seconds:.0f} s{speed}", obeys, *self._transport.status.troubles.values()]))
+            status = self._transport.status
+            ctx.doing("; ".join([f"{seconds:.0f} s{speed}", obeys, *status.troubles.values(), *status.news()]))
             self._noted = seconds, now

@@ -14,6 +14,9 @@ class LiveStatus:
 
     def __init__(self) -> None:
         self.troubles: dict[str, str] = {}
+        self.left_out: dict[str, str] = {}
+        """What cannot be published or answered in this run, and why: said once, and never tried again."""
+        self._said: set[str] = set()
         self.counts: Counter[str] = Counter()
         self.live = False
         self.spread_m = float("nan")
@@ -26,6 +29,16 @@ class LiveStatus:
             self.troubles[what] = trouble
         else:
             self.troubles.pop(what, None)
+
+    def leave_out(self, what: str, why: str) -> None:
+        """Do without a topic or a service from now on."""
+        self.left_out[what] = why
+
+    def news(self) -> list[str]:
+        """Why something is left out, of what has not been said yet."""
+        unsaid = [why for what, why in sorted(self.left_out.items()) if what not in self._said]
+        self._said |= self.left_out.keys()
+        return unsaid
 
     def published(self, stamp: int) -> None:
         """A tick of an image with that stamp (ns) has led to a pose, now."""

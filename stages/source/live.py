@@ -225,7 +225,11 @@ class LiveSource(Source):
         self._watched = now
         intake.watch()
         self._count_losses(ctx, intake)
-        ctx.doing(self._transport.status.line())
+        status = self._transport.status
+        news = status.news()
+        for sentence in news:
+            ctx.warn(sentence)
+        ctx.doing(", ".join([status.line(), *news]))
         if self.diagnostics is not None:
             publish_diagnostics(self._transport, self.diagnostics)
 

@@ -63,7 +63,7 @@ class PanoramaTable:
         if seen is None:
             raise BadInput(
                 f"camera: a {camera.projection} camera does not see the full circle, so that it makes no panorama; "
-                "use a recording of an omnidirectional one"
+                "type unwarp=window (its images as they are), or take an omnidirectional one"
             )
         top, bottom = seen
         elevations = top + (bottom - top) * (np.arange(rows) + 0.5) / rows

@@ -96,11 +96,13 @@ def test_a_pose_that_is_set_by_service_comes_as_one_by_topic_does():
     assert (arrival.topic, arrival.msgtype, arrival.data) == ("/initialpose", POSE, asked)
 
 
-def test_a_service_whose_type_is_not_installed_is_a_trouble_in_words():
+def test_a_service_whose_type_is_not_installed_is_left_out_and_said_once():
     transport = Services()
     serve_amcl(transport, "amcl", None)
     assert sorted(transport.answers) == ["/request_nomotion_update"]
-    assert sorted(transport.status.troubles) == ["/amcl/change_state", "/amcl/get_state"]
+    assert sorted(transport.status.left_out) == ["/amcl/change_state", "/amcl/get_state"]
+    assert [why.partition(" is not ")[0][-12:] for why in transport.status.news()] == ["/ChangeState", "srv/GetState"]
+    assert transport.status.news() == []
 
 
 INTERFACE = ["/amcl_pose", "/particle_cloud", "/initialpose", "/map", "/scan", "/tf"]

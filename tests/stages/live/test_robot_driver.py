@@ -123,7 +123,7 @@ def test_a_topic_whose_type_is_not_installed_is_left_out(wire, monkeypatch):
     monkeypatch.setattr(wire, "publish", publish)
     Drive().tick()
     assert {"/odom", "/scan", "/clock"} <= {topic for topic, _ in wire.sent}
-    assert sorted(wire.status.troubles) == ["/tf", "/tf_static"]
+    assert sorted(wire.status.left_out) == ["/tf", "/tf_static"]
 
 
 def test_truth_and_collisions_have_the_stamps_of_the_driver(wire):
