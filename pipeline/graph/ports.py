@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
-from .problems import Problem, cut, suggest
+from .problems import Problem, cut, nearest, suggest
 from .signature import read_parameters, split_optional
 from .stage import Bounds
 
@@ -162,7 +162,9 @@ def _convert_union(value: Any, expected: Any, where: str) -> Any:
         except _Unfit as unfit:
             several.append(unfit.problems)
     shaped = [p for p in several if any(problem.where != where for problem in p)]
-    raise _Unfit(shaped[0]) if shaped else _unfit(value, expected, where)
+    names = [name for option in get_args(expected) if get_origin(option) is Literal for name in get_args(option)]
+    near = nearest(value, map(str, names)) if isinstance(value, str) else None
+    raise _Unfit(shaped[0]) if shaped else _unfit(value, expected, where, f"did you mean '{near}'?" if near else "")
 
 
 def _by_kind(value: Any, options: Sequence[Any], where: str) -> Any:

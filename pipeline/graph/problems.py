@@ -87,11 +87,12 @@ HINTS = {
 def as_bad_input(error: BaseException) -> BadInput | None:
     """What a user can do about an error that no reader has put into words; None where it is a defect of ours."""
     if isinstance(error, OSError):
-        where = error.filename if error.filename is not None else "a file"
+        where = "" if error.filename is None else f"{error.filename}: "
         number = error.errno or 0
         if error.strerror != os.strerror(number):  # words of ours, which say what to do
-            return BadInput(f"{where}: {error.strerror or error}")
-        return BadInput(f"{where}: {error.strerror}; {HINTS.get(number, 'name another')}")
+            return BadInput(f"{where}{error.strerror or error}")
+        hint = HINTS.get(number, "name another" if where else "nothing says which file")
+        return BadInput(f"{where}{error.strerror}; {hint}")
     yaml, omegaconf = sys.modules.get("yaml"), sys.modules.get("omegaconf.errors")  # who met their errors has them
     if omegaconf is not None and isinstance(error, omegaconf.OmegaConfBaseException):
         return BadInput(f"{getattr(error, 'full_key', None) or 'configuration'}: {str(error).splitlines()[0]}")

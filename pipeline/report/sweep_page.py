@@ -1,5 +1,6 @@
 """A sweep as one page: a row per job."""
 
+import math
 import os
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -67,7 +68,10 @@ def _shown(mean: Mean, path: str, runs: Sequence[Mapping[str, Number]]) -> str:
     entry = next(run[path] for run in runs if path in run).entry
     if mean.low is None or mean.high is None:
         return entry.text(mean.mean)
-    return f"{entry.text(mean.mean)} ± {entry.text((mean.high - mean.low) / 2)}"
+    low, high = mean.mean - mean.low, mean.high - mean.mean
+    if math.isclose(low, high, rel_tol=1e-9, abs_tol=1e-12):
+        return f"{entry.text(mean.mean)} ± {entry.text(high)}"
+    return f"{entry.text(mean.mean)} ({entry.text(mean.low)} to {entry.text(mean.high)})"
 
 
 def _link(folder: Path, file: Path) -> str:

@@ -54,21 +54,23 @@ def conditions(rows: Sequence[Mapping[str, Any]]) -> list[Condition]:
 def _means(jobs: Sequence[Mapping[str, Number]]) -> dict[str, Mean]:
     found = {}
     for path in dict.fromkeys(path for job in jobs for path in job):
-        values = [number for job in jobs if path in job and (number := _number(job[path].value)) is not None]
+        there = [job[path] for job in jobs if path in job]
+        values = [number for one in there if (number := _number(one.value)) is not None]
         if values:
-            found[path] = mean_of(values)
+            found[path] = mean_of(values, 1.0 if there[0].unit == "%" else math.inf)
     return found
 
 
-def mean_of(values: Sequence[float]) -> Mean:
-    """The mean of some numbers with its 95 % interval."""
+def mean_of(values: Sequence[float], most: float = math.inf) -> Mean:
+    """The mean of some numbers with its 95 % interval, which ends at 0 where none is negative, and at `most`."""
     mean = float(np.mean(values))
     if len(values) < 2:
         return Mean(mean, None, None)
     from scipy.special import stdtrit  # of Student's t; scipy.stats takes a second to import
 
     half = float(stdtrit(len(values) - 1, 0.975) * np.std(values, ddof=1) / math.sqrt(len(values)))
-    return Mean(mean, mean - half, mean + half)
+    least = -math.inf if min(values) < 0 else 0.0
+    return Mean(mean, max(mean - half, least), min(mean + half, max(most, mean)))
 
 
 def write_sweep_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:

@@ -31,7 +31,7 @@ def named_camera(name: str, size: Callable[[], tuple[int, int]]) -> tuple[Camera
     if camera is None:
         known = [model for model, kind in models.items() if kind.of_size(64, 32) is not None]
         near = nearest(name, known)
-        what = "needs its numbers" if name in models else "is no camera"
+        what = "needs its numbers" if name in models else "there is no such file or projection"
         hint = f"did you mean '{near}'?" if near else f"type camera=PATH/camera.yaml, or one of {', '.join(known)}"
         raise UnreadableRecording(f"camera={name:.60}: {what}; {hint}")
     return camera, []

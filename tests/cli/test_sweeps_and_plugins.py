@@ -145,6 +145,17 @@ def test_an_optimiser_gets_each_jobs_objective_and_a_failed_one_counts_as_a_fail
     assert found["best_params"]["seed"] == 0
 
 
+def test_an_optimiser_whose_jobs_all_fail_says_so_in_a_line(omninav, shared_cache: Path, tmp_path: Path):
+    pytest.importorskip("hydra_plugins.hydra_optuna_sweeper", reason="pip install 'omninav[optuna]'")
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    words = ("--config-dir", "examples/edges/conf", "features=raises_at_seed", SHORT, f"cache={shared_cache}")
+    optuna = ("hydra/sweeper=optuna", "hydra/sweeper/sampler=grid", "hydra.sweeper.n_trials=1")
+    ended = omninav("-m", *words, *optuna, "seed=choice(1)", "objective=position_error_m.median")
+    assert ended.returncode == 1
+    assert "no job ended well: there is nothing to choose the best from" in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
 def test_an_objective_that_no_run_has_is_named_with_what_there_is(omninav, shared_cache: Path):
     ended = omninav("variant=plain_matching", SHORT, f"cache={shared_cache}", "objective=position_eror_m.median")
     assert ended.returncode == 2

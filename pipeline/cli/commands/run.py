@@ -62,14 +62,10 @@ def _handed_over(hydra: Hydra, flags: Namespace, words: list[str], job: Callable
             outcomes = Path(place) / "outcomes"
             os.environ[OUTCOMES] = str(outcomes)
             if flags.multirun:
-                hydra.multirun("config", job, [*words, "hydra.mode=MULTIRUN"])
+                _sweep(hydra, job, words, outcomes)
             else:
                 hydra.run("config", job, [*words, "hydra.mode=RUN"])
-            ends = (
-                [line.partition(" ") for line in outcomes.read_text(encoding="utf-8").splitlines()]
-                if outcomes.exists()
-                else []
-            )
+            ends = _ends(outcomes)
         for page in {page for _, _, page in ends if page}:
             print(f"sweep: {shown(Path(page))}", flush=True)
             optimum = (
@@ -79,6 +75,25 @@ def _handed_over(hydra: Hydra, flags: Namespace, words: list[str], job: Callable
                 print(f"optimum: {shown(optimum)}\n{optimum.read_text(encoding='utf-8').strip()}", flush=True)
         return max((int(code) for code, _, _ in ends), default=0)
     return 0
+
+
+def _sweep(hydra: Hydra, job: Callable[[Any], float | None], words: Sequence[str], outcomes: Path) -> None:
+    """Run a sweep. An optimiser that gives up because every job has failed is no error of its own."""
+    try:
+        hydra.multirun("config", job, [*words, "hydra.mode=MULTIRUN"])
+    except HydraException:
+        raise
+    except Exception:
+        ends = _ends(outcomes)
+        if not ends or any(code == "0" for code, _, _ in ends):
+            raise
+        print("no job ended well: there is nothing to choose the best from", file=sys.stderr, flush=True)
+
+
+def _ends(outcomes: Path) -> list[tuple[str, str, str]]:
+    """The exit code of each job, and its sweep's page."""
+    lines = outcomes.read_text(encoding="utf-8").splitlines() if outcomes.exists() else []
+    return [line.partition(" ") for line in lines]
 
 
 def _refuse_misspelled_sweep(words: Sequence[str], folders: Sequence[str]) -> None:

@@ -20,6 +20,13 @@ def test_the_interval_of_a_mean_is_students():
     assert mean_of([5.0]) == type(found)(5.0, None, None)
 
 
+def test_an_interval_ends_where_no_figure_can_be():
+    assert mean_of([0.1, 0.3]).low == 0.0
+    assert mean_of([-0.1, 0.3]).low < -2.0
+    (rates,) = conditions(rows(0.8, 1.0))
+    assert (rates.means["loss_rate"].low, rates.means["loss_rate"].high) == (0.0, 1.0)
+
+
 def test_means_are_over_the_seeds_of_each_condition_and_failed_jobs_are_left_out():
     first, second = conditions(rows(0.1, 0.2, 0.3, 0.5, None, 0.7))
     assert (first.settings, first.jobs, first.means["loss_rate"].mean) == ({"gain": "0"}, 3, pytest.approx(0.2))

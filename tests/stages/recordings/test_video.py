@@ -65,7 +65,9 @@ def test_other_images_need_a_camera(tmp_path: Path) -> None:
     assert (camera.projection, camera.width, camera.height_px) == ("perspective", 80, 64)
     with pytest.raises(UnreadableRecording, match=r"camera=hyperbolic: needs its numbers; .*camera.yaml"):
         open_recording(path, camera="hyperbolic")
-    with pytest.raises(UnreadableRecording, match="camera=perspektive: is no camera; did you mean 'perspective'"):
+    with pytest.raises(
+        UnreadableRecording, match="camera=perspektive: there is no such file or projection; did you mean 'perspective'"
+    ):
         open_recording(path, camera="perspektive")
 
 
