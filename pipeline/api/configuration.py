@@ -12,6 +12,7 @@ from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.run.plan import Plan, plan
 
+from .plain_errors import plain_errors
 from .words import words_of
 
 
@@ -72,6 +73,7 @@ def compose(*words: str, **settings: Any) -> Configuration:
     return made
 
 
+@plain_errors()
 def check(*words: str, **settings: Any) -> Configuration:
     """`compose`, and open every file that the run would read, so that nothing is found to be missing later."""
     from omninav.pipeline.engine.artifact import check_artifact

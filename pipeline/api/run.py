@@ -23,6 +23,7 @@ from omninav.pipeline.run.run_folder import CONFIG, recorded_name, start
 from omninav.pipeline.tables import read_table
 
 from .configuration import Configuration, configured
+from .plain_errors import plain_errors
 
 
 class Figures(dict[str, Any]):
@@ -156,6 +157,7 @@ def _rendered(metrics: Metrics, html: bool) -> str:
     return console.file.getvalue()
 
 
+@plain_errors()
 def run(
     *words: "str | Configuration",
     folder: str | os.PathLike[str] | None = None,

@@ -20,6 +20,7 @@ from omninav.pipeline.run.resume import reopened
 from omninav.pipeline.run.run_folder import RunFolder, start
 
 from .configuration import Configuration, configured
+from .plain_errors import plain_errors
 from .run import Run
 
 PUSHED = "source=pushed"
@@ -152,6 +153,7 @@ def outputs_by_name(graph: Graph) -> dict[str, str]:
     return names | {origin: origin for origin in origins}
 
 
+@plain_errors()
 def open(*words: str | Configuration, folder: str | os.PathLike[str] | None = None, **settings: Any) -> Session:
     """Begin a session: `with omninav.open("some_variant") as session: out = session.step(…)`.
 
@@ -175,6 +177,7 @@ def open(*words: str | Configuration, folder: str | os.PathLike[str] | None = No
     return Session(start(made.plan, ["omninav", *made.words], place), made.plan)
 
 
+@plain_errors()
 def resume(folder: str | os.PathLike[str] = "runs/latest", trust: Sequence[str] = ()) -> Run | Session:
     """Go on with what was interrupted: a session with its next frame, any other run to its end.
 

@@ -13,6 +13,7 @@ from omninav.pipeline.cli.words import word_of
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.tables import read_table
 
+from .plain_errors import plain_errors
 from .run import Run
 from .words import words_of
 
@@ -60,6 +61,7 @@ class Sweep:
         return str(means._repr_html_() if hasattr(means, "_repr_html_") else f"<pre>{means}</pre>")
 
 
+@plain_errors()
 def sweep(*words: str, folder: str | os.PathLike[str] | None = None, progress: bool = True, **settings: Any) -> Sweep:
     """Run all combinations: `sweep("some_variant", "match=selective,l2", seed=range(5))`.
 

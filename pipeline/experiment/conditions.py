@@ -163,14 +163,14 @@ def timed_groups(experiment: Experiment) -> list[tuple[str, ...]]:
 
 
 def find_results(experiment: Experiment, runs: Sequence[ConditionRun]) -> None:
-    """Plan every run anew, with the recordings that it reads by now, and find the results of earlier attempts."""
+    """Plan every run again, with the recordings that it reads by now, and find the results of earlier attempts."""
     for run in runs:
         if run.error:
             continue
         try:
             run.planned = plan(run.config)
             run.key = condition_key(run.planned, timed_groups(experiment))
-            place = run.config.get("cache") if run.shared else None  # what is timed is timed anew
+            place = run.config.get("cache") if run.shared else None  # what is timed is timed again
             run.results = finished(run.folder, run.key, run.seeds, Cache(Path(place)) if place else None)
         except (ProblemsFound, BadInput) as wrong:
             run.error = str(wrong)

@@ -88,7 +88,7 @@ def _with_verdicts(page: Path, verdicts: Sequence[Verdict]) -> str:
     rows = [number for number, line in enumerate(lines) if re.search(rf"\| ({VERDICT_WORDS}) \|$", line)]
     cases = [(verdict, case) for verdict in verdicts for case in verdict.cases]
     if len(rows) != len(cases):
-        raise BadInput(f"{page}: {len(rows)} rows of verdicts, but {len(cases)} in the file beside it; write it anew")
+        raise BadInput(f"{page}: {len(rows)} rows of verdicts, but {len(cases)} in the file beside it; write it again")
     for number, (verdict, case) in zip(rows, cases, strict=True):
         line = re.sub(rf"\| ({VERDICT_WORDS}) \|$", f"| {in_words(case.holds)} |", lines[number])
         lines[number] = re.sub(rf": \*\*({VERDICT_WORDS})\*\* \|", f": **{in_words(verdict.holds)}** |", line, count=1)

@@ -210,7 +210,7 @@ def run_repetition(
         engine.run()
         keep_prefix(engine, prefix, cache)
     # Only now is it known which stages draw random numbers: they and what follows from them are run every time.
-    # What grows in place has grown by now: it starts anew too.
+    # What grows in place has grown by now: it starts again too.
     drew = [name for name, call in engine.calls.items() if call.ctx.drew]
     seeded = following(graph, [*drew, *(node.name for node in graph.of_lifetime("before") if _grows(node))])
     nodes = prefix_nodes(graph, artifacts=True, without=seeded)

@@ -20,7 +20,7 @@ REPORT = "report.html"
 
 
 def redraw(folder: Path, plots: str, display: ProgressDisplay | None = None) -> None:
-    """Write a complete run's report anew with `plots` (few, all or none); all else in its folder stays as it is.
+    """Write a complete run's report again with `plots` (few, all or none); all else in its folder stays as it is.
 
     The run is computed once more, from the caches where they hold its features, because a run keeps no more than its
     results. Raises `BadInput` where it is not complete, where its inputs have changed, or where it gives other figures

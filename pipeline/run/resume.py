@@ -62,7 +62,7 @@ def reopened(run: RunFolder, folder: Path) -> Plan | None:
 
 
 def _reopened(run: RunFolder, folder: Path) -> Plan | None:
-    for half_written in folder.glob("*.part"):  # by the process that was killed; it is written anew
+    for half_written in folder.glob("*.part"):  # by the process that was killed; it is written again
         half_written.unlink()
     began, config = _beginning(run, folder)
     if began.status == "complete":

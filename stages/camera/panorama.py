@@ -1,4 +1,4 @@
-"""A panorama's own camera, so that whoever reads images reads panoramas alike."""
+"""A panorama's own camera, so that whoever reads images reads panoramas too."""
 
 from omninav.stages.values.image import Image, Panorama
 

@@ -77,7 +77,7 @@ class IndexedCandidates(NearBelief):
         if views.shape[1:] != map.features.shape[1:]:
             raise BadInput(
                 f"map: its views are of {map.features.shape[1]} segments x {map.features.shape[2]} bins, the current "
-                f"one of {views.shape[1]} x {views.shape[2]}; learn the map anew with these features"
+                f"one of {views.shape[1]} x {views.shape[2]}; learn the map again with these features"
             )
         return appearance_vectors(views, map.kind)
 

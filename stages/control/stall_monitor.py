@@ -36,7 +36,7 @@ class StallMonitor(Stage):
     """Says that the way is blocked where the robot has driven for long and come no closer to its target.
 
     What stands in the direct way may be a closed door, around which there is no way. The robot is no longer blocked as
-    soon as it has another target, or after `detour_s`, so that it tries again if nobody plans anew. The time in which
+    soon as it has another target, or after `detour_s`, so that it tries again if nobody plans again. The time in which
     the target is lost does not count.
     """
 

@@ -77,10 +77,10 @@ def hsv_histograms(
 
     `joint` False: `hue_bins` + `value_bins` bins, half of the mass in each part; a pixel whose hue is not defined
     (saturation below `min_saturation` or value below `min_value`, of 255; S = 0 or V = 0 never is) gives its share to
-    V. `joint` True: `hue_bins` x `value_bins` bins, hue slowest, and behind them `value_bins` for such pixels (in all
-    hues alike, grey would resemble noise of all colours). So grey segments compare by value in both: two of one value
-    intersect by 1, white and black by 0. OpenCV's hue is 0..179 and circular: bins are equal arcs, of which the first
-    starts at red (erratum 22 in docs/papers.md).
+    V. `joint` True: `hue_bins` x `value_bins` bins, hue slowest, and behind them `value_bins` for such pixels (spread
+    over all hues, grey would resemble noise of all colours). So grey segments compare by value in both: two of one
+    value intersect by 1, white and black by 0. OpenCV's hue is 0..179 and circular: bins are equal arcs, of which the
+    first starts at red (erratum 22 in docs/papers.md).
     """
     hsv = cast(Pixels, cv2.cvtColor(pixels, cv2.COLOR_BGR2HSV))
     hue_bin = np.arange(256) * hue_bins // 180

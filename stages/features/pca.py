@@ -35,7 +35,7 @@ class PrincipalComponents(AveragedStrip, Stage):
         if projection.components.shape[1] != size:
             raise BadInput(
                 f"projection: learned from strips of {projection.components.shape[1]} numbers, the present ones have "
-                f"{size}; give features the rows, columns and channels it was learned with, or learn it anew"
+                f"{size}; give features the rows, columns and channels it was learned with, or learn it again"
             )
         self._projection = projection
         self._turned = turned_copies(projection.components, self.headings).reshape(-1, size)

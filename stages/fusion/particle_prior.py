@@ -47,7 +47,7 @@ class ParticlePrior(Stage):
         area: FreeSpace | None = None,
         restart: Restart | None = None,
     ) -> Out:
-        """Give the first belief, also where somebody asks a running robot to begin anew (`restart`)."""
+        """Give the first belief, also where somebody asks a running robot to start again (`restart`)."""
         if not ctx.tick.first_of_log and restart is None:
             return self.Out()
         where = self.at if restart is None else restart.at or "uniform"

@@ -33,7 +33,7 @@ class PlacePrior(Stage):
     def step(
         self, ctx: Context, tick: Tick, map: TopologicalMap, truth: Pose | None = None, restart: Restart | None = None
     ) -> Out:
-        """Give the first belief, also where somebody asks a running robot to begin anew (`restart`)."""
+        """Give the first belief, also where somebody asks a running robot to start again (`restart`)."""
         where = self.at if restart is None else restart.at or "uniform"
         if not (
             tick.first_of_log or restart is not None or (self.restart_after and tick.index % self.restart_after == 0)

@@ -26,7 +26,7 @@ class WaypointImages(Stage):
 
     Goedemé et al. 2007, section 7.2.4. A view on the way is also reached where it lies behind and less than half of the
     way to it is left. At the last view the robot only turns, until it has the view's heading. A lost target's vector
-    does not count. `vector` is the one of the tick before, by a delayed wire. A path with another number begins anew
+    does not count. `vector` is the one of the tick before, by a delayed wire. A path with another number starts again
     at its first view. Nearness is the distance over that of a typical feature.
     """
 

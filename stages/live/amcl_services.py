@@ -16,7 +16,7 @@ STATE_AFTER = {1: INACTIVE, 2: UNCONFIGURED, 3: ACTIVE, 4: INACTIVE, 5: FINALIZE
 
 
 def serve_restart(transport: Transport, service: str) -> None:
-    """A call is as good as a message on the topic of that name: the belief begins anew, uniform."""
+    """A call is as good as a message on the topic of that name: the belief starts again, uniform."""
 
     def restart(_: bytes) -> bytes:
         transport.inbox.put(Arrival(service, EMPTY, time.time_ns(), NOTHING))

@@ -172,7 +172,7 @@ class RobotDriver(Stage):
                     )
             elif left <= 0.0:
                 if left < -1.0:
-                    self._started -= left  # too slow by a second: from here on time is counted anew
+                    self._started -= left  # too slow by a second: from here on time is counted again
                 return
 
     def _publish(

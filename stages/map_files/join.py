@@ -23,7 +23,7 @@ class JoinMaps(Stage):
     """The maps (.omap), at least two."""
     same_frame: bool = False
     """States that the poses of all maps are in one frame. It need not be said of poses from ground truth; poses from
-    odometry begin anew with every tour."""
+    odometry start again with every tour."""
     out: str = "joined.omap"
     """The file to write."""
 

@@ -193,7 +193,7 @@ def with_names(map: TopologicalMap, rooms: Rooms) -> TopologicalMap:
 
 
 def with_loops(map: TopologicalMap, pairs: Ints) -> TopologicalMap:
-    """The map with links between pairs of places (L, 2) that look alike, without path images."""
+    """The map with links between pairs of places (L, 2) that look similar, without path images."""
     ordered = dict.fromkeys((int(pair.min()), int(pair.max())) for pair in pairs)
     new = [pair for pair in ordered if pair[0] != pair[1] and map.link(*pair) is None]
     return dataclasses.replace(

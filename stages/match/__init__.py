@@ -1,1 +1,1 @@
-"""How alike the present view and the views of the map are."""
+"""How similar the present view and the views of the map are."""

@@ -61,5 +61,5 @@ def check_same_kind(features: SegmentFeatures, map: ReferenceGraph) -> None:
     if len(map) and (map.kind != kind or shape != features.values.shape):
         raise BadInput(
             f"map: its views are {map.kind} of {shape[0]} segments x {shape[1]} bins, the current one is {kind} of "
-            f"{features.values.shape[0]} x {features.values.shape[1]}; learn the map anew with these features"
+            f"{features.values.shape[0]} x {features.values.shape[1]}; learn the map again with these features"
         )

@@ -11,7 +11,7 @@ from .homing_snapshot import EncodedHomingView, Points
 
 Colour = tuple[int, int, int]
 LOST, TRACKED, AGAIN, MATCHED = range(4)
-NAMES = {TRACKED: "tracked", AGAIN: "found again", MATCHED: "matched anew", LOST: "lost"}
+NAMES = {TRACKED: "tracked", AGAIN: "found again", MATCHED: "matched again", LOST: "lost"}
 """Kinds of features, in the order of legends."""
 BRIGHT: dict[int, Colour] = {
     LOST: (0, 94, 255),

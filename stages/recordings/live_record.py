@@ -175,7 +175,7 @@ class LiveRecording(TopicRecording):
         return self._frames[frame].scan
 
     def restart(self, frame: int) -> Restart | None:
-        """Where the belief was to begin anew at that tick."""
+        """Where the belief was to start again at that tick."""
         return self._frames[frame].restart
 
     def goal(self, frame: int) -> GoalPoint | None:

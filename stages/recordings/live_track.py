@@ -29,7 +29,7 @@ class LiveTrack:
 
     What no robot can have driven, and what lies before the last stamp or long after it, is doubted: dropped where the
     track goes on as before, and believed once it has gone on for `EXCURSION_S` by itself. Then odometry is joined to
-    where it was (`jumps` false), or the truth begins anew there; where stamps went back, all before is forgotten.
+    where it was (`jumps` false), or the truth starts again there; where stamps went back, all before is forgotten.
     `dropped` counts by kind what was left out. What comes of it depends on what was kept alone: fed with that, another
     track gives the same.
     """

@@ -17,7 +17,7 @@ Mask = npt.NDArray[np.bool_]
 MIN_INTERVAL_S = 0.05
 """Stamps of a busy computer come in bunches: of two that are closer, this interval is judged."""
 EXCURSION_S = 1.0
-"""A track that is back after this time was never away; one that stays away longer has begun anew."""
+"""A track that is back after this time was never away; one that stays away longer has started again."""
 LOOK_BACK = 16
 """Stretches to which a track may be back."""
 MIN_STRETCH = 1.5
@@ -38,7 +38,7 @@ class BelievedTrack(NamedTuple):
     """A track without what no robot does.
 
     `rows` (K,): which of the poses are believed. `jumps` (J,): those of `rows` (positions in it) that no motion leads
-    to from the one before: the track begins anew there. `gaps` (G, 2): stamps (ns) between which nothing that was
+    to from the one before: the track starts again there. `gaps` (G, 2): stamps (ns) between which nothing that was
     measured is believed: about poses left out, and before jumps.
     """
 
@@ -52,7 +52,7 @@ def believed(stamps: Stamps, poses: Array, limits: MotionLimits) -> BelievedTrac
 
     Where two poses in a row need a faster motion the track is split. Of its stretches those are kept that hold the most
     poses together: one follows another within `EXCURSION_S` where the robot can have come from its end, or it begins
-    anew, as a counter does that was reset, at the cost of as many poses as `EXCURSION_S` has. NaN is left out.
+    again, as a counter does that was reset, at the cost of as many poses as `EXCURSION_S` has. NaN is left out.
     """
     known = np.flatnonzero(np.isfinite(poses).all(axis=1))
     rows, jumps = _kept(stamps[known], poses[known], np.diff(known) > 1, limits)
@@ -63,7 +63,7 @@ def believed(stamps: Stamps, poses: Array, limits: MotionLimits) -> BelievedTrac
 
 
 def _kept(stamps: Stamps, poses: Array, torn: Mask, limits: MotionLimits) -> tuple[Rows, Rows]:
-    """The longest chain of stretches by dynamic programming: its rows, and which of these begin anew.
+    """The longest chain of stretches by dynamic programming: its rows, and which of these start again.
 
     `torn` (N - 1,): where a pose between two is missing. There a stretch ends too, since more is possible.
     """

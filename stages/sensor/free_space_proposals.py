@@ -10,7 +10,7 @@ from omninav.stages.values.grid import FreeSpace
 
 
 class FreeSpaceProposals(Stage):
-    """Draws poses uniformly over the free space with all headings, anew at each image.
+    """Draws poses uniformly over the free space with all headings, again at each image.
 
     Wolf, Burgard & Burkhardt 2005, section III: random samples. All poses have equal weights.
     """

@@ -44,7 +44,7 @@ class Visibility(Stage):
     """How the weight falls over the window: step, triangle, or gaussian (the window is its sigma)."""
     distance_sigma_m: Annotated[float, Bounds(gt=0)] | None = 1.0
     """Sigma of the Gaussian by which a view's weight falls with the distance from where it was taken; null: all views
-    of the area weigh alike, as in the paper. Not in length scales, which differ between cameras in one place."""
+    of the area weigh the same, as in the paper. Not in length scales, which differ between cameras in one place."""
     power: Annotated[float, Bounds(gt=0)] | None = 1.0
     """Exponent of the similarities, 1 in the paper; null: from `contrast`."""
     contrast: Annotated[float, Bounds(gt=0)] = 2.0

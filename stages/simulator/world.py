@@ -41,7 +41,7 @@ def _drawn(seed: int, material: str, name: str) -> npt.NDArray[np.uint8]:
 class World:
     """A world from its configuration, as it stands on a day.
 
-    The seed decides textures and goods; on days other than 0 a share of the shelves' compartments is filled anew.
+    The seed decides textures and goods; on days other than 0 a share of the shelves' compartments is filled again.
     """
 
     def __init__(self, config: WorldConfig, day: int = 0) -> None:

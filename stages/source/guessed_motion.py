@@ -20,7 +20,7 @@ from omninav.stages.values.pose import GuessedMotion, Motion
 COLUMNS, ROWS = 360, 24
 """Of the panoramas that the compass compares."""
 BAND = math.radians(30.0)
-"""Elevation (rad) above and below the horizon that they reach: what stands around turns, floor and sky are alike."""
+"""Elevation (rad) above and below the horizon that they reach: what stands around turns, floor and sky do not."""
 BLUR_PX = 1.0
 """Standard deviation of the blur of their columns: between images, leaves and noise change."""
 NOMINAL_SPEED = 0.5

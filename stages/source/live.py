@@ -70,11 +70,11 @@ class LiveSource(Source):
     topics: Topics = Topics()
     """Which topics are read. An image topic whose name ends with `compressed` carries compressed images."""
     initial_pose: str | None = "/initialpose"
-    """Where somebody says where the robot is (PoseWithCovarianceStamped): the belief begins anew there."""
+    """Where somebody says where the robot is (PoseWithCovarianceStamped): the belief starts again there."""
     goal: str | None = "/goal_pose"
     """Where somebody says where it is to go (PoseStamped)."""
     restart: str | None = "/reinitialize_global_localization"
-    """Topic (Empty), and service of that name where the transport has services: the belief begins anew, uniform."""
+    """Topic (Empty), and service of that name where the transport has services: the belief starts again, uniform."""
     amcl: str | None = None
     """The name of nav2's AMCL node, to answer its other services too, where the transport has services."""
     camera: str | None = None

@@ -145,7 +145,7 @@ class PushedSource(Source):
         if driven > MAX_MOTION_M:
             raise BadInput(
                 f"step: {driven:g} m since the image before, expected at most {MAX_MOTION_M:g}; "
-                "leave it out, or begin anew with new_log=True"
+                "leave it out, or start a new log with new_log=True"
             )
         measured = rows["motion"] is not None or rows["odometry"] is not None
         if measured:

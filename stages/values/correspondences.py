@@ -12,7 +12,7 @@ Ints = npt.NDArray[np.int64]
 
 
 class Correspondences(Value):
-    """Pairs of features, one of each of two views, that look alike; the clearest first.
+    """Pairs of features, one of each of two views, that look similar; the clearest first.
 
     `first` (M,) and `second` (M,): their rows in the features of the first and of the second view. Nothing is in two
     pairs. `distance` (M,): how different they look, in the units of whoever matched them. In homing the first view is

@@ -46,7 +46,7 @@ class HomingVector(Value):
     `direction`: where to go (rad, counter-clockwise from forward); `turn`: how far to turn, in all, to have the
     target's heading (rad, counter-clockwise). `distance`: in units of the first baseline, the way from where the local
     map was made (erratum 39 in docs/papers.md: bearings alone give no metres); `ratio`: over the way from where homing
-    towards this target began, the same unless the map was made anew. `nearness`: the distance over that of a typical
+    towards this target began, the same unless the map was made again. `nearness`: the distance over that of a typical
     feature; small where the two views hardly differ, from the first tick on. `metres`: the distance, where odometry has
     told the unit. `inliers`: features that agree with it. `state`: `new` (from two views), `tracking` (from the local
     map), or `lost`, and then `why`; what is said of a lost target is what was known last, moved on by odometry where

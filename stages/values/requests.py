@@ -6,7 +6,7 @@ from .pose import StartPose
 
 
 class Restart(Value):
-    """The belief is to begin anew: at a pose (x, y, heading, sigma_xy, sigma_heading; m, rad), or uniform (None)."""
+    """The belief is to start again: at a pose (x, y, heading, sigma_xy, sigma_heading; m, rad), or uniform (None)."""
 
     at: StartPose | None = None
 

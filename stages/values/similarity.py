@@ -40,7 +40,7 @@ class Similarities(Value):
 class SimilarityField(Value):
     """Weights (max(S, floor) / top)^power over the compared references and headings, prepared for drawing.
 
-    `values`, `candidates`: as in `Similarities`. `floor`: the similarity below which all cells weigh alike. `above`
+    `values`, `candidates`: as in `Similarities`. `floor`: the similarity below which all cells weigh the same. `above`
     (A,): flat indices of the cells above it, `weights` (A,): their cumulative weights. `floor_cells` (references,):
     cumulative number of cells at the floor, by sampling weight; `floor_weight`: what they weigh in all. `mean`: mean
     weight over the map.

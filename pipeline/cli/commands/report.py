@@ -1,4 +1,4 @@
-"""`omninav report`: a run's results, and where its report lies; with `plots=all` drawn anew."""
+"""`omninav report`: a run's results, and where its report lies; with `plots=all` drawn again."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from omninav.pipeline.run.metrics_files import read_metrics
 
 
 def command(arguments: list[str]) -> int:
-    """Print the results of a run that ended (the latest where none is named); with `plots=…` draw its report anew."""
+    """Print the results of a run that ended (the latest where none is named); with `plots=…` draw its report again."""
     plots = [word.removeprefix("plots=") for word in arguments if word.startswith("plots=")]
     named = [word for word in arguments if not word.startswith("plots=")]
     folder = Path(named[0] if named else "runs/latest").absolute()

@@ -55,7 +55,7 @@ def moments(means: Array, covariances: Array, weights: Array, spread: bool = Tru
 
     With `spread` the covariance holds the spread of the means (Gross, Koenig & Mueller 2005, equations 13 and 14,
     divided by the sum of weights: erratum 7); without, it is the mean of the covariances (Porta & Kroese 2004, section
-    3.2), which is over-confident (erratum 16). Where all weights are 0 all count alike.
+    3.2), which is over-confident (erratum 16). Where all weights are 0 all count the same.
     """
     total = float(weights.sum())
     share = weights / total if total > 0.0 else np.full(len(weights), 1.0 / len(weights))

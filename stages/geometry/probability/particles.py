@@ -196,7 +196,7 @@ def occupied_cells(poses: Array, cell: float, angle: float) -> int:
 
 
 def uniform_around(centres: Array, radius: float, number: int, rng: np.random.Generator) -> Array:
-    """Poses (number, 3) uniform over the area within `radius` metres of any centre (R, >= 2), all headings alike."""
+    """Poses (number, 3) uniform over the area within `radius` metres of any centre (R, >= 2), any heading."""
     from scipy.spatial import KDTree  # slow to import, and seldom needed
 
     tree: Any = KDTree(centres[:, :2])  # type: ignore[no-untyped-call]

@@ -64,7 +64,7 @@ def angular_residuals(matrix: Array, first: npt.ArrayLike, second: npt.ArrayLike
 def shared_residuals(rotation: Array, translation: Array, first: npt.ArrayLike, second: npt.ArrayLike) -> Array:
     """Angles (N,), rad, by which the bearings of both views together must move to share a plane with the baseline.
 
-    To first order: asin(|b1' E b2| / sqrt(|E b2|^2 + |E' b1|^2)), in which the noise of both views counts alike and a
+    To first order: asin(|b1' E b2| / sqrt(|E b2|^2 + |E' b1|^2)), in which the noise of both views counts equally and a
     bearing close to the baseline, whose plane is hardly known, is not blamed for it.
     """
     first, second = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)

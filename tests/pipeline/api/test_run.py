@@ -53,6 +53,12 @@ def test_what_is_not_there_is_said_with_what_to_type(run, tmp_path):
         omninav.run("plain_matching", tour=TOUR, log=DRIVE, folder=run.folder)
 
 
+def test_a_folder_that_is_none_is_bad_input_with_what_to_do(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(omninav.BadInput, match="file/x: Not a directory; a part of its path is a file; name another"):
+        omninav.run("plain_matching", folder=tmp_path / "file" / "x", progress=False)
+
+
 @pytest.mark.parametrize(
     ("record", "what"),
     [("mach.similarities", "did you mean 'match.similarities'"), ("errors.metrics", "no output 'errors.metrics'")],
