@@ -10,13 +10,12 @@ from omninav.stages.plots.result_messages import ResultMessages, ResultMessagesS
 from omninav.stages.values.ros_messages import RosMessages
 
 
-def messages_of(run: SmallRun, beliefs=None, map=None, **inputs) -> list[RosMessages]:
+def messages_of(run: SmallRun, beliefs=None, map=None, max_views=2000, **inputs) -> list[RosMessages]:
     """What `ResultMessages` gives for a small run; `inputs` are the same for every tick."""
-    stage, shown = ResultMessages(particles=30), ResultMessagesState()
+    stage, shown = ResultMessages(particles=30, max_views=max_views), ResultMessagesState()
     rows = zip(run.ticks, run.motion, run.truth, run.estimates, beliefs or run.beliefs, strict=True)
     return [
-        stage.step(Context("messages"), shown, *row, map=run.map if map is None else map, **inputs).messages
-        for row in rows
+        stage.step(Context("messages"), shown, *row, map=run.map if map is None else map, **inputs).kept for row in rows
     ]
 
 

@@ -1,7 +1,8 @@
 """Collects what every metric and plot of a drive needs."""
 
+import math
+from array import array
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -32,55 +33,51 @@ class CollectDrive(Stage):
         matches: Sequence[BestMatch | None] | None = None,
     ) -> Out:
         """The whole run at once. Each sequence is read once, in order."""
-        rows: list[tuple[Any, ...]] = []
+        whole, parts = array("q"), array("d")  # not lists: a long run has many rows
         absent = [None] * len(ticks)
-        for tick, estimate, true, moved, tally, match in zip(
-            ticks,
-            absent if estimates is None else estimates,
-            truth,
-            motion,
-            absent if tallies is None else tallies,
-            absent if matches is None else matches,
-            strict=True,
-        ):
-            rows.append(
-                (
-                    (len(rows), tick.log, tick.frame, tick.stamp),
-                    pose_row(estimate.pose if estimate else None),
-                    np.full((3, 3), np.nan) if estimate is None else estimate.covariance,
-                    0.0 if estimate is None else estimate.mode_weight,
-                    pose_row(estimate.mean if estimate else None),
-                    pose_row(true),
-                    (np.nan,) * 3 if moved is None else (moved.x, moved.y, moved.turn),
-                    (
-                        0 if tally is None else tally.collisions,
-                        -1 if estimate is None or estimate.place is None else estimate.place,
-                        -1 if match is None else match.reference,
-                    ),
-                    np.nan if tally is None else tally.distance,
-                    (np.nan,) * 3 if match is None else (match.similarity, match.distance, match.turn),
-                )
+        for row, (tick, estimate, true, moved, tally, match) in enumerate(
+            zip(
+                ticks,
+                absent if estimates is None else estimates,
+                truth,
+                motion,
+                absent if tallies is None else tallies,
+                absent if matches is None else matches,
+                strict=True,
             )
-        numbers, estimated, covariance, share, mean, true_pose, motions, counted, distance, looks = (
-            zip(*rows, strict=True) if rows else [()] * 10
+        ):
+            whole.extend((row, tick.log, tick.frame, tick.stamp, 0 if tally is None else tally.collisions))
+            whole.append(-1 if estimate is None or estimate.place is None else estimate.place)
+            whole.append(-1 if match is None else match.reference)
+            parts.extend(pose_row(estimate.pose if estimate else None))
+            parts.extend([math.nan] * 9 if estimate is None else np.ravel(estimate.covariance).tolist())
+            parts.append(0.0 if estimate is None else estimate.mode_weight)
+            parts.extend(pose_row(estimate.mean if estimate else None))
+            parts.extend(pose_row(true))
+            parts.extend((math.nan,) * 3 if moved is None else (moved.x, moved.y, moved.turn))
+            parts.append(math.nan if tally is None else tally.distance)
+            looked = (None,) * 3 if match is None else (match.similarity, match.distance, match.turn)
+            parts.extend(math.nan if value is None else value for value in looked)
+        row_of, log, frames, stamps, collisions, place, reference = np.array(whole, np.int64).reshape(-1, 7).T.copy()
+        columns = np.array(parts, np.float64).reshape(-1, 26)
+        estimated, covariance, weight, mean, true_pose, motions, distance, looks = (
+            np.ascontiguousarray(part) for part in np.split(columns, (3, 12, 13, 16, 19, 22, 23), axis=1)
         )
-        row, log, frames, stamps = np.array(numbers, dtype=np.int64).reshape(-1, 4).T
-        collisions, place, reference = np.array(counted, dtype=np.int64).reshape(-1, 3).T
-        similarity, visual_distance, turn = np.array(looks, dtype=np.float64).reshape(-1, 3).T
+        similarity, visual_distance, turn = looks.T.copy()
         return self.Out(
             drive=Drive(
-                row=row,
+                row=row_of,
                 log=log,
                 frames=frames,
                 stamps=stamps,
-                estimate=np.array(estimated, dtype=np.float64).reshape(-1, 3),
-                covariance=np.array(covariance, dtype=np.float64).reshape(-1, 3, 3),
-                mode_weight=np.array(share, dtype=np.float64),
-                mean=np.array(mean, dtype=np.float64).reshape(-1, 3),
-                truth=np.array(true_pose, dtype=np.float64).reshape(-1, 3),
-                motion=np.array(motions, dtype=np.float64).reshape(-1, 3),
+                estimate=estimated,
+                covariance=covariance.reshape(-1, 3, 3),
+                mode_weight=weight[:, 0],
+                mean=mean,
+                truth=true_pose,
+                motion=motions,
                 collisions=collisions,
-                distance=np.array(distance, dtype=np.float64),
+                distance=distance[:, 0],
                 place=place,
                 reference=reference,
                 similarity=similarity,

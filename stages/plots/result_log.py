@@ -1,11 +1,9 @@
 """The run as a log of ROS 2 messages, for Foxglove, rosbags and whoever else reads MCAP."""
 
-from collections import Counter
 from collections.abc import Sequence
 from importlib.resources import files
-from typing import Annotated
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.recordings.pose_messages import path_message
@@ -14,10 +12,9 @@ from omninav.stages.values.map_places import AnyMap
 from omninav.stages.values.ros_messages import RosMessages
 
 from .markers import map_markers
+from .result_messages import VIEWS
 
 LAYOUT = "foxglove_layout.json"
-VIEWS = frozenset(("/panorama/compressed", "/belief", "/belief/markers", "/similarity", "/homing", "/estimate/path"))
-"""Topics that are looked at and fill a log; what is computed with is small, and kept of every tick."""
 
 
 class ResultLog(Stage):
@@ -26,13 +23,7 @@ class ResultLog(Stage):
     That is, in the map frame, per log: `/estimate/path`, all of its estimates, and `/odometry/path`, where odometry
     alone would have led from the first true pose (without any, through the last estimate); and `/map` as it was left.
     Beside it stands `foxglove_layout.json`, a layout of Foxglove's panels for these topics.
-
-    Of a run of more than `max_views` ticks, images, beliefs, similarities and paths so far are thinned: of each such
-    topic every second message is kept, or every third, …, the first in any case.
     """
-
-    max_views: Annotated[int, Bounds(ge=1)] = 2000
-    """Ticks whose images, beliefs and similarities are kept. Poses, transforms and commands are kept of every tick."""
 
     class Out(Outputs):
         """Nothing: the files are the result."""
@@ -43,12 +34,11 @@ class ResultLog(Stage):
             return self.Out()
         with LogWriter(ctx.folder / "result.mcap") as log:
             ended = {int(part.row[-1]): part for part in drive.by_log}
-            every, seen = -(-len(messages) // self.max_views), Counter[str]()
+            every = messages[-1].views_every if messages else 1  # the last knows how long the run was
             for row, tick in enumerate(messages):
-                for topic, msgtype, data in zip(tick.topics, tick.types, tick.data, strict=True):
-                    if topic not in VIEWS or seen[topic] % every == 0:
-                        log.append(topic, msgtype, tick.stamp, data)
-                    seen[topic] += 1
+                shown = tick.without(VIEWS) if row % every else tick
+                for topic, msgtype, data in zip(shown.topics, shown.types, shown.data, strict=True):
+                    log.append(topic, msgtype, tick.stamp, data)
                 if row in ended:
                     _write_paths(log, ended[row])
             if map is not None and len(map) and len(drive):

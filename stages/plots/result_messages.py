@@ -41,8 +41,10 @@ from .thin_belief import heaviest, thin
 
 PATH_POSES = 500
 """Most poses in the path so far; of a longer one every second, every fourth, … is shown."""
-PATH_TICKS = 20
-"""Ticks between two messages of the path so far."""
+PATH_TICKS = 16
+"""Ticks between two messages of the path so far; a power of two, as between views."""
+VIEWS = frozenset(("/panorama/compressed", "/belief", "/belief/markers", "/similarity", "/homing", "/estimate/path"))
+"""Topics that are only looked at, and fill a log. The others are small."""
 SHOWN_REFERENCES = 300
 """Most references whose similarity is shown, the most similar ones."""
 
@@ -50,7 +52,7 @@ SHOWN_REFERENCES = 300
 class ResultMessagesState(State):
     """What later ticks need of earlier ones: `odometry` (3,) since the log's first frame; `correction` (3,) from map to
     odometry, and whether it is `anchored`; the `path` so far (N, 3) with its `stamps` (N,), every `stride`-th tick's;
-    the size of the map and the number of the route that were shown last.
+    the size of the map and the number of the route that were shown last; the `ticks` so far.
     """
 
     odometry: Array = field(default_factory=lambda: np.zeros(3))
@@ -61,6 +63,7 @@ class ResultMessagesState(State):
     stride: int = 1
     map_size: int = 0
     route: int = -1
+    ticks: int = 0
 
 
 class ResultMessages(Stage):
@@ -71,7 +74,7 @@ class ResultMessages(Stage):
     | `/tf` | TFMessage | `map` to `odom` and `odom` to `base_link` |
     | `/odom` | Odometry | odometry alone, from the log's first frame, in the frame `odom` |
     | `/estimate/pose` | PoseWithCovarianceStamped | the estimate; 6 x 6 covariance, plane entries only |
-    | `/estimate/path` | Path | the estimates so far, every 20 ticks; all of a log's at its end |
+    | `/estimate/path` | Path | the estimates so far, every 16 ticks; all of a log's at its end |
     | `/ground_truth/pose` | PoseStamped | where the log has it |
     | `/belief` | PoseArray | few particles, a mixture's means, or the likely places |
     | `/belief/markers` | MarkerArray | a mixture's ellipses by their axes (one sigma), or the likely places |
@@ -91,11 +94,15 @@ class ResultMessages(Stage):
 
     particles: Annotated[int, Bounds(ge=1)] = 200
     """Largest number of poses in a message of the belief."""
+    max_views: Annotated[int, Bounds(ge=1)] = 2000
+    """Ticks whose panorama, belief, similarities, homing vector and path so far are kept in a log: of a run of more
+    ticks every second, every fourth, … Poses, transforms and commands are kept of every tick."""
 
     class Out(Outputs):
-        """`messages`: of this tick."""
+        """`messages`: of this tick. `kept`: those of them that a log keeps."""
 
         messages: RosMessages
+        kept: RosMessages
 
     def step(
         self,
@@ -144,7 +151,10 @@ class ResultMessages(Stage):
         if command is not None:
             twist = {"linear": {"x": command.speed}, "angular": {"z": command.turning}}
             out.add("/command", "geometry_msgs/msg/TwistStamped", {"header": header(tick.stamp, BASE), "twist": twist})
-        return self.Out(messages=out.made())
+        made = out.made(views_every=1 << (shown.ticks // self.max_views).bit_length())
+        kept = made.without(VIEWS) if shown.ticks % made.views_every else made
+        shown.ticks += 1
+        return self.Out(messages=made, kept=kept)
 
     def _show_poses(
         self,
@@ -179,7 +189,7 @@ class ResultMessages(Stage):
                 shown.path, shown.stamps = np.vstack([shown.path, row]), [*shown.stamps, tick.stamp]
             if len(shown.path) > PATH_POSES:
                 shown.path, shown.stamps, shown.stride = shown.path[::2], shown.stamps[::2], 2 * shown.stride
-        if shown.stamps and tick.frame % PATH_TICKS == PATH_TICKS - 1:
+        if shown.stamps and shown.ticks and shown.ticks % PATH_TICKS == 0:
             fields = path_message(shown.stamps, shown.path, tick.stamp)
             out.add("/estimate/path", "nav_msgs/msg/Path", fields)
 
@@ -232,6 +242,6 @@ class _Messages:
     def markers(self, topic: str, markers: list[Any]) -> None:
         self.add(topic, "visualization_msgs/msg/MarkerArray", {"markers": markers})
 
-    def made(self) -> RosMessages:
+    def made(self, views_every: int) -> RosMessages:
         topics, types, data = zip(*self._all, strict=True)
-        return RosMessages(self.stamp, topics, types, data)
+        return RosMessages(self.stamp, topics, types, data, views_every)

@@ -135,7 +135,7 @@ def test_a_log_of_mixtures_opens_with_mcaps_own_ros2_decoder(run, learned, resul
     assert {topic: len(messages) for topic, messages in found.items()} == {
         "/belief": 60,
         "/belief/markers": 60,
-        "/estimate/path": 4,
+        "/estimate/path": 5,
         "/estimate/pose": 60,
         "/ground_truth/pose": 60,
         "/map": 3,
