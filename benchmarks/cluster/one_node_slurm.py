@@ -40,7 +40,7 @@ MpiDefault=none
 ReturnToService=2
 SchedulerParameters=sched_interval=1,batch_sched_delay=0
 KillWait=2
-NodeName={host} NodeAddr=127.0.0.1 CPUs={cpus} Boards=1 SocketsPerBoard=1 CoresPerSocket={cpus} ThreadsPerCore=1 RealMemory={memory}
+NodeName={host} NodeAddr=127.0.0.1 CPUs={cpus} Boards=1 CoresPerSocket={cpus} ThreadsPerCore=1 RealMemory={memory}
 PartitionName=short Nodes={host} Default=YES MaxTime=INFINITE State=UP
 """
 
@@ -122,6 +122,7 @@ def wait_for(condition: Callable[[], bool], what: str, seconds: float = 60.0) ->
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit())
     with OneNodeSlurm(Path(sys.argv[1])) as slurm:
         print(*(f"export {name}={value}" for name, value in slurm.environment.items()), sep="\n", flush=True)
         signal.pause()

@@ -14,7 +14,7 @@ from .composition import complete, configured_variants, read_words
 from .overrides import invalid_overrides, with_unlisted_parameters
 from .terminal import shown
 
-OF_THE_EXPERIMENT = ("experiment", "profile", "runs", "cache", "hydra")
+OF_THE_EXPERIMENT = ("experiment", "profile", "runs", "cache", "engine", "hydra")
 
 
 def condition_words(words: Sequence[str]) -> list[str]:

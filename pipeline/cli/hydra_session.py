@@ -45,6 +45,9 @@ CALLED_BY_NAME = ("custom_search_space",)
 @contextmanager
 def hydra_started(folders: Sequence[str] = ()) -> Iterator[Hydra]:
     """Hydra, which finds configurations among omninav's own and in `folders` (of `--config-dir`)."""
+    from .launcher import offer_launcher
+
+    offer_launcher()
     session, version_base = GlobalHydra.instance(), "1.3"
     before, session.hydra = session.hydra, None
     version.setbase(version_base)

@@ -41,17 +41,47 @@ class SweepJob:
     overrides: str
 
 
+@dataclass(frozen=True)
+class JobEnd:
+    """How a job ended; plain data."""
+
+    code: int = 0
+    """Its exit code."""
+    error: str = ""
+    """What went wrong, in one line."""
+    objective: float | None = None
+    log: str = ""
+    """The file with the traceback."""
+    sweep: str = ""
+    """The folder of its sweep; '' where it is alone."""
+    number: str = ""
+    """Its number in the sweep."""
+
+
 def run_job(
     config: Any,
     arguments: Sequence[str],
     run_experiment: Callable[[Any, Sequence[str]], int],
     check: Callable[[Mapping[str, Any]], Plan] = plan,
 ) -> float | None:
-    """Run what a configuration describes, and return its objective, if one is named (see `_run`).
+    """Run what a configuration describes, say how it ended, and return its objective, if one is named (see `_run`).
 
     In a sweep the other jobs go on; the exit code is left in a file. A job that fails returns None, which Optuna counts
     as a failed trial (NaN would end the whole sweep).
     """
+    end = ended(config, arguments, run_experiment, check)
+    report_end(end)
+    leave_outcome(end, write_page(Path(end.sweep)) if end.sweep else None)
+    return end.objective
+
+
+def ended(
+    config: Any,
+    arguments: Sequence[str],
+    run_experiment: Callable[[Any, Sequence[str]], int],
+    check: Callable[[Mapping[str, Any]], Plan] = plan,
+) -> JobEnd:
+    """Run what a configuration describes. How that ended stands in the manifest of a sweep's job by then."""
     sweep, folder = _sweep_job(), _folder()
     of_experiment = config.get("experiment") is not None
     code, error, objective = 0, "", None
@@ -77,21 +107,30 @@ def run_job(
         code, error = (2, str(known)) if known else (1, f"{type(unknown).__name__}: {unknown}")
         if known is None and sweep is None:
             traceback.print_exc()
-    if error:
-        print(f"job {sweep.number}: {error}" if sweep else error, file=sys.stderr, flush=True)
-    if error and code == 1:
-        log = (folder or Path(str(config.get("runs", "runs"))) / "latest") / "run.log"
-        if log.is_file():
-            print(f"the traceback is in {shown(log)}", file=sys.stderr, flush=True)
-    page = None
-    if sweep is not None:
-        page = _note_job(sweep, code, error)
-    elif folder is not None and folder.is_dir() and not any(folder.iterdir()):
-        folder.rmdir()  # Hydra has made it, and nothing has run
+    log = (folder or Path(str(config.get("runs", "runs"))) / "latest") / "run.log"
+    trace = str(log) if error and code == 1 and log.is_file() else ""
+    if sweep is None:
+        if folder is not None and folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()  # Hydra has made it, and nothing has run
+        return JobEnd(code, error, objective, trace)
+    end = JobEnd(code, error, objective, trace, str(sweep.sweep), sweep.number)
+    note_end(sweep, end)
+    return end
+
+
+def report_end(end: JobEnd) -> None:
+    """Say what went wrong with a job, if anything has."""
+    if end.error:
+        print(f"job {end.number}: {end.error}" if end.sweep else end.error, file=sys.stderr, flush=True)
+    if end.log:
+        print(f"the traceback is in {shown(Path(end.log))}", file=sys.stderr, flush=True)
+
+
+def leave_outcome(end: JobEnd, page: Path | None) -> None:
+    """Leave a job's exit code, and its sweep's page, where the command finds them."""
     if OUTCOMES in os.environ:
         with open(os.environ[OUTCOMES], "a", encoding="utf-8") as file:
-            file.write(f"{code} {page or ''}\n")
-    return objective
+            file.write(f"{end.code} {page or ''}\n")
 
 
 def _run(
@@ -167,19 +206,20 @@ def _sweep_job() -> SweepJob | None:
     return SweepJob(sweep, own, str(settings.job.num), " ".join(settings.overrides.task))
 
 
-def _note_job(job: SweepJob, code: int, error: str) -> Path:
-    """Put a job's end on the sweep's page at once, and return that page.
-
-    Jobs in other processes wait for each other here.
-    """
-    from omninav.pipeline.report.sweep_page import write_sweep_page
-
+def note_end(job: SweepJob, end: JobEnd) -> None:
+    """Put a job's end into its manifest, where its sweep's page finds it."""
     file = job.folder / "manifest.json"
     manifest = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {"status": "refused"}
-    manifest |= {"job": job.number, "overrides": job.overrides} | ({"error": error} if error else {})
+    manifest |= {"job": job.number, "overrides": job.overrides} | ({"error": end.error} if end.error else {})
     write_json(file, manifest)
-    with locked(job.sweep / ".page.lock"):
-        return write_sweep_page(job.sweep, sorted(_sweep_rows(job.sweep), key=lambda row: int(row["job"])))
+
+
+def write_page(sweep: Path) -> Path:
+    """Write a sweep's page as things stand. Jobs in other processes wait for each other here."""
+    from omninav.pipeline.report.sweep_page import write_sweep_page
+
+    with locked(sweep / ".page.lock"):
+        return write_sweep_page(sweep, sorted(_sweep_rows(sweep), key=lambda row: int(row["job"])))
 
 
 def _sweep_rows(sweep: Path) -> Iterator[dict[str, Any]]:

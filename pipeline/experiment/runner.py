@@ -32,7 +32,7 @@ from .conditions import (
 )
 from .page import PageContent, made_with, write_page
 from .repetition import finished
-from .shared_inputs import Recording, artifacts_of, modules_of, recordings_of
+from .shared_inputs import Recording, artifacts_of, recordings_of
 from .specification import Experiment, read_experiment
 
 STATE = "experiment.json"
@@ -154,7 +154,7 @@ class ExperimentRun:
                 "groups": timed_groups(self.experiment),
             }
             function, log = "omninav.pipeline.experiment.repetition:repeat", run.folder / f"run{several}.log"
-            found.append(Job(f"{run.folder.name}{several}", function, given, log, modules_of(run.config)))
+            found.append(Job(f"{run.folder.name}{several}", function, given, log))
         return found
 
     def _run_jobs(self, workers: Workers, jobs: Sequence[Job], what: str) -> dict[str, str]:

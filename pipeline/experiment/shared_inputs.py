@@ -61,7 +61,7 @@ class Recording:
             "folder": str(self.folder),
         }
         log = folder / f"{self.folder.name}.log"
-        return Job(self.name, f"{__name__}:record", given, log, modules_of(self.readers[0][0].config))
+        return Job(self.name, f"{__name__}:record", given, log)
 
     def use(self) -> None:
         """Let all its readers replay it."""
@@ -173,7 +173,7 @@ class SharedArtifact:
         run, name = self.readers[0]
         given = {"config": run.config, "name": name, "folder": str(self.folder)}
         log = self.folder.with_suffix(".log")
-        return Job(self.name, f"{__name__}:make_artifact", given, log, modules_of(run.config))
+        return Job(self.name, f"{__name__}:make_artifact", given, log)
 
     def use(self) -> None:
         """Let all its readers load it."""
@@ -195,16 +195,6 @@ def artifacts_of(runs: Sequence[ConditionRun], folder: Path) -> list[SharedArtif
             shared = found.setdefault(name, SharedArtifact(name, folder / "artifacts" / name.replace(" ", "_")))
             shared.readers.append((run, artifact.name))
     return list(found.values())
-
-
-def modules_of(config: Mapping[str, Any]) -> tuple[str, ...]:
-    """The modules of the stages that a configuration names: a job that runs it imports them."""
-    graphs = [config, *(each.get("graph") or {} for each in (config.get("artifacts") or {}).values())]
-    targets = [
-        str(node.get("_target_", "")) for graph in graphs for node in (graph.get("nodes") or {}).values() if node
-    ]
-    names = (target.rpartition(".")[0] for target in targets if ":" not in target)
-    return tuple(sorted({name for name in names if name.startswith("omninav.") and ":" not in name}))
 
 
 def make_artifact(given: Mapping[str, Any], send: Send) -> None:

@@ -37,8 +37,6 @@ class Job:
     """Its first argument."""
     log: Path
     """The file that gets what it prints. Beside it lie its messages, while it runs."""
-    imports: tuple[str, ...] = ()
-    """Modules that it will need: they are imported once for many jobs."""
 
     @property
     def messages(self) -> Path:
@@ -53,7 +51,6 @@ class Job:
         plain = {
             "function": self.function,
             "given": self.given,
-            "imports": [self.function.partition(":")[0], *self.imports],
             "log": str(self.log.absolute()),
             "messages": str(self.messages.absolute()),
             "attempt": attempt,

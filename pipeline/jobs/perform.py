@@ -43,6 +43,7 @@ class _Server:
             start_new_session=True,  # Ctrl-C is for whoever waits for the jobs
         )
         self._answers = b""
+        self._modules: list[str] = []
 
     @property
     def ready(self) -> bool:
@@ -62,7 +63,7 @@ class _Server:
     def run(self, job: dict[str, Any]) -> dict[str, Any]:
         """Have it run a job. Raises `OSError` where it dies itself."""
         assert self._process.stdin is not None
-        self._process.stdin.write(json.dumps(job).encode() + b"\n")
+        self._process.stdin.write(json.dumps({**job, "modules": self._modules}).encode() + b"\n")
         self._process.stdin.flush()
         lease, limit, peak = _Lease(job), job["memory"], 0
         known: dict[str, Any] = {}
@@ -79,6 +80,7 @@ class _Server:
             if lease.over():
                 self.close()
                 return {"error": "stopped, because whoever started it has ended"}
+        self._modules = known.get("modules", self._modules)  # the next job will need them too
         if known["code"] == 0 and "ended" in known:
             return {**known["ended"], "memory": known["memory"]}
         error = f"{_cause(known['code'])}; it had taken {size_text(known['memory'])} of memory"

@@ -1,7 +1,7 @@
 """A process that imports what jobs need once, and forks for each of them. `perform` starts it and talks to it.
 
 It has no threads, so that a fork is safe. A line of its input is a job. It answers with lines: the process that runs
-it; what that returned or raised, where it came so far; and how it ended.
+it; what that returned or raised, where it came so far, and which modules it had imported; and how it ended.
 """
 
 import faulthandler
@@ -15,8 +15,8 @@ import traceback
 from contextlib import suppress
 from typing import Any
 
-IMPORTED = ("omninav.pipeline.run.execution", "omninav.pipeline.graph.registry")
-"""What every job needs."""
+OWN = "omninav."
+"""Whose modules are imported once: a user's own may change between two jobs."""
 
 
 def main() -> None:
@@ -27,7 +27,7 @@ def main() -> None:
         job = json.loads(line)
         sys.path += [place for place in job["path"] if place not in sys.path]
         os.environ.update(job["environment"])
-        for name in (*IMPORTED, *job["imports"]):
+        for name in job["modules"]:
             with suppress(Exception):  # the job imports it again, and says what is wrong
                 importlib.import_module(name)
         gc.freeze()  # what is shared with a fork stays shared
@@ -66,7 +66,7 @@ def _run(job: dict[str, Any], answers: int) -> None:
         sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
         faulthandler.enable()
         os.chdir(job["folder"])
-        ended = json.dumps({"ended": _called(job)}, default=str)
+        ended = json.dumps({"ended": _called(job), "modules": _own_modules()}, default=str)
         sys.stdout.flush()
         sys.stderr.flush()
         _write(answers, ended.encode() + b"\n")
@@ -75,6 +75,10 @@ def _run(job: dict[str, Any], answers: int) -> None:
         traceback.print_exc()
     finally:
         os._exit(code)
+
+
+def _own_modules() -> list[str]:
+    return [name for name in sys.modules if name.startswith(OWN)]
 
 
 def _end_with_parent() -> None:

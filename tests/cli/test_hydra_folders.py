@@ -1,6 +1,7 @@
 """Where a run's files lie: where Hydra's settings say, with what Hydra's users look for."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,8 @@ wires:
   all:
     numbers: {from: sum.number, collect: true}
 """
+SAME = ("status", "error", "job", "overrides", "seed", "graph", "config", "variant")
+"""What a job's manifest says wherever it ran."""
 
 
 @pytest.fixture
@@ -68,6 +71,22 @@ def test_the_jobs_of_a_sweep_lie_where_hydra_sweep_dir_and_subdir_say(toy, tmp_p
     page = (tmp_path / "swept" / "sweep.html").read_text()
     assert "2 jobs: 2 complete" in page
     assert not list(tmp_path.glob("runs/[!.]*"))
+
+
+def test_the_jobs_of_a_sweep_that_an_engine_runs_leave_the_same_and_name_what_fails(toy, tmp_path: Path):
+    words = ("--config-dir=mine", "-m", "seed=0,1", "nodes.count.length_=4,none")
+    ended = toy(*words, "hydra.sweep.dir=there", "engine.workers=2")
+    assert ended.returncode == 2
+    assert sorted(re.findall(r"^job (\d): 1 problem:\n +nodes.count.length_: 'none'", ended.stderr, re.M)) == ["1", "3"]
+    assert ended.stdout.splitlines()[-1] == "sweep: there/sweep.html"
+    toy(*words, "hydra.sweep.dir=here")
+    for number in range(4):
+        here, there = (
+            json.loads((tmp_path / place / f"{number}/manifest.json").read_text()) for place in ("here", "there")
+        )
+        assert {name: here.get(name) for name in SAME} == {name: there.get(name) for name in SAME}
+    metrics = [(tmp_path / place / "0" / "metrics.json").read_bytes() for place in ("here", "there")]
+    assert metrics[0] == metrics[1]
 
 
 def test_another_sweep_does_not_take_the_folder_of_a_finished_one(toy, tmp_path: Path):

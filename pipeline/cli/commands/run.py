@@ -1,5 +1,6 @@
 """`omninav variant=… log=…`, `omninav -m …`, `omninav +experiment=…`: hand over to Hydra, which calls each job."""
 
+import itertools
 import os
 import sys
 import tempfile
@@ -17,12 +18,16 @@ from omninav.pipeline.cli.composition import composed, offer_plugins
 from omninav.pipeline.cli.experiments import condition_words, run_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.jobs import OUTCOMES, run_job
+from omninav.pipeline.cli.launcher import is_of_engine
 from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
 from omninav.pipeline.cli.terminal import shown
 from omninav.pipeline.cli.words import read_flags
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.run.plan import Plan, plan
+
+LAUNCHER = "hydra/launcher=omninav"
+"""How the jobs of a sweep go to the engine that was typed."""
 
 
 def command(arguments: list[str], check: Callable[[Mapping[str, Any]], Plan] = plan) -> int:
@@ -36,6 +41,8 @@ def command(arguments: list[str], check: Callable[[Mapping[str, Any]], Plan] = p
         if flags.multirun:
             _refuse_misspelled_sweep(listed, folders)
             _refuse_other_sweep(listed)
+            if any(map(is_of_engine, listed)) and not _has_launcher(listed):
+                listed, arguments = [*listed, LAUNCHER], [*arguments, LAUNCHER]
 
         def job(config: Any) -> float | None:
             return run_job(config, arguments, run_experiment, check)
@@ -96,6 +103,10 @@ def _ends(outcomes: Path) -> list[tuple[str, str, str]]:
     return [line.partition(" ") for line in lines]
 
 
+def _has_launcher(words: Sequence[str]) -> bool:
+    return any(word.startswith("hydra/launcher") for word in words)
+
+
 def _refuse_misspelled_sweep(words: Sequence[str], folders: Sequence[str]) -> None:
     """Hydra makes a sweep's folder before it reads the words; so they are read before."""
     for job in list(jobs_to_try(words, folders)):
@@ -111,7 +122,8 @@ def _refuse_other_sweep(words: Sequence[str]) -> None:
             continue
         settings = read_yaml(file)
         before = [str(word) for word in OmegaConf.select(OmegaConf.create(settings), "hydra.overrides.task") or ()]
-        if sorted(before) != sorted(word for word in words if not word.startswith(("hydra.", "hydra/"))):
+        given = [word for word in words if not word.startswith(("hydra.", "hydra/"))]
+        if sorted(itertools.filterfalse(is_of_engine, before)) != sorted(itertools.filterfalse(is_of_engine, given)):
             raise BadInput(
                 f"{folder}: another sweep is in it ({' '.join(before):.200}); name another: hydra.sweep.dir=…"
             )
