@@ -148,7 +148,12 @@ def measured(name: str) -> str:
         of = dict(zip(KINDS, ends, strict=True))
         candidate(["well"] * EMPTY, [""] * EMPTY, folder)
         each = 1e3 * (candidate.ended - candidate.begun) / EMPTY
-    words = [of["raises"], of["dies"], of["dies once"], f"{len(innocent)} of 9" + (f" ({innocent[0]})" if innocent else "")]
+    words = [
+        of["raises"],
+        of["dies"],
+        of["dies once"],
+        f"{len(innocent)} of 9" + (f" ({innocent[0]})" if innocent else ""),
+    ]
     return f"| {name} | {' | '.join(words)} | {seconds:.1f} | {each:.1f} |"
 
 
