@@ -84,6 +84,7 @@ class Context:
         self.counts: Counter[str] = Counter()
         self.details: dict[str, str] = {}
         self.facts: dict[str, Any] = {}
+        self.run_facts: dict[str, Any] = {}
         self.warnings: list[str] = []
         self.drew = False
         self.read: frozenset[str] | None = None
@@ -113,9 +114,12 @@ class Context:
         if detail:
             self.details.setdefault(kind, detail)
 
-    def fact(self, name: str, value: Any) -> None:
-        """Put a fact about the run into the manifest (`noise: synthetic`)."""
-        self.facts[name] = value
+    def fact(self, name: str, value: Any, of_run: bool = False) -> None:
+        """Put a fact about the run into the manifest (`noise: synthetic`), and into the files that the run makes.
+
+        `of_run`: not into those, as it says nothing of them (its pace).
+        """
+        (self.run_facts if of_run else self.facts)[name] = value
 
     def warn(self, sentence: str) -> None:
         """Say once what one has to know to judge the run's results."""

@@ -16,6 +16,7 @@ from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix
 from omninav.pipeline.files import digest_text, whole_file
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.stage import Source
 from omninav.pipeline.graph.value import Value
 
 from .plan import ArtifactPlan, digests_of, stages_of
@@ -164,5 +165,13 @@ def _make(
 
 
 def provenance(graph: Graph, engine: Engine, variant: str) -> dict[str, Any]:
-    """How an artifact was made, for its file's header: what was dropped and stated, the variant, and its stages."""
-    return {**notes_of(engine, graph.nodes), "variant": variant, "stages": stages_of(graph)}
+    """How an artifact was made, for its file's header: what was dropped and stated, the variant, and its stages.
+
+    Of a source that gives other ticks in every run only the facts: what it counted is of that run, and the same ticks
+    from a record make the same file.
+    """
+    source, notes = graph.source, notes_of(engine, graph.nodes)
+    if source is not None and isinstance(source.stage, Source) and not source.stage.repeatable:
+        others = notes_of(engine, graph.nodes.keys() - {source.name})
+        notes = others | {"facts": others["facts"] | engine.calls[source.name].ctx.facts}
+    return {**notes, "variant": variant, "stages": stages_of(graph)}

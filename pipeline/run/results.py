@@ -43,6 +43,6 @@ def notes_of(engine: Engine, only: Container[str] | None = None) -> dict[str, An
         for kind, number in call.ctx.counts.items():
             first = call.ctx.details.get(kind, "")
             dropped[kind if "." in kind else f"{name}.{kind}"] = {"count": number, "first": first}
-        facts |= call.ctx.facts
+        facts |= call.ctx.facts | call.ctx.run_facts
         warnings += call.ctx.warnings
     return {"dropped": dropped, "facts": facts, "warnings": warnings}

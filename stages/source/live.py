@@ -201,9 +201,9 @@ class LiveSource(Source):
         self._count_losses(ctx, intake)
         status = self._transport.status
         if status.latencies_ms is not None:
-            ctx.fact("latency_ms_median", round(status.latencies_ms[0], 1))
-            ctx.fact("latency_ms_p95", round(status.latencies_ms[1], 1))
-            ctx.fact("rate_hz", round(status.rate_hz, 2))
+            ctx.fact("latency_ms_median", round(status.latencies_ms[0], 1), of_run=True)
+            ctx.fact("latency_ms_p95", round(status.latencies_ms[1], 1), of_run=True)
+            ctx.fact("rate_hz", round(status.rate_hz, 2), of_run=True)
         self._write(intake, intake.recordable())
         if self._record is not None:
             self._record.close()

@@ -1,6 +1,6 @@
 """omninav's end of the AMCL test, in rclpy's own Python: what it is told, it says on its output."""
 
-import sys
+import itertools
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from omninav.pipeline import Context, Tick
 from omninav.stages.live.amcl_services import serve_amcl, serve_restart
 from omninav.stages.live.intake import Intake
 from omninav.stages.live.publish import Publish
-from omninav.stages.live.transport import connect, disconnect
+from omninav.stages.live.transport import connect
 from omninav.stages.recordings.live_record import DriveSoFar, LiveHeader
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.pose import Pose
@@ -25,10 +25,9 @@ publish, ctx = Publish(transport="rclpy", pose="/amcl_pose", tf=None), Context("
 publish.setup(ctx)
 belief = Particles(np.array([[1.0, 2.0, 0.5]]), np.ones(1))
 print("ready", flush=True)
-for number in range(int(sys.argv[1])):
+for number in itertools.count():  # until it is killed
     publish.step(ctx, Tick(number, number + 1), belief=belief, odometry=Pose(0.0, 0.0, 0.0))
     intake.next(0.1)
     made = drive.frame(number)
     if made is not None and made[0].restart is not None:
         print("restart", made[0].restart.at, flush=True)
-disconnect()

@@ -63,7 +63,7 @@ def main() -> None:
         elif order["do"] == "call":
             kind = type_of(order["type"])
             client = clients.setdefault(topic, node.create_client(kind, topic))
-            there = client.wait_for_service(timeout_sec=5.0)
+            there = client.wait_for_service(timeout_sec=60.0)
             future = client.call_async(fill(kind.Request(), order.get("request", {}))) if there else None
             if future is None:
                 say(answer=None)
