@@ -13,6 +13,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from .line_points import drawn_points
+
 Array = npt.NDArray[np.float64]
 Colour = Literal["blue", "orange", "green", "pink", "ink", "grey", "quiet", "line"]
 Symbol = Literal["line", "dashes", "dot", "square", "ring"]
@@ -94,15 +96,9 @@ class Layer:
     def line(
         self, points: Array, colour: Colour, width: float = 1.5, dashed: bool = False, opacity: float = 1.0
     ) -> None:
-        """A line, interrupted at NaN. What moves by less than a third of a pixel is left out."""
-        pixels = self._pixels(points)
-        if len(pixels) > 2:
-            fine = np.round(np.nan_to_num(pixels, nan=-1e6) * 3)
-            moved = np.r_[True, (fine[1:] != fine[:-1]).any(axis=1)]
-            moved[-1] = True
-            pixels = pixels[moved]
+        """A line, interrupted at NaN; see `drawn_points` for what is left out of a long one."""
         words, drawing = [], False
-        for x, y in pixels.tolist():
+        for x, y in drawn_points(self._pixels(points)).tolist():
             known = math.isfinite(x + y)
             if known:
                 words.append(f"{'L' if drawing else 'M'}{x:.1f} {y:.1f}")

@@ -1,0 +1,29 @@
+"""Lines of long runs are drawn in few points."""
+
+import numpy as np
+
+from omninav.pipeline.report.line_points import STRETCHES, drawn_points
+
+
+def test_a_short_line_loses_what_no_eye_tells_apart():
+    line = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [9.0, 0.0], [9.05, 0.0]])
+    assert drawn_points(line).tolist() == [[0.0, 0.0], [9.0, 0.0], [9.05, 0.0]]
+
+
+def test_a_long_line_keeps_its_ends_its_peaks_and_its_gaps():
+    rng = np.random.default_rng(0)
+    line = np.column_stack([np.linspace(0, 700, 200_000), rng.uniform(0, 100, 200_000)])
+    line[70_000, 1], line[140_001, 1] = 500.0, -500.0
+    line[100_000:110_000] = np.nan
+    drawn = drawn_points(line)
+    assert len(drawn) <= 6 * STRETCHES
+    assert drawn[[0, -1]].tolist() == line[[0, -1]].tolist()
+    assert np.nanmax(drawn[:, 1]) == 500.0
+    assert np.nanmin(drawn[:, 1]) == -500.0
+    assert np.isnan(drawn).any()
+    sparse = np.flatnonzero(np.diff(drawn[np.isfinite(drawn[:, 0]), 0]) > 2.0)
+    assert len(sparse) == 1  # the gap alone
+
+
+def test_a_line_of_nothing_but_gaps_stays_one():
+    assert np.isnan(drawn_points(np.full((10_000, 2), np.nan))).all()
