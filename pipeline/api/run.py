@@ -14,6 +14,7 @@ from omninav.pipeline.graph.problems import BadInput, suggest
 from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.graph.value import Value
+from omninav.pipeline.report.notebook_table import notebook_table
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.report.terminal_tables import results_table
 from omninav.pipeline.run.execution import execute
@@ -135,26 +136,19 @@ class Run:
 
     def __str__(self) -> str:
         """Its results as a table."""
-        return _rendered(self._described(), html=False)
+        import io
+
+        from rich.console import Console
+
+        text = io.StringIO()
+        Console(file=text, width=100, force_jupyter=False).print(results_table(self._described()))
+        return text.getvalue()
 
     def _repr_html_(self) -> str:
         head = (
             f"<p><b>{escape(self.folder.name)}</b> {escape(self.status)}, <code>{escape(str(self.folder))}</code></p>"
         )
-        return head + (_rendered(self._described(), html=True) if (self.folder / "metrics.json").is_file() else "")
-
-
-def _rendered(metrics: Metrics, html: bool) -> str:
-    import io
-
-    from rich.console import Console
-
-    console = Console(file=io.StringIO(), record=html, width=100, force_jupyter=False)
-    console.print(results_table(metrics))
-    if html:
-        return console.export_html(inline_styles=True, code_format="<pre style='line-height:1.2'>{code}</pre>")
-    assert isinstance(console.file, io.StringIO)
-    return console.file.getvalue()
+        return head + (notebook_table(self._described()) if (self.folder / "metrics.json").is_file() else "")
 
 
 @plain_errors()

@@ -1,4 +1,4 @@
-"""What `omninav --help` and `omninav COMMAND --help` print: the texts in `omninav.conf`."""
+"""What `omninav --help` and `omninav COMMAND --help` print: texts in `omninav.conf`, and what a tool's file says."""
 
 import re
 from collections.abc import Sequence
@@ -7,6 +7,8 @@ from importlib.resources import files
 from .config_groups import CONF, group_files
 
 FLAGS = ("-h", "--help")
+BLOCKS = ("defaults", "variant", "inputs", "nodes", "wires", "artifacts", "saves")
+"""What stands at the top of a variant's file and is no setting."""
 
 
 def asks_for_help(words: Sequence[str]) -> bool:
@@ -15,14 +17,39 @@ def asks_for_help(words: Sequence[str]) -> bool:
 
 
 def help_text(words: Sequence[str]) -> str:
-    """The text of the command that a command line names, of `omninav` where it names none."""
+    """The text of the command or tool that a command line names, of `omninav` where it names none."""
     named = [word for word in words if word not in (*FLAGS, "help")]
-    for name in ("_".join(named[:2]), *named[:1]):
-        file = files(CONF).joinpath("help", f"{name}.txt")
-        if name.isidentifier() and file.is_file():
-            return re.sub(r"\{group:(\w+)\}", lambda found: _options(found[1]), file.read_text(encoding="utf-8"))
+    texts = files(CONF).joinpath("help")
+    if named and f"{named[0]}.txt" in {file.name for file in texts.iterdir()}:
+        text = texts.joinpath(f"{named[0]}.txt").read_text(encoding="utf-8")
+        return re.sub(r"\{group:(\w+)\}", lambda found: _options(found[1]), text)
+    for file in group_files("variant"):
+        if len(named) > 1 and file.name == f"{'_'.join(named[:2])}.yaml":
+            return _of_tool(named[:2], file.read_text(encoding="utf-8"))
     return files(CONF).joinpath("help.txt").read_text(encoding="utf-8")
 
 
 def _options(group: str) -> str:
     return ", ".join(file.name.removesuffix(".yaml") for file in group_files(group))
+
+
+def _of_tool(named: Sequence[str], text: str) -> str:
+    """The comment at the head of a tool's file, its example, its inputs, and its settings with their comments."""
+    import yaml
+
+    content = yaml.safe_load(text)
+    tool = f"omninav {' '.join(named)}"
+    comment = next(line for line in text.splitlines() if line.startswith("# ") and "@package" not in line)
+    what, _, example = comment[2:].partition("  omninav ")
+    rows = []
+    for name, given in content["inputs"].items():
+        required = isinstance(given, dict) and given.get("required", False)
+        meaning = given["meaning"] if isinstance(given, dict) else given
+        rows.append((f"{name}=…", meaning + (" (required)" if required else "")))
+    for name, value in content.items():
+        if name not in BLOCKS and name not in content["inputs"]:
+            said = re.search(rf"^{name}:[^#\n]*# *(.*)$", text, re.MULTILINE)
+            rows.append((f"{name}={'…' if value is None else value}", said[1] if said else ""))
+    _, _, typed = example.partition(" ")
+    lines = [f"{tool}     {what}", "", f"  {tool} {typed}", ""]
+    return "\n".join([*lines, *(f"  {name:16} {meaning}" for name, meaning in rows), ""])
