@@ -24,7 +24,7 @@ def drawn_points(pixels: Array) -> Array:
     pixels = pixels[moved]
     if len(pixels) <= 4 * STRETCHES:
         return pixels
-    known: npt.NDArray[np.bool_] = np.isfinite(pixels).all(axis=1)
+    known = np.asarray(np.isfinite(pixels).all(axis=1))
     kept = [len(pixels) - 1]
     lowest, highest = (np.where(known, pixels[:, 1], beyond) for beyond in (np.inf, -np.inf))
     for start, end in pairwise(np.linspace(0, len(pixels), STRETCHES + 1).astype(int).tolist()):
