@@ -3,13 +3,11 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Context
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import MAX_COLOUR_DISTANCE, penalties, sorting_network
-from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
 from omninav.stages.values.length_scale import LengthScale
@@ -17,7 +15,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
 
-from .near_references import Array, Floats, Ints, NearReferences
+from .near_references import Array, Floats, Ints, NearReferences, Shorts
 
 
 # Sums over the bins may be taken in any order, which lets them be vector instructions.
@@ -28,11 +26,7 @@ def _similarity(
     features: Floats,
     view: Floats,
     histograms: bool,
-    origin: Array,
-    cell: float,
-    columns: int,
-    lines: int,
-    nearest: npt.NDArray[np.int32],
+    nearest: Shorts,
     fade_distance_m: float,
     background_level: float,
     network: Ints,
@@ -45,10 +39,7 @@ def _similarity(
     out = np.empty(len(poses))
     for n in range(len(poses)):
         out[n] = background_level
-        i, j = int(np.floor((poses[n, 0] - origin[0]) / cell)), int(np.floor((poses[n, 1] - origin[1]) / cell))
-        if not (0 <= i < columns and 0 <= j < lines):
-            continue
-        here = nearest[i * lines + j]
+        here = nearest[n]
         number, closest, mass = 0, np.inf, 0.0
         while number < len(here) and here[number] >= 0:
             x, y = poses[n, 0] - references[here[number], 0], poses[n, 1] - references[here[number], 1]
@@ -106,7 +97,7 @@ def similarity_of_expected(
     features: Floats,
     view: Floats,
     histograms: bool,
-    cells: NearestCells,
+    nearest: Shorts,
     fade_distance_m: float,
     background_level: float,
     exponent: float = 0.5,
@@ -114,9 +105,9 @@ def similarity_of_expected(
 ) -> Array:
     """Selective similarity of a view (segments, bins) to the one expected at each pose: (N, 3) -> (N,).
 
-    The expected view is the mean of the references nearest to the pose (`references` (R, 3), `features` (R, segments,
-    bins)), each turned to the pose's heading, with weights 1 / (d^2 + (d_min / 2)^2). S as in `segments.similarities`.
-    It fades to `background_level` as in `expected_similarity`.
+    The expected view is the mean of the references `nearest` (N, k) to the pose, -1 for none (`references` (R, 3),
+    `features` (R, segments, bins)), each turned to the pose's heading, with weights 1 / (d^2 + (d_min / 2)^2). S as in
+    `segments.similarities`. It fades to `background_level` as in `expected_similarity`.
     """
     network, factors = sorting_network(len(view)), penalties(len(view), exponent)
     poses, view = np.ascontiguousarray(poses), np.ascontiguousarray(view, np.float32)
@@ -127,7 +118,7 @@ def similarity_of_expected(
         features,
         view,
         histograms,
-        *cells,
+        nearest,
         fade_distance_m,
         background_level,
         network,
@@ -170,13 +161,15 @@ class ExpectedObservation(NearReferences):
     def _expected(
         self, poses: Array, map: ReferenceGraph, rows: Ints, values: Floats, unit: float, floor: float
     ) -> Array:
+        near = self._cells.of(poses)
+        used = np.unique(near)[1:] if (near < 0).any() else np.unique(near)
         return similarity_of_expected(
             poses,
-            map.poses,
-            map.features[:],
+            map.poses[used],
+            map.features[used],
             self._view.values,
             isinstance(self._view, SegmentHistograms),
-            self._cells,
+            np.where(near < 0, -1, np.searchsorted(used, near)).astype(np.int32),
             self.fade_distance * unit,
             floor,
             self._exponent,

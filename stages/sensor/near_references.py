@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
-from omninav.stages.geometry.plane.nearest_cells import NearestCells, nearest_cells
+from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.geometry.probability.evidence import best_headings, contrast_power, evidence_novelty
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.length_scale import LengthScale
@@ -16,9 +16,12 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities, SimilarityField
 
+from .compared_rows import ComparedRows
+
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
+Shorts = npt.NDArray[np.int32]
 
 CELLS_PER_LENGTH_SCALE = 4
 CUTOFF_SIGMAS = 3.0
@@ -31,16 +34,12 @@ def _expected(
     references: Array,
     rows: Ints,
     similarity: Floats,
-    origin: Array,
-    cell: float,
-    columns: int,
-    lines: int,
-    nearest: npt.NDArray[np.int32],
+    nearest: Shorts,
     fade_distance_m: float,
     background_level: float,
 ) -> Array:
     headings = similarity.shape[1]
-    per_radian, per_cell = headings / (2 * np.pi), 1.0 / cell
+    per_radian = headings / (2 * np.pi)
     min_square, decay = 1e-4 * fade_distance_m * fade_distance_m, -0.5 / (fade_distance_m * fade_distance_m)
     neighbours = nearest.shape[1]
     row = np.empty(neighbours, np.int64)
@@ -50,13 +49,9 @@ def _expected(
     for n in range(len(poses)):
         x, y, heading = poses[n, 0], poses[n, 1], poses[n, 2]
         out[n] = background_level
-        i, j = int(np.floor((x - origin[0]) * per_cell)), int(np.floor((y - origin[1]) * per_cell))
-        if not (0 <= i < columns and 0 <= j < lines):
-            continue
-        here = nearest[i * lines + j]
         number, closest = 0, np.inf
         for k in range(neighbours):
-            r = here[k]
+            r = nearest[n, k]
             if r < 0:
                 break
             if rows[r] < 0:
@@ -85,7 +80,7 @@ def _expected(
 def expected_similarity(
     poses: Array,
     references: Array,
-    cells: NearestCells,
+    nearest: Shorts,
     rows: Ints,
     similarity: Floats,
     fade_distance_m: float,
@@ -93,13 +88,13 @@ def expected_similarity(
 ) -> Array:
     """Similarity of the current view to the one expected at poses: (N, 3) -> (N,).
 
-    The references nearest to a pose have the weights 1 / (d^2 + (d_min / 2)^2), each at the pose's heading (linear
-    between the compared headings). With the distance d_min of the nearest one the expectation fades to
-    `background_level` by exp(-d_min^2 / (2 fade_distance^2)); it is never below. `rows` (R,): each reference's row in
-    `similarity`, -1 where it was not compared.
+    The references `nearest` (N, k) to each pose (-1: none) have the weights 1 / (d^2 + (d_min / 2)^2), each at the
+    pose's heading (linear between the compared headings). With the distance d_min of the nearest one the expectation
+    fades to `background_level` by exp(-d_min^2 / (2 fade_distance^2)); it is never below. `rows` (R,): each reference's
+    row in `similarity`, -1 where it was not compared.
     """
     poses, similarity = np.ascontiguousarray(poses), np.ascontiguousarray(similarity)
-    return _expected(poses, references, rows, similarity, *cells, fade_distance_m, background_level)
+    return _expected(poses, references, rows, similarity, nearest, fade_distance_m, background_level)
 
 
 def weighted_quantile(values: Floats, weights: Array, quantile: float) -> float:
@@ -206,9 +201,10 @@ class NearReferences(Stage):
             return self.Out(likelihood=Likelihood(np.ones(len(particles.poses))))
         if map is not self._map or len(map) != self._length:
             radius = CUTOFF_SIGMAS * self.fade_distance * unit
-            self._cells = nearest_cells(map.poses, self.neighbours, unit / CELLS_PER_LENGTH_SCALE, radius)
+            self._cells = NearestCells(map.poses, self.neighbours, unit / CELLS_PER_LENGTH_SCALE, radius)
+            self._rows = ComparedRows(len(map))
             self._map, self._length = map, len(map)
-        candidates, rows = similarities.rows(len(map))
+        candidates, rows = self._rows.of(similarities.candidates)
         best, each = best_headings(np.ascontiguousarray(values)), similarities.sampling_weight
         places, distance = map.poses[candidates], self.background_distance * unit
         floor = background_similarity(best, places, distance, self.background_quantile, each)
@@ -224,4 +220,5 @@ class NearReferences(Stage):
     def _expected(
         self, poses: Array, map: ReferenceGraph, rows: Ints, values: Floats, unit: float, floor: float
     ) -> Array:
-        return expected_similarity(poses, map.poses, self._cells, rows, values, self.fade_distance * unit, floor)
+        near = self._cells.of(poses)
+        return expected_similarity(poses, map.poses, near, rows, values, self.fade_distance * unit, floor)

@@ -15,6 +15,7 @@ from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities
 from omninav.stages.values.visibility import VisibilityAreas
 
+from .compared_rows import ComparedRows
 from .visibility_index import looks_at, seen_from, sees_any
 from .visibility_similarity import CUTOFF_SIGMAS, Window, mean_seen, sums_by_turn
 
@@ -91,18 +92,21 @@ class Visibility(Stage):
             self._areas = areas
             self._looks = looks_at(areas, map.poses, each_view=sigma < math.inf)
             self._cells = seen_from(areas, self._looks, CUTOFF_SIGMAS * sigma)
+            self._rows, self._summed = ComparedRows(len(map)), ComparedRows(len(self._looks.target))
         if not self.retrieval:
             return self.Out(likelihood=Likelihood(sees_any(particles.poses, self._cells).astype(np.float64)))
-        _, rows = similarities.rows(len(map))
+        compared, rows = self._rows.of(similarities.candidates)
         each = np.ones(len(values)) if similarities.sampling_weight is None else similarities.sampling_weight
         best = best_headings(np.ascontiguousarray(values))
         power = contrast_power(best, self.contrast, similarities.sampling_weight) if self.power is None else self.power
         raised: Array = (values.astype(np.float64) / max(float(best.max()), 1e-12)) ** power
         background_level = float(np.average(raised.mean(axis=1), weights=each))
         panoramic = values.shape[1] > 1 if self.field_of_view == "auto" else self.field_of_view == "panoramic"
-        sums, number = sums_by_turn(self._looks, rows, raised if panoramic else raised[:, :1], each)
+        groups = None if similarities.candidates is None else self._looks.groups_with(compared)
+        groups, summed = self._summed.of(groups)
+        sums, number = sums_by_turn(self._looks, groups, rows, raised if panoramic else raised[:, :1], each)
         window = None if panoramic else math.radians(self.window_deg), self.window_shape, sigma
-        mean = mean_seen(particles.poses, self._cells, self._looks, sums, number, background_level, *window)
+        mean = mean_seen(particles.poses, self._cells, summed, sums, number, background_level, *window)
         unit = self.length_scale_m if length_scale is None else length_scale.metres
         driven = None if motion is None else math.hypot(motion.x, motion.y)
         novelty = evidence_novelty(driven, self.independence_distance * unit, self.min_novelty)

@@ -22,7 +22,8 @@ class Looks(NamedTuple):
     `target` (G,): the point of a group; `point` (G, 2): its position (m); `place` (G, 2): mean position of the views
     (m); `bearing` (G,): bearing of the point from the robot of the first view (rad). The views of group g are rows
     `starts[g]` to `starts[g + 1]` of `reference` (A,), their references, and `turned` (A,), how much farther to the
-    left than in the first view the robot sees the point (rad).
+    left than in the first view the robot sees the point (rad). The groups with a view of reference r are
+    `groups_of[of_reference[r] : of_reference[r + 1]]`.
     """
 
     target: Shorts
@@ -32,12 +33,21 @@ class Looks(NamedTuple):
     starts: Ints
     reference: Shorts
     turned: Array
+    of_reference: Ints
+    groups_of: Shorts
+
+    def groups_with(self, references: Ints) -> Ints:
+        """The groups that have a view of any of these references, ascending."""
+        first, number = self.of_reference[references], self.of_reference[references + 1] - self.of_reference[references]
+        at = np.repeat(first - np.cumsum(number) + number, number) + np.arange(number.sum())
+        return np.unique(self.groups_of[at]).astype(np.int64)
 
 
 class Cells(NamedTuple):
     """The groups seen from each cell of a grid: from cell n (row by row) `items[starts[n] : starts[n + 1]]`.
 
-    `origin` x, y (m) of the lower left corner; `resolution` (m); `rows`, `columns`.
+    `origin` x, y (m) of the lower left corner; `resolution` (m); `rows`, `columns`. `places` (G, 5) float32: where each
+    group's point and its views lie from the origin (m), and its bearing (turns). `most`: groups seen from any cell.
     """
 
     starts: Ints
@@ -46,6 +56,8 @@ class Cells(NamedTuple):
     resolution: float
     rows: int
     columns: int
+    places: npt.NDArray[np.float32]
+    most: int
 
 
 def looks_at(areas: VisibilityAreas, poses: Array, each_view: bool = False) -> Looks:
@@ -61,7 +73,11 @@ def looks_at(areas: VisibilityAreas, poses: Array, each_view: bool = False) -> L
     first, number = starts[:-1], np.diff(starts)
     mean = np.add.reduceat(place, first, axis=0) / number[:, None] if len(first) else place
     turned = bearing - np.repeat(bearing[first], number)
-    return Looks(target[first], point[first], mean, bearing[first], starts, reference.astype(np.int32), turned)
+    by_reference = np.argsort(reference, kind="stable")
+    groups = np.repeat(np.arange(len(number), dtype=np.int32), number)[by_reference]
+    of_reference = np.searchsorted(reference[by_reference], np.arange(len(poses) + 1))
+    short: Shorts = reference.astype(np.int32)
+    return Looks(target[first], point[first], mean, bearing[first], starts, short, turned, of_reference, groups)
 
 
 def seen_from(areas: VisibilityAreas, looks: Looks, within: float = math.inf) -> Cells:
@@ -69,7 +85,10 @@ def seen_from(areas: VisibilityAreas, looks: Looks, within: float = math.inf) ->
     radius = within / areas.resolution + math.sqrt(0.5)  # in cells, from the middle of one: its corners lie so far out
     middle = (looks.place - areas.origin) / areas.resolution - 0.5
     starts, items = _by_cell(areas.starts, areas.runs, *areas.shape, looks.target, middle, radius)
-    return Cells(starts, items, areas.origin, areas.resolution, *areas.shape)
+    turns = looks.bearing / (2 * math.pi) % 1.0
+    places = np.column_stack([looks.point - areas.origin, looks.place - areas.origin, turns]).astype(np.float32)
+    most = max(1, int(np.diff(starts).max(initial=0)))
+    return Cells(starts, items, areas.origin, areas.resolution, *areas.shape, places, most)
 
 
 @compiled(nogil=True)

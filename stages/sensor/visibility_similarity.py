@@ -25,28 +25,28 @@ EXPONENTIAL = tuple(
 """exp(-t) on [0, 9 / 16] as 1, t, t^2 ...: a least-squares fit; its eighth power is off by 1.5e-6 of it at most."""
 
 
-def sums_by_turn(looks: Looks, rows: Ints, values: Array, each: Array) -> tuple[Floats, Floats]:
-    """Sums of the views of each group over the robot's turn: (G, headings + 1), (G,).
+def sums_by_turn(looks: Looks, groups: Ints, rows: Ints, values: Array, each: Array) -> tuple[Floats, Floats]:
+    """Sums of the views of some `groups` (S,) over the robot's turn: (S, headings + 1), (S,).
 
-    Entry (g, h) is the sum of the `values` (R, headings) of all views of group g for a robot that sees their point
+    Entry (s, h) is the sum of the `values` (R, headings) of all views of group s for a robot that sees their point
     2 pi h / headings farther to its right than the robot of the first view did, wherever it has moved meanwhile: the
     first is compared at that turn, the others at what they are `turned` more. Between the compared headings values are
     linear. The last column repeats the first. The second result is the number of views. `rows` (references,): a
     reference's row in `values`, -1 where it was not compared; `each` (R,): its sampling weight.
     """
-    return _sums(looks.starts, looks.reference, looks.turned, rows, np.ascontiguousarray(values), each)
+    return _sums(looks.starts, groups, looks.reference, looks.turned, rows, np.ascontiguousarray(values), each)
 
 
 @compiled(nogil=True, error_model="numpy")
 def _sums(
-    starts: Ints, reference: Shorts, turned: Array, rows: Ints, values: Array, each: Array
+    starts: Ints, groups: Ints, reference: Shorts, turned: Array, rows: Ints, values: Array, each: Array
 ) -> tuple[Floats, Floats]:
     headings = values.shape[1]
-    sums, number = np.zeros((len(starts) - 1, headings + 1), np.float32), np.zeros(len(starts) - 1, np.float32)
+    sums, number = np.zeros((len(groups), headings + 1), np.float32), np.zeros(len(groups), np.float32)
     at_turns = np.empty(headings)
-    for g in range(len(starts) - 1):
+    for g in range(len(groups)):
         at_turns[:] = 0.0
-        for a in range(starts[g], starts[g + 1]):
+        for a in range(starts[groups[g]], starts[groups[g] + 1]):
             row = rows[reference[a]]
             if row < 0:
                 continue
@@ -67,7 +67,7 @@ def _sums(
 def mean_seen(
     poses: Array,
     cells: Cells,
-    looks: Looks,
+    summed: Ints,
     sums: Floats,
     number: Floats,
     background_level: float,
@@ -77,19 +77,18 @@ def mean_seen(
 ) -> Array:
     """Mean similarity of the views whose areas hold a pose, equations 7 and 8: (N, 3) -> (N,).
 
-    `sums` and `number` as `sums_by_turn` gives them. With a `window` robots look ahead: psi is the angle between the
-    heading and the direction to a point, wrapped to [-pi, pi) (erratum 44 in docs/papers.md); d(psi) is 1 up to
-    `window` radians and 0 beyond (`step`, the paper's), falls to 0 there (`triangle`), or has it as standard deviation
-    (`gaussian`). Without one they see all around, and look up their turn relative to each point. p(M_j | l) of equation
-    6 falls with the distance d to where a group was taken as exp(-d^2 / (2 distance_sigma^2)) and is 0 beyond three
-    sigmas; with an infinite sigma it is the paper's. `background_level`: the result where K = 0.
+    `sums` and `number` as `sums_by_turn` gives them, `summed` (G,): each group's row in them, -1 where it has none.
+    With a `window` robots look ahead: psi is the angle between the heading and the direction to a point, wrapped to
+    [-pi, pi) (erratum 44 in docs/papers.md); d(psi) is 1 up to `window` radians and 0 beyond (`step`, the paper's),
+    falls to 0 there (`triangle`), or has it as standard deviation (`gaussian`). Without one they see all around, and
+    look up their turn relative to each point. p(M_j | l) of equation 6 falls with the distance d to where a group was
+    taken as exp(-d^2 / (2 distance_sigma^2)) and is 0 beyond three sigmas; with an infinite sigma it is the paper's.
+    `background_level`: the result where K = 0.
     """
     farthest = math.pi if window is None else min(CUTOFF_SIGMAS * window if shape == "gaussian" else window, math.pi)
-    turns = looks.bearing / (2 * math.pi)
-    groups = np.column_stack([looks.point - cells.origin, looks.place - cells.origin, turns % 1.0]).astype(np.float32)
     min_cosine = math.cos(farthest) if farthest < math.pi else -2.0
     ahead = window is not None, window or math.pi, min_cosine, WINDOW_SHAPES[shape]
-    return _seen(np.ascontiguousarray(poses), *cells, groups, sums, number, background_level, distance_sigma_m, *ahead)
+    return _seen(np.ascontiguousarray(poses), *cells, summed, sums, number, background_level, distance_sigma_m, *ahead)
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -102,6 +101,8 @@ def _seen(
     rows: int,
     columns: int,
     groups: Floats,
+    most: int,
+    summed: Ints,
     sums: Floats,
     number: Floats,
     background_level: float,
@@ -112,10 +113,8 @@ def _seen(
     shape: int,
 ) -> Array:
     # Single precision, from the grid's corner, and one plain loop for each thing to work out: vector instructions.
-    headings, most = np.float32(sums.shape[1] - 1), 1
-    for cell in range(rows * columns):
-        most = max(most, starts[cell + 1] - starts[cell])
-    kept, right, up = np.empty(most, np.uint32), np.empty(most, np.float32), np.empty(most, np.float32)
+    headings = np.float32(sums.shape[1] - 1)
+    kept, right, up = np.empty(most, np.int64), np.empty(most, np.float32), np.empty(most, np.float32)
     weight, turn = np.empty(most, np.float32), np.empty(most, np.float32)
     whole, part = np.empty(most, np.int32), np.empty(most, np.float32)
     per_near, beyond, along = (
@@ -138,9 +137,10 @@ def _seen(
             wide, high = (groups[g, 2] - x) * per_near, (groups[g, 3] - y) * per_near
             far, east, north = wide * wide + high * high, groups[g, 0] - x, groups[g, 1] - y
             off_axis = ahead and east * cosine + north * sine < along * np.sqrt(east * east + north * north)
-            if far > beyond or off_axis:
+            if far > beyond or off_axis or summed[g] < 0:
                 continue
-            kept[many], right[many], up[many], weight[many], turn[many] = g, east, north, far, heading + groups[g, 4]
+            kept[many], right[many], up[many], weight[many] = summed[g], east, north, far
+            turn[many] = heading + groups[g, 4]
             many += 1
         for k in range(many):
             weight[k] = _gaussian(weight[k])

@@ -29,13 +29,6 @@ class Similarities(Value):
     exponent: float | None = None
     colour_scale: float | None = None
 
-    def rows(self, references: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """Which of a map's references were compared, and each reference's row in `values`, -1 where it was not."""
-        compared = np.arange(references) if self.candidates is None else self.candidates
-        rows = np.full(references, -1, np.int64)
-        rows[compared] = np.arange(len(compared))
-        return compared, rows
-
 
 class SimilarityField(Value):
     """Weights (max(S, floor) / top)^power over the compared references and headings, prepared for drawing.

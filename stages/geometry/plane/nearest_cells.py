@@ -1,40 +1,80 @@
 """Looks up the nearest of some fixed points in cells of the plane."""
 
-from typing import Any, NamedTuple
+import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import KDTree
 
+from omninav.pipeline.engine.compiled import compiled
+
 Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Shorts = npt.NDArray[np.int32]
 
-MAX_CELLS = 1 << 20
+MAX_CELLS = 1 << 26
+"""Cells over an area; a huge one has larger cells."""
 
 
-class NearestCells(NamedTuple):
-    """Cells of `cell` metres from `origin` (2,) on; cell (i, j) is row i * rows + j of `nearest` (cells, k).
+class NearestCells:
+    """For places in a plane, the k points (N, >= 2) nearest to the centres of their cells, within `radius` (m).
 
-    A row lists the points nearest to the cell's centre within a radius, nearest first, then -1. Places outside the
-    cells have no point within the radius.
+    `cell`: width of a cell (m), from the corner `origin` (2,) on. A cell's list is made when the first place falls into
+    it, so that neither time nor memory grows with the area.
     """
 
-    origin: Array
-    cell: float
-    columns: int
-    rows: int
-    nearest: npt.NDArray[np.int32]
+    def __init__(self, points: Array, k: int, cell: float, radius: float) -> None:
+        xy = np.ascontiguousarray(points[:, :2], np.float64)
+        self.k, self.radius = k, radius
+        self.origin, self.cell, self._columns, self._rows = np.zeros(2), cell, 0, 0
+        if len(xy):
+            self.origin = xy.min(axis=0) - radius
+            span = xy.max(axis=0) + radius - self.origin
+            self.cell = max(cell, float(np.sqrt(span[0] * span[1] / MAX_CELLS)))
+            self._columns, self._rows = (int(n) for n in np.floor(span / self.cell) + 1)
+        self._tree: Any = KDTree(xy)  # type: ignore[no-untyped-call]
+        self._numbers = np.zeros(self._columns * self._rows, np.int32)  # memory is taken where it is written
+        self._lists, self._known = np.full((64, k), -1, np.int32), 1
+
+    def of(self, poses: Array) -> Shorts:
+        """The points nearest to the cell of each pose (M, >= 2): (M, k), nearest first, then -1."""
+        poses = np.ascontiguousarray(poses, np.float64)
+        cells = self.origin, self.cell, self._columns, self._rows, self._numbers
+        new = _new_cells(poses, *cells, self._known)
+        if len(new):
+            centres = self.origin + self.cell * (np.column_stack(np.divmod(new, self._rows)) + 0.5)
+            found = self._tree.query(centres, k=[*range(1, self.k + 1)], distance_upper_bound=self.radius)[1]
+            known = self._known + len(new)
+            if known > len(self._lists):
+                self._lists = np.concatenate([self._lists, np.full((known, self.k), -1, np.int32)])
+            self._lists[self._known : known] = np.where(found < self._tree.n, found, -1)
+            self._known = known
+        lists: Shorts = self._lists[_numbers_of(poses, *cells)]
+        return lists
 
 
-def nearest_cells(points: Array, k: int, cell: float, radius: float) -> NearestCells:
-    """The cells for points (N, >= 2), the k nearest within `radius` (m) each. `cell` grows for huge areas."""
-    xy = np.ascontiguousarray(points[:, :2], np.float64)
-    if not len(xy):
-        return NearestCells(np.zeros(2), 1.0, 0, 0, np.full((0, k), -1, np.int32))
-    origin = xy.min(axis=0) - radius
-    span = xy.max(axis=0) + radius - origin
-    cell = max(cell, float(np.sqrt(span[0] * span[1] / MAX_CELLS)))
-    columns, rows = (int(n) for n in np.floor(span / cell) + 1)
-    centres = np.stack(np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5, indexing="ij"), -1).reshape(-1, 2)
-    tree: Any = KDTree(xy)  # type: ignore[no-untyped-call]
-    found = tree.query(origin + cell * centres, k=[*range(1, k + 1)], distance_upper_bound=radius)[1]
-    return NearestCells(origin, cell, columns, rows, np.where(found < len(xy), found, -1).astype(np.int32))
+@compiled(nogil=True)
+def _new_cells(poses: Array, origin: Array, cell: float, columns: int, rows: int, numbers: Shorts, known: int) -> Ints:
+    # The cells without a list in which poses are, each once; they get the numbers from `known` on.
+    found, number, per_cell = np.empty(len(poses), np.int64), 0, 1.0 / cell
+    for n in range(len(poses)):
+        i = math.floor((poses[n, 0] - origin[0]) * per_cell)
+        j = math.floor((poses[n, 1] - origin[1]) * per_cell)
+        if 0 <= i < columns and 0 <= j < rows and numbers[i * rows + j] == 0:
+            numbers[i * rows + j] = known + number
+            found[number] = i * rows + j
+            number += 1
+    return found[:number].copy()
+
+
+@compiled(nogil=True)
+def _numbers_of(poses: Array, origin: Array, cell: float, columns: int, rows: int, numbers: Shorts) -> Shorts:
+    # The number of the list of each pose's cell; list 0 is empty.
+    found, per_cell = np.zeros(len(poses), np.int32), 1.0 / cell
+    for n in range(len(poses)):
+        i = math.floor((poses[n, 0] - origin[0]) * per_cell)
+        j = math.floor((poses[n, 1] - origin[1]) * per_cell)
+        if 0 <= i < columns and 0 <= j < rows:
+            found[n] = numbers[i * rows + j]
+    return found

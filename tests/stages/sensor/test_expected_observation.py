@@ -6,7 +6,7 @@ import pytest
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import selective_similarity, turned_view
-from omninav.stages.geometry.plane.nearest_cells import nearest_cells
+from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.match.l2 import L2Match
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.sensor.expected_observation import ExpectedObservation, similarity_of_expected
@@ -23,8 +23,8 @@ FEATURES /= FEATURES.sum(axis=2, keepdims=True)
 
 def test_the_expected_view_is_the_mean_of_the_nearest_turned_to_the_heading() -> None:
     poses, view = np.column_stack([RNG.uniform(0, 4, (30, 2)), RNG.uniform(-9, 9, 30)]), FEATURES[5]
-    cells = nearest_cells(REFERENCES, 3, 0.1, 6.0)
-    found = similarity_of_expected(poses, REFERENCES, FEATURES, view, True, cells, 2.0, 0.1)
+    cells = NearestCells(REFERENCES, 3, 0.1, 6.0)
+    found = similarity_of_expected(poses, REFERENCES, FEATURES, view, True, cells.of(poses), 2.0, 0.1)
     for pose, likeness in zip(poses, found, strict=True):
         centre = cells.origin + (np.floor((pose[:2] - cells.origin) / cells.cell) + 0.5) * cells.cell
         nearest = np.argsort(np.hypot(*(REFERENCES[:, :2] - centre).T))[:3]
@@ -38,8 +38,8 @@ def test_the_expected_view_is_the_mean_of_the_nearest_turned_to_the_heading() ->
 
 def test_colours_are_compared_by_their_distance() -> None:
     colours = (RNG.random((40, 9, 3)) * 255).astype(np.float32)
-    cells = nearest_cells(REFERENCES, 1, 0.05, 3.0)
-    found = similarity_of_expected(REFERENCES, REFERENCES, colours, colours[4], False, cells, 1.0, 0.0)
+    cells = NearestCells(REFERENCES, 1, 0.05, 3.0)
+    found = similarity_of_expected(REFERENCES, REFERENCES, colours, colours[4], False, cells.of(REFERENCES), 1.0, 0.0)
     assert int(np.argmax(found)) == 4
     assert found[4] == pytest.approx(1.0, abs=0.01)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.geometry.plane.nearest_cells import nearest_cells
+from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.sensor.near_references import (
     NearReferences,
     background_similarity,
@@ -51,8 +51,8 @@ def by_words(pose: np.ndarray, fade: float, ordinary: float, cell: float, neighb
 @pytest.mark.parametrize("fade", [0.2, 0.5, 1.0])
 def test_the_kernel_agrees_with_a_plain_implementation(fade: float) -> None:
     poses = np.column_stack([RNG.uniform(-1, 5, (60, 2)), RNG.uniform(-9, 9, 60)])
-    cells = nearest_cells(REFERENCES, 4, 0.1, 3 * fade)
-    found = expected_similarity(poses, REFERENCES, cells, np.arange(40), FIELD, fade, 0.3)
+    cells = NearestCells(REFERENCES, 4, 0.1, 3 * fade)
+    found = expected_similarity(poses, REFERENCES, cells.of(poses), np.arange(40), FIELD, fade, 0.3)
     words = [by_words(pose, fade, 0.3, cells.cell, 4, 3 * fade) for pose in poses]
     assert np.allclose(found, words, atol=1e-6)
     assert (found > 0.3).any()
@@ -60,8 +60,8 @@ def test_the_kernel_agrees_with_a_plain_implementation(fade: float) -> None:
 
 def test_references_that_were_not_compared_do_not_count() -> None:
     poses = REFERENCES[:5].copy()
-    cells = nearest_cells(REFERENCES, 4, 0.1, 1.5)
-    found = expected_similarity(poses, REFERENCES, cells, np.full(40, -1), FIELD, 0.5, 0.3)
+    cells = NearestCells(REFERENCES, 4, 0.1, 1.5)
+    found = expected_similarity(poses, REFERENCES, cells.of(poses), np.full(40, -1), FIELD, 0.5, 0.3)
     assert np.allclose(found, 0.3)
 
 

@@ -92,8 +92,9 @@ def test_an_ordinary_cameras_particles_weigh_what_equations_7_and_8_say(shape):
     areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
     values = RNG.random((25, 1))
     looks, poses = looks_at(areas, REFERENCES), some_poses(300)
-    sums, number = sums_by_turn(looks, np.arange(25), values, np.ones(25))
-    found = mean_seen(poses, seen_from(areas, looks), looks, sums, number, 0.25, math.radians(20), shape)
+    groups = np.arange(len(looks.target))
+    sums, number = sums_by_turn(looks, groups, np.arange(25), values, np.ones(25))
+    found = mean_seen(poses, seen_from(areas, looks), groups, sums, number, 0.25, math.radians(20), shape)
     words = [by_equation_7(areas, pose, values, 0.25, WINDOWS[shape], False) for pose in poses]
     assert np.allclose(found, words, atol=1e-5)
     assert 0.05 < (found != 0.25).mean() < 0.95

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from omninav.stages.geometry.plane.nearest_cells import nearest_cells
+from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.geometry.plane.se2 import between, compose, wrap
 from omninav.stages.geometry.probability.particles import effective_size, occupied_cells, systematic, uniform_around
 
@@ -70,12 +70,17 @@ def test_the_uniform_belief_covers_the_area_around_the_centres_evenly() -> None:
 def test_a_cell_lists_the_points_nearest_to_its_centre(seed: int, radius: float) -> None:
     rng = np.random.default_rng(seed)
     points, places = rng.uniform(0, 5, (30, 2)), rng.uniform(-1, 6, (20, 2))
-    cells = nearest_cells(points, 3, radius / 4, radius)
-    for place in places:
-        i, j = np.floor((place - cells.origin) / cells.cell).astype(int)
-        if not (0 <= i < cells.columns and 0 <= j < cells.rows):
-            assert np.hypot(*(points - place).T).min() >= radius
-            continue
-        gaps = np.hypot(*(points - (cells.origin + (np.array([i, j]) + 0.5) * cells.cell)).T)
+    cells = NearestCells(points, 3, radius / 4, radius)
+    for place, near in zip(places, cells.of(places), strict=True):
+        centre = cells.origin + (np.floor((place - cells.origin) / cells.cell) + 0.5) * cells.cell
+        gaps = np.hypot(*(points - centre).T)
         wanted = [n for n in np.argsort(gaps)[:3] if gaps[n] < radius]
-        assert [n for n in cells.nearest[i * cells.rows + j] if n >= 0] == wanted
+        if np.hypot(*(points - place).T).min() < radius - cells.cell:
+            assert [n for n in near if n >= 0] == wanted
+        else:  # it may lie outside of all cells
+            assert set(near) - {-1} <= set(wanted)
+
+
+def test_points_far_apart_take_no_memory_between_them() -> None:
+    cells = NearestCells(np.array([[0.0, 0.0], [500.0, 500.0]]), 1, 0.1, 1.0)
+    assert cells.of(np.array([[0.0, 0.0], [250.0, 250.0], [500.0, 500.0]])).tolist() == [[0], [-1], [1]]
