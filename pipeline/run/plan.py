@@ -75,7 +75,8 @@ def plan(config: Mapping[str, Any]) -> Plan:
         problems.append(Problem("seed", f"{seed!r}, expected a whole number >= 0", "type seed=0"))
     for name, spec in specs.items():
         try:
-            made = _plan_artifact(name, spec)
+            alike = (one.whole for one in artifacts if one.whole is not None and specs[one.name].graph == spec.graph)
+            made = _plan_artifact(name, spec, next(alike, None))
         except ProblemsFound as found:
             problems += found.problems
             types[name] = Any
@@ -148,7 +149,8 @@ def load_stages(config: Mapping[str, Any]) -> None:
                 resolve(spec["_target_"])
 
 
-def _plan_artifact(name: str, spec: ArtifactSpecification) -> ArtifactPlan:
+def _plan_artifact(name: str, spec: ArtifactSpecification, graph: Graph | None) -> ArtifactPlan:
+    """Where an artifact comes from. `graph`: that makes it, where another's plan has it: so its log is opened once."""
     if spec.file is not None:
         file = Path(spec.file)
         try:
@@ -160,7 +162,7 @@ def _plan_artifact(name: str, spec: ArtifactSpecification) -> ArtifactPlan:
         what = f"this variant needs a {name}, and none is given"
         raise ProblemsFound([Problem(name, what, _how_to_get(name, spec))])
     where = f"artifacts.{name}"
-    graph = build(spec.graph, prefix=f"{where}.", shared=spec.inherit)
+    graph = graph or build(spec.graph, prefix=f"{where}.", shared=spec.inherit)
     origin = spec.output or str((spec.graph.get("saves") or {}).get(name, ""))
     if graph.port(origin) is None:
         raise ProblemsFound([_no_output(f"{where}.output", origin, graph)])

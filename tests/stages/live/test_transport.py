@@ -42,7 +42,13 @@ def test_a_domain_that_is_none_is_refused(monkeypatch: pytest.MonkeyPatch, value
         connect("dds")
 
 
-def test_messages_pass_both_ways_between_dds_and_rclpy(other_end: OtherEnd):
+@pytest.fixture(params=["SUBNET", "LOCALHOST"])
+def reach(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """How far both ends look for each other."""
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", request.param)
+
+
+def test_messages_pass_both_ways_between_dds_and_rclpy(reach: None, other_end: OtherEnd):
     transport = connect("dds")
     transport.subscribe("/odom", ODOMETRY)
     other_end.order("advertise", "/odom", type=ODOMETRY)
