@@ -7,8 +7,9 @@ from typing import Any
 from omninav.pipeline.files import write_whole
 
 from .codec import BadEncoding, decode, encode, seal, unseal
+from .grown_rows import GrownRows, grows
 
-FORMAT = 3
+FORMAT = 4
 
 
 class OtherVersion(BadEncoding):
@@ -39,15 +40,20 @@ class Checkpoint:
     sequences: dict[str, int] = field(default_factory=dict)
 
 
-def save(path: Path, checkpoint: Checkpoint) -> None:
-    """Write a checkpoint, whole or not at all."""
+def save(path: Path, checkpoint: Checkpoint, rows: GrownRows) -> None:
+    """Write a checkpoint, whole or not at all. What grows is written to `rows` before."""
     objects: list[Any] = []
     numbers: dict[int, int] = {}
+    grown: dict[int, tuple[str, dict[str, Any]]] = {}
 
-    def number(value: Any) -> int:
+    def number(value: Any, name: str) -> int:
         if id(value) not in numbers:
-            numbers[id(value)] = len(objects)
+            own = numbers[id(value)] = len(objects)
+            if grows(value):
+                value, where = rows.write(name, value)
+                grown[own] = name, where
             objects.append(value)
+            return own
         return numbers[id(value)]
 
     content = {
@@ -56,26 +62,37 @@ def save(path: Path, checkpoint: Checkpoint) -> None:
         "ticks": checkpoint.ticks,
         "ended": checkpoint.ended,
         "replayed": checkpoint.replayed,
-        "channels": {key: [number(value) for value in values] for key, values in checkpoint.channels.items()},
-        "held": {key: number(value) for key, value in checkpoint.held.items()},
+        "channels": {
+            key: [number(value, key.partition("@")[0]) for value in values]
+            for key, values in checkpoint.channels.items()
+        },
+        "held": {key: number(value, key) for key, value in checkpoint.held.items()},
         "states": checkpoint.states,
         "generators": checkpoint.generators,
         "notes": checkpoint.notes,
         "sequences": checkpoint.sequences,
         "objects": objects,
+        "grown": grown,
     }
     write_whole(path, seal(encode(content)))
 
 
-def load(path: Path) -> Checkpoint:
-    """Read a checkpoint. Raises `BadEncoding` naming the file where it is damaged or of another version."""
+def load(path: Path, rows: GrownRows) -> Checkpoint:
+    """Read a checkpoint, and what has grown from `rows`.
+
+    Raises `BadEncoding` naming the file where one is damaged or of another version.
+    """
     content = decode(unseal(path.read_bytes(), str(path)))
     try:
         if content.pop("format", None) != FORMAT:
             raise OtherVersion(f"{path} was written by another version of omninav; start the run again")
         objects = content.pop("objects")
+        for number, (name, where) in content.pop("grown").items():
+            rows.read(name, objects[number], where)
         content["channels"] = {key: [objects[n] for n in numbers] for key, numbers in content["channels"].items()}
         content["held"] = {key: objects[n] for key, n in content["held"].items()}
         return Checkpoint(**content)
-    except (LookupError, TypeError, AttributeError):
+    except BadEncoding:
+        raise
+    except (LookupError, TypeError, AttributeError, ValueError):
         raise BadEncoding(f"{path} is no checkpoint") from None

@@ -25,6 +25,7 @@ from .checkpoint import Checkpoint, OtherVersion
 from .codec import BadEncoding, encode_state, restore_state
 from .damage import say_damaged
 from .disk_sequence import DiskSequence, Present
+from .grown_rows import GrownRows
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,7 @@ class Engine:
         self._ticking: list[Call] = []
         self._total: int | None = None
         self._saved = 0.0
+        self._rows: GrownRows | None = None
 
     def _call(self, node: Node) -> Call:
         rng = np.random.default_rng([self.options.seed, zlib.crc32(node.name.encode())])
@@ -216,6 +218,8 @@ class Engine:
         """Close the files of what is collected; nothing runs any more."""
         for sequence in self.sequences.values():
             sequence.close()
+        if self._rows is not None:
+            self._rows.close()
 
     def last(self, origin: str) -> Any:
         """The last present value of an output that is wanted or read after the loop; else that of the last tick."""
@@ -288,7 +292,13 @@ class Engine:
             notes={name: call.ctx.notes() for name, call in self.calls.items()},
             sequences={name: sequence.size for name, sequence in self.sequences.items()},
         )
-        checkpoints.save(self.options.memory / "checkpoint", present)
+        checkpoints.save(self.options.memory / "checkpoint", present, self._grown())
+
+    def _grown(self) -> GrownRows:
+        if self._rows is None:
+            assert self.options.memory is not None
+            self._rows = GrownRows(self.options.memory)
+        return self._rows
 
     def _verify_sequences(self) -> None:
         """Nothing is computed from sequences that do not hold exactly what the ticks gave."""
@@ -304,7 +314,7 @@ class Engine:
         if path is None or not path.exists():
             return None
         try:
-            found = checkpoints.load(path)
+            found = checkpoints.load(path, self._grown())
             if found.replayed and self.replay is None:  # the cache it read from is gone
                 return None
             if found.identity != self.options.identity:

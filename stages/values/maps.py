@@ -25,6 +25,7 @@ class ReferenceGraph(GrowableArrays, Value):
     """
 
     in_place = True
+    grows = ("poses", "features", "edges")
 
     poses: Annotated[npt.NDArray[np.float64], Shape("R", 3)]
     features: Annotated[Rows, Shape("R", "segments", "bins")]

@@ -8,12 +8,13 @@ import pytest
 from omninav.pipeline.engine import checkpoint as checkpoints
 from omninav.pipeline.engine.checkpoint import Checkpoint
 from omninav.pipeline.engine.codec import BadEncoding, encode, seal
+from omninav.pipeline.engine.grown_rows import GrownRows
 from toys import Big, Ledger, Number
 
 
 def saved_and_loaded(checkpoint: Checkpoint, place: Path) -> Checkpoint:
-    checkpoints.save(place / "checkpoint", checkpoint)
-    return checkpoints.load(place / "checkpoint")
+    checkpoints.save(place / "checkpoint", checkpoint, GrownRows(place))
+    return checkpoints.load(place / "checkpoint", GrownRows(place))
 
 
 def test_it_comes_back_as_it_was_saved(tmp_path: Path):
@@ -46,12 +47,12 @@ def test_a_value_that_stands_in_two_places_is_one_object_again(tmp_path: Path):
 
 def test_damage_and_another_version_are_refused_by_name(tmp_path: Path):
     path = tmp_path / "checkpoint"
-    checkpoints.save(path, Checkpoint("run", 1))
+    checkpoints.save(path, Checkpoint("run", 1), GrownRows(tmp_path))
     content = bytearray(path.read_bytes())
     content[-1] ^= 1
     path.write_bytes(content)
     with pytest.raises(BadEncoding, match=r"checkpoint is damaged: its sha256 does not fit"):
-        checkpoints.load(path)
+        checkpoints.load(path, GrownRows(tmp_path))
     path.write_bytes(seal(encode({"format": 0})))
     with pytest.raises(BadEncoding, match=r"was written by another version of omninav; start the run again"):
-        checkpoints.load(path)
+        checkpoints.load(path, GrownRows(tmp_path))
