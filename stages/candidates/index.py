@@ -8,6 +8,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import turned_views
+from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
 from omninav.stages.values.length_scale import LengthScale
@@ -63,7 +64,7 @@ class IndexedCandidates(NearBelief):
         number, lists = self._effort(known)
         if number:
             found = file.nearest(self._turned(features, map), number, lists)
-            around = np.union1d(around, found) if known else found
+            around = distinct(np.concatenate([around, found])) if known else found
         return self.Out(candidates=with_background(around, len(map), self.background_references, ctx.tick.index))
 
     def _effort(self, known: bool) -> tuple[int, int]:

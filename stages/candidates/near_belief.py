@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.plane.point_cells import sort_into_cells, within
+from omninav.stages.geometry.plane.point_cells import distinct, sort_into_cells, within
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.length_scale import LengthScale
@@ -59,9 +59,11 @@ class NearBelief(Stage):
     def _around(self, map: ReferenceGraph, near: Particles, length_scale: LengthScale | None) -> Ints:
         """The references near the belief: ascending indices."""
         unit = self.length_scale_m if length_scale is None else length_scale.metres
+        radii = self.radius * unit, self.recovery_radius * unit
         if map is not self._map or len(map) != self._length:
-            self._cells = sort_into_cells(map.poses, max(self.radius, self.recovery_radius) * unit or 1.0)
+            self._cells = [sort_into_cells(map.poses, radius or 1.0) for radius in radii]
             self._map, self._length = map, len(map)
         tracked = len(near.poses) - near.recovery_particles
-        around = within(self._cells, near.poses[:tracked], self.radius * unit)
-        return np.union1d(around, within(self._cells, near.poses[tracked:], self.recovery_radius * unit))
+        parts = near.poses[:tracked], near.poses[tracked:]
+        found = [within(*each) for each in zip(self._cells, parts, radii, strict=True)]
+        return distinct(np.concatenate(found))

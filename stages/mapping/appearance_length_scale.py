@@ -1,7 +1,7 @@
 """Measures the appearance length scale of a finished map."""
 
 import math
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,9 @@ from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 
 Array = npt.NDArray[np.float64]
+
+MAX_COMPARED, NEAREST_COMPARED = 10_000, 1000
+"""References with which a sample is compared, and how many of them, in a larger map, are those nearest to it."""
 
 
 def excess_by_distance(distances: Array, similarity: Array, bins: int = 30) -> tuple[Array, Array]:
@@ -37,6 +40,22 @@ def excess_by_distance(distances: Array, similarity: Array, bins: int = 30) -> t
     sums = np.bincount(which[inside], excess[inside], minlength=bins)
     full = counts >= 5
     return np.sqrt(edges[:-1] * edges[1:])[full], sums[full] / counts[full]
+
+
+def compared_with(poses: Array, samples: npt.NDArray[np.int64]) -> npt.NDArray[np.int64] | None:
+    """With which references each of the samples (S,) of a large map is compared: (S, C). None: with all of them.
+
+    Those nearest to it, for the similarity over short distances, and more of them evenly over the map, for the
+    background.
+    """
+    if len(poses) <= MAX_COMPARED:
+        return None
+    from scipy.spatial import KDTree  # slow to import, and seldom needed
+
+    tree: Any = KDTree(poses[:, :2])  # type: ignore[no-untyped-call]
+    near = tree.query(poses[samples, :2], k=NEAREST_COMPARED)[1]
+    even = np.linspace(0, len(poses) - 1, MAX_COMPARED - NEAREST_COMPARED).astype(np.int64)
+    return np.concatenate([near, np.broadcast_to(even, (len(samples), len(even)))], axis=1)
 
 
 class AppearanceLengthScale(Stage):
@@ -76,14 +95,23 @@ class AppearanceLengthScale(Stage):
             return self.default_m
         chosen = np.unique(np.linspace(0, len(map) - 1, min(self.samples, len(map))).astype(np.int64))
         histograms, scale = map.kind == "histograms", MAX_DISTANCES[map.kind]
-        views = map.features[:]
+        others = compared_with(map.poses, chosen)
+        views = map.features[:] if others is None else None
         similarity = np.stack(
             [
-                similarities(views, views[n], self.headings, histograms, False, 0.0, max_distance=scale).max(axis=1)
-                for n in chosen
+                similarities(
+                    map.features[rows] if views is None else views,
+                    map.features[n],
+                    self.headings,
+                    histograms,
+                    False,
+                    0.0,
+                    max_distance=scale,
+                ).max(axis=1)
+                for n, rows in zip(chosen, chosen if others is None else others, strict=True)
             ]
         ).astype(np.float64)
-        gap = map.poses[chosen, None] - map.poses
+        gap = map.poses[chosen, None] - (map.poses if others is None else map.poses[others])
         if map.features.shape[1] == 1:
             similarity[np.abs(wrap(gap[..., 2])) > math.radians(self.max_heading_difference_deg)] = np.nan
         centres, excess = excess_by_distance(np.hypot(gap[..., 0], gap[..., 1]), similarity)

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.values.grid import cells_of
 from omninav.stages.values.visibility import VisibilityAreas
 
@@ -40,7 +41,7 @@ class Looks(NamedTuple):
         """The groups that have a view of any of these references, ascending."""
         first, number = self.of_reference[references], self.of_reference[references + 1] - self.of_reference[references]
         at = np.repeat(first - np.cumsum(number) + number, number) + np.arange(number.sum())
-        return np.unique(self.groups_of[at]).astype(np.int64)
+        return distinct(self.groups_of[at].astype(np.int64))
 
 
 class Cells(NamedTuple):

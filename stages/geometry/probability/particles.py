@@ -1,12 +1,13 @@
 """Weighted pose samples: moments and modes."""
 
 import itertools
-from typing import Any
+import math
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
+from omninav.stages.geometry.plane.point_cells import distinct, have_a_point_within, sort_into_cells
 
 Array = npt.NDArray[np.float64]
 Members = npt.NDArray[np.bool_]
@@ -197,17 +198,21 @@ def occupied_cells(poses: Array, cell: float, angle: float) -> int:
 
 def uniform_around(centres: Array, radius: float, number: int, rng: np.random.Generator) -> Array:
     """Poses (number, 3) uniform over the area within `radius` metres of any centre (R, >= 2), any heading."""
-    from scipy.spatial import KDTree  # slow to import, and seldom needed
-
-    tree: Any = KDTree(centres[:, :2])  # type: ignore[no-untyped-call]
+    reach = radius + radius / 2 * np.sqrt(0.5)
+    cells = sort_into_cells(centres, reach)
     low, high = centres[:, :2].min(axis=0) - radius, centres[:, :2].max(axis=0) + radius
     cell = radius / 2
     columns, rows = (int(n) for n in np.ceil((high - low) / cell))
-    corners = low + cell * np.stack(np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij"), -1).reshape(-1, 2)
-    reach = radius + cell * np.sqrt(0.5)
-    corners = corners[np.isfinite(tree.query(corners + cell / 2, distance_upper_bound=reach)[0])]
+    at = distinct(np.floor((centres[:, :2] - low) / cell).astype(np.int64) @ np.array([rows, 1]))
+    steps = np.arange(-math.ceil(reach / cell), math.ceil(reach / cell) + 1)
+    wide = np.column_stack(np.divmod(at, rows))[:, 1:] + steps  # cells around centres, and no others: maps may be large
+    at = distinct((at[:, None] + steps)[(wide >= 0) & (wide < rows)])
+    at = distinct(at[:, None] + steps * rows)
+    at = at[(at >= 0) & (at < columns * rows)]
+    corners = low + cell * np.column_stack(np.divmod(at, rows))
+    corners = corners[have_a_point_within(cells, corners + cell / 2, reach)]
     xy = np.empty((0, 2))
     while len(xy) < number:
         drawn = corners[rng.integers(len(corners), size=number)] + cell * rng.random((number, 2))
-        xy = np.concatenate([xy, drawn[np.isfinite(tree.query(drawn, distance_upper_bound=radius)[0])]])
+        xy = np.concatenate([xy, drawn[have_a_point_within(cells, drawn, radius)]])
     return np.column_stack([xy[:number], rng.uniform(-np.pi, np.pi, number)])
