@@ -25,10 +25,19 @@ class MapGrowth(Stage):
 
         figure: Figure | None = None
 
-    def step(self, ctx: Context, drive: Drive, events: Sequence[ViewEvent | None]) -> Out:
-        """The whole run at once."""
+    def step(
+        self,
+        ctx: Context,
+        drive: Drive,
+        events: Sequence[ViewEvent | None],
+        after_last: ViewEvent | None = None,
+    ) -> Out:
+        """The whole run at once. `after_last`: what was learned once the last log had ended, counted to its end."""
         rows = [row for row, event in enumerate(events) if event is not None]
         found = [event for event in events if event is not None]
+        if after_last is not None and len(events):
+            rows.append(len(events) - 1)
+            found.append(after_last)
         if not found:
             return self.Out()
         at = np.array(rows)

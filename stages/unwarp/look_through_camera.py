@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 import cv2
 import numpy as np
 
-from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
+from omninav.pipeline import BadInput, Bounds, Context, Figure, Outputs, Stage
 from omninav.pipeline.files import user_path, write_whole
 from omninav.pipeline.report.plot_style import PALETTE, plot
 from omninav.stages.camera.donut import Donut
 from omninav.stages.camera.model import Camera
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Topics
+from omninav.stages.values.encoded_image import decode_image
 from omninav.stages.values.image import Image
 
 from .donut import DonutUnwrapState, with_ring
@@ -45,7 +46,9 @@ class LookThroughCamera(Stage):
     """The file to write."""
 
     class Out(Outputs):
-        """Nothing: it writes a file."""
+        """`figure`: what it writes as a file."""
+
+        figure: Figure
 
     def step(self, ctx: Context) -> Out:
         """Unwarp one image and draw it."""
@@ -74,7 +77,16 @@ class LookThroughCamera(Stage):
         for sentence in recording.assumed:
             print(f"assumed: {sentence}")
         print(f"{path}: image {frame}, {camera.projection} camera; forward is at 0 degrees")
-        return self.Out()
+        return self.Out(
+            figure=Figure(
+                name="look",
+                title="What the camera sees",
+                caption=f"Image {frame} of {self.log} by a {camera.projection} camera, unwarped; forward is at 0. "
+                "Where upright things lean or the horizon is bent, the camera is not what it is said to be.",
+                content=cv2.imencode(".jpg", decode_image(drawn.content))[1].tobytes(),
+                media_type="image/jpeg",
+            )
+        )
 
 
 def draw_panorama(axes: "Axes", image: Image, camera: Camera) -> None:
