@@ -20,6 +20,7 @@ PARTS = (
     "logs",
     "command_line",
     "session",
+    "jobs",
 )
 
 

@@ -18,6 +18,15 @@ def task(kind: str, mark: str) -> str:
     return kind
 
 
+def repeat(given: dict[str, Any], send: Callable[[Any], None]) -> float:
+    """Repetitions of an experiment's condition. Returns what they took of the processor (s)."""
+    from omninav.pipeline.experiment import repetition
+
+    begun = time.process_time()
+    repetition.repeat(given, send)
+    return time.process_time() - begun
+
+
 def job(given: dict[str, str], send: Callable[[Any], None]) -> str:
     """The same, as a job of ours."""
     return task(given["kind"], given["mark"])

@@ -63,9 +63,10 @@ def slurm(settings: EngineSettings) -> DaskExecutor:
     """`engine=slurm`: each worker is a batch job of one core; one that dies is started again."""
     from dask_jobqueue import SLURMCluster
 
-    options = _options(settings, ("partition", "time", "account", "interface", "logs"))
+    options = _options(settings, ("partition", "time", "account", "interface"))
     workers = settings.workers or 4
     memory = (settings.memory or JOB_MEMORY) + WORKER_MEMORY
+    logs = str(settings.folder / "workers") if settings.folder is not None else ""
     _quiet()
     cluster = SLURMCluster(
         cores=1,
@@ -76,7 +77,7 @@ def slurm(settings: EngineSettings) -> DaskExecutor:
         walltime=options.get("time", "12:00:00"),
         account=options.get("account"),
         interface=options.get("interface"),
-        log_directory=options.get("logs"),
+        log_directory=logs if WORD.fullmatch(logs) else None,
         scheduler_options={"dashboard": False, "dashboard_address": None},
     )
     try:

@@ -7,6 +7,7 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import Any
 
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
@@ -31,6 +32,8 @@ class EngineSettings:
     """Bytes that a job may take; None: as many as there are."""
     options: Mapping[str, Any] = field(default_factory=dict)
     """Whatever else stands there, for the engine itself."""
+    folder: Path | None = None
+    """Where an engine may leave what its workers print; all machines see it."""
 
 
 Factory = Callable[[EngineSettings], Executor]

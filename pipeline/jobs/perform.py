@@ -1,4 +1,4 @@
-"""What an executor calls, wherever it places a job: run it in a process forked for it, and watch that process."""
+"""What an executor calls, wherever it places a job: hand it to a process of this machine, and watch that process."""
 
 import json
 import os
@@ -19,31 +19,33 @@ LOOK_S = 0.5
 """How often a running job is looked at."""
 LEASE_S = 60.0
 """For how long a job goes on whose client gives no sign of life."""
+MAX_LEFT = 1_000_000_000
+"""A process that keeps more than this after a job (bytes) does not get another one."""
 
 
 def perform(text: str) -> dict[str, Any]:
     """Run a job as `Job.text` describes it, and return its `Outcome` as plain data. It never raises."""
     job = json.loads(text)
     try:
-        with _server() as server:
-            return server.run(job)
-    except OSError as error:  # no process can be started, or the one that forks was killed
+        with _worker(job["token"]) as worker:
+            return worker.run(job)
+    except OSError as error:
         return {"error": f"its process could not be started: {error}", "died": True}
 
 
-class _Server:
-    """The process that imports once and forks for each job (`server.py`). It ends when this one does."""
+class _Worker:
+    """A process for jobs (`worker.py`). It ends when this one does."""
 
-    def __init__(self) -> None:
+    def __init__(self, token: str) -> None:
+        self.token = token
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-c", "from omninav.pipeline.jobs.server import main; main()"],
+            [sys.executable, "-P", "-c", "from omninav.pipeline.jobs.worker import main; main()"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env={**os.environ, **ONE_THREAD},
             start_new_session=True,  # Ctrl-C is for whoever waits for the jobs
         )
         self._answers = b""
-        self._modules: list[str] = []
 
     @property
     def ready(self) -> bool:
@@ -61,40 +63,39 @@ class _Server:
                     pipe.close()
 
     def run(self, job: dict[str, Any]) -> dict[str, Any]:
-        """Have it run a job. Raises `OSError` where it dies itself."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(json.dumps({**job, "modules": self._modules}).encode() + b"\n")
-        self._process.stdin.flush()
+        """Have it run a job."""
         lease, limit, peak = _Lease(job), job["memory"], 0
-        known: dict[str, Any] = {}
-        while "code" not in known:
-            line = self._answer()
-            if line is not None:
-                known |= json.loads(line)
-                continue
-            peak = max(peak, _memory(known.get("process", 0)))
+        assert self._process.stdin is not None
+        with suppress(BrokenPipeError):  # it has died; that is seen below
+            self._process.stdin.write(json.dumps(job).encode() + b"\n")
+            self._process.stdin.flush()
+        while (line := self._answer()) is None:
+            peak = max(peak, _memory(self._process.pid))
             if limit and peak > limit:
-                self.close()
-                error = f"it took {size_text(peak)} of memory, more than engine.memory={size_text(limit)} allows"
-                return {"error": error, "memory": peak}
+                return self._ended(f"it took {_size(peak)} of memory, more than engine.memory={_size(limit)} allows")
             if lease.over():
-                self.close()
-                return {"error": "stopped, because whoever started it has ended"}
-        self._modules = known.get("modules", self._modules)  # the next job will need them too
-        if known["code"] == 0 and "ended" in known:
-            return {**known["ended"], "memory": known["memory"]}
-        error = f"{_cause(known['code'])}; it had taken {size_text(known['memory'])} of memory"
-        return {"error": error, "died": True, "memory": known["memory"]}
+                return self._ended("stopped, because whoever started it has ended")
+        if not line:
+            taken = f"; it had taken {_size(peak)} of memory" if peak else ""
+            return {"error": _cause(self._process.wait()) + taken, "died": True, "memory": peak}
+        ended: dict[str, Any] = json.loads(line)
+        if ended.pop("left") > MAX_LEFT:
+            self.close()
+        return ended
+
+    def _ended(self, why: str) -> dict[str, Any]:
+        self.close()
+        return {"error": why}
 
     def _answer(self) -> bytes | None:
-        """Its next line; None where it says nothing for a while."""
+        """Its next line; None where it says nothing for a while, nothing where it has died."""
         assert self._process.stdout is not None
         while b"\n" not in self._answers:
             if not select.select([self._process.stdout], [], [], LOOK_S)[0]:
                 return None
             part = os.read(self._process.stdout.fileno(), 1 << 20)
             if not part:
-                raise OSError("the process that starts jobs was killed")
+                return b""
             self._answers += part
         line, _, self._answers = self._answers.partition(b"\n")
         return line
@@ -122,24 +123,27 @@ class _Lease:
         return time.monotonic() - self._since > LEASE_S
 
 
-_free: list[_Server] = []
+_free: list[_Worker] = []
 _lock = threading.Lock()
 
 
 @contextmanager
-def _server() -> Iterator[_Server]:
-    """A process that forks: one that waits for a job, or a new one."""
+def _worker(token: str) -> Iterator[_Worker]:
+    """A process that waits for a job of the same client (another's may have imported other code), or a new one."""
     with _lock:
-        server = _free.pop() if _free else None
-    if server is None or not server.ready:
-        server = _Server()
+        old = [worker for worker in _free if worker.token != token or not worker.ready]
+        _free[:] = [worker for worker in _free if worker not in old]
+        worker = _free.pop() if _free else None
+    for each in old:
+        each.close()
+    worker = worker or _Worker(token)
     try:
-        yield server
+        yield worker
     except BaseException:
-        server.close()
+        worker.close()
         raise
     with _lock:
-        _free.append(server)
+        _free.append(worker)
 
 
 def release() -> None:
@@ -147,8 +151,8 @@ def release() -> None:
     with _lock:
         free = _free[:]
         _free.clear()
-    for server in free:
-        server.close()
+    for worker in free:
+        worker.close()
 
 
 def _memory(process: int) -> int:
@@ -166,6 +170,5 @@ def _cause(code: int) -> str:
     return f"its process ended without a message (exit code {code})"
 
 
-def size_text(size: int) -> str:
-    """A number of bytes, for people."""
+def _size(size: int) -> str:
     return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.0f} MB"

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import CancelledError, Executor, Future
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -36,7 +37,7 @@ class Workers:
     """
 
     def __init__(self, settings: EngineSettings, folder: Path) -> None:
-        self.settings = settings
+        self.settings = replace(settings, folder=folder.absolute())
         self._lease = folder / ".client"
         self._token = secrets.token_hex(16)
         self._executor: Executor | None = None

@@ -35,7 +35,7 @@ def test_a_job_that_fails_or_dies_is_reported_and_the_others_finish(tmp_path: Pa
         )
     assert outcomes == ended
     assert outcomes["fail"].error == "ValueError: no such number"
-    assert outcomes["die"].error.startswith("its process was ended by SIGKILL; it had taken ")
+    assert outcomes["die"].error.startswith("its process was ended by SIGKILL")
     assert outcomes["die_once"].error is None
     assert (outcomes["count"].error, outcomes["count"].value) == (None, 3)
     assert messages == [("count", 0), ("count", 1), ("count", 2)]
@@ -49,7 +49,7 @@ def test_a_job_that_takes_too_much_memory_is_ended_and_named_with_what_it_took(t
     greedy = job("take", tmp_path, megabytes=300, seconds=60, mark=str(tmp_path / "mark"))
     with Workers(EngineSettings(workers=1, memory=200_000_000), tmp_path) as workers:
         outcome = workers.run([greedy])["take"]
-    assert re.fullmatch(r"it took 3\d\d MB of memory, more than engine.memory=200 MB allows", outcome.error)
+    assert re.fullmatch(r"it took [23]\d\d MB of memory, more than engine.memory=200 MB allows", outcome.error)
     wait_for(lambda: not lives(int((tmp_path / "mark").read_text())))
 
 

@@ -1,0 +1,98 @@
+"""What a job costs beside its own work, and what a second worker brings."""
+
+import json
+import statistics
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import omninav
+from omninav.pipeline.experiment.repetition import condition_key
+from omninav.pipeline.jobs.executors import EngineSettings
+from omninav.pipeline.jobs.job import Job
+from omninav.pipeline.jobs.run import Workers
+
+from .table import Row
+
+DATA = Path(__file__).resolve().parents[1] / "tests" / "data"
+EMPTY = 200
+REPETITIONS = 40
+ROUNDS = 3
+
+
+def rows() -> list[Row]:
+    """Empty tasks; forty repetitions of `omniview_mcl` with 5000 particles on one worker and on two, in turns."""
+    with tempfile.TemporaryDirectory() as place:
+        return [*_overhead(Path(place) / "empty"), *_throughput(Path(place) / "repetitions")]
+
+
+def _overhead(place: Path) -> list[Row]:
+    jobs = [
+        Job(str(n), "benchmarks.cluster.tasks:job", {"kind": "well", "mark": ""}, place / f"{n}.log")
+        for n in range(EMPTY)
+    ]
+    with Workers(EngineSettings(workers=1), place) as workers:
+        workers.run(jobs[:5])
+        times = []
+        for _ in range(ROUNDS):
+            begun = time.perf_counter()
+            workers.run(jobs)
+            times.append((time.perf_counter() - begun) / EMPTY)
+    return [Row("overhead of a task, engine=local", 1e3 * statistics.median(times), "ms", limit=20.0)]
+
+
+def _throughput(place: Path) -> list[Row]:
+    words: dict[str, Any] = {"tour": str(DATA / "tour.mcap"), "log": str(DATA / "drive.mcap"), "plots": "none"}
+    made = omninav.compose("omniview_mcl", cache=str(place / "cache"), **words, **{"nodes.prior.number": 5000})
+    given = {
+        "config": json.loads(json.dumps(made.plan.config, default=str)),
+        "key": condition_key(made.plan),
+        "code": made.plan.digest,
+        "shared": True,
+        "groups": [],
+    }
+    used = 0
+
+    def jobs(workers: int, number: int) -> list[Job]:
+        nonlocal used
+        found = []
+        for part in range(workers):
+            seeds = list(range(used, used + number // workers))
+            used += len(seeds)
+            folder = place / f"{used}_{part}"
+            own = {**given, "folder": str(folder), "part": "part", "seeds": seeds}
+            found.append(Job(folder.name, "benchmarks.cluster.tasks:repeat", own, folder / "log"))
+        return found
+
+    times: dict[int, list[float]] = {1: [], 2: []}
+    processor: dict[int, list[float]] = {1: [], 2: []}
+    with Workers(EngineSettings(workers=1), place) as one, Workers(EngineSettings(workers=2), place / "two") as two:
+        engines = {1: one, 2: two}
+        for number, workers in engines.items():  # map, features and compiled code are there by then
+            ends = workers.run(jobs(number, 2))
+            assert not any(end.error for end in ends.values()), ends
+        for _ in range(ROUNDS):
+            for number, workers in engines.items():
+                workers.run(jobs(number, number))  # its processes are there
+                some = jobs(number, REPETITIONS)
+                begun = time.perf_counter()
+                ends = workers.run(some)
+                times[number].append(time.perf_counter() - begun)
+                processor[number].append(max(end.value for end in ends.values()))
+    alone, both = (statistics.median(times[number]) for number in (1, 2))
+    busy_alone, busy_both = (statistics.median(processor[number]) for number in (1, 2))
+    return [
+        Row("repetitions/s on 1 worker", REPETITIONS / alone, "1/s"),
+        Row("repetitions/s on 2 workers", REPETITIONS / both, "1/s", "1 worker", REPETITIONS / alone),
+        Row(
+            "forty repetitions: 1 worker's processor time",
+            busy_alone,
+            "s",
+            "the busier of 2 workers",
+            busy_both,
+            limit=1.9,
+            of_peer=True,
+            higher_is_better=True,
+        ),
+    ]
