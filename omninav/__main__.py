@@ -1,5 +1,6 @@
 """The command `omninav`, which is also `python -m omninav`."""
 
+import gc
 import os
 import sys
 
@@ -13,6 +14,8 @@ for threads in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(threads, "1")
 
 from omninav.pipeline.cli.main import main  # noqa: E402
+
+gc.set_threshold(50_000)  # a tick makes a thousand objects and drops them: seldom are there circles among them
 
 if __name__ == "__main__":
     raise SystemExit(main())
