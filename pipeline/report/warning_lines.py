@@ -22,5 +22,6 @@ def warning_lines(manifest: Mapping[str, Any]) -> list[str]:
     lines = [str(warning) for warning in manifest.get("warnings") or ()]
     for row in skipped(manifest):
         if row["first"]:
-            lines.append(f"{row['kind']}: {row['count']} (first: {row['first']})")
+            kind, which = row["kind"].rpartition(".")[2], "" if row["count"] == 1 else "first: "
+            lines.append(f"{kind}: {row['count']} ({which}{row['first']})")
     return lines
