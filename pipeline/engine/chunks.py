@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from omninav.pipeline.graph.contents import MAX_MAGNITUDE
 from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.graph.stored_rows import StoredRows
+from omninav.pipeline.graph.stored_rows import FileRows, StoredRows
 
 CHUNK = 1 << 16
 """Bytes with one sum: what is read, and checked, for a row that has not been read."""
@@ -28,6 +28,9 @@ SUM = 32
 _NPY_HEAD, _PAD, _STEP = 1 << 16, 0xD935, 1 << 20
 _EMPTY_ROWS = 1 << 24
 """Rows that an array without any bytes may have: whoever goes through them row by row comes to an end."""
+
+
+Ints = npt.NDArray[np.int64]
 
 
 class Unfit(Exception):
@@ -77,16 +80,20 @@ def sums_of(file: BinaryIO, end: int) -> npt.NDArray[np.uint8]:
 
 
 class Front:
-    """The front of an open artifact file. What lies in it is mapped, and each chunk is checked before its first use."""
+    """The front of an artifact file, which stays open. Each chunk is checked before anything in it is used.
+
+    It is read, not mapped into memory: mapped pages count as the process's own, megabytes for a row of some kilobytes,
+    and a process that touches one behind the end of a file that was cut is killed.
+    """
 
     def __init__(self, path: Path, end: int, sums: npt.NDArray[np.uint8]) -> None:
         """`end`: where the front ends. Raises `Unfit` where the sums are not those of that many bytes."""
         if sums.dtype != np.uint8 or sums.shape != (-(-end // CHUNK), SUM):
             raise Unfit(f"its front of {end} bytes has sums of the shape {sums.shape!s:.40}")
         self.path, self._sums, self._end = path, sums, end
-        self._file = os.open(path, os.O_RDONLY)  # chunks are read to be checked: what is mapped counts as memory
+        self._file = os.open(path, os.O_RDONLY)
         weakref.finalize(self, os.close, self._file)
-        self._mapped: npt.NDArray[np.uint8] = np.asarray(np.memmap(path, np.uint8, "r", shape=(end,)))
+        self._checked = np.zeros(len(sums), bool)
 
     def array(self, entry: zipfile.ZipInfo, whole: bool) -> npt.NDArray[Any] | StoredRows[Any]:
         """An array of the front; all of it in memory where it is to be `whole`, or is small.
@@ -101,50 +108,48 @@ class Front:
         head = io.BytesIO(self._read(begin, min(size, _NPY_HEAD), name))
         shape, dtype = parse_npy_head(head, size)
         begin, size = begin + head.tell(), size - head.tell()
-        if whole or size <= IN_MEMORY or not shape:
-            content = self._read(begin, size, name)
-            return np.frombuffer(content, dtype).reshape(shape) if size else np.empty(shape, dtype)
-        if begin % dtype.itemsize:
-            raise Unfit(f"the array '{name:.40}' is not aligned")
-        array = np.frombuffer(self._mapped[begin : begin + size], dtype).reshape(shape)
-        return StoredRows(array, self._row_check(name, begin, array))
+        if not whole and size > IN_MEMORY and shape:
+            return FileRows(shape, dtype, self._row_reader(name, begin, size // shape[0], dtype))
+        array = np.empty(shape, dtype)
+        flat = array.reshape(-1).view(np.uint8) if size else np.empty(0, np.uint8)
+        for at in range(0, size, _STEP):
+            flat[at : at + _STEP] = np.frombuffer(self._read(begin + at, min(_STEP, size - at), name), np.uint8)
+        return array
+
+    def _row_reader(self, name: str, begin: int, width: int, dtype: np.dtype[Any]) -> Callable[[Ints, Ints], bytearray]:
+        def read(first: Ints, last: Ints) -> bytearray:
+            content = self._read_runs(begin + first * width, begin + last * width, name)
+            if dtype.kind == "f" and not _are_finite(np.frombuffer(content, dtype)):
+                rows = f"rows {first[0]} to {last[-1] - 1} of the array '{name:.40}'"
+                raise BadInput(f"{self.path}: {rows} hold numbers that are not finite; make it again")
+            return content
+
+        return read
 
     def _read(self, begin: int, size: int, name: str) -> bytearray:
         """Bytes of the front, checked; as many as there are."""
-        begin = max(begin, 0)
-        end = min(begin + size, self._end)
-        found = bytearray()
-        for chunk in range(begin // CHUNK, -(-end // CHUNK)):
-            content, start = self._checked_chunk(chunk, name), chunk * CHUNK
-            found += content[max(begin - start, 0) : end - start]
+        begin, end = max(begin, 0), min(begin + size, self._end)
+        return self._read_runs(np.array([begin]), np.array([end]), name) if begin < end else bytearray()
+
+    def _read_runs(self, begin: Ints, end: Ints, name: str) -> bytearray:
+        """The bytes of some runs, each from `begin` to before `end`, checked."""
+        first, last = begin // CHUNK, (end - 1) // CHUNK
+        chunks = np.minimum(first[:, None] + np.arange(int((last - first).max()) + 1), last[:, None])
+        for chunk in np.unique(chunks[~self._checked[chunks]]).tolist():
+            start = chunk * CHUNK
+            content = os.pread(self._file, min(CHUNK, self._end - start), start)
+            if hashlib.sha256(content).digest() != self._sums[chunk].tobytes():
+                where = f"chunk {chunk} of the array '{name:.40}' (from byte {start})"
+                raise BadInput(f"{self.path}: {where} is damaged, its sha256 differs; make it again")
+            self._checked[chunk] = True
+        sizes = end - begin
+        file, read = self._file, os.pread
+        found = bytearray().join(
+            [read(file, size, at) for size, at in zip(sizes.tolist(), begin.tolist(), strict=True)]
+        )
+        if len(found) != int(sizes.sum()):
+            raise BadInput(f"{self.path}: cut off while it was read; make it again")
         return found
-
-    def _row_check(self, name: str, begin: int, array: npt.NDArray[Any]) -> Callable[[npt.NDArray[np.int64]], None]:
-        width = array.nbytes // len(array)
-        sound = np.zeros(len(self._sums), bool)
-
-        def check(rows: npt.NDArray[np.int64]) -> None:
-            first, last = (begin + rows * width) // CHUNK, (begin + (rows + 1) * width - 1) // CHUNK
-            more = int((last - first).max(initial=0)) + 1
-            chunks = np.minimum(first[:, None] + np.arange(more), last[:, None]).ravel()
-            for chunk in np.unique(chunks[~sound[chunks]]).tolist():
-                content, start = self._checked_chunk(chunk, name), chunk * CHUNK
-                own = content[max(begin - start, 0) : begin + array.nbytes - start]
-                if array.dtype.kind == "f" and not _are_finite(np.frombuffer(own, array.dtype)):
-                    raise BadInput(f"{self._place(chunk, name)} holds numbers that are not finite; make it again")
-                sound[chunk] = True
-
-        return check
-
-    def _checked_chunk(self, chunk: int, name: str) -> bytes:
-        start = chunk * CHUNK
-        content = os.pread(self._file, min(CHUNK, self._end - start), start)
-        if hashlib.sha256(content).digest() != self._sums[chunk].tobytes():
-            raise BadInput(f"{self._place(chunk, name)} is damaged, its sha256 differs; make it again")
-        return content
-
-    def _place(self, chunk: int, name: str) -> str:
-        return f"{self.path}: chunk {chunk} of the array '{name:.40}' (from byte {chunk * CHUNK})"
 
 
 def _are_finite(numbers: npt.NDArray[Any]) -> bool:
