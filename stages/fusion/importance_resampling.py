@@ -5,7 +5,6 @@ from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import ndtri
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.probability.particles import effective_size, occupied_cells, systematic
@@ -19,6 +18,8 @@ def kld_number(cells: int, error: float, confidence: float) -> int:
 
     Fox 2001: n = (k - 1) / (2 error) (1 - 2 / (9 (k - 1)) + sqrt(2 / (9 (k - 1))) z)^3, z the normal quantile.
     """
+    from scipy.special import ndtri  # slow to import: not before a run
+
     if cells < 2:
         return 1
     part = 2.0 / (9.0 * (cells - 1))

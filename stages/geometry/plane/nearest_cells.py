@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import KDTree
 
 from omninav.pipeline.engine.compiled import compiled
 
@@ -25,6 +24,8 @@ class NearestCells:
     """
 
     def __init__(self, points: Array, k: int, cell: float, radius: float) -> None:
+        from scipy.spatial import KDTree  # slow to import: not before a run
+
         xy = np.ascontiguousarray(points[:, :2], np.float64)
         self.k, self.radius = k, radius
         self.origin, self.cell, self._columns, self._rows = np.zeros(2), cell, 0, 0

@@ -4,8 +4,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from .particles import NEIGHBOUR_STEPS
 
@@ -18,6 +16,9 @@ def clusters(poses: Array, metres: float, radians: float) -> npt.NDArray[np.int6
     Cells are `metres` square and about `radians` high in heading, which goes round; cells with a pose that touch, by a
     face, an edge or a corner, are of one cluster.
     """
+    from scipy.sparse import coo_matrix  # slow to import: not before a run
+    from scipy.sparse.csgraph import connected_components
+
     headings = max(3, round(2 * np.pi / radians))
     turn = np.floor(np.mod(poses[:, 2], 2 * np.pi) * (headings / (2 * np.pi))).astype(np.int64) % headings
     column, row = (np.floor(poses[:, axis] / metres).astype(np.int64) for axis in (0, 1))
