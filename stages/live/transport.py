@@ -6,7 +6,7 @@ import os
 import threading
 from abc import ABC, abstractmethod
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from typing import Literal, NamedTuple, TypeVar
 
@@ -14,8 +14,9 @@ from omninav.pipeline.graph.problems import BadInput
 
 from .status import LiveStatus
 
-TransportName = Literal["dds", "rclpy"]
-"""`dds`: CycloneDDS, no ROS needed (`pip install 'omninav[live]'`). `rclpy`: a sourced ROS 2, or `omninav[ros2]`."""
+TransportName = Literal["dds", "rclpy", "zenoh"]
+"""`dds`: CycloneDDS, no ROS needed (`pip install 'omninav[live]'`). `rclpy`: a sourced ROS 2, or `omninav[ros2]`.
+`zenoh`: a robot with rmw_zenoh, no ROS needed (`omninav[zenoh]`)."""
 MAX_WAITING = 10_000
 """Messages of one topic that wait to be taken; of more the oldest is overtaken. A minute of odometry at 150 Hz."""
 
@@ -44,6 +45,11 @@ class Inbox:
     def open(self, topic: str, newest: bool) -> None:
         """Make room for a topic: for its newest message alone, or for all up to `MAX_WAITING`."""
         self._arrivals[topic] = deque(maxlen=1 if newest else MAX_WAITING)
+
+    @property
+    def topics(self) -> Collection[str]:
+        """Those that have room."""
+        return self._arrivals.keys()
 
     def put(self, arrival: Arrival) -> None:
         """Keep a message; where there is no room the oldest of its topic is overtaken."""

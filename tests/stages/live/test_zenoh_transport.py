@@ -1,0 +1,82 @@
+"""The zenoh transport between two processes and a router, and the keys by which nodes with rmw_zenoh find it."""
+
+import json
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from omninav.stages.live.transport import TransportError, connect, disconnect
+
+from .conftest import WAIT_S, decode, encode, until
+
+zenoh = pytest.importorskip("zenoh")
+ODOMETRY, TWIST, POSE = "nav_msgs/msg/Odometry", "geometry_msgs/msg/Twist", "geometry_msgs/msg/PoseStamped"
+STRING = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+"""std_msgs/String, in the examples of rmw_zenoh's own design document."""
+
+
+@pytest.fixture
+def router(monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
+    """As `ros2 run rmw_zenoh_cpp rmw_zenohd` starts one, at a port of the test's own."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        place = json.dumps([f"tcp/127.0.0.1:{free.getsockname()[1]}"])
+    settings = zenoh.Config()
+    for key, value in (("mode", '"router"'), ("listen/endpoints", place), ("scouting/multicast/enabled", "false")):
+        settings.insert_json5(key, value)
+    monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", f"connect/endpoints={place}")
+    with zenoh.open(settings) as session:
+        yield session
+        disconnect()
+
+
+def test_messages_pass_both_ways_between_two_processes(router: object):
+    transport = connect("zenoh", 3)
+    transport.subscribe("/odom", ODOMETRY)
+    transport.publish("/pose", POSE, encode(POSE, {}, 1), latched=True)
+    script = str(Path(__file__).parent / "zenoh_robot.py")
+    robot = subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True)
+    try:
+        got = transport.take(WAIT_S)
+        assert got is not None
+        assert (got.topic, decode(ODOMETRY, got.data).child_frame_id) == ("/odom", "base_link")
+        until(lambda: transport.matched("/odom") == 1)
+        assert transport.offered()["/odom"] == ODOMETRY
+        twist = encode(TWIST, {"linear": {"x": 0.25}})
+        until(lambda: transport.publish("/cmd_vel", TWIST, twist) or robot.poll() is not None)
+        assert robot.stdout is not None
+        assert robot.stdout.read().split() == ["/cmd_vel", TWIST, twist.hex(), POSE]
+    finally:
+        robot.kill()
+        robot.wait()
+
+
+def test_keys_tokens_and_attachments_are_rmw_zenohs(router: zenoh.Session):
+    heard: list[zenoh.Sample] = []
+    listener = router.declare_subscriber(f"2/chatter/std_msgs::msg::dds_::String_/{STRING}", heard.append)
+    transport = connect("zenoh", 2)
+    until(lambda: transport.publish("/chatter", "std_msgs/msg/String", encode("std_msgs/msg/String", {})) or heard)
+    attachment = heard[0].attachment.to_bytes()
+    assert (len(attachment), attachment[16]) == (33, 16)  # two int64, and 16 bytes after their number
+    replies = router.liveliness().get("@ros2_lv/2/**", timeout=5.0)
+    tokens = sorted(str(reply.ok.key_expr).split("/", 3)[3] for reply in replies)
+    assert tokens == [
+        "0/0/NN/%/%/omninav",
+        f"0/2/MP/%/%/omninav/%chatter/std_msgs::msg::dds_::String_/{STRING}/::,16:,:,:,,",
+    ]
+    listener.undeclare()
+
+
+def test_a_configuration_that_is_none_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch):
+    for value in ("connect/endpoints=nonsense", "nonsense=1"):
+        monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", value)
+        with pytest.raises(TransportError, match="transport=zenoh: a session cannot be opened"):
+            connect("zenoh", 4)
+    monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", "")
+    monkeypatch.setenv("ZENOH_SESSION_CONFIG_URI", "/nowhere.json5")
+    with pytest.raises(TransportError, match="transport=zenoh: a session cannot be opened"):
+        connect("zenoh", 4)
