@@ -33,3 +33,19 @@ def with_background(chosen: Ints, references: int, background: int, turn: int) -
     sampled = taken + np.searchsorted(chosen - np.arange(len(chosen)), taken, side="right")
     found, first_of = np.unique(np.concatenate([chosen, sampled]), return_index=True)
     return Candidates(found, np.where(first_of < len(chosen), 1.0, step))
+
+
+def with_even_background(chosen: Ints, references: int, background: int) -> Candidates:
+    """References `chosen` (N,), ascending, and `background` others at even steps over the map, always the same ones.
+
+    What is read of a map that lies in its file is then read again and again, and not all of it little by little.
+    """
+    others = references - len(chosen)
+    if not len(chosen) or others <= background:
+        return Candidates()
+    even = np.linspace(0, references - 1, background).astype(np.int64)
+    even = even[~np.isin(even, chosen)]
+    together = np.concatenate([chosen, even])
+    weight = np.concatenate([np.ones(len(chosen)), np.full(len(even), others / max(len(even), 1))])
+    order = np.argsort(together, kind="stable")
+    return Candidates(together[order], weight[order])

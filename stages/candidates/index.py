@@ -16,7 +16,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.reference_index import ReferenceIndex
 
 from .appearance_vectors import appearance_vectors
-from .background import with_background
+from .background import with_even_background
 from .inverted_file import InvertedFile, faiss_or_none
 from .near_belief import NearBelief
 
@@ -26,17 +26,18 @@ class IndexedCandidates(NearBelief):
 
     For maps that are too large to be compared whole. Without a belief, and where it is spread so widely that more than
     `global_references` are near it, those come from the index alone. A belief in one place is looked after as in
-    `near_belief`, and the index adds a few, so that a kidnapped robot is found. The view is looked up at all headings.
+    `near_belief`, and the index adds a few, so that a kidnapped robot is found. The view is looked up at all headings;
+    the background is the same at each image, since it has not to find anything.
     Small maps are compared whole; without an index (port `index`) the rule is that of `near_belief`.
     """
 
-    global_references: Annotated[int, Bounds(ge=1)] = 4000
+    global_references: Annotated[int, Bounds(ge=1)] = 3000
     """References from the index where it is not known where the robot is."""
-    recovery_references: Annotated[int, Bounds(ge=0)] = 50
+    recovery_references: Annotated[int, Bounds(ge=0)] = 16
     """References from the index where it is, in case it was kidnapped."""
     headings: Annotated[int, Bounds(ge=1)] = 36
     """Headings at which the view is looked up."""
-    lists: Annotated[int, Bounds(ge=1)] = 32
+    lists: Annotated[int, Bounds(ge=1)] = 64
     """Lists of similar references that are searched for each heading without a belief."""
     recovery_lists: Annotated[int, Bounds(ge=1)] = 4
     """The same with one."""
@@ -65,7 +66,7 @@ class IndexedCandidates(NearBelief):
         if number:
             found = file.nearest(self._turned(features, map), number, lists)
             around = distinct(np.concatenate([around, found])) if known else found
-        return self.Out(candidates=with_background(around, len(map), self.background_references, ctx.tick.index))
+        return self.Out(candidates=with_even_background(around, len(map), self.background_references))
 
     def _effort(self, known: bool) -> tuple[int, int]:
         if known:
