@@ -92,6 +92,8 @@ class FrameByFrame(Stage):
         if (ticks or not isinstance(map, ViewMixtures)) and (last.reference >= 0).any():
             chart.name("best reference", "green", "ring")
         words += _what_images_show(snapshots[int(last.row[rows[0]])])
+        if isinstance(map, TopologicalMap) and thumbnails is not None:
+            words.append("The map's images are as the camera took them.")
         return self.Out(
             figure=Figure(
                 name="frame_by_frame",
