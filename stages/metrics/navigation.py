@@ -33,12 +33,13 @@ class Navigation(Stage):
     """Measures how a drive to a goal ended: the entry `navigation` of metrics.json.
 
     `reached`: the robot said that it has arrived, close to where the medoid of the route's last place was taken;
-    `end_error_m`: how far from there it ended. `collisions`; `path_length_m`: driven; `shortest_m`: from where it began
-    along the images of the map, the shortest path that it could have known; `time_s`: until it said that it has arrived
-    or given up, else all of it. `routes`: how many it planned; `state` and `reason`: what it last said. `reached_rate`
-    and `collision_free_rate`: 1 or 0, for means over drives. Only of drives that reached their goal:
-    `path_length_ratio`, the path driven over the shortest; `time_per_metre_s`, seconds for a metre of the shortest;
-    `reached_error_m`, how far from the place it ended. Truth of the map's poses that is not known gives None.
+    `end_error_m`: how far from there it ended. `collisions`, in a simulated world; `path_length_m`: driven, on a robot
+    by its odometry; `shortest_m`: from where it began along the images of the map, the shortest path that it could have
+    known; `time_s`: until it said that it has arrived or given up, else all of it. `routes`: how many it planned;
+    `state` and `reason`: what it last said. `reached_rate` and `collision_free_rate`: 1 or 0, for means over drives.
+    Only of drives that reached their goal: `path_length_ratio`, the path driven over the shortest; `time_per_metre_s`,
+    seconds for a metre of the shortest; `reached_error_m`, how far from the place it ended. Truth of the map's poses
+    that is not known gives None.
     """
 
     within_m: Annotated[float, Bounds(gt=0)] = 0.5
@@ -66,14 +67,15 @@ class Navigation(Stage):
         ended = next(ends, len(drive) - 1)
         tallied = np.flatnonzero(np.isfinite(drive.distance))
         collisions = int(drive.collisions[-1]) if len(tallied) else None
-        driven = float(drive.distance[tallied[-1]]) if len(tallied) else None
+        by_odometry = float(np.nansum(np.hypot(drive.motion[:, 0], drive.motion[:, 1])))
+        driven = float(drive.distance[tallied[-1]]) if len(tallied) else by_odometry
         goal = int(last.places[-1]) if len(last.places) else None
         apart = shortest = None
         if goal is not None and map.pose_source == "truth":
             apart = math.dist(spots[-1], map.poses[map.places[goal]][:2])
             shortest = shortest_metres(map, spots[0], goal)
-        found: dict[str, Any] = {
-            "collisions": collisions,
+        found: dict[str, Any] = {} if collisions is None else {"collisions": collisions}
+        found |= {
             "end_error_m": apart,
             "path_length_m": driven,
             "shortest_m": shortest,
@@ -92,8 +94,7 @@ class Navigation(Stage):
                 found["reached_error_m"] = apart
             if reached and shortest:
                 found["time_per_metre_s"] = found["time_s"] / shortest
-                if driven is not None:
-                    found["path_length_ratio"] = driven / shortest
+                found["path_length_ratio"] = driven / shortest
         headlines = ("navigation.reached_rate", "navigation.path_length_ratio")
         return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, headlines))
 

@@ -18,12 +18,13 @@ CORNER = made_map([(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (9.0, 9.0)], {(0, 1): 0, 
 PLACES = np.array([0, 1, 2])
 
 
-def ended(spots, states, collisions=0, driven=0.0, map=CORNER):
+def ended(spots, states, collisions=0, driven=0.0, map=CORNER, tallied=True):
     ways = [PlannedRoute(PLACES, state, 0, "tired" if state == "gave up" else "") for state in states]
     ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(len(spots))]
     truth = [Pose(x, y, 0.0) for x, y in spots]
     tallies = [DriveTally(collisions, driven)] * len(spots)
-    metrics = Navigation().step(Context("navigation"), collected(ticks, truth, tallies=tallies), ways, map).metrics
+    drive = collected(ticks, truth, tallies=tallies if tallied else None)
+    metrics = Navigation().step(Context("navigation"), drive, ways, map).metrics
     return metrics.values["navigation"]
 
 
@@ -38,6 +39,13 @@ def test_a_drive_along_the_map_has_its_length_and_ends_when_it_says_so():
     assert (found["reached_rate"], found["collision_free_rate"]) == (1.0, 1.0)
     assert (found["path_length_ratio"], found["time_per_metre_s"]) == pytest.approx((7.2 / 7.0, 2.0 / 7.0))
     assert (found["goal"], found["routes"], found["collisions"]) == (2, 1, 0)
+
+
+def test_of_a_real_robot_no_contacts_are_claimed_and_odometry_measures_its_path():
+    found = ended([(0.0, 0.0), (3.0, 4.0)], ["under way", "arrived"], tallied=False)
+    assert found["reached"]
+    assert not {"collisions", "collision_free_rate"} & found.keys()
+    assert found["path_length_m"] == 0.0  # it knows of no motion
 
 
 @pytest.mark.parametrize(
