@@ -58,6 +58,48 @@ def compared_with(poses: Array, samples: npt.NDArray[np.int64]) -> npt.NDArray[n
     return np.concatenate([near, np.broadcast_to(even, (len(samples), len(even)))], axis=1)
 
 
+def length_scale_of(
+    map: ReferenceGraph,
+    samples: int = 40,
+    share: float = 0.5,
+    headings: int = 36,
+    max_heading_difference: float = math.radians(30.0),
+    min_references: int = 10,
+) -> float | None:
+    """The distance (m) at which a map's views keep `share` of their excess similarity; None where none can be measured.
+
+    The parameters are those of `AppearanceLengthScale`; `max_heading_difference` in radians.
+    """
+    if len(map) < min_references:
+        return None
+    chosen = np.unique(np.linspace(0, len(map) - 1, min(samples, len(map))).astype(np.int64))
+    histograms, scale = map.kind == "histograms", MAX_DISTANCES[map.kind]
+    others = compared_with(map.poses, chosen)
+    views = map.features[:] if others is None else None
+    similarity = np.stack(
+        [
+            similarities(
+                map.features[rows] if views is None else views,
+                map.features[n],
+                headings,
+                histograms,
+                False,
+                0.0,
+                max_distance=scale,
+            ).max(axis=1)
+            for n, rows in zip(chosen, chosen if others is None else others, strict=True)
+        ]
+    ).astype(np.float64)
+    gap = map.poses[chosen, None] - (map.poses if others is None else map.poses[others])
+    if map.features.shape[1] == 1:
+        similarity[np.abs(wrap(gap[..., 2])) > max_heading_difference] = np.nan
+    centres, excess = excess_by_distance(np.hypot(gap[..., 0], gap[..., 1]), similarity)
+    below = np.flatnonzero(excess < share)
+    if not len(centres):
+        return None
+    return float(centres[below[0]] if len(below) else centres[-1])
+
+
 class AppearanceLengthScale(Stage):
     """Measures the distance at which the map's views have lost half of their excess similarity, a correlation length.
 
@@ -86,36 +128,8 @@ class AppearanceLengthScale(Stage):
 
     def step(self, ctx: Context, map: ReferenceGraph) -> Out:
         """Measure one map."""
-        metres = self._measured(map)
+        limit = math.radians(self.max_heading_difference_deg)
+        metres = length_scale_of(map, self.samples, self.share, self.headings, limit, self.min_references)
+        metres = self.default_m if metres is None else metres
         ctx.fact("appearance_length_scale_m", round(metres, 3))
         return self.Out(length_scale=LengthScale(metres))
-
-    def _measured(self, map: ReferenceGraph) -> float:
-        if len(map) < self.min_references:
-            return self.default_m
-        chosen = np.unique(np.linspace(0, len(map) - 1, min(self.samples, len(map))).astype(np.int64))
-        histograms, scale = map.kind == "histograms", MAX_DISTANCES[map.kind]
-        others = compared_with(map.poses, chosen)
-        views = map.features[:] if others is None else None
-        similarity = np.stack(
-            [
-                similarities(
-                    map.features[rows] if views is None else views,
-                    map.features[n],
-                    self.headings,
-                    histograms,
-                    False,
-                    0.0,
-                    max_distance=scale,
-                ).max(axis=1)
-                for n, rows in zip(chosen, chosen if others is None else others, strict=True)
-            ]
-        ).astype(np.float64)
-        gap = map.poses[chosen, None] - (map.poses if others is None else map.poses[others])
-        if map.features.shape[1] == 1:
-            similarity[np.abs(wrap(gap[..., 2])) > math.radians(self.max_heading_difference_deg)] = np.nan
-        centres, excess = excess_by_distance(np.hypot(gap[..., 0], gap[..., 1]), similarity)
-        below = np.flatnonzero(excess < self.share)
-        if not len(centres):
-            return self.default_m
-        return float(centres[below[0]] if len(below) else centres[-1])

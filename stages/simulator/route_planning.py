@@ -233,7 +233,7 @@ class _FreeSpace:
             ends.append(number[b][both])
             costs.append((0.5 * self._step * math.hypot(dx, dy) * (self._cost_factor[a] + self._cost_factor[b]))[both])
         start, end, cost = np.concatenate(starts), np.concatenate(ends), np.concatenate(costs)
-        return csr_array((cost, (start, end)), shape=(number.size, number.size))  # type: ignore[no-untyped-call]
+        return csr_array((cost, (start, end)), shape=(number.size, number.size))
 
     def _cell(self, point: npt.ArrayLike) -> int:
         """Number of the free cell nearest to a point."""

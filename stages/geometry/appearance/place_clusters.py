@@ -40,9 +40,7 @@ def complete_linkage(distances: Array, size: float) -> Ints:
 def groups(number: int, pairs: Ints) -> Ints:
     """Connected components (number,) of the graph with edges `pairs` (M, 2), numbered in order."""
     ones = np.ones(len(pairs))
-    graph: Any = coo_matrix(  # type: ignore[no-untyped-call]
-        (ones, (pairs[:, 0], pairs[:, 1])), shape=(number, number)
-    )
+    graph: Any = coo_matrix((ones, (pairs[:, 0], pairs[:, 1])), shape=(number, number))
     return renumbered(connected_components(graph, directed=False)[1])
 
 

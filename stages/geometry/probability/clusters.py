@@ -31,7 +31,7 @@ def clusters(poses: Array, metres: float, radians: float) -> npt.NDArray[np.int6
     found = np.minimum(np.searchsorted(cells, beside), len(cells) - 1)
     one, other = np.nonzero(cells[found] == beside)
     pairs = (np.ones(len(one), np.int8), (one, found[one, other]))
-    joined: Any = coo_matrix(pairs, shape=(len(cells), len(cells)))  # type: ignore[no-untyped-call]
+    joined: Any = coo_matrix(pairs, shape=(len(cells), len(cells)))
     labels = connected_components(joined, directed=False)[1]
     label: npt.NDArray[np.int64] = labels[inverse.ravel()].astype(np.int64)
     return label

@@ -1,0 +1,160 @@
+"""Straightens a map whose poses are odometry by the places that the drive came back to."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Tick
+from omninav.stages.geometry.appearance.segments import EXPONENTS, MAX_DISTANCES, similarities
+from omninav.stages.geometry.plane.pose_graph import optimised_poses
+from omninav.stages.geometry.plane.se2 import between, wrap
+from omninav.stages.values.maps import ReferenceGraph
+
+from .appearance_length_scale import length_scale_of
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float32]
+
+ODOMETRY_SIGMAS = (0.02, 0.02, 0.02)
+"""Standard deviation of odometry per metre (m, m, rad)."""
+TURN_SIGMA = 0.05
+"""The same of a turn, per radian."""
+LEAST_SIGMAS = (0.005, 0.005, 0.0025)
+"""Of the shortest motion (m, m, rad): poses in a map are samples of a drive."""
+
+QUANTITIES = {
+    "straightened.closures": Quantity(title="Places that the tour came back to", context=True),
+    "straightened.rejected": Quantity(title="Of these contradicted by the others", context=True),
+    "straightened.moved_median_m": Quantity(title="References moved by, median", context=True),
+    "straightened.moved_max_m": Quantity(title="References moved by, largest", context=True),
+}
+
+
+class Closures(NamedTuple):
+    """Pairs of references that show one place. `pairs` (C, 2), the earlier first; `turns` (C,): heading of the later in
+    the frame of the earlier (rad)."""
+
+    pairs: Ints
+    turns: Array
+
+
+def closures_by_appearance(
+    features: Floats, driven: Array, histograms: bool, scale: float, headings: int, min_excess: float, min_gap: float,
+    samples: int,
+) -> Closures:  # fmt: skip
+    """The most similar reference of each, among those at least `min_gap` metres before or behind along the drive.
+
+    `features` (R, segments, bins); `driven` (R,): metres from the start to each. A pair counts where its similarity
+    keeps `min_excess` of what exceeds the background, the median over the map: (S - median) / (1 - median). Of more
+    than `samples` references so many, evenly spaced, look for a partner.
+    """
+    found: dict[tuple[int, int], float] = {}
+    queries = np.unique(np.linspace(0, len(features) - 1, min(samples, len(features))).astype(np.int64))
+    for one in queries.tolist():
+        apart = np.flatnonzero(np.abs(driven - driven[one]) >= min_gap)
+        if not len(apart):
+            continue
+        values = similarities(features, features[one], headings, histograms, True, EXPONENTS["sqrt"], None, scale)
+        best = values.max(axis=1)
+        background = float(np.median(best))
+        other = int(apart[best[apart].argmax()])
+        if best[other] - background < min_excess * (1.0 - background):
+            continue
+        turn = _peak(values[other])  # of the robot at `one`, seen from `other`
+        pair = (other, one) if other < one else (one, other)
+        found.setdefault(pair, turn if other < one else -turn)
+    pairs = np.array(sorted(found), np.int64).reshape(-1, 2)
+    return Closures(pairs, np.array([found[one, other] for one, other in pairs.tolist()]))
+
+
+def _peak(values: Floats) -> float:
+    """The angle at which values over the circle are largest, between samples by a parabola (rad)."""
+    number, best = len(values), int(values.argmax())
+    before, here, after = (float(values[(best + step) % number]) for step in (-1, 0, 1))
+    bend = before - 2.0 * here + after
+    offset = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+    return float(wrap(2.0 * math.pi * (best + offset) / number))
+
+
+class StraightenMap(Stage):
+    """Moves the references of a map whose poses are odometry so that what looks like one place is one place.
+
+    References that look alike although the drive lies between them close a loop; a pose graph of odometry and closures
+    gives the poses, with Cauchy's loss on closures, since some are wrong. The first reference stays. Poses that are
+    ground truth, views of one direction and drives that come back to no place are left as they are: without a crossing
+    nothing tells how odometry bent them. Manifest fact `map_straightened`.
+
+    Not in the paper, whose maps are corrected by a laser scanner. Pose graphs: Grisetti et al. 2010, "A tutorial on
+    graph-based SLAM". Defaults: docs/experiments/straightened_maps.md.
+    """
+
+    min_excess: Annotated[float, Bounds(gt=0, lt=1)] = 0.7
+    """Share of the similarity above the background that a closure keeps; half of it is left a length scale away."""
+    min_gap: Annotated[float, Bounds(gt=0)] = 5.0
+    """Way along the drive, in length scales, after which two references may close a loop."""
+    closure_sigma: Annotated[float, Bounds(gt=0)] = 0.5
+    """Standard deviation of a closure's position, in length scales."""
+    closure_sigma_deg: Annotated[float, Bounds(gt=0)] = 5.0
+    """Standard deviation of its heading."""
+    headings: Annotated[int, Bounds(ge=1)] = 36
+    """Headings at which references are compared."""
+    samples: Annotated[int, Bounds(ge=1)] = 1000
+    """References that look for another, evenly spaced over a map of more."""
+
+    class Out(Outputs):
+        """The map with straightened poses, or as it was."""
+
+        map: ReferenceGraph
+        metrics: Metrics | None = None
+
+    def step(self, ctx: Context, map: ReferenceGraph, ticks: Sequence[Tick]) -> Out:
+        """The finished map; `ticks` are collected so that it is finished."""
+        if map.pose_source == "truth":
+            return self.Out(map=map)
+        unit = length_scale_of(map) if map.features.shape[1] > 1 else None
+        if unit is None:
+            ctx.fact("map_straightened", "no: a map needs ten views, all around the robot")
+            return self.Out(map=map)
+        steps = between(map.poses[:-1], map.poses[1:])
+        driven = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+        closures = closures_by_appearance(
+            map.features[:], driven, map.kind == "histograms", MAX_DISTANCES[map.kind], self.headings,
+            self.min_excess, self.min_gap * unit, self.samples,
+        )  # fmt: skip
+        if not len(closures.pairs):
+            ctx.fact("map_straightened", "no: the tour came back to no place, so nothing tells how odometry bent it")
+            return self.Out(map=map)
+        poses, weights = self._optimised(map.poses, steps, closures, unit)
+        moved = np.hypot(*(poses - map.poses)[:, :2].T)
+        values = {
+            "closures": len(closures.pairs),
+            "rejected": int((weights < 0.1).sum()),
+            "moved_median_m": float(np.median(moved)),
+            "moved_max_m": float(moved.max()),
+        }
+        ctx.fact("map_straightened", "by {closures} closures, {moved_max_m:.2f} m at most".format(**values))
+        metrics = Metrics({"straightened": values}, QUANTITIES)
+        return self.Out(map=replace(map, poses=poses), metrics=metrics)
+
+    def _optimised(self, poses: Array, steps: Array, closures: Closures, unit: float) -> tuple[Array, Array]:
+        """The poses, and the weights of the closures."""
+        number = len(poses)
+        length = np.hypot(steps[:, 0], steps[:, 1])
+        drift = np.asarray(LEAST_SIGMAS) + np.asarray(ODOMETRY_SIGMAS) * length[:, None]
+        drift[:, 2] += TURN_SIGMA * np.abs(steps[:, 2])
+        loops = np.zeros((len(closures.pairs), 3))
+        loops[:, 2] = closures.turns
+        spread = [self.closure_sigma * unit, self.closure_sigma * unit, math.radians(self.closure_sigma_deg)]
+        found, weights = optimised_poses(
+            poses,
+            np.concatenate([np.column_stack([np.arange(number - 1), np.arange(1, number)]), closures.pairs]),
+            np.concatenate([steps, loops]),
+            np.concatenate([drift, np.tile(spread, (len(loops), 1))]),
+            np.arange(number - 1 + len(loops)) >= number - 1,
+        )
+        return found, weights[number - 1 :]

@@ -1,0 +1,58 @@
+"""How far the poses of a map's references are from where their views were taken."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
+from omninav.stages.values.drive import pose_rows
+from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph
+from omninav.stages.values.pose import Pose
+
+from .relative_errors import absolute_trajectory_errors
+
+Array = npt.NDArray[np.float64]
+
+QUANTITIES = {
+    "map_error.as_driven_m": Quantity(title="Map: error of the positions by odometry", better="lower"),
+    "map_error.straightened_m": Quantity(title="Map: error of the positions straightened", better="lower"),
+}
+
+
+class MapPoseErrors(Stage):
+    """Measures the positions of references by odometry against true ones, where the log has both.
+
+    Under `map_error`: the root mean square distance (m) after the map as a whole was moved and turned to fit best,
+    `as_driven_m` by odometry and `straightened_m` by the map that is saved; `references`, of how many. Nothing for a
+    map whose poses are true ones.
+    """
+
+    class Out(Outputs):
+        """Absent where there is nothing to measure."""
+
+        metrics: Metrics | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        events: Sequence[ReferenceEvent | None],
+        truth: Sequence[Pose | None],
+        map: ReferenceGraph,
+        straightened: ReferenceGraph,
+    ) -> Out:
+        """The map at the end of the run."""
+        if map.pose_source == "truth" or not len(map):
+            return self.Out()
+        where = np.full((len(map), 3), np.nan)
+        for event, pose in zip(events, pose_rows(truth), strict=True):
+            if event is not None:
+                where[event.inserted] = pose
+        known = np.isfinite(where).all(axis=1)
+        if known.sum() < 3:
+            return self.Out()
+        values: dict[str, Any] = {"references": int(known.sum())}
+        for name, poses in (("as_driven_m", map.poses), ("straightened_m", straightened.poses)):
+            values[name] = float(np.sqrt((absolute_trajectory_errors(poses[known], where[known]) ** 2).mean()))
+        return self.Out(metrics=Metrics({"map_error": values}, QUANTITIES))
