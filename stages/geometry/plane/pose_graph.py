@@ -4,8 +4,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from .se2 import between, wrap
 
@@ -32,6 +30,9 @@ def optimised_poses(
     the largest error to 1, so that a right loop that odometry contradicts far is not given up at once (graduated
     non-convexity: Yang, Antonante, Tzoumas & Carlone 2020).
     """
+    from scipy import sparse  # slow to import, and seldom needed
+    from scipy.sparse.linalg import splu
+
     poses = poses.copy()
     one, other = edges.T
     rows = 3 * np.arange(len(edges))
@@ -58,6 +59,8 @@ def optimised_poses(
 
 def _jacobian(poses: Array, one: Ints, other: Ints, rows: Ints, scale: Array) -> Any:
     """Of `between`, times `scale` (E, 3), with respect to all poses but the first: (3 E, 3 N - 3)."""
+    from scipy import sparse
+
     cos, sin = np.cos(poses[one, 2]), np.sin(poses[one, 2])
     dx, dy = (poses[other, :2] - poses[one, :2]).T
     unit = np.ones(len(one))
