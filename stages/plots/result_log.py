@@ -2,12 +2,16 @@
 
 from collections.abc import Sequence
 from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.recordings.pose_messages import path_message
-from omninav.stages.values.drive import Drive, known
+from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.map_places import AnyMap
 from omninav.stages.values.ros_messages import RosMessages
 
@@ -15,13 +19,16 @@ from .markers import map_markers
 from .result_messages import VIEWS
 
 LAYOUT = "foxglove_layout.json"
+PATH_POSES = 10_000
+"""Most poses in a path; of a longer one every second is kept, every third, …"""
 
 
 class ResultLog(Stage):
     """Writes `result.mcap`: the messages of every tick (see `ResultMessages`), and what is known at the end.
 
-    That is, in the map frame, per log: `/estimate/path`, all of its estimates, and `/odometry/path`, where odometry
-    alone would have led from the first true pose (without any, through the last estimate); and `/map` as it was left.
+    That is, in the map frame, per log: `/estimate/path`, its estimates (at most 10,000), and `/odometry/path`, where
+    odometry alone would have led from the first true pose (without any, through the last estimate); and `/map` as it
+    was left.
     Beside it stands `foxglove_layout.json`, a layout of Foxglove's panels for these topics.
     """
 
@@ -52,8 +59,13 @@ def _write_paths(log: LogWriter, drive: Drive) -> None:
     """The paths of one log, at its end."""
     last, has_estimate = int(drive.stamps[-1]), known(drive.estimate)
     if has_estimate.any():
-        path = path_message(drive.stamps[has_estimate].tolist(), drive.estimate[has_estimate], last)
+        path = _path(drive.stamps[has_estimate], drive.estimate[has_estimate], last)
         log.write("/estimate/path", "nav_msgs/msg/Path", last, path)
     alone = drive.odometry_alone()
     if alone is not None:
-        log.write("/odometry/path", "nav_msgs/msg/Path", last, path_message(drive.stamps.tolist(), alone, last))
+        log.write("/odometry/path", "nav_msgs/msg/Path", last, _path(drive.stamps, alone, last))
+
+
+def _path(stamps: npt.NDArray[np.int64], poses: Array, now: int) -> dict[str, Any]:
+    every = -(-len(poses) // PATH_POSES)
+    return path_message(stamps[::every].tolist(), poses[::every], now)
