@@ -11,10 +11,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from random import Random
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from made_values import made_values
 
+from omninav.pipeline import StoredRows
+from omninav.pipeline.engine import chunks as chunk_files
 from omninav.pipeline.engine.artifact import read_artifact, read_header, write_artifact
 from omninav.pipeline.engine.chunks import sums_of
 from omninav.pipeline.engine.codec import encode
@@ -40,8 +43,11 @@ def samples() -> Sequence[Files]:
 
 
 def read(folder: Path, files: Files) -> Any:
-    """Header and value, of which large arrays stay in the file until they are searched."""
-    return read_header(folder / MAP)["facts"], read_artifact(folder / MAP)
+    """Header and value, and the rows that would stay in a larger file, read from there."""
+    facts, value = read_header(folder / MAP)["facts"], read_artifact(folder / MAP)
+    with patch.object(chunk_files, "IN_MEMORY", 0):
+        rows = getattr(read_artifact(folder / MAP), "features", None)
+    return facts, value, rows[:] if isinstance(rows, StoredRows) else None
 
 
 def entries_of(data: bytes) -> dict[str, bytes]:
