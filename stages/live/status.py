@@ -16,7 +16,7 @@ class LiveStatus:
         self.troubles: dict[str, str] = {}
         self.left_out: dict[str, str] = {}
         """What cannot be published or answered in this run, and why: said once, and never tried again."""
-        self._said: set[str] = set()
+        self._reported: set[str] = set()
         self.counts: Counter[str] = Counter()
         self.live = False
         self.spread_m = float("nan")
@@ -36,8 +36,8 @@ class LiveStatus:
 
     def news(self) -> list[str]:
         """Why something is left out, of what has not been said yet."""
-        unsaid = [why for what, why in sorted(self.left_out.items()) if what not in self._said]
-        self._said |= self.left_out.keys()
+        unsaid = [why for what, why in sorted(self.left_out.items()) if what not in self._reported]
+        self._reported |= self.left_out.keys()
         return unsaid
 
     def published(self, stamp: int) -> None:
