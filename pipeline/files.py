@@ -5,6 +5,7 @@ import fcntl
 import hashlib
 import json
 import os
+import re
 import stat
 import time
 from collections.abc import Iterator, Mapping
@@ -14,6 +15,8 @@ from typing import Any
 
 SUM = "sha256"
 """The key of a JSON file's own checksum."""
+PART = f"@{re.sub(r'[^A-Za-z0-9-]', '_', os.uname().nodename)}.part"
+"""How the name of a file ends that a process of this machine is writing: others may share its disk."""
 
 
 class Damaged(ValueError):
@@ -34,7 +37,7 @@ def write_whole(path: Path, content: bytes | str) -> None:
 def whole_file(path: Path) -> Iterator[Path]:
     """A path to write to; renamed to `path` when the block ends well, removed when it does not."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    part = path.with_name(f"{path.name}.{os.getpid()}{PART}")
     part.unlink(missing_ok=True)  # a link of that name would be written through
     _remove_left_over(path)
     try:
@@ -48,8 +51,8 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def _remove_left_over(path: Path) -> None:
-    """Remove what processes left that were killed while they wrote this file."""
-    begins, ends = f"{path.name}.", ".part"
+    """Remove what processes of this machine left that were killed while they wrote this file."""
+    begins, ends = f"{path.name}.", PART
     for name in os.listdir(path.parent):
         number = name.removeprefix(begins).removesuffix(ends)
         if name == f"{begins}{number}{ends}" and number.isdecimal() and not _lives(int(number)):

@@ -56,14 +56,12 @@ class Client:
         return self.process.wait(LIMIT_S)
 
     def contents(self) -> tuple[bytes, dict[str, Any]]:
-        """The verdicts, byte by byte, and every repetition without its times."""
+        """The verdicts, byte by byte, and the metrics of every repetition."""
         (verdicts,) = self.folder.glob("*/verdicts.json")
         found = {}
         for file in self.results():
             plain = json.loads(file.read_text())
-            found[f"{file.parent.name}/{file.name}"] = {
-                name: plain[name] for name in ("key", "seed", "metrics", "context")
-            }
+            found[f"{file.parent.name}/{file.name}"] = {name: plain[name] for name in ("seed", "metrics", "context")}
         return verdicts.read_bytes(), found
 
 
@@ -155,26 +153,6 @@ def main() -> None:
         return [client.end()]
 
     case("local, 1 worker", "nothing", nothing, "engine.workers=1")
-    case("local, 2 workers", "client", client_dies, "engine.workers=2")
-    with Dask(place / "dask_parts") as dask:
-        address = ("engine=dask", f"engine.address=tcp://127.0.0.1:{PORT}")
-
-        def worker_dies(client: Client) -> list[int]:
-            dask.kill("worker 0")
-            dask.start("worker 2")
-            return [client.end()]
-
-        def scheduler_dies(client: Client) -> list[int]:
-            dask.kill("scheduler")
-            first = client.end()
-            dask.start("scheduler")
-            dask.start("worker 3")
-            client.start()
-            return [first, client.end()]
-
-        case("dask", "worker", worker_dies, *address)
-        case("dask", "client", client_dies, *address)
-        case("dask", "scheduler", scheduler_dies, *address)
     with OneNodeSlurm(place / "slurm_parts", port=PORT + 100) as slurm:
         on_slurm = ("engine=slurm", "engine.workers=2", "engine.memory=2GB")
 
@@ -196,6 +174,26 @@ def main() -> None:
         case("slurm", "batch job", job_is_cancelled, *on_slurm, **slurm.environment)
         case("slurm", "controller", controller_dies, *on_slurm, **slurm.environment)
         case("slurm", "client", client_dies, *on_slurm, **slurm.environment)
+    with Dask(place / "dask_parts") as dask:
+        address = ("engine=dask", f"engine.address=tcp://127.0.0.1:{PORT}")
+
+        def worker_dies(client: Client) -> list[int]:
+            dask.kill("worker 0")
+            dask.start("worker 2")
+            return [client.end()]
+
+        def scheduler_dies(client: Client) -> list[int]:
+            dask.kill("scheduler")
+            first = client.end()
+            dask.start("scheduler")
+            dask.start("worker 3")
+            client.start()
+            return [first, client.end()]
+
+        case("dask", "worker", worker_dies, *address)
+        case("dask", "client", client_dies, *address)
+        case("dask", "scheduler", scheduler_dies, *address)
+    case("local, 2 workers", "client", client_dies, "engine.workers=2")
 
 
 if __name__ == "__main__":

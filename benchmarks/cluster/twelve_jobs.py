@@ -110,7 +110,9 @@ def _executorlib_slurm(**how: Any) -> Any:
     import executorlib
 
     folder = tempfile.mkdtemp()
-    return executorlib.SlurmClusterExecutor(cache_directory=folder, resource_dict={"cores": 1}, **how)
+    return executorlib.SlurmClusterExecutor(
+        cache_directory=folder, resource_dict={"cores": 1, "partition": "short"}, **how
+    )
 
 
 def _submitit(cluster: str) -> Any:

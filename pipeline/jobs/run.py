@@ -74,9 +74,7 @@ class Workers:
         if not jobs:
             return {}
         if self._executor is None:
-            write_whole(self._lease, self._token)
-            self._executor = executor_of(self.settings)
-            threading.Thread(target=self._renew, daemon=True).start()
+            self.start(executor_of(self.settings))
         outcomes: dict[str, Outcome] = {}
         ends: Ends = queue.SimpleQueue()
         mailbox = _Mailbox(on_message)
@@ -101,6 +99,12 @@ class Workers:
                 on_end(job, outcome)
             mailbox.look(open_jobs.values())
         return outcomes
+
+    def start(self, executor: Executor) -> None:
+        """Give the jobs to this executor."""
+        write_whole(self._lease, self._token)
+        self._executor = executor
+        threading.Thread(target=self._renew, daemon=True).start()
 
     def _submit(
         self, job: Job, attempt: int, ends: "queue.SimpleQueue[tuple[Job, int, Future[dict[str, Any]]]]"

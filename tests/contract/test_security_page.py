@@ -16,6 +16,7 @@ TESTS = {
     ),
     "Stages that you type": (TRUST, "test_a_stage_of_ones_own_is_found_here_and_the_path_is_as_before"),
     "Launchers and sweepers": (TRUST, "test_launchers_and_sweepers_of_installed_packages_take_their_parameters"),
+    "Clusters": ("tests/pipeline/jobs/test_run.py", "test_what_crosses_to_a_cluster_is_text"),
     "Networks": ("tests/stages/features/test_onnx_encoder.py", "test_what_does_not_fit_is_refused_in_one_line"),
     "Configurations": (TRUST, "test_what_a_configuration_says_of_hydra_is_refused_before_anything_is_called"),
     "Words of the command line": (TRUST, "test_hostile_words_are_refused_in_a_few_short_lines"),

@@ -11,8 +11,10 @@ from omninav.pipeline.files import write_whole
 def test_what_a_killed_process_left_is_removed_by_the_next_and_nothing_else(tmp_path: Path) -> None:
     ended = subprocess.Popen([sys.executable, "-c", ""])
     ended.wait()
-    left = tmp_path / f"out.mcap.{ended.pid}.part"
-    others = [tmp_path / name for name in (f"out.mcap.{os.getppid()}.part", f"out.{ended.pid}.part", "out.mcap.x.part")]
+    here = f"@{os.uname().nodename}.part"
+    left = tmp_path / f"out.mcap.{ended.pid}{here}"
+    names = (f"out.mcap.{os.getppid()}{here}", f"out.{ended.pid}{here}", f"out.mcap.x{here}")
+    others = [tmp_path / name for name in (*names, f"out.mcap.{ended.pid}@elsewhere.part")]
     for file in (left, *others):
         file.write_bytes(b"half")
     write_whole(tmp_path / "out.mcap", b"whole")

@@ -1,5 +1,6 @@
 """Jobs in processes of their own, by several engines: messages, errors, deaths, memory and orphans."""
 
+import json
 import os
 import re
 import signal
@@ -7,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -101,6 +103,23 @@ def test_jobs_run_on_a_cluster_of_dask_as_they_do_here(tmp_path: Path):
     errors = {name: outcome.error for name, outcome in outcomes.items()}
     assert errors == {"fail": "ValueError: no such number", "die_once": None, "count": None}
     assert messages == [0, 1, 2]
+
+
+def test_what_crosses_to_a_cluster_is_text(tmp_path: Path):
+    crossed = []
+
+    class Noting(ThreadPoolExecutor):
+        def submit(self, fn, /, *args, **kwargs):
+            crossed.append((fn, args, kwargs))
+            return super().submit(fn, *args, **kwargs)
+
+    with Workers(EngineSettings(workers=1), tmp_path) as workers:
+        workers.start(Noting(1))
+        workers.run([job("count", tmp_path, messages=1)])
+    ((function, (text,), named),) = crossed
+    assert f"{function.__module__}.{function.__name__}" == "omninav.pipeline.jobs.perform.perform"
+    assert json.loads(text)["given"] == {"messages": 1}
+    assert not named
 
 
 @pytest.mark.parametrize(
