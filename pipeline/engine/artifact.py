@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline.files import whole_file
+from omninav.pipeline.files import user_path, whole_file
 from omninav.pipeline.graph.contents import misfit, stored_fields
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.stored_rows import StoredRows
@@ -117,12 +117,13 @@ def type_of(path: Path) -> type[Value]:
         return _type(_header(archive))
 
 
-def read_artifact(path: Path, whole: bool = False) -> Value:
+def read_artifact(path: str | Path, whole: bool = False) -> Value:
     """The value in an artifact file, checked against what its fields state (see `graph.contents`).
 
     A large array in the front of the file is read, and checked, where it is needed (`StoredRows`), or now with `whole`.
     Raises `BadInput` naming the file where it is missing, cut or changed, and where its content is no such value.
     """
+    path = user_path(path)
     with _opened(path) as (archive, end):
         header = _header(archive)
         cls = _type(header)

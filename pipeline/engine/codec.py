@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from omninav.pipeline.graph.stage import State
+from omninav.pipeline.graph.stored_rows import StoredRows
 from omninav.pipeline.graph.value import VALUE_TYPES, Value, value_name
 
 _LENGTH = struct.Struct("<Q")
@@ -49,7 +50,7 @@ def _describe(thing: Any, arrays: list[bytes]) -> Any:
         raise BadEncoding(f"{thing!r} is an Enum: use a Literal instead")
     if isinstance(thing, _PLAIN):
         return thing
-    if isinstance(thing, np.ndarray):
+    if isinstance(thing, np.ndarray | StoredRows):
         if thing.dtype.hasobject:
             raise BadEncoding("an array of objects cannot be written: use a numeric array")
         arrays.append(np.ascontiguousarray(thing).tobytes())

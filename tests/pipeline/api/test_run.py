@@ -23,7 +23,7 @@ def test_a_run_gives_what_its_files_hold(run):
     assert list(run.trajectory.columns)[:2] == ["stamp_ns", "estimate_x"]
     assert run.report.read_text().startswith("<!doctype html>")
     assert len(run.map) == run.metrics["map.references"]
-    assert len(omninav.load_map(run.folder / "map.omap")) == len(run.map)
+    assert len(omninav.load_map(str(run.folder / "map.omap"))) == len(run.map)
 
 
 def test_a_run_shows_itself(run):
