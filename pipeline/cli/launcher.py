@@ -1,6 +1,5 @@
 """Hydra's launcher for the jobs of a sweep that run where `engine=…` says: `hydra/launcher=omninav`."""
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -21,6 +20,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.jobs.executors import read_engine
 from omninav.pipeline.jobs.job import Job, Outcome, Send
 from omninav.pipeline.jobs.run import Workers
+from omninav.pipeline.jobs.throttle import Throttle
 from omninav.pipeline.report.progress import Progress
 
 from .hydra_session import CheckedFolder, hydra_started
@@ -56,19 +56,15 @@ class EngineLauncher(Launcher):
             jobs.append(Job(str(number), f"{__name__}:{run_sweep_job.__name__}", own, sweep / LOGS / f"{number}.log"))
         engine: Any = OmegaConf.to_container(self._config.engine, resolve=True)
         ends: dict[str, JobEnd] = {}
-        page_due = 0.0
+        throttle = Throttle()
         with Progress(unit="jobs") as progress, Workers(read_engine(engine), sweep / LOGS) as workers:
             progress.begin(sweep.name, 0, len(jobs))
 
             def on_end(job: Job, outcome: Outcome) -> None:
-                nonlocal page_due
                 ends[job.name] = end = _end_of(job, outcome)
                 report_end(end)
                 progress.update(sweep.name, len(ends), len(jobs))
-                if time.monotonic() > page_due:  # of thousands of jobs it takes a while
-                    begun = time.monotonic()
-                    write_page(sweep)
-                    page_due = time.monotonic() + 20 * (time.monotonic() - begun)
+                throttle(lambda: write_page(sweep))
 
             workers.run(jobs, on_end=on_end)
         page = write_page(sweep)

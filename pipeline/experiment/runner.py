@@ -17,6 +17,7 @@ from omninav.pipeline.jobs.executors import EngineSettings, read_engine
 from omninav.pipeline.jobs.job import Job, Outcome
 from omninav.pipeline.jobs.progress import JobProgress
 from omninav.pipeline.jobs.run import Workers
+from omninav.pipeline.jobs.throttle import Throttle
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.run.provenance import git_commit
 
@@ -118,6 +119,7 @@ class ExperimentRun:
         def done() -> int:
             return sum(len(run.results) for run in self.all_runs)
 
+        throttle = Throttle()
         with Progress(unit="repetitions") as progress:
 
             def on_message(job: Job, message: Any) -> None:
@@ -131,7 +133,7 @@ class ExperimentRun:
                 if outcome.error:
                     run.error = outcome.error
                     print(f"{run.name}: {outcome.error}", flush=True)
-                self.write_page()
+                throttle(self.write_page)
 
             progress.begin(self.experiment.name, done(), total)
             workers.run([job for job, _ in jobs.values()], on_message, on_end)

@@ -4,7 +4,6 @@ import json
 import queue
 import secrets
 import threading
-import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import CancelledError, Executor, Future
 from contextlib import suppress
@@ -19,6 +18,7 @@ from omninav.pipeline.graph.problems import BadInput
 from .executors import EngineSettings, cores, executor_of
 from .job import Job, Outcome
 from .perform import perform, release
+from .throttle import Throttle
 
 ATTEMPTS = 3
 """How often a job is started whose process dies."""
@@ -77,7 +77,7 @@ class Workers:
             self.start(executor_of(self.settings))
         outcomes: dict[str, Outcome] = {}
         ends: Ends = queue.SimpleQueue()
-        mailbox = _Mailbox(on_message)
+        mailbox, throttle = _Mailbox(on_message), Throttle(LOOK_S)
         for job in jobs:
             job.log.parent.mkdir(parents=True, exist_ok=True)
             job.messages.unlink(missing_ok=True)
@@ -86,7 +86,7 @@ class Workers:
         open_jobs = {job.name: job for job in jobs}
         while open_jobs:
             with suppress(queue.Empty):
-                job, attempt, future = ends.get(timeout=mailbox.pause)
+                job, attempt, future = ends.get(timeout=throttle.pause)
                 outcome = _outcome(future)
                 mailbox.read(job)
                 if outcome.died and attempt + 1 < ATTEMPTS:
@@ -97,7 +97,7 @@ class Workers:
                 mailbox.close(job)
                 outcomes[job.name] = outcome
                 on_end(job, outcome)
-            mailbox.look(open_jobs.values())
+            throttle(lambda: mailbox.read_all(open_jobs.values()))
         return outcomes
 
     def start(self, executor: Executor) -> None:
@@ -106,9 +106,7 @@ class Workers:
         self._executor = executor
         threading.Thread(target=self._renew, daemon=True).start()
 
-    def _submit(
-        self, job: Job, attempt: int, ends: "queue.SimpleQueue[tuple[Job, int, Future[dict[str, Any]]]]"
-    ) -> None:
+    def _submit(self, job: Job, attempt: int, ends: Ends) -> None:
         assert self._executor is not None
         try:
             future = self._executor.submit(perform, job.text(attempt, self._lease, self._token, self.settings.memory))
@@ -133,27 +131,16 @@ def _outcome(future: Future[dict[str, Any]]) -> Outcome:
 
 
 class _Mailbox:
-    """What jobs send, as it comes. Looking for it takes at most a twentieth of the time, however slow the disk is."""
+    """What jobs send, as it comes."""
 
     def __init__(self, on_message: Callable[[Job, Any], None]) -> None:
         self._on_message = on_message
         self._read: dict[str, int] = {}
-        self._due = 0.0
 
-    @property
-    def pause(self) -> float:
-        """Seconds until it looks again."""
-        return max(0.0, self._due - time.monotonic())
-
-    def look(self, jobs: Iterable[Job]) -> None:
-        """Read what jobs have sent, if it is time to."""
-        begun = time.monotonic()
-        if begun < self._due:
-            return
+    def read_all(self, jobs: Iterable[Job]) -> None:
+        """Read what jobs have sent since."""
         for job in list(jobs):
             self.read(job)
-        now = time.monotonic()
-        self._due = now + max(LOOK_S, 20 * (now - begun))
 
     def read(self, job: Job) -> None:
         """Read what a job has sent since."""
