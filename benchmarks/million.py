@@ -41,7 +41,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.reference_index import ReferenceIndex
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
-TRACKED, LOOKED_UP, SEARCHED = 60, 24, 300
+TRACKED, LOOKED_UP, SEARCHED = 60, 24, 800
 """Frames that are tracked, views that are looked up in the whole map, and frames given to find a lost robot."""
 
 

@@ -95,7 +95,7 @@ class InvertedFile:
         short = np.ascontiguousarray(self._short(vectors))
         left_out = np.square(vectors - self.index.mean).sum(axis=1) - np.square(short).sum(axis=1)
         options = self._faiss.SearchParametersIVF(nprobe=min(lists, len(self.index.centroids)))
-        each = min(max(number // PER_TURN, 16), len(self))
+        each = min(max(number // PER_TURN, min(number, 64)), len(self))
         distances, found = self._file.search(short, each, params=options)
         distances, found = (distances + left_out[:, None])[found >= 0], found[found >= 0]
         order = np.lexsort((found, distances))

@@ -109,6 +109,12 @@ def test_others_are_sampled_so_that_the_whole_map_is_represented(index: Referenc
     assert candidates.sampling_weight.sum() == pytest.approx(len(MAP))
 
 
+def test_the_background_is_the_same_at_each_image(index: ReferenceIndex) -> None:
+    one, other = (selected(index, MAP.features[place]) for place in (7, 1900))
+    sampled = [set(each.references) - set(chosen(each)) for each in (one, other)]  # type: ignore[arg-type]
+    assert len(sampled[0] & sampled[1]) > 0.85 * 256
+
+
 def test_a_known_place_is_looked_after_and_a_kidnapped_robot_is_found(index: ReferenceIndex) -> None:
     near = particles_at(100.0)
     around = chosen(near_belief(near))

@@ -35,6 +35,14 @@ def test_views_reach_as_far_however_many_ways_pictures_look_from_each_place(dire
     assert stage.step(ctx, along_a_wall(directions, segments)).length_scale.metres == pytest.approx(0.55, abs=0.1)
 
 
+def test_in_a_large_map_what_is_near_and_some_of_the_rest_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = "omninav.stages.mapping.appearance_length_scale"
+    monkeypatch.setattr(f"{module}.MAX_COMPARED", 70)
+    monkeypatch.setattr(f"{module}.NEAREST_COMPARED", 25)
+    map = along_a_wall(1, 1)
+    assert AppearanceLengthScale().step(Context("scale"), map).length_scale.metres == pytest.approx(0.55, abs=0.1)
+
+
 def test_pictures_that_look_other_ways_are_strangers_where_they_are_compared():
     assert (
         AppearanceLengthScale(max_heading_difference_deg=180.0)
