@@ -26,6 +26,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.reference_index import ReferenceIndex
 
 HEADINGS, BEST, BLOCK, QUERIES = 36, 100, 1 << 15, 24
+ASKED = (1000, 3000, 4000, 5000)
 RECORDED = {
     "house": ("log={}/photoreal-house/tour.mcap", "log={}/photoreal-house/drive.mcap"),
     "Sussex": ("log=sussex_training:{}/sussex-outdoor-route", "log=sussex_repeat:{}/sussex-outdoor-route"),
@@ -54,7 +55,7 @@ def on_recording(map: ReferenceGraph, drive: ReferenceGraph) -> list[float]:
     return [float(share) for share in np.mean(hits, axis=0)]
 
 
-def in_large_map(folder: Path, references: int) -> dict[str, float]:
+def in_large_map(folder: Path, references: int) -> dict[int, list[float]]:
     """Recall of the hundred best and of the best, in a map that is too large to be compared whole at every image."""
     map, index = read_artifact(folder / f"{references}.omap"), read_artifact(folder / f"{references}.index")
     assert isinstance(map, ReferenceGraph)
@@ -70,14 +71,14 @@ def in_large_map(folder: Path, references: int) -> dict[str, float]:
             turns = vectors_of(view)
             squares = np.square(turns).sum(axis=1) - 2 * (vectors @ turns.T)
             near[query, rows] = squares.min(axis=1) + np.square(vectors).sum(axis=1)
-    shares = []
+    shares: dict[int, list[list[float]]] = {number: [] for number in ASKED}
     for view, own, gap in zip(asked, alike, near, strict=True):
-        found = file.nearest(vectors_of(view), IndexedCandidates.global_references, IndexedCandidates.lists)
         best, closest = np.argsort(-own, kind="stable")[:BEST], np.argsort(gap, kind="stable")[:BEST]
-        reached = np.sort(own[found])[::-1][:BEST].mean() / own[best].mean()
-        shares.append([np.isin(best, found).mean(), best[0] in found, np.isin(closest, found).mean(), reached])
-    names = ("of the hundred best", "of the best", "of the hundred nearest vectors", "similarity of the hundred found")
-    return dict(zip(names, np.mean(shares, axis=0).tolist(), strict=True))
+        for number, rows in shares.items():
+            found = file.nearest(vectors_of(view), number, IndexedCandidates.lists)
+            reached = np.sort(own[found])[::-1][:BEST].mean() / own[best].mean()
+            rows.append([best[0] in found, np.isin(best, found).mean(), np.isin(closest, found).mean(), reached])
+    return {number: np.mean(rows, axis=0).tolist() for number, rows in shares.items()}
 
 
 def main() -> int:
@@ -89,8 +90,10 @@ def main() -> int:
     words = parser.parse_args()
     words.folder.mkdir(parents=True, exist_ok=True)
     if words.map:
-        for what, share in in_large_map(words.folder, words.map).items():
-            print(f"{what:40} {100 * share:6.1f} %")
+        print("| asked for | the best | hundred best | hundred nearest vectors | similarity of the hundred found |")
+        print("|---|---|---|---|---|")
+        for number, shares in in_large_map(words.folder, words.map).items():
+            print(f"| {number} | {' | '.join(f'{100 * share:.2f} %' for share in shares)} |")
     if words.recordings:
         drives = {"simulator": (RENDERED["tour"], RENDERED["drive"])}
         for name, logs in RECORDED.items():

@@ -26,11 +26,14 @@ class IndexedCandidates(NearBelief):
 
     For maps that are too large to be compared whole. Without a belief, and where it is spread so widely that more than
     `global_references` are near it, those come from the index alone. A belief in one place is looked after as in
-    `near_belief`, and the index adds a few, so that a kidnapped robot is found. The view is looked up at all headings;
+    `near_belief`, and the index adds a few, so that a kidnapped robot is found: the view is looked up at every other
+    heading, the others at the next image. Without such a belief it is looked up at all headings;
     the background is the same at each image, since it has not to find anything.
     Small maps are compared whole; without an index (port `index`) the rule is that of `near_belief`.
     """
 
+    background_references: Annotated[int, Bounds(ge=0)] = 128
+    """References compared of all others, the same at each image."""
     global_references: Annotated[int, Bounds(ge=1)] = 3000
     """References from the index where it is not known where the robot is."""
     recovery_references: Annotated[int, Bounds(ge=0)] = 16
@@ -64,7 +67,8 @@ class IndexedCandidates(NearBelief):
         known = 0 < len(around) <= self.global_references
         number, lists = self._effort(known)
         if number:
-            found = file.nearest(self._turned(features, map), number, lists)
+            turned = self._turned(features, map)
+            found = file.nearest(turned[ctx.tick.index % 2 :: 2] if known else turned, number, lists)
             around = distinct(np.concatenate([around, found])) if known else found
         return self.Out(candidates=with_even_background(around, len(map), self.background_references))
 

@@ -1,5 +1,6 @@
 """Recall of place recognition: whether the most similar references were taken where the robot is."""
 
+import itertools
 from collections.abc import Sequence
 from typing import Annotated, Any
 
@@ -7,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Value
+from omninav.stages.geometry.plane.point_cells import have_a_point_within, sort_into_cells
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
@@ -76,11 +78,12 @@ def recalls(
     positions: Array, ranked: Sequence[npt.NDArray[np.int64]], references: Array, distance_m: float
 ) -> dict[str, Any]:
     """Recall of ranked references for queries at positions (N, 2), by where references (R, 2) were taken (m)."""
+    cells = sort_into_cells(references, distance_m)
+    counts = have_a_point_within(cells, positions, float(np.nextafter(distance_m, np.inf)))
     hits = []
-    for position, best in zip(positions, ranked, strict=True):
-        near = np.hypot(*(references - position).T) <= distance_m
-        if near.any():
-            hits.append((near[best[:1]].any(), near[best[:5]].any()))
+    for position, best in zip(positions[counts], itertools.compress(ranked, counts), strict=True):
+        near = np.hypot(*(references[best[:5]] - position).T) <= distance_m
+        hits.append((near[:1].any(), near.any()))
     first, five = np.array(hits, np.float64).reshape(-1, 2).mean(axis=0) if hits else (None, None)
     return {
         "queries": len(hits),
