@@ -5,6 +5,8 @@ import re
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -397,3 +399,25 @@ def test_frames_of_jobs_add_up_and_silent_ones_count_as_the_mean_of_the_others()
     frames.end("training", well=False)
     frames.end("cached")
     assert (frames.done, frames.total, frames.ended) == (500, 500, 3)
+
+
+@contextmanager
+def dask_cluster() -> Iterator[tuple[str, ...]]:
+    distributed = pytest.importorskip("distributed", reason="pip install 'omninav[dask]'")
+    how = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "protocol": "tcp", "dashboard_address": ":0"}
+    with distributed.LocalCluster(**how) as cluster:
+        yield "engine=dask", f"engine.address={cluster.scheduler_address}"
+
+
+@pytest.mark.parametrize(
+    "engine",
+    [nullcontext(("engine.workers=1",)), nullcontext(("engine.workers=8",)), dask_cluster()],
+    ids=["one process", "eight processes", "dask"],
+)
+def test_results_are_the_same_bytes_wherever_they_were_computed(dice: Finished, engine, request):
+    runs = dice.place / request.node.callspec.id.replace(" ", "_")
+    with engine as words:
+        dice.go(*MINE, *words, f"runs={runs}", "cache=null")
+    here, there = dice.place / "runs/dice_paper", runs / "dice_paper"
+    assert (there / "verdicts.json").read_bytes() == (here / "verdicts.json").read_bytes()
+    assert results(there) == results(here)

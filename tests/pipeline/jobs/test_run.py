@@ -94,7 +94,7 @@ def test_jobs_run_on_a_cluster_of_dask_as_they_do_here(tmp_path: Path):
     jobs = [job(name, tmp_path, messages=3, mark=str(tmp_path / "mark")) for name in ("fail", "die_once", "count")]
     messages = []
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None
+        n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0"
     ) as cluster:
         settings = EngineSettings("dask", options={"address": cluster.scheduler_address})
         with Workers(settings, tmp_path) as workers:
