@@ -56,7 +56,7 @@ def milliseconds(calls: list[Callable[[], object]]) -> float:
 
 
 def resident() -> dict[str, float]:
-    """Resident megabytes: of this process's own, and pages of mapped files, which the system takes back at need."""
+    """Resident megabytes: the process's own, and those of mapped files, libraries above all."""
     fields = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
     return {name: int(fields[key].split()[0]) / 1e3 for name, key in (("own_mb", "RssAnon"), ("mapped_mb", "RssFile"))}
 
@@ -195,7 +195,7 @@ def table(rows: list[dict[str, Any]]) -> str:
         "the same over that of 1,000, in turns": "{tracking_ratio:.2f}",
         "references compared while tracking": "{compared}",
         "resident, own (MB)": "{end_own_mb:.0f}",
-        "resident, pages of the map's file (MB)": "{end_mapped_mb:.0f}",
+        "resident, mapped files (MB)": "{end_mapped_mb:.0f}",
         "uniform belief (s)": "{uniform_s:.1f}",
         "found after (frames)": "{found_after_frames}",
         "error at the end of tracking (m)": "{tracked_error_m:.2f}",
@@ -213,7 +213,7 @@ def draw(rows: list[dict[str, Any]], file: Path) -> None:
     import matplotlib
 
     matplotlib.use("svg")
-    matplotlib.rcParams["svg.hashsalt"] = "omninav"
+    matplotlib.rcParams |= {"svg.hashsalt": "omninav", "svg.fonttype": "none"}
     from matplotlib import pyplot
 
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
@@ -221,7 +221,7 @@ def draw(rows: list[dict[str, Any]], file: Path) -> None:
     for key, label in (("global_ms", "global step"), ("tracking_ms", "tracking step")):
         left.plot(sizes, [row[key] for row in rows], "o-", label=label)
     right.plot(sizes, [row["end_own_mb"] for row in rows], "o-", label="the process's own")
-    right.plot(sizes, [row["end_mapped_mb"] for row in rows], "o-", label="pages of the map's file")
+    right.plot(sizes, [row["end_mapped_mb"] for row in rows], "o-", label="mapped files, libraries above all")
     for axes, what in ((left, "ms, one thread"), (right, "resident MB")):
         axes.set(xscale="log", xlabel="references", ylabel=what, ylim=(0, None))
         axes.legend(frameon=False)
