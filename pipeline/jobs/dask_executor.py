@@ -4,9 +4,9 @@ import logging
 import re
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
+from contextlib import suppress
 from typing import Any, TypeVar
 
-import dask
 from distributed import Client
 
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
@@ -45,8 +45,10 @@ class DaskExecutor(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the connection, and what was started for it."""
-        self._executor.shutdown(wait and not cancel_futures)
-        self._client.close(timeout=5)
+        with suppress(Exception):  # its scheduler may be gone
+            self._executor.shutdown(wait and not cancel_futures)
+        with suppress(Exception):
+            self._client.close(timeout=5)
         if self._cluster is not None:
             self._cluster.close(timeout=10)
 
@@ -111,6 +113,7 @@ def _client(where: Any) -> Any:
 
 
 def _quiet() -> None:
-    """Keep Dask's own log to what nobody here says better."""
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    dask.config.set({"logging.distributed": "critical"})
+    """Keep to ourselves what Dask logs: a worker or a scheduler that is lost is said in one line here."""
+    for name in logging.root.manager.loggerDict:  # each of Dask's has a level of its own
+        if name.partition(".")[0] in ("asyncio", "distributed", "tornado"):
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
