@@ -26,7 +26,7 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.reference_index import ReferenceIndex
 
 HEADINGS, BEST, BLOCK, QUERIES = 36, 100, 1 << 15, 24
-ASKED = (1000, 3000, 4000, 5000)
+ASKED = (1000, 3000, 4800)
 RECORDED = {
     "house": ("log={}/photoreal-house/tour.mcap", "log={}/photoreal-house/drive.mcap"),
     "Sussex": ("log=sussex_training:{}/sussex-outdoor-route", "log=sussex_repeat:{}/sussex-outdoor-route"),

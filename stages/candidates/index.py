@@ -34,7 +34,7 @@ class IndexedCandidates(NearBelief):
 
     background_references: Annotated[int, Bounds(ge=0)] = 128
     """References compared of all others, the same at each image."""
-    global_references: Annotated[int, Bounds(ge=1)] = 3000
+    global_references: Annotated[int, Bounds(ge=1)] = 4800
     """References from the index where it is not known where the robot is."""
     recovery_references: Annotated[int, Bounds(ge=0)] = 16
     """References from the index where it is, in case it was kidnapped."""
