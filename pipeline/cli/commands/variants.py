@@ -17,7 +17,9 @@ INDENT = 27
 
 def command(arguments: list[str]) -> int:
     """Print what all variants, or those that are named, do and take; what several share is explained once."""
-    summaries = {file.name.removesuffix(".yaml"): _summary(file.read_text(encoding="utf-8")) for file in group_files("variant")}
+    summaries = {
+        file.name.removesuffix(".yaml"): _summary(file.read_text(encoding="utf-8")) for file in group_files("variant")
+    }
     for word in arguments:
         if word not in summaries:
             raise BadInput(f"variants: there is no variant {word}; {suggest(word, summaries, 'variants')}")
