@@ -20,7 +20,8 @@ from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_inpu
 from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import Plan, plan
-from omninav.pipeline.run.run_folder import start
+from omninav.pipeline.run.resume import resume
+from omninav.pipeline.run.run_folder import start, was_started
 
 from .composition import complete
 from .terminal import show, shown
@@ -148,9 +149,12 @@ def _run(
     if sweep is None and folder is not None:
         no_run_in(folder)
     argv = ["omninav", *(sweep.overrides.split() if sweep else sys.argv[1:])]
-    run = start(planned, argv, folder, _hydra_files(config))
     with Progress() as progress, compile_notice(progress.say):
-        metrics = execute(run, planned, progress)
+        if sweep is not None and folder is not None and was_started(folder, planned):
+            run, metrics = resume(folder, progress)  # the sweep was stopped and is typed again, or this job has died
+        else:
+            run = start(planned, argv, folder, _hydra_files(config))
+            metrics = execute(run, planned, progress)
     if sweep is None:
         show(results_table(metrics))
         for sentence in warning_lines(run.manifest):

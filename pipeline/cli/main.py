@@ -72,7 +72,13 @@ def _run(arguments: list[str]) -> int:
         command = importlib.import_module(f"omninav.pipeline.cli.commands.{name}").command
         return int(command(arguments))
     except KeyboardInterrupt:  # it may come before anything is imported, so it stands first
-        print("stopped; `omninav resume runs/latest` goes on", file=sys.stderr)
+        of_a_sweep = "-m" in arguments or "--multirun" in arguments
+        on = (
+            "the same command with hydra.sweep.dir=FOLDER of this sweep"
+            if of_a_sweep
+            else "`omninav resume runs/latest`"
+        )
+        print(f"stopped; {on} goes on", file=sys.stderr)
         return 130
     except (ProblemsFound, BadInput) as error:
         print(error, file=sys.stderr)

@@ -14,7 +14,7 @@ import yaml
 
 from omninav.pipeline.engine.code_version import LIBRARIES, version
 from omninav.pipeline.engine.codec import encode, seal
-from omninav.pipeline.files import Taken, digest_text, locked, write_json, write_whole
+from omninav.pipeline.files import Damaged, Taken, digest_text, locked, read_json, write_json, write_whole
 from omninav.pipeline.graph.problems import BadInput
 
 from .inputs import refuse_missing
@@ -134,6 +134,21 @@ def start(
         run.folder = _named(beginning, root, named)
         _point_latest(run.folder)
     return run
+
+
+def was_started(folder: Path, planned: Plan) -> bool:
+    """Whether a run of the same configuration, stages and inputs was started in a folder: then it can go on there."""
+    try:
+        manifest = read_json(folder / MANIFEST)
+    except (OSError, Damaged):
+        return False
+    now = {
+        "graph": planned.digest,
+        "config": digest_text(config_text(planned)),
+        "inputs": input_digests(planned),
+        "git_commit": git_commit(),
+    }
+    return all(manifest.get(key) == value for key, value in now.items())
 
 
 def _named(folder: Path, root: Path, name: str) -> Path:

@@ -34,7 +34,7 @@ class FramesTable(Stage):
     | `truth_x`, `_y`, `_heading` | the ground truth |
     | `position_error_m`, `heading_error_deg` | the estimate against the ground truth |
     | `motion_x`, `_y`, `_turn` | odometry's motion since the frame before, in the robot's frame |
-    | `odometry_x`, `_y`, `_heading` | odometry alone, from the first true pose on |
+    | `odometry_x`, `_y`, `_heading` | odometry alone, from the first true pose on, or through the last estimate |
     | `reference` | number of the map's reference, view or place that looked most like the image |
     | `similarity`, `visual_distance` | how much: 1 and 0 are equal; which of them, depends on the comparison |
     | `reference_turn` | how far the robot stood turned against it (rad, counter-clockwise) |

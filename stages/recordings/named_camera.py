@@ -46,7 +46,8 @@ def assumed_camera(name: str, pixels: Pixels) -> tuple[Camera, str]:
     if width != 2 * height:
         raise UnreadableRecording(
             f"{name}: nothing says how its images of {width} x {height} are to be read; type "
-            "camera=PATH/camera.yaml, camera=perspective (an ordinary camera) or camera=donut (a mirror)"
+            "camera=PATH/camera.yaml, or camera=perspective (an ordinary camera), donut (a mirror), fisheye, "
+            "dual_fisheye or equirectangular (from straight up to straight down)"
         )
     if _two_circles(pixels):
         raise UnreadableRecording(

@@ -48,7 +48,7 @@ class RecordLog(Stage):
         """Render the whole drive and write it."""
         path = Path(self.log or "")
         if path.suffix != ".mcap":
-            raise BadInput("simulate: name the log to write: log=out.mcap")
+            raise BadInput("simulate: name the log to write, an MCAP file: log=out.mcap")
         days = in_order(self.day)
         ctx.doing(f"building {self.world.name} and planning {self.route}")
         drives = [SimulatedRecording(self.world, self.route, day, self.kidnappings) for day in days]

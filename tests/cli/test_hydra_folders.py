@@ -89,6 +89,19 @@ def test_the_jobs_of_a_sweep_that_an_engine_runs_leave_the_same_and_name_what_fa
     assert metrics[0] == metrics[1]
 
 
+@pytest.mark.parametrize("engine", [(), ("engine.workers=1",)])
+def test_a_sweep_that_is_typed_again_does_only_what_is_missing(toy, tmp_path: Path, engine: tuple[str, ...]):
+    words = ("--config-dir=mine", "-m", "seed=0,1", "hydra.sweep.dir=out", *engine)
+    manifests = [tmp_path / "out" / number / "manifest.json" for number in "01"]
+    toy(*words, check=True)
+    first = [manifest.read_bytes() for manifest in manifests]
+    manifests[1].unlink()  # as if it had not begun
+    toy(*words, check=True)
+    assert manifests[0].read_bytes() == first[0]
+    assert json.loads(manifests[1].read_text())["status"] == "complete"
+    assert "2 jobs: 2 complete" in (tmp_path / "out" / "sweep.html").read_text()
+
+
 def test_another_sweep_does_not_take_the_folder_of_a_finished_one(toy, tmp_path: Path):
     where = ("--config-dir=mine", "-m", "hydra.sweep.dir=out")
     toy(*where, "seed=0", check=True)
