@@ -59,7 +59,7 @@ def thinned_references(map: ReferenceGraph, spacing_m: float) -> ReferenceGraph:
 def keepers(poses: Array, spacing_m: float, turn: float) -> Ints:
     """For each pose (R, 3) the first kept one within `spacing_m` and `turn` (rad) that stands for it: (R,) rows."""
     keeper = np.full(len(poses), -1)
-    tree: Any = KDTree(poses[:, :2])  # type: ignore[no-untyped-call]
+    tree: Any = KDTree(poses[:, :2])
     for row in range(len(poses)):
         if keeper[row] < 0:
             near = np.array(tree.query_ball_point(poses[row, :2], spacing_m), np.int64)

@@ -52,7 +52,7 @@ def compared_with(poses: Array, samples: npt.NDArray[np.int64]) -> npt.NDArray[n
         return None
     from scipy.spatial import KDTree  # slow to import, and seldom needed
 
-    tree: Any = KDTree(poses[:, :2])  # type: ignore[no-untyped-call]
+    tree: Any = KDTree(poses[:, :2])
     near = tree.query(poses[samples, :2], k=NEAREST_COMPARED)[1]
     even = np.linspace(0, len(poses) - 1, MAX_COMPARED - NEAREST_COMPARED).astype(np.int64)
     return np.concatenate([near, np.broadcast_to(even, (len(samples), len(even)))], axis=1)

@@ -95,7 +95,7 @@ def described(file: Path, map: AnyMap) -> Iterator[tuple[str, Any]]:
         yield "area", f"{x1 - x0:.1f} x {y1 - y0:.1f} m: x {x0:.1f} to {x1:.1f}, y {y0:.1f} to {y1:.1f}"
     if len(poses) > 1:
         some = poses[np.unique(np.linspace(0, len(poses) - 1, min(len(poses), SAMPLE)).astype(np.int64)), :2]
-        tree: Any = KDTree(poses[:, :2])  # type: ignore[no-untyped-call]
+        tree: Any = KDTree(poses[:, :2])
         gaps = tree.query(some, k=2)[0][:, 1]
         yield "spacing", f"{np.median(gaps):.3f} m to the nearest other (median), {gaps.max():.2f} m at most"
     facts = read_header(file)["facts"]

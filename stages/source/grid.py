@@ -164,7 +164,7 @@ def along_path(poses: Array, edges: npt.NDArray[np.int64], reach: float, resolut
     grid = OccupancyGrid(
         np.full((rows, columns), UNKNOWN, np.uint8), resolution, (float(origin[0]), float(origin[1])), "tour"
     )
-    tree: Any = KDTree(places)  # type: ignore[no-untyped-call]
+    tree: Any = KDTree(places)
     centres = grid.centres(*np.divmod(np.arange(rows * columns), columns))
     free: Mask = np.isfinite(tree.query(centres, distance_upper_bound=reach)[0]).reshape(rows, columns)
     grid.cells[cv2.dilate(free.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = OCCUPIED

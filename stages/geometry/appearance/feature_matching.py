@@ -172,6 +172,6 @@ def tree_matches(one: npt.ArrayLike, other: npt.ArrayLike, ratio: float) -> Pair
 def _two_nearest(stored: Array, asked: Array) -> tuple[Array, Ints]:
     from scipy.spatial import KDTree  # slow to import, and seldom needed
 
-    tree = KDTree(stored)  # type: ignore[no-untyped-call]
-    gap, nearest = tree.query(asked, k=2)  # type: ignore[no-untyped-call]
+    tree = KDTree(stored)
+    gap, nearest = tree.query(asked, k=2)
     return gap, nearest

@@ -34,7 +34,7 @@ class NearestCells:
             span = xy.max(axis=0) + radius - self.origin
             self.cell = max(cell, float(np.sqrt(span[0] * span[1] / MAX_CELLS)))
             self._columns, self._rows = (int(n) for n in np.floor(span / self.cell) + 1)
-        self._tree: Any = KDTree(xy)  # type: ignore[no-untyped-call]
+        self._tree: Any = KDTree(xy)
         self._numbers = np.zeros(self._columns * self._rows, np.int32)  # memory is taken where it is written
         self._lists, self._known = np.full((64, k), -1, np.int32), 1
 
