@@ -15,14 +15,15 @@ import numpy as np
 from variants import DataSet, data_sets
 
 import omninav
+from omninav import Context
 from omninav.stages.features.colour_histogram import colour_histograms
 from omninav.stages.features.grey_world import grey_world_pixels
 from omninav.stages.features.hsv_histogram import hsv_histograms
 from omninav.stages.geometry.appearance.segments import similarities
-from omninav.stages.perturbation.changed_light import changed_light
+from omninav.stages.perturbation.changed_light import ChangedLight
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.unwarp.table import PanoramaTable
-from omninav.stages.values.image import Image, Pixels
+from omninav.stages.values.image import Image, Panorama, Pixels
 
 LIGHTS: Mapping[str, Mapping[str, float]] = {
     "as is": {},
@@ -62,11 +63,9 @@ def views(log: str) -> tuple[list[Pixels], Any]:
     return shown, recording.truth[known]
 
 
-def in_light(
-    pixels: Pixels, gamma: float = 1.0, gain: float = 1.0, blue: float = 1.0, red: float = 1.0, side: float = 0.0
-) -> Pixels:
-    """What the stage ChangedLight shows."""
-    return changed_light(pixels, gamma, (gain * blue, gain, gain * red), side, np.pi / 2)
+def in_light(pixels: Pixels, light: Mapping[str, float]) -> Pixels:
+    """A panorama as the stage shows it."""
+    return ChangedLight(**light).step(Context("light", np.random.default_rng(0)), Panorama(pixels)).panorama.pixels
 
 
 def nearest(on: DataSet) -> None:
@@ -77,7 +76,7 @@ def nearest(on: DataSet) -> None:
         cells = []
         for light in LIGHTS.values():
             best = [
-                similarities(references, described(in_light(pixels, **light)), 36, True, True, 0.5, None, 1.0)
+                similarities(references, described(in_light(pixels, light)), 36, True, True, 0.5, None, 1.0)
                 for pixels in seen[::3]
             ]
             chosen = places[[int(each.max(axis=1).argmax()) for each in best]]

@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Tick
 from omninav.stages.geometry.appearance.segments import EXPONENTS, MAX_DISTANCES, similarities
+from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
 from omninav.stages.geometry.plane.pose_graph import optimised_poses
-from omninav.stages.geometry.plane.se2 import between, wrap
+from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.maps import ReferenceGraph
 
 from .appearance_length_scale import length_scale_of
@@ -24,7 +25,7 @@ ODOMETRY_SIGMAS = (0.02, 0.02, 0.02)
 """Standard deviation of odometry per metre (m, m, rad)."""
 TURN_SIGMA = 0.05
 """The same of a turn, per radian."""
-LEAST_SIGMAS = (0.005, 0.005, 0.0025)
+MIN_SIGMAS = (0.005, 0.005, 0.0025)
 """Of the shortest motion (m, m, rad): poses in a map are samples of a drive."""
 
 QUANTITIES = {
@@ -65,20 +66,11 @@ def closures_by_appearance(
         other = int(apart[best[apart].argmax()])
         if best[other] - background < min_excess * (1.0 - background):
             continue
-        turn = _peak(values[other])  # of the robot at `one`, seen from `other`
+        turn = angle_of_peak(values[other])  # of the robot at `one`, seen from `other`
         pair = (other, one) if other < one else (one, other)
         found.setdefault(pair, turn if other < one else -turn)
     pairs = np.array(sorted(found), np.int64).reshape(-1, 2)
     return Closures(pairs, np.array([found[one, other] for one, other in pairs.tolist()]))
-
-
-def _peak(values: Floats) -> float:
-    """The angle at which values over the circle are largest, between samples by a parabola (rad)."""
-    number, best = len(values), int(values.argmax())
-    before, here, after = (float(values[(best + step) % number]) for step in (-1, 0, 1))
-    bend = before - 2.0 * here + after
-    offset = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
-    return float(wrap(2.0 * math.pi * (best + offset) / number))
 
 
 class StraightenMap(Stage):
@@ -145,7 +137,7 @@ class StraightenMap(Stage):
         """The poses, and the weights of the closures."""
         number = len(poses)
         length = np.hypot(steps[:, 0], steps[:, 1])
-        drift = np.asarray(LEAST_SIGMAS) + np.asarray(ODOMETRY_SIGMAS) * length[:, None]
+        drift = np.asarray(MIN_SIGMAS) + np.asarray(ODOMETRY_SIGMAS) * length[:, None]
         drift[:, 2] += TURN_SIGMA * np.abs(steps[:, 2])
         loops = np.zeros((len(closures.pairs), 3))
         loops[:, 2] = closures.turns

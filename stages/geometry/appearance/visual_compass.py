@@ -19,8 +19,13 @@ def turn_between(before: Strip, after: Strip) -> float:
     columns = before.shape[1]
     spectra = [np.fft.rfft(view - view.mean(axis=1, keepdims=True)) for view in (before, after)]
     likeness = np.fft.irfft((np.conj(spectra[0]) * spectra[1]).sum(axis=0), columns)
-    best = int(np.argmax(likeness))
-    left, middle, right = (float(likeness[(best + offset) % columns]) for offset in (-1, 0, 1))
+    return angle_of_peak(likeness)
+
+
+def angle_of_peak(values: npt.NDArray[np.floating]) -> float:
+    """The angle (rad) at which values around the full circle are largest, between samples by a parabola."""
+    number, best = len(values), int(np.argmax(values))
+    left, middle, right = (float(values[(best + offset) % number]) for offset in (-1, 0, 1))
     bend = left - 2.0 * middle + right
     shift = best + (0.5 * (left - right) / bend if bend < 0.0 else 0.0)
-    return math.remainder(2.0 * math.pi * shift / columns, 2.0 * math.pi)
+    return math.remainder(2.0 * math.pi * shift / number, 2.0 * math.pi)
