@@ -21,10 +21,12 @@ def omninav(*words: str, python: str = sys.executable) -> list[str]:
     return [python, "-m", "omninav", *words]
 
 
-def wait_for(path: Path, seconds: float = 600.0) -> None:
-    """Until a file is there."""
+def wait_for(path: Path, writer: subprocess.Popen[bytes], seconds: float = 600.0) -> None:
+    """Until a process has written a file."""
     until = time.monotonic() + seconds
     while not path.exists():
+        if writer.poll() is not None:
+            raise SystemExit(f"{writer.args} ended before it wrote {path}; a robot's messages are in robot.log")
         if time.monotonic() > until:
             raise SystemExit(f"{path} did not appear in {seconds:.0f} s")
         time.sleep(0.2)
@@ -55,11 +57,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = ("simulate", f"live={given.robot}", "world=office", "day=2", f"camera={camera}", stops)
     robot = subprocess.Popen(omninav(*words, python=given.robot_python), stderr=(folder / "robot.log").open("w"))
     try:
-        wait_for(camera)
+        wait_for(camera, robot)
         common = ("variant=topological_nav", "goal=kitchen", f"map={given.map}", "video=none")
         ends = ("nodes.source.rest_s=2", f"nodes.source.seconds={given.seconds}")
         node = subprocess.Popen(omninav("live", *common, *ends, f"camera={camera}", f"hydra.run.dir={run}"))
-        wait_for(run / "live.mcap.unfinished")
+        wait_for(run / "live.mcap.unfinished", node)
         time.sleep(given.kill_after)
         node.send_signal(signal.SIGKILL)
         node.wait()
