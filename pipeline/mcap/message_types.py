@@ -1,10 +1,11 @@
 """ROS 2 message types: those that come with ROS, those that a file defines, and messages made from mappings."""
 
-from collections.abc import Collection, Mapping
-from functools import cache, lru_cache
+from collections.abc import Callable, Collection, Mapping
+from functools import cache, lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from omninav.pipeline.graph.problems import nearest
 
@@ -13,6 +14,7 @@ from .message import LogError
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
+_BYTES = {"octet": "uint8", "byte": "uint8", "char": "uint8"}
 _DEFINITION_ENCODINGS = ("ros2msg", "ros2idl")
 MAX_DEFINITION = 100_000
 """Bytes of a message's definition with all that it is made of; those of ROS have some 5000."""
@@ -61,49 +63,57 @@ def make_message(msgtype: str, fields: Mapping[str, Any], stamp: int | None = No
 
     Raises `LogError` for an unknown type or field, with the nearest name.
     """
-    store = standard_types()
-    if msgtype not in store.fielddefs:
-        raise LogError(f"{msgtype}: no such message type{_nearest(msgtype, store.fielddefs)}")
-    definitions = dict(store.fielddefs[msgtype][1])
-    for name in fields:
-        if name not in definitions:
-            raise LogError(f"{msgtype}: no field '{name}'{_nearest(name, definitions)}")
-    kinds = _kinds()
-    values = {name: _make_field(definition, fields.get(name), kinds) for name, definition in definitions.items()}
-    if stamp is not None and "header" in definitions:
-        seconds, nanoseconds = divmod(stamp, 1_000_000_000)
-        values["header"].stamp.sec, values["header"].stamp.nanosec = (
-            seconds,
-            nanoseconds,
-        )
-    return store.types[msgtype](**values)
+    message = _maker(msgtype)(fields)
+    if stamp is not None and hasattr(message, "header"):
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+    return message
 
 
 @cache
-def _kinds() -> Any:
+def _maker(msgtype: str) -> Callable[[Mapping[str, Any]], Any]:
+    """What makes messages of a type: its definition is gone through once, and not for every message."""
+    store = standard_types()
+    if msgtype not in store.fielddefs:
+        raise LogError(f"{msgtype}: no such message type{_nearest(msgtype, store.fielddefs)}")
+    makers = {name: _field_maker(definition) for name, definition in store.fielddefs[msgtype][1]}
+    of_type = store.types[msgtype]
+
+    def make(fields: Mapping[str, Any]) -> Any:
+        for name in fields:
+            if name not in makers:
+                raise LogError(f"{msgtype}: no field '{name}'{_nearest(name, makers)}")
+        return of_type(**{name: maker(fields.get(name)) for name, maker in makers.items()})
+
+    return make
+
+
+def _field_maker(definition: Any) -> Callable[[Any], Any]:
     from rosbags.interfaces import Nodetype
 
-    return Nodetype
-
-
-def _make_field(definition: Any, value: Any, kinds: Any) -> Any:
     kind, detail = definition
-    if kind == kinds.NAME:
-        return make_message(detail, value or {}) if value is None or isinstance(value, Mapping) else value
-    if kind == kinds.BASE:
-        name = detail[0]
-        empty: Any = "" if name in ("string", "wstring") else False if name == "bool" else 0
-        return empty if value is None else value
+    if kind == Nodetype.NAME:
+        make = _maker(detail)
+        return lambda value: make(value or {}) if value is None or isinstance(value, Mapping) else value
+    if kind == Nodetype.BASE:
+        empty: Any = "" if detail[0] in ("string", "wstring") else False if detail[0] == "bool" else 0
+        return lambda value: empty if value is None else value
     inner, count = detail
-    if inner[0] == kinds.BASE and inner[1][0] not in ("string", "wstring"):
-        dtype = np.dtype({"octet": "uint8", "byte": "uint8", "char": "uint8"}.get(inner[1][0], inner[1][0]))
-        if value is None:
-            return np.zeros(count if kind == kinds.ARRAY else 0, dtype)
-        return np.frombuffer(value, dtype) if isinstance(value, (bytes, memoryview)) else np.asarray(value, dtype)
-    if value and inner[0] == kinds.NAME and not isinstance(value[0], Mapping):  # message objects already
+    length = count if kind == Nodetype.ARRAY else 0
+    if inner[0] == Nodetype.BASE and inner[1][0] not in ("string", "wstring"):
+        return partial(_numbers, np.dtype(_BYTES.get(inner[1][0], inner[1][0])), length)
+    return partial(_items, _field_maker(inner), inner[0] == Nodetype.NAME, length)
+
+
+def _numbers(dtype: np.dtype[Any], length: int, value: Any) -> npt.NDArray[Any]:
+    if value is None:
+        return np.zeros(length, dtype)
+    return np.frombuffer(value, dtype) if isinstance(value, (bytes, memoryview)) else np.asarray(value, dtype)
+
+
+def _items(make: Callable[[Any], Any], messages: bool, length: int, value: Any) -> Any:
+    if value and messages and not isinstance(value[0], Mapping):  # message objects already
         return value
-    length = count if kind == kinds.ARRAY else 0
-    return [_make_field(inner, item, kinds) for item in (value if value is not None else [None] * length)]
+    return [make(item) for item in (value if value is not None else [None] * length)]
 
 
 def _nearest(name: str, names: Collection[str]) -> str:

@@ -45,7 +45,7 @@ PATH_TICKS = 16
 """Ticks between two messages of the path so far; a power of two, as between views."""
 VIEWS = frozenset(("/panorama/compressed", "/belief", "/belief/markers", "/similarity", "/homing", "/estimate/path"))
 """Topics that are only looked at, and fill a log. The others are small."""
-SHOWN_REFERENCES = 300
+SHOWN_REFERENCES = 50
 """Most references whose similarity is shown, the most similar ones."""
 
 
@@ -92,7 +92,7 @@ class ResultMessages(Stage):
     Stamps are the tick's: the images' header stamps. Of `VisualDistances` d the similarity is 1 / (1 + d).
     """
 
-    particles: Annotated[int, Bounds(ge=1)] = 200
+    particles: Annotated[int, Bounds(ge=1)] = 100
     """Largest number of poses in a message of the belief."""
     max_views: Annotated[int, Bounds(ge=1)] = 2000
     """Ticks whose panorama, belief, similarities, homing vector and path so far are kept in a log: of a run of more
