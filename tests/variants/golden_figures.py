@@ -28,6 +28,8 @@ RUNS: dict[str, tuple[str, ...]] = {
     "homing": (*SMALL_CAMERA, *NO_VIDEO, "nodes.source.seconds=4"),
     "homing_field": ("world=home_store_demo", *SMALL_CAMERA, "nodes.field.rings=2"),
     "matched_pairs": (MAPPED, "nodes.matches.pairs=4"),
+    "omninav": (TOUR, DRIVE),
+    "omninav_map": (MAPPED,),
     "omniview_cml": (BOTH, "nodes.novelty_threshold.views=30"),
     "omniview_cml_map": (MAPPED, "nodes.novelty_threshold.views=30"),
     "omniview_mcl": (TOUR, DRIVE),
