@@ -57,7 +57,7 @@ def _run(arguments: list[str]) -> int:
     elif _is_tool(arguments):
         name = "tool"
     elif arguments and arguments[0].isidentifier():
-        return _unknown_command(arguments[0])
+        return _unknown_command(*arguments[:2])
     else:
         name = "run"
     try:
@@ -112,15 +112,22 @@ def _is_tool(arguments: Sequence[str]) -> bool:
     return named and files("omninav.conf").joinpath(f"variant/{'_'.join(words)}.yaml").is_file()
 
 
-def _unknown_command(name: str) -> int:
-    from omninav.pipeline.graph.problems import suggest
+def _unknown_command(name: str, second: str = "") -> int:
+    from omninav.pipeline.graph.problems import nearest, suggest
 
     variants = {file.name.removesuffix(".yaml") for file in files("omninav.conf").joinpath("variant").iterdir()}
-    longer = sorted(f"omninav {name} {one.removeprefix(f'{name}_')}" for one in variants if one.startswith(f"{name}_"))
-    hint = suggest(name, COMMANDS, "commands", prefix="omninav ")
+    longer = sorted(one.removeprefix(f"{name}_") for one in variants if one.startswith(f"{name}_"))
     if name in variants:
         hint = f"type omninav variant={name}"
     elif longer:
-        hint = f"there are: {', '.join(longer)}"
+        tools = ", ".join(f"omninav {name} {one}" for one in longer)
+        name, near = f"{name} {second}".strip(), nearest(second, longer)
+        hint = (
+            f"there are: {tools}"
+            if near is None
+            else f"did you mean 'omninav {name.split()[0]} {near}'? there are: {tools}"
+        )
+    else:
+        hint = suggest(name, COMMANDS, "commands", prefix="omninav ")
     print(f"'{name}' is no command. {hint}", file=sys.stderr)
     return 2

@@ -20,6 +20,8 @@ class Equirectangular(Strip, projection="equirectangular"):
 
     @classmethod
     def of_size(cls, width: int, height: int) -> Self:
-        """The whole sphere with forward in the middle, as 360-degree cameras export it."""
-        half = math.pi / 2
-        return cls(width, height, width / 2, elevation_top=half, elevation_bottom=-half)
+        """Forward in the middle: the whole sphere, as 360-degree cameras export it, where the image is twice as wide as
+        high; else a part of it around the horizon, of square pixels.
+        """
+        half = math.pi / 2 if width == 2 * height else None
+        return cls(width, height, width / 2, elevation_top=half, elevation_bottom=half and -half)

@@ -110,7 +110,7 @@ class LiveSource(Source):
         ctx.fact("odometry", "guessed" if self._guess else "measured")
         self._transport, assumed = self._connect()
         if assumed:
-            ctx.fact("assumed", assumed)
+            ctx.warn(f"assumed: {assumed}")
         self._path = None if ctx.folder is None else ctx.folder / RECORD
         self._before = None if self._path is None else _recorded(self._path)
         self._intake: Intake | None = None

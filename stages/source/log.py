@@ -125,9 +125,8 @@ class LogSource(Source):
             for kind, number in sorted(lost.items()):
                 ctx.count(kind, number, recording.details.get(kind, ""))
         ctx.fact("odometry", ", ".join(dict.fromkeys(part.kind for part in self._parts)))
-        assumed = [sentence for recording in self._opened for sentence in recording.assumed]
-        if assumed:
-            ctx.fact("assumed", "; ".join(assumed))
+        for sentence in (sentence for recording in self._opened for sentence in recording.assumed):
+            ctx.warn(f"assumed: {sentence}")
         for part in self._parts:
             recording, truth = part.recording, part.truth
             if part.kind == "synthetic":

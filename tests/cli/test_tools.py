@@ -31,7 +31,7 @@ def test_a_variant_that_runs_over_a_log_is_no_such_command(capsys: pytest.Captur
     assert main(["homing"]) == 2
     said = capsys.readouterr().err
     assert "type omninav variant=omniview_mcl_map" in said
-    assert "'camera' is no command. there are: omninav camera calibrate, omninav camera look" in said
+    assert "'camera lok' is no command. did you mean 'omninav camera look'? there are: omninav camera calibrate" in said
     assert "'homing' is no command. type omninav variant=homing" in said
 
 
