@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 from hydra import compose
 from hydra.core.config_store import ConfigStore
-from hydra.errors import HydraException
+from hydra.errors import HydraException, MissingConfigException
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -23,7 +23,7 @@ from omninav.pipeline.graph.stage import Bounds
 from omninav.pipeline.run.artifact_specification import ArtifactSpecification, read_specifications, without_absent
 from omninav.pipeline.run.inputs import not_taken, read_inputs
 
-from .config_groups import settings_left_open
+from .config_groups import group_files, settings_left_open
 from .hydra_session import hydra_started
 from .overrides import invalid_overrides, with_unlisted_parameters
 from .words import read_flags
@@ -143,7 +143,14 @@ def _is_repeatable(node: Any) -> bool:
 
 
 def _graph_of(config: Any, name: str, spec: ArtifactSpecification, variants: Variants) -> dict[str, Any]:
-    other = variants(str(spec.variant))
+    try:
+        other = variants(str(spec.variant))
+    except MissingConfigException:
+        hint = suggest(
+            str(spec.variant), [file.name.removesuffix(".yaml") for file in group_files("variant")], "variants"
+        )
+        what = f"there is no variant '{spec.variant}' to make it with"
+        raise ProblemsFound([Problem(f"artifacts.{name}.variant", what, hint)]) from None
     OmegaConf.set_struct(other, False)
     for key in config:
         if str(key) not in OF_THE_VARIANT:

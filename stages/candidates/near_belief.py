@@ -51,10 +51,15 @@ class NearBelief(Stage):
         self, ctx: Context, map: ReferenceGraph, near: Particles | None = None, length_scale: LengthScale | None = None
     ) -> Out:
         """Select the references for one view."""
+        return self.Out(candidates=self._near(ctx, map, near, length_scale))
+
+    def _near(
+        self, ctx: Context, map: ReferenceGraph, near: Particles | None, length_scale: LengthScale | None
+    ) -> Candidates:
         if near is None or self.radius <= 0.0 or len(map) <= self.compare_all_up_to:
-            return self.Out(candidates=Candidates())
+            return Candidates()
         chosen = self._around(map, near, length_scale)
-        return self.Out(candidates=with_background(chosen, len(map), self.background_references, ctx.tick.index))
+        return with_background(chosen, len(map), self.background_references, ctx.tick.index)
 
     def _around(self, map: ReferenceGraph, near: Particles, length_scale: LengthScale | None) -> Ints:
         """The references near the belief: ascending indices."""

@@ -1,0 +1,53 @@
+"""Learns the visual words of a map's references."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.appearance.visual_words import learned_words, root_descriptors
+from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.maps import ReferenceEvent
+from omninav.stages.values.visual_words import VisualWords, words_of
+
+
+class LearnVisualWords(Stage):
+    """Learns a vocabulary from the local features of a map's own references, and finds the words of each.
+
+    Words are centres of descriptors by k-means (Sivic & Zisserman 2003), from a sample at even steps along the tour:
+    the same tour gives the same words. There are fewer where the references have fewer different descriptors, and none
+    where they have no features.
+    """
+
+    words: Annotated[int, Bounds(ge=1)] = 2048
+    """Size of the vocabulary."""
+    descriptors_per_word: Annotated[int, Bounds(ge=1)] = 16
+    """Descriptors that the vocabulary is learned from, for each word."""
+
+    class Out(Outputs):
+        """The vocabulary, and the words of each reference in the map's order."""
+
+        words: VisualWords
+
+    def step(
+        self, ctx: Context, features: Sequence[LocalFeatures | None], events: Sequence[ReferenceEvent | None]
+    ) -> Out:
+        """The whole tour at once; `events`: which of its images became references."""
+        views = [
+            np.empty((0, 128), np.uint8) if found is None else found.descriptors
+            for found, event in zip(features, events, strict=True)
+            if event is not None
+        ]
+        ctx.doing("learning visual words")
+        made = vocabulary_and_words(views, self.words, self.descriptors_per_word)
+        ctx.fact("visual_words", len(made.centres))
+        return self.Out(words=made)
+
+
+def vocabulary_and_words(views: Sequence[npt.NDArray[np.uint8]], words: int, descriptors_per_word: int) -> VisualWords:
+    """A vocabulary of so many words, learned from the views' own descriptors (N, D), and the words of each view."""
+    together = np.concatenate([np.empty((0, 128), np.uint8), *(view for view in views if len(view))])
+    rows = np.linspace(0, max(len(together) - 1, 0), min(len(together), words * descriptors_per_word)).astype(np.int64)
+    return words_of(views, learned_words(root_descriptors(together[rows]), words))

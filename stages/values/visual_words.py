@@ -1,0 +1,67 @@
+"""The visual words of a map's views."""
+
+from collections.abc import Sequence
+from typing import Annotated, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csr_matrix
+
+from omninav.pipeline import Bounds, Value
+from omninav.pipeline.graph.contents import RowsOf, Shape, Starts
+from omninav.stages.geometry.appearance import visual_words
+
+Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
+
+
+class VisualWords(Value):
+    """A vocabulary of local features, and which of its words each view of a map holds.
+
+    `centres` (K, D): descriptors, as `root_descriptors` makes them, that stand for one word each. `rarity` (K,): what a
+    word weighs. Of view v the words are rows `starts[v]` to `starts[v + 1]` of `words` (W,), ascending, and their
+    weights (W,), which have length 1 together.
+    """
+
+    costly: ClassVar[bool] = True
+
+    centres: Annotated[Floats, Shape("K", "D")]
+    rarity: Annotated[Floats, Shape("K"), Bounds(ge=0)]
+    starts: Annotated[Ints, Shape("V+1"), Starts("W")]
+    words: Annotated[npt.NDArray[np.int32], Shape("W"), RowsOf("K")]
+    weights: Annotated[Floats, Shape("W"), Bounds(ge=0, le=1.001)]
+
+    def __len__(self) -> int:
+        return len(self.starts) - 1
+
+    def similarities(self, descriptors: npt.NDArray[np.uint8]) -> Floats:
+        """The cosine (V,) in [0, 1] of the angle between a view's words and those of each view of the map.
+
+        `descriptors` (N, D): of the view's local features. 0 for all where it has none.
+        """
+        view = np.zeros(len(self.centres), np.float32)
+        words, counts = visual_words.word_counts(visual_words.root_descriptors(descriptors), self.centres)
+        view[words] = visual_words.weighted(words, counts, self.rarity)
+        rows = csr_matrix((self.weights, self.words, self.starts), shape=(len(self), len(self.centres)))
+        return np.clip(np.asarray(rows @ view, np.float32), 0.0, 1.0)
+
+
+def words_of(views: Sequence[npt.NDArray[np.uint8]], centres: Floats) -> VisualWords:
+    """The words of a map's views, each given by its descriptors (N, D), with a vocabulary that was learned."""
+    found = [visual_words.word_counts(visual_words.root_descriptors(each), centres) for each in views]
+    words = np.concatenate([np.empty(0, np.int64), *(each for each, _ in found)])
+    rarity = visual_words.rarity(np.bincount(words, minlength=len(centres)), len(views))
+    weights = [visual_words.weighted(*each, rarity) for each in found]
+    return VisualWords(
+        centres,
+        rarity,
+        np.cumsum([0, *(len(each) for each in weights)], dtype=np.int64),
+        words.astype(np.int32),
+        np.concatenate([np.empty(0, np.float32), *weights]),
+    )
+
+
+class WordSimilarities(Value):
+    """Similarity of the present view to each view of a map by their visual words: `values` (V,) float32 in [0, 1]."""
+
+    values: Annotated[Floats, Shape("V"), Bounds(ge=0, le=1)]

@@ -1,0 +1,62 @@
+import numpy as np
+import pytest
+from made_words import NOTHING, seen_along
+
+from omninav.pipeline import Context
+from omninav.stages.mapping.learned_words import LearnVisualWords
+from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.maps import ReferenceEvent
+from omninav.stages.values.visual_words import VisualWords
+
+
+def learned(views: list[LocalFeatures | None], taken: list[bool] | None = None, **parameters: int) -> VisualWords:
+    taken = taken or [True] * len(views)
+    events = [ReferenceEvent(n, "far") if each else None for n, each in enumerate(taken)]
+    return LearnVisualWords(**parameters).step(Context("words"), views, events).words
+
+
+def test_a_view_is_most_similar_to_the_references_around_it_whatever_its_heading() -> None:
+    views = seen_along(60)
+    words = learned(views[::2], words=300)
+    for n in range(1, 59, 2):
+        turned = views[n].chosen(np.roll(np.arange(len(views[n])), 13))
+        assert abs(words.similarities(turned.descriptors).argmax() - n / 2) <= 2
+
+
+def test_a_reference_is_itself() -> None:
+    views = seen_along(20)
+    words = learned(views, words=300)
+    assert words.similarities(views[7].descriptors)[7] == pytest.approx(1.0, abs=1e-5)
+
+
+def test_only_images_that_became_references_have_words() -> None:
+    views = seen_along(12)
+    some = learned(views, [n % 3 == 0 for n in range(12)], words=100)
+    assert len(some) == 4
+    assert int(np.argmax(some.similarities(views[9].descriptors))) == 3
+
+
+def test_the_same_tour_gives_the_same_words() -> None:
+    one, other = learned(seen_along(10), words=64), learned(seen_along(10), words=64)
+    for name in ("centres", "rarity", "starts", "words", "weights"):
+        assert getattr(one, name).tobytes() == getattr(other, name).tobytes()
+
+
+def test_a_map_of_black_images_has_no_words_and_resembles_nothing() -> None:
+    words = learned([NOTHING, None, NOTHING])
+    assert words.centres.shape == (0, 128)
+    assert words.similarities(seen_along(1)[0].descriptors).tolist() == [0.0, 0.0, 0.0]
+
+
+def test_a_black_image_among_others_has_no_words() -> None:
+    views = [*seen_along(5), NOTHING]
+    words = learned(views, words=1000)  # more than there are descriptors
+    assert len(words.centres) <= 200
+    assert words.similarities(views[0].descriptors)[5] == 0.0
+    assert not words.similarities(NOTHING.descriptors).any()
+
+
+def test_a_map_of_one_image_knows_it() -> None:
+    view = seen_along(1)[0]
+    assert learned([view]).similarities(view.descriptors) == pytest.approx([1.0], abs=1e-5)
+    assert len(learned([])) == 0
