@@ -24,7 +24,10 @@ def write_sweep_page(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     """
     runs = [row["metrics"] for row in rows]
     measured = [{} if metrics is None else numbers(metrics) for metrics in runs]
-    paths = [p for p in headlines([each for each in runs if each is not None]) if any(p in run for run in measured)]
+    every = [p for p in headlines([each for each in runs if each is not None]) if any(p in run for run in measured)]
+    ended = [run for run in measured if run]
+    alike = [p for p in every if len(ended) > 1 and len({run[p].text if p in run else "" for run in ended}) == 1]
+    paths = [path for path in every if path not in alike]
     best = {path: best_of(path, measured) for path in paths}
     lines = []
     for number, (row, run) in enumerate(zip(rows, measured, strict=True)):
@@ -55,6 +58,7 @@ def write_sweep_page(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
         title=folder.resolve().name,
         counts=f"{len(lines)} jobs: " + ", ".join(f"{number} {status}" for status, number in sorted(counts.items())),
         columns=[head_of(path, measured) for path in paths],
+        alike=[f"{head_of(path, measured)} {ended[0][path].text}" for path in alike],
         rows=lines,
         means=means if any(condition["jobs"] > 1 for condition in means) else [],
     )

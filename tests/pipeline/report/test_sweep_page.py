@@ -28,6 +28,16 @@ def test_a_failed_job_stands_in_the_sweeps_page_with_its_error_and_log(tmp_path)
     assert "http" not in page
 
 
+def test_what_is_the_same_in_all_jobs_is_said_once(tmp_path):
+    rows = [
+        {"job": str(n), "folder": tmp_path / str(n), "manifest": {"status": "complete"}, "metrics": metrics}
+        for n, metrics in enumerate((measured(loss_rate=0.5), measured()))
+    ]
+    page = write_sweep_page(tmp_path, rows).read_text()
+    assert "all jobs: Position error, median, after convergence (m) 0.050, Converged after (frames) 12<" in page
+    assert set(re.findall("<th>([^<]*)</th>", page)) == {"job", "jobs", "Loss rate (%)"}
+
+
 def test_a_sweeps_best_job_is_marked(tmp_path):
     rows = [
         {"job": str(n), "folder": tmp_path / str(n), "manifest": {"status": "complete"}, "metrics": metrics}
