@@ -1,4 +1,4 @@
-"""The table of finished experiments: written from their verdict files, which are judged again by today's rule."""
+"""Tables of finished experiments, and of what papers claim: from verdict files, judged again by today's rule."""
 
 import json
 import re
@@ -10,6 +10,9 @@ from omninav.pipeline.files import write_whole
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.run.provenance import git_commit
 
+from .claims import BEGIN as CLAIMS_BEGIN
+from .claims import CLAIMS, claim_tables
+from .claims import END as CLAIMS_END
 from .page import made_with
 from .verdicts import Verdict, headline, in_words, judged_again, verdict_of
 
@@ -19,22 +22,35 @@ VERDICT_WORDS = "holds|does not hold|undecided"
 RULE = "a claim of fewer than six repetitions is undecided"
 
 
-def write_index(folder: Path) -> list[str]:
-    """Judge the pages of a folder again, and write the table of them into its README.md, between the two marks.
+def write_index(folder: Path) -> tuple[list[str], list[Path]]:
+    """Judge the pages of a folder again; write the table of them into its README.md, and that of its `claims.yaml`.
 
     Of each `NAME.verdicts.json` and `NAME.md`: where today's rule judges a claim otherwise, both files are changed, and
-    the page says at which commit. Returns the names of those. Raises BadInput where a file is not as a page is written.
+    the page says at which commit. Returns the names of those, and the pages with tables. Each table goes between two
+    marks of its page. Raises BadInput where a file is not as a page is written, ProblemsFound for a list of claims that
+    names what is not there.
     """
-    readme = folder / "README.md"
-    text = _read(readme)
-    before, found, rest = text.partition(BEGIN)
-    _, ended, after = rest.partition(END)
-    if not found or not ended:
-        raise BadInput(f"{readme}: needs a line {BEGIN} and below it a line {END}: the table goes between them")
     here = made_with(version("omninav"), git_commit(), "Judged again with")  # before a file of the checkout changes
+    readme = folder / "README.md"
+    _between(readme, BEGIN, END, "")
     changed = [path.name.partition(".")[0] for path in verdict_files(folder) if _judge_again(path, here)]
-    write_whole(readme, f"{before}{BEGIN}\n{index_table(folder)}{END}{after}")
-    return changed
+    written = {readme: _between(readme, BEGIN, END, index_table(folder))}
+    if (folder / CLAIMS).exists():
+        found = {page_of(path).stem: read_verdicts(path) for path in verdict_files(folder)}
+        page, tables = claim_tables(folder / CLAIMS, found)
+        written[page] = _between(page, CLAIMS_BEGIN, CLAIMS_END, f"\n{tables}\n")
+    for page, text in written.items():
+        write_whole(page, text)
+    return changed, list(written)
+
+
+def _between(page: Path, begin: str, end: str, content: str) -> str:
+    """A page's text with other content between two marks."""
+    before, found, rest = _read(page).partition(begin)
+    _, ended, after = rest.partition(end)
+    if not found or not ended:
+        raise BadInput(f"{page}: needs a line {begin} and below it a line {end}: the table goes between them")
+    return f"{before}{begin}\n{content}{end}{after}"
 
 
 def verdict_files(folder: Path) -> list[Path]:

@@ -1,4 +1,4 @@
-"""`omninav experiments`: the table of finished experiments, written from their verdict files."""
+"""`omninav experiments`: tables of finished experiments and of papers' claims, written from verdict files."""
 
 from pathlib import Path
 
@@ -7,11 +7,12 @@ from omninav.pipeline.graph.problems import BadInput
 
 
 def command(arguments: list[str]) -> int:
-    """Judge the pages in a folder by today's rule, and write the table of them into its README.md."""
+    """Judge the pages in a folder by today's rule, and write their table and that of the papers' claims."""
     if len(arguments) != 1:
         raise BadInput("experiments: name the folder with the pages: omninav experiments docs/experiments")
-    folder = Path(arguments[0])
-    for name in write_index(folder):
+    changed, pages = write_index(Path(arguments[0]))
+    for name in changed:
         print(f"{name}: judged again")
-    print(f"table: {folder / 'README.md'}")
+    for page in pages:
+        print(f"table: {page}")
     return 0

@@ -55,11 +55,13 @@ def test_fewer_than_six_repetitions_decide_nothing_afterwards_either(
     assert [case.ours for case in again.cases] == [1.0] * len(cases)
 
 
-def test_the_committed_table_is_what_the_command_writes(tmp_path: Path) -> None:
+def test_the_committed_tables_are_what_the_command_writes(tmp_path: Path) -> None:
     folder = Path(shutil.copytree(PAGES, tmp_path / "pages", ignore=shutil.ignore_patterns("*.png")))
-    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    papers = Path(shutil.copy(PAGES.parent / "papers.md", tmp_path))
+    before = {path: path.read_text() for path in [papers, *folder.iterdir()]}
     assert main(["experiments", str(folder)]) == 0
-    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    after = {path: path.read_text().replace("](pages/", "](experiments/") for path in [papers, *folder.iterdir()]}
+    assert after == before
     assert index_table(PAGES) in (PAGES / "README.md").read_text()
 
 

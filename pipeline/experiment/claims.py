@@ -1,0 +1,151 @@
+"""What papers claim, in one list: beside each claim the experiment that judges it, with its verdict and figure."""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from omninav.pipeline.graph.ports import convert
+from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
+from omninav.pipeline.graph.small_files import read_yaml
+
+from .page import number
+from .verdicts import Case, Verdict, in_words
+
+CLAIMS = "claims.yaml"
+"""The list's name, in the folder of the pages."""
+BEGIN, END = "<!-- claims: omninav experiments -->", "<!-- end of the claims -->"
+HEAD = ("claim", "where", "experiment", "verdict", "ours")
+UNJUDGED, NOT_HERE = "no experiment", "not testable here"
+
+
+@dataclass(frozen=True)
+class ListedClaim:
+    """What a paper says, and one of three: which verdict judges it, what an experiment of it needs, why none can be."""
+
+    claim: str
+    """In our words, with the paper's figure."""
+    where: str
+    """Where the paper says it: section, figure, table, equation."""
+    experiment: str = ""
+    """The page that judges it, without `.md`."""
+    statement: str = ""
+    """The page's claim that does, as its verdict file has it."""
+    case: str = ""
+    """Labels of the cases that count (`second, 60`), as the file has them; '' where all do."""
+    needs: str = ""
+    """What an experiment of it would need; there is none."""
+    not_here: str = ""
+    """Why no experiment of ours can judge it."""
+
+
+@dataclass(frozen=True)
+class ClaimList:
+    """What `claims.yaml` holds."""
+
+    page: str
+    """The page that the tables are written into, from the list's folder."""
+    papers: Mapping[str, tuple[ListedClaim, ...]]
+    """Paper -> its claims, in the paper's order."""
+
+
+def claim_tables(path: Path, found: Mapping[str, Sequence[Verdict]]) -> tuple[Path, str]:
+    """The page that a list goes into, and its Markdown: how many claims there are of each kind, a table for each paper.
+
+    `found`: page -> its verdicts. Raises BadInput where the list cannot be read, ProblemsFound with all that is wrong
+    in it: a page, a statement or a case that no verdict file has too.
+    """
+    listed, problems = convert(read_yaml(path), ClaimList, str(path))
+    if problems:
+        raise ProblemsFound(problems)
+    page = Path(os.path.normpath(path.parent / listed.page))
+    away = os.path.relpath(path.parent, page.parent)
+    blocks, verdicts = [], []
+    for paper, claims in listed.papers.items():
+        lines = [f"### {paper}", "", f"| {' | '.join(HEAD)} |", f"|{'---|' * len(HEAD)}"]
+        for index, claim in enumerate(claims):
+            try:
+                cells = _cells(claim, found, away, f"{path}: {paper}[{index}]")
+            except ProblemsFound as error:
+                problems += error.problems
+                continue
+            lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+            verdicts.append(cells[3])
+        blocks.append("\n".join(lines))
+    if problems:
+        raise ProblemsFound(problems)
+    return page, "\n\n".join([_counts(verdicts), *blocks]) + "\n"
+
+
+def _cells(claim: ListedClaim, found: Mapping[str, Sequence[Verdict]], away: str, where: str) -> tuple[str, ...]:
+    """A claim's row, in the order of `HEAD`."""
+    given = [claim.experiment, claim.needs, claim.not_here]
+    if sum(map(bool, given)) != 1 or bool(claim.experiment) != bool(claim.statement):
+        raise ProblemsFound([Problem(where, "expected one of: experiment with statement, needs, not_here")])
+    if not claim.experiment:
+        told = f"needs {claim.needs}" if claim.needs else claim.not_here
+        return claim.claim, claim.where, told, UNJUDGED if claim.needs else NOT_HERE, ""
+    verdict = _judged(claim, found, where)
+    case = f" ({claim.case})" if claim.case else ""
+    link = f"[{claim.experiment}]({away}/{claim.experiment}.md): {verdict.claim}{case}"
+    return claim.claim, claim.where, link, in_words(verdict.holds), _ours(verdict)
+
+
+def _judged(claim: ListedClaim, found: Mapping[str, Sequence[Verdict]], where: str) -> Verdict:
+    """The verdict that a claim names, with the cases that it names."""
+    if claim.experiment not in found:
+        raise _unknown(f"{where}.experiment", claim.experiment, list(found), "pages")
+    verdicts = [verdict for verdict in found[claim.experiment] if verdict.claim == claim.statement]
+    if not verdicts:
+        statements = [verdict.claim for verdict in found[claim.experiment]]
+        raise _unknown(f"{where}.statement", claim.statement, statements, f"claims of {claim.experiment}")
+    labels = {label.strip() for label in claim.case.split(",") if label.strip()}
+    fitting = [
+        Verdict(verdict.claim, verdict.measure, verdict.paper, cases)
+        for verdict in verdicts
+        if (cases := tuple(case for case in verdict.cases if labels <= set(case.where.split(", "))))
+    ]
+    there = [case.where for verdict in verdicts for case in verdict.cases]
+    if not fitting:
+        raise _unknown(f"{where}.case", claim.case, there, f"cases of '{claim.statement}'")
+    if len(fitting) > 1:
+        what = f"{len(fitting)} claims of {claim.experiment} read '{claim.statement}'"
+        raise ProblemsFound([Problem(f"{where}.case", what, f"name a case: {', '.join(there)}")])
+    return fitting[0]
+
+
+def _unknown(where: str, name: str, options: Sequence[str], kind: str) -> ProblemsFound:
+    return ProblemsFound([Problem(where, f"there is no '{name}'", suggest(name, options, kind))])
+
+
+def _ours(verdict: Verdict) -> str:
+    """The measure, and our figure with what it is compared with; of several cases the least and the greatest."""
+    known = [case for case in verdict.cases if case.ours is not None]
+    if not known:
+        return f"{verdict.measure}: –"
+    if len(verdict.cases) == 1:
+        beside = "" if known[0].other is None else f", beside {_figure(known[0].other)} ({known[0].against})"
+        return f"{verdict.measure}{_ratio(known[0])}: {_figure(known[0].ours)}{beside}"
+    figures = sorted(case.ours for case in known if case.ours is not None)
+    held = sum(case.holds is True for case in verdict.cases)
+    spread = f"{_figure(figures[0])} to {_figure(figures[-1])}"
+    return f"{verdict.measure}{_ratio(known[0])}: {spread}; {held} of {len(verdict.cases)} cases hold"
+
+
+def _ratio(case: Case) -> str:
+    return ", ratio" if case.ratio else ""
+
+
+def _figure(value: float | None) -> str:
+    size = abs(value or 0.0)
+    return number(value, 0 if size >= 100.0 else 1 if size >= 10.0 else 2)
+
+
+def _counts(verdicts: Sequence[str]) -> str:
+    """How many claims there are, and what they come to."""
+    judged = [f"{words}: {verdicts.count(words)}" for words in map(in_words, (True, False, None))]
+    beside = [verdicts.count(kind) for kind in (UNJUDGED, NOT_HERE)]
+    return (
+        f"{len(verdicts)} claims: {len(verdicts) - sum(beside)} have an experiment ({'; '.join(judged)}), "
+        f"{beside[0]} have none and {beside[1]} cannot be tested here."
+    )
