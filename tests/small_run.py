@@ -8,6 +8,7 @@ from omninav.pipeline import Context, Tick
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.metrics.collect_drive import CollectDrive
 from omninav.stages.values.belief import GaussianMixture, Particles, PoseEstimate
+from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.maps import ReferenceGraph
@@ -42,10 +43,12 @@ def collected(
     estimates: list[PoseEstimate | None] | None = None,
     tallies: list[DriveTally | None] | None = None,
     matches: list[BestMatch | None] | None = None,
+    confidences: list[PoseConfidence | None] | None = None,
 ) -> Drive:
     """Sequences as a graph would collect them."""
     still = [None] * len(ticks)
-    return CollectDrive().step(Context("drive"), ticks, truth, motion or still, estimates, tallies, matches).drive
+    given = estimates, tallies, matches, confidences
+    return CollectDrive().step(Context("drive"), ticks, truth, motion or still, *given).drive
 
 
 def eight(frames: int) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage, Tick
 from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.drive import Drive, pose_row
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.pose import Motion, Pose
@@ -31,11 +32,12 @@ class CollectDrive(Stage):
         estimates: Sequence[PoseEstimate | None] | None = None,
         tallies: Sequence[DriveTally | None] | None = None,
         matches: Sequence[BestMatch | None] | None = None,
+        confidences: Sequence[PoseConfidence | None] | None = None,
     ) -> Out:
         """The whole run at once. Each sequence is read once, in order."""
         whole, parts = array("q"), array("d")  # not lists: a long run has many rows
         absent = [None] * len(ticks)
-        for row, (tick, estimate, true, moved, tally, match) in enumerate(
+        for row, (tick, estimate, true, moved, tally, match, confidence) in enumerate(
             zip(
                 ticks,
                 absent if estimates is None else estimates,
@@ -43,6 +45,7 @@ class CollectDrive(Stage):
                 motion,
                 absent if tallies is None else tallies,
                 absent if matches is None else matches,
+                absent if confidences is None else confidences,
                 strict=True,
             )
         ):
@@ -58,10 +61,11 @@ class CollectDrive(Stage):
             parts.append(math.nan if tally is None else tally.distance)
             looked = (None,) * 3 if match is None else (match.similarity, match.distance, match.turn)
             parts.extend(math.nan if value is None else value for value in looked)
+            parts.append(math.nan if confidence is None else confidence.probability)
         row_of, log, frames, stamps, collisions, place, reference = np.array(whole, np.int64).reshape(-1, 7).T.copy()
-        columns = np.array(parts, np.float64).reshape(-1, 26)
-        estimated, covariance, weight, mean, true_pose, motions, distance, looks = (
-            np.ascontiguousarray(part) for part in np.split(columns, (3, 12, 13, 16, 19, 22, 23), axis=1)
+        columns = np.array(parts, np.float64).reshape(-1, 27)
+        estimated, covariance, weight, mean, true_pose, motions, distance, looks, trusted = (
+            np.ascontiguousarray(part) for part in np.split(columns, (3, 12, 13, 16, 19, 22, 23, 26), axis=1)
         )
         similarity, visual_distance, turn = looks.T.copy()
         return self.Out(
@@ -83,5 +87,6 @@ class CollectDrive(Stage):
                 similarity=similarity,
                 visual_distance=visual_distance,
                 reference_turn=turn,
+                confidence=trusted[:, 0],
             )
         )

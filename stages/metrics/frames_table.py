@@ -30,6 +30,7 @@ class FramesTable(Stage):
     | `covariance_xx`, `_xy`, `_xh`, `_yy`, `_yh`, `_hh` | its covariance over x, y and heading (m², m rad, rad²) |
     | `estimate_weight` | its share of the belief, from 0 to 1: how sure the estimate is |
     | `confident` | 1 where the estimate is confident (see `Confidence`), else 0 |
+    | `confidence` | probability that the estimate is right (see `ConfidenceMonitor`), where a monitor tells it |
     | `mean_x`, `_y`, `_heading` | the mean of the whole belief |
     | `truth_x`, `_y`, `_heading` | the ground truth |
     | `position_error_m`, `heading_error_deg` | the estimate against the ground truth |
@@ -64,6 +65,7 @@ def columns_of(drive: Drive) -> Columns:
     columns |= {f"covariance_{name}": drive.covariance[:, row, column] for name, row, column in PLANE}
     columns["estimate_weight"] = np.where(known(drive.estimate), drive.mode_weight, np.nan)
     columns["confident"] = np.where(known(drive.estimate), confident(drive), -1)
+    columns["confidence"] = drive.confidence
     columns |= _poses("mean", drive.mean) | _poses("truth", drive.truth)
     columns["position_error_m"] = np.where(both, position_errors(drive.estimate, drive.truth), np.nan)
     columns["heading_error_deg"] = np.where(both, heading_errors_deg(drive.estimate, drive.truth), np.nan)

@@ -21,6 +21,7 @@ from omninav.stages.recordings.pose_messages import (
 )
 from omninav.stages.values.belief import Belief, GaussianMixture, Particles, PlaceBelief, PoseEstimate
 from omninav.stages.values.command import Command
+from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.drive import Array, pose_row
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OccupancyGrid
@@ -74,6 +75,7 @@ class ResultMessages(Stage):
     | `/tf` | TFMessage | `map` to `odom` and `odom` to `base_link` |
     | `/odom` | Odometry | odometry alone, from the log's first frame, in the frame `odom` |
     | `/estimate/pose` | PoseWithCovarianceStamped | the estimate; 6 x 6 covariance, plane entries only |
+    | `/estimate/confidence` | Float64 | probability that the estimate is right, in [0, 1] |
     | `/estimate/path` | Path | the estimates so far, every 16 ticks; all of a log's at its end |
     | `/ground_truth/pose` | PoseStamped | where the log has it |
     | `/belief` | PoseArray | few particles, a mixture's means, or the likely places |
@@ -121,6 +123,7 @@ class ResultMessages(Stage):
         route: PlannedRoute | None = None,
         vector: HomingVector | None = None,
         command: Command | None = None,
+        confidence: PoseConfidence | None = None,
     ) -> Out:
         """One tick."""
         out = _Messages(tick.stamp)
@@ -134,6 +137,8 @@ class ResultMessages(Stage):
             shown.map_size = len(map)
             out.markers("/map", map_markers(map, tick.stamp)["markers"])
         self._show_poses(out, shown, tick, motion, truth, estimate)
+        if confidence is not None:
+            out.add("/estimate/confidence", "std_msgs/msg/Float64", {"data": confidence.probability})
         if belief is not None:
             self._show_belief(out, belief)
         if similarities is not None and map is not None:

@@ -1,0 +1,56 @@
+"""Whether stated probabilities hold: reliability, calibration error, separation."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+
+class Reliability(NamedTuple):
+    """Statements by their probability, in bins of equal width; empty bins are left out: (B,) each.
+
+    `stated`: mean probability, `observed`: share of those that came true, `counts`: how many there are.
+    """
+
+    stated: Array
+    observed: Array
+    counts: npt.NDArray[np.int64]
+
+
+def reliability(probabilities: Array, true: Flags, bins: int = 10) -> Reliability:
+    """Sorts statements (N,) into bins of probability. DeGroot & Fienberg 1983."""
+    which = np.minimum((probabilities * bins).astype(np.int64), bins - 1)
+    counts = np.bincount(which, minlength=bins)
+    full = counts > 0
+    stated, observed = (np.bincount(which, each, minlength=bins)[full] / counts[full] for each in (probabilities, true))
+    return Reliability(stated, observed, counts[full])
+
+
+def expected_calibration_error(found: Reliability) -> float:
+    """Mean distance of stated and observed shares over all statements. Naeini, Cooper & Hauskrecht 2015."""
+    return float((np.abs(found.stated - found.observed) * found.counts).sum() / found.counts.sum())
+
+
+def area_under_roc(scores: Array, positive: Flags) -> float | None:
+    """The probability that a positive has a higher score than a negative, equal ones a half; None without one of each.
+
+    `scores`, `positive`: (N,). The area under the receiver operating characteristic: Hanley & McNeil 1982.
+    """
+    above, below = scores[positive], np.sort(scores[~positive])
+    if not (len(above) and len(below)):
+        return None
+    lower, upper = np.searchsorted(below, above), np.searchsorted(below, above, side="right")
+    return float((lower + upper).sum() / (2 * len(above) * len(below)))
+
+
+def squared_mahalanobis(errors: Array, covariances: Array) -> Array:
+    """Errors (N, D) in units of their covariances (N, D, D), squared: (N,); NaN where a covariance has no inverse."""
+    found = np.full(len(errors), np.nan)
+    finite = np.flatnonzero(np.isfinite(covariances).all(axis=(1, 2)) & np.isfinite(errors).all(axis=1))
+    sound = finite[np.linalg.eigvalsh(covariances[finite])[:, 0] > 1e-12]
+    solved = np.linalg.solve(covariances[sound], errors[sound, :, None])[..., 0]
+    found[sound] = (errors[sound] * solved).sum(axis=1)
+    return found

@@ -1,0 +1,45 @@
+"""Whether the places that images look like lie where an estimate says that they were taken."""
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.stages.geometry.plane.se2 import wrap
+
+Array = npt.NDArray[np.float64]
+
+
+def consistency(places: Array, pose: Array, metres: float, radians: float) -> Array:
+    """How far places (N, 3) agree with a pose (3,), in [0, 1]: a Gaussian of these widths; (N,)."""
+    squares = (np.square(places[:, :2] - pose[:2]).sum(axis=1)) / metres**2
+    share: Array = np.exp(-0.5 * (squares + np.square(wrap(places[:, 2] - pose[2]) / radians)))
+    return share
+
+
+def log_odds_of_right(
+    consistent: Array, weights: Array, novelties: Array, when_wrong: float, strength: float, kidnapping: float
+) -> float:
+    """Log odds that an estimate is right, by which of the last images agree with it; (N,) each, the oldest first.
+
+    `consistent`: 1 where an image agrees, 0 where it does not; `weights`: how many images it counts as. While the
+    estimate is right, the share of consistent images is not known (light, people): uniform. While it is wrong, the
+    share has a Beta distribution with mean `when_wrong`, as if known from `strength` images. Before each image the robot
+    may have been carried elsewhere, or the filter may have recovered, with a probability of `kidnapping` times the
+    image's novelty. Likelihoods are Beta-binomial; of several changes one is the most likely.
+    """
+    agree = np.concatenate([[0.0], np.cumsum(weights * consistent)])
+    other = np.concatenate([[0.0], np.cumsum(weights * (1.0 - consistent))])
+    right, wrong = (1.0, 1.0), (when_wrong * strength, (1.0 - when_wrong) * strength)
+    before = [_log_likelihood(agree, other, prior) for prior in (right, wrong)]
+    since = [_log_likelihood(agree[-1] - agree, other[-1] - other, prior) for prior in (right, wrong)]
+    change = np.log(kidnapping * novelties[1:]) if kidnapping > 0.0 else np.full(max(len(novelties) - 1, 0), -np.inf)
+    inner = slice(1, len(agree) - 1)
+    stayed_right, stayed_wrong = before[0][-1], before[1][-1]
+    recovered, kidnapped = before[1][inner] + since[0][inner] + change, before[0][inner] + since[1][inner] + change
+    return float(np.logaddexp.reduce([stayed_right, *recovered]) - np.logaddexp.reduce([stayed_wrong, *kidnapped]))
+
+
+def _log_likelihood(agree: Array, other: Array, prior: tuple[float, float]) -> Array:
+    from scipy.special import betaln  # slow to import: not before a run
+
+    found: Array = betaln(prior[0] + agree, prior[1] + other) - betaln(*prior)
+    return found

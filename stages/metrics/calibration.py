@@ -1,0 +1,107 @@
+"""Whether a localisation knows how good it is: its confidence and its ellipses against ground truth."""
+
+import math
+from typing import Annotated, Any
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Figure, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline.report.chart import Chart
+from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
+from omninav.stages.geometry.probability.calibration import (
+    Flags,
+    Reliability,
+    area_under_roc,
+    expected_calibration_error,
+    reliability,
+    squared_mahalanobis,
+)
+from omninav.stages.values.drive import Drive, known
+
+QUANTITIES = {
+    "calibration.lost_auroc": Quantity(title="Confidence tells lost frames (AUROC)", better="higher"),
+    "calibration.wrong_auroc": Quantity(title="Confidence tells wrong frames (AUROC)", better="higher"),
+    "calibration.expected_error": Quantity(title="Calibration error of the confidence (ECE)", unit="%", better="lower"),
+    "calibration.right_share": Quantity(title="Frames within the tolerance", unit="%", better="higher"),
+    "calibration.ellipse_50": Quantity(title="True positions in the 50 % ellipse", unit="%"),
+    "calibration.ellipse_95": Quantity(title="True positions in the 95 % ellipse", unit="%"),
+    "calibration.nees": Quantity(title="Squared error over covariance (NEES; 2 is right)"),
+}
+
+
+class Calibration(Stage):
+    """Measures whether the confidence holds, and whether the belief's ellipses do.
+
+    Of the last log, under `calibration`. Where a monitor states a confidence: `expected_error`, the mean distance
+    between stated probability and observed share over ten bins (expected calibration error, ECE); `wrong_auroc`, the
+    probability that a frame outside the tolerance has a lower confidence than one within; `lost_auroc`, that a lost one
+    has a lower one than the others; None where there are no such frames. Where estimates have a covariance:
+    `ellipse_50`, `ellipse_95`, the share of true positions within the ellipse that should hold so many, and `nees`, the
+    mean normalised estimation error squared e' C^-1 e of the position, 2 where covariances are right (Bar-Shalom, Li &
+    Kirubarajan 2001, section 5.4), larger where they are too small.
+    """
+
+    within_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """Tolerance in position (m), as the monitor's."""
+    within_deg: Annotated[float, Bounds(gt=0, le=180)] = 10.0
+    """Tolerance in heading, as the monitor's; wider where the true heading is not known so well."""
+    lost_m: Annotated[float, Bounds(gt=0)] = 2.5
+    """Position error (m) above which the robot counts as lost."""
+
+    class Out(Outputs):
+        """Both absent without ground truth, `figure` without a confidence."""
+
+        metrics: Metrics | None = None
+        figure: Figure | None = None
+
+    def step(self, ctx: Context, drive: Drive) -> Out:
+        """The whole run at once."""
+        last = drive.last_log
+        last = last.at(known(last.truth) & known(last.estimate))
+        values = covered(last)
+        stated = last.at(np.isfinite(last.confidence))
+        figure = None
+        if len(stated):
+            errors = position_errors(stated.estimate, stated.truth)
+            right = (errors <= self.within_m) & (heading_errors_deg(stated.estimate, stated.truth) <= self.within_deg)
+            found = reliability(stated.confidence, right)
+            values |= {
+                "expected_error": expected_calibration_error(found),
+                "wrong_auroc": area_under_roc(-stated.confidence, ~right),
+                "lost_auroc": area_under_roc(-stated.confidence, errors > self.lost_m),
+                "right_share": float(right.mean()),
+            }
+            figure = self._drawn(found, stated, right)
+        metrics = Metrics({"calibration": values}, QUANTITIES, ("calibration.expected_error",)) if values else None
+        return self.Out(metrics=metrics, figure=figure)
+
+    def _drawn(self, found: Reliability, stated: Drive, right: Flags) -> Figure:
+        chart = Chart((0.0, 1.0), (0.0, 1.0), "stated probability", "share of frames within the tolerance", equal=True,
+                      height=(190.0, 300.0))  # fmt: skip
+        chart.base.line(np.array([(0.0, 0.0), (1.0, 1.0)]), "quiet", dashed=True)
+        points = np.column_stack([found.stated, found.observed])
+        chart.base.line(points, "blue")
+        chart.base.discs(points, 3.0 + 9.0 * np.sqrt(found.counts / found.counts.sum()), "blue", 0.7)
+        chart.name("as observed, larger for more frames", "blue", "dot")
+        chart.name("as it should be", "quiet", "dashes")
+        return Figure(
+            name="reliability",
+            title="Does the confidence hold?",
+            caption=f"Frames by the probability that was stated for an estimate within {self.within_m:g} m and "
+            f"{self.within_deg:g} degrees, and how many were. Below the dashed line it was too sure.",
+            content=chart.svg(),
+            media_type="image/svg+xml",
+            order=12,
+        )
+
+
+def covered(drive: Drive) -> dict[str, Any]:
+    """How many true positions lie in the ellipses of 50 and 95 %, and the mean normalised error; empty without any."""
+    errors = (drive.estimate - drive.truth)[:, :2]
+    squares = squared_mahalanobis(errors, drive.covariance[:, :2, :2])
+    squares = squares[np.isfinite(squares)]
+    if not len(squares):
+        return {}
+    within = {f"ellipse_{share}": -2.0 * math.log(1.0 - share / 100) for share in (50, 95)}  # chi squared, 2 degrees
+    shares = {name: float((squares <= limit).mean()) for name, limit in within.items()}
+    return shares | {"nees": float(squares.mean())}

@@ -1,0 +1,1 @@
+"""Watches a localisation from outside: how far it is to be trusted."""

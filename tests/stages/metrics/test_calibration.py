@@ -1,0 +1,109 @@
+"""Stated probabilities and ellipses against what came true."""
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, mannwhitneyu
+from small_run import collected
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.geometry.probability.calibration import (
+    area_under_roc,
+    expected_calibration_error,
+    reliability,
+    squared_mahalanobis,
+)
+from omninav.stages.geometry.probability.consistency import log_odds_of_right
+from omninav.stages.metrics.calibration import Calibration
+from omninav.stages.plots.confidence_over_time import ConfidenceOverTime
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.confidence import PoseConfidence
+from omninav.stages.values.drive import Drive
+from omninav.stages.values.pose import Pose
+
+
+def test_statements_that_come_true_as_often_as_stated_have_no_calibration_error():
+    true = np.repeat([True, False, True, False], [8, 2, 1, 9])
+    assert expected_calibration_error(reliability(np.repeat([0.8, 0.1], 10), true)) == pytest.approx(0.0)
+    # worked by hand: 10 of 20 statements are 0.2 too high, the others 0.1 too low
+    assert expected_calibration_error(reliability(np.repeat([1.0, 0.0], 10), true)) == pytest.approx(0.15)
+
+
+def test_area_under_roc_is_the_statistic_of_mann_and_whitney():
+    rng = np.random.default_rng(0)
+    scores, positive = rng.integers(0, 8, 60).astype(float), rng.random(60) < 0.3
+    peer = mannwhitneyu(scores[positive], scores[~positive]).statistic / (positive.sum() * (~positive).sum())
+    assert area_under_roc(scores, positive) == pytest.approx(peer)
+    assert area_under_roc(scores, np.zeros(60, bool)) is None
+
+
+def odds(consistent: list[float], kidnapping: float = 0.0) -> float:
+    ones = np.ones(len(consistent))
+    return log_odds_of_right(np.array(consistent, float), ones, ones, 0.05, 20.0, kidnapping)
+
+
+def test_the_odds_after_no_image_are_even_and_agreement_speaks_for_the_estimate():
+    assert odds([]) == pytest.approx(0.0)
+    # one image: the mean of a uniform share against chance
+    assert odds([1]) == pytest.approx(np.log(0.5 / 0.05))
+    assert odds([0]) == pytest.approx(np.log(0.5 / 0.95))
+
+
+def test_a_change_that_may_happen_lets_the_last_images_decide():
+    assert odds([1] * 8 + [0] * 8) > 2.0
+    assert odds([1] * 8 + [0] * 8, kidnapping=1e-3) < 0.0
+    assert odds([0] * 8 + [1] * 8, kidnapping=1e-3) > odds([1, 0] * 8, kidnapping=1e-3)
+    # two images, worked by hand: right and right, wrong then right, against wrong and wrong, right then wrong
+    right, wrong = 1 / 3 + 0.1 * 0.05 / 2, 0.05 * 2 / 21 + 0.1 * 0.05 / 2
+    assert odds([1, 1], kidnapping=0.1) == pytest.approx(np.log(right / wrong))
+
+
+def made(confidences: list[float | None], sigma: float = 0.3) -> Drive:
+    """Errors drawn from the stated covariance; the last quarter is 5 m off as well."""
+    rng, number = np.random.default_rng(3), len(confidences)
+    x = rng.normal(0.0, 0.3, (number, 2)) + np.where(np.arange(number) >= 0.75 * number, 5.0, 0.0)[:, None]
+    covariance = np.diag([sigma**2, sigma**2, 0.01])
+    estimates = [PoseEstimate(Pose(a, b, 0.0), covariance, 1.0, Pose(a, b, 0.0)) for a, b in x.tolist()]
+    ticks = [Tick(n, n * 10**9) for n in range(number)]
+    told = [None if each is None else PoseConfidence(each) for each in confidences]
+    return collected(ticks, [Pose(0.0, 0.0, 0.0)] * number, estimates=estimates, confidences=told)
+
+
+def test_a_confidence_that_falls_where_the_robot_is_lost_tells_all_of_it():
+    out = Calibration().step(Context("calibration"), made([0.9] * 300 + [0.1] * 100))
+    found = out.metrics.values["calibration"]
+    assert found["lost_auroc"] == 1.0
+    assert out.figure is not None
+    assert b"stated probability" in out.figure.content
+    blind = Calibration().step(Context("calibration"), made([0.9] * 100 + [0.1] * 300)).metrics.values["calibration"]
+    assert blind["lost_auroc"] < 0.9
+    assert blind["expected_error"] > found["expected_error"]
+
+
+def test_ellipses_hold_as_many_true_positions_as_they_say_and_fewer_where_they_are_too_small():
+    right = made([None] * 400)
+    right = right.at(np.arange(300))
+    out = Calibration().step(Context("calibration"), right)
+    found = out.metrics.values["calibration"]
+    assert found["ellipse_50"] == pytest.approx(0.5, abs=0.06)
+    assert found["ellipse_95"] == pytest.approx(0.95, abs=0.03)
+    assert found["nees"] == pytest.approx(2.0, abs=0.3)
+    assert out.figure is None
+    assert "expected_error" not in found
+    small = made([None] * 400, sigma=0.1).at(np.arange(300))
+    assert Calibration().step(Context("calibration"), small).metrics.values["calibration"]["ellipse_50"] < 0.2
+
+
+def test_squared_errors_over_covariances_are_chi_squared_and_a_flat_covariance_has_none():
+    rng = np.random.default_rng(0)
+    root = np.array([[0.5, 0.2], [0.0, 0.1]])
+    errors = rng.normal(size=(4000, 2)) @ root
+    squares = squared_mahalanobis(errors, np.broadcast_to(root.T @ root, (4000, 2, 2)))
+    assert (squares < chi2.ppf(0.9, 2)).mean() == pytest.approx(0.9, abs=0.02)
+    assert np.isnan(squared_mahalanobis(np.ones((1, 2)), np.zeros((1, 2, 2)))).all()
+
+
+def test_confidence_is_plotted_where_there_is_one():
+    figure = ConfidenceOverTime().step(Context("plot"), made([0.9, 0.2, 0.3, 0.1])).figure
+    assert figure is not None
+    assert "75 %" in figure.caption
+    assert ConfidenceOverTime().step(Context("plot"), made([None] * 4)).figure is None

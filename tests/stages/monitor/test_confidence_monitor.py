@@ -1,0 +1,86 @@
+"""Images that agree with the estimate speak for it, others against it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.monitor.wrong_pose_agreement import LearnWrongPoseAgreement
+from omninav.stages.monitor.confidence_monitor import ConfidenceMonitor, ConfidenceMonitorState
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.confidence import WrongPoseAgreement
+from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Motion
+from omninav.stages.values.similarity import Similarities
+
+SCALE = LengthScale(0.3)
+LINE = ReferenceGraph(
+    np.column_stack([np.arange(40.0), np.zeros((40, 2))]),
+    np.random.default_rng(0).dirichlet(np.ones(20), (40, 8)).astype(np.float32),
+    "histograms",
+    np.zeros((0, 2), np.int64),
+    "truth",
+)
+
+
+def drive(matches: list[int], at: float = 0.0, step: float = 1.0, spread: float = 0.05) -> list[float]:
+    """Confidences along a line; the best match of each image is given, and the estimate follows odometry."""
+    monitor, recent, rng = ConfidenceMonitor(), ConfidenceMonitorState(), np.random.default_rng(1)
+    told = []
+    for n, match in enumerate(matches):
+        values = np.zeros((len(LINE), 36), np.float32)
+        values[match, 0] = 0.9
+        poses = np.array([at + step * n, 0.0, 0.0]) + rng.normal(0.0, spread, (500, 3))
+        belief = Particles(poses, np.full(500, 1 / 500))
+        ctx = Context("monitor")
+        ctx.tick = Tick(n, n * 10**9, first_of_log=n == 0)
+        motion = Motion(step, 0.0, 0.0) if n else None
+        out = monitor.step(
+            ctx, recent, belief, belief.estimate(), LINE, SCALE, WrongPoseAgreement(0.02), Similarities(values), motion
+        )
+        told.append(out.confidence.probability)
+    return told
+
+
+def test_matches_along_the_estimated_path_make_it_sure_and_scattered_ones_do_not():
+    scattered = np.random.default_rng(2).permutation(40)[:20].tolist()
+    assert drive(list(range(20)))[-1] > 0.95
+    assert drive(scattered)[-1] < 0.5
+    assert drive([n + 20 for n in range(20)])[-1] < 0.5  # consistent, but elsewhere
+
+
+def test_it_falls_when_images_stop_to_agree_and_more_with_each():
+    told = drive([*range(12), *[39 - n for n in range(18)]])
+    assert told[11] > 0.9
+    assert (np.diff(told[12:22]) < 0.0).all()
+    assert told[-1] < 0.5
+
+
+def test_a_wide_belief_is_less_sure_than_a_narrow_one():
+    assert drive(list(range(8)), spread=1.0)[-1] < drive(list(range(8)))[-1] - 0.1
+
+
+def test_a_robot_that_stands_gains_little_from_the_same_image_again():
+    once, standing = drive([0])[-1], drive([0] * 6, step=0.0)[-1]
+    assert standing < drive(list(range(6)))[-1] - 0.02
+    assert standing == pytest.approx(once, abs=0.15)
+
+
+def test_chance_is_small_where_images_are_taken_everywhere_and_large_where_all_look_like_one():
+    ctx = Context("chance")
+    apart = LearnWrongPoseAgreement().step(ctx, LINE, SCALE).when_wrong.share
+    views = np.repeat(LINE.features[:1], 40, axis=0)
+    views[::4] += np.float32(1e-4)  # these few look the most like all others
+    alike = ReferenceGraph(LINE.poses * (0.05, 1.0, 1.0), views, "histograms", LINE.edges, "truth")
+    assert apart < 0.03
+    assert LearnWrongPoseAgreement(within_m=0.2).step(ctx, alike, LengthScale(0.05)).when_wrong.share > 0.1
+
+
+def test_chance_in_a_map_of_one_image_is_the_least():
+    lone = ReferenceGraph(LINE.poses[:1], LINE.features[:1], "histograms", LINE.edges, "truth")
+    assert LearnWrongPoseAgreement().step(Context("chance"), lone, SCALE).when_wrong.share == 0.005
+    assert math.isclose(
+        LearnWrongPoseAgreement(min_share=0.1).step(Context("chance"), lone, SCALE).when_wrong.share, 0.1
+    )
