@@ -6,8 +6,9 @@ import networkx
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Figure, Metrics, Outputs, Quantity, Stage
 from omninav.pipeline.engine.artifact import artifact_bytes
+from omninav.pipeline.report.chart import Chart
 from omninav.stages.geometry.probability.dempster_shafer import support
 from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
 
@@ -18,7 +19,7 @@ QUANTITIES = {
     "loops.loop_closures.precision": Quantity(title="Loop closures, precision", unit="%", better="higher"),
     "loops.loop_closures.recall": Quantity(title="Loop closures, recall", unit="%", better="higher"),
     "loops.loop_closures.average_precision": Quantity(
-        title="Loop closures, area under precision-recall", unit="%", better="higher"
+        title="Loop closures, area under precision-recall, Σ Pₙ (Rₙ - Rₙ₋₁)", unit="%", better="higher"
     ),
     "precision": Quantity(unit="%", better="higher"),
     "recall": Quantity(unit="%", better="higher"),
@@ -37,7 +38,8 @@ class LoopClosures(Stage):
     A hypothesis is right where some image of one of its subclusters was taken near some image of the other. Precision
     is the share of accepted ones that are right, recall the share of right ones that are accepted; None where there are
     none, or where the map's poses are not truth. `loop_closures` leaves out those between views of one stretch of the
-    drive, and adds `average_precision`, the area under the precision-recall curve over the support; `merged`, of
+    drive, and adds `average_precision`, the area under the precision-recall curve over the support, sum over n of
+    P_n (R_n - R_(n-1)) with the precision P_n and recall R_n of the n best supported ones; `merged`, of
     these: counts as accepted what became one place, be it through third ones. `at_supports` is what they would be with
     other thresholds of support. `parts`: between which no path leads; more than one where a map was added to from a
     tour that it does not know. `step_m`: how far apart neighbouring path images were taken. `size_bytes`: of the map's
@@ -50,9 +52,10 @@ class LoopClosures(Stage):
     """Images of the tour that must lie between two views for their hypothesis to be a loop closure."""
 
     class Out(Outputs):
-        """`metrics`: the entries `map` and `loops` of metrics.json."""
+        """`metrics`: the entries `map` and `loops` of metrics.json; `figure`: absent where no loop closure is right."""
 
         metrics: Metrics
+        figure: Figure | None = None
 
     def step(self, ctx: Context, hypotheses: LoopHypotheses, map: TopologicalMap) -> Out:
         """The map and what it was made of."""
@@ -83,7 +86,8 @@ class LoopClosures(Stage):
             "merged": counted((one == other)[far], near, self.near_m),
             "at_supports": at_supports(supports[far], near, self.near_m),
         }
-        return self.Out(metrics=Metrics({"map": held, "loops": loops}, QUANTITIES, HEADLINES))
+        figure = None if near is None else _drawn(supports[far], near <= self.near_m)
+        return self.Out(metrics=Metrics({"map": held, "loops": loops}, QUANTITIES, HEADLINES), figure=figure)
 
 
 def parts_of(map: TopologicalMap) -> int:
@@ -122,11 +126,41 @@ def average_precision(support: Array, right: npt.NDArray[np.bool_]) -> float | N
     """
     if not right.any():
         return None
+    precision, recall = precision_recall(support, right)
+    return float((precision * np.diff(recall, prepend=0.0)).sum())
+
+
+def precision_recall(support: Array, right: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Precision and recall of hypotheses (H,) accepted by falling support, after each of its values; one must be right.
+
+    Hypotheses of equal support are accepted together.
+    """
     order = np.argsort(-support, kind="stable")
     last_of_equals = np.append(np.diff(support[order]) != 0, True)
     accepted = (np.arange(len(order)) + 1)[last_of_equals]
     found = np.cumsum(right[order])[last_of_equals]
-    return float((found / accepted * np.diff(found, prepend=0)).sum() / right.sum())
+    return found / accepted, found / right.sum()
+
+
+def _drawn(support: Array, right: npt.NDArray[np.bool_]) -> Figure | None:
+    area = average_precision(support, right)
+    if area is None:
+        return None
+    precision, recall = precision_recall(support, right)
+    chart = Chart((0.0, 1.0), (0.0, 1.0), "recall", "precision", equal=True, height=(190.0, 300.0))
+    ends = np.column_stack([recall, precision])  # each step is as high as the precision where it ends
+    begins = np.column_stack([np.append(0.0, recall[:-1]), precision])
+    points = np.stack([begins, ends], axis=1).reshape(-1, 2)
+    chart.base.line(points, "blue", 1.8)
+    return Figure(
+        name="precision_recall",
+        title="Precision and recall of loop closures",
+        caption=f"Loop closures accepted by falling support, {int(right.sum())} of {len(right)} right. The area below "
+        f"the line, the sum of Pₙ (Rₙ - Rₙ₋₁), is {100 * area:.1f} %.",
+        content=chart.svg(),
+        media_type="image/svg+xml",
+        order=31,
+    )
 
 
 def at_supports(support: Array, gaps: Array | None, near: float) -> dict[str, list[float | int | None]]:

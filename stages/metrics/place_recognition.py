@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Value
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Table, Value
 from omninav.stages.geometry.plane.point_cells import have_a_point_within, sort_into_cells
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.maps import ReferenceGraph
@@ -16,9 +16,14 @@ from omninav.stages.values.similarity import Similarities
 QUANTITIES = {
     "place_recognition.recall_at_1": Quantity(title="Recall@1", unit="%", better="higher"),
     "place_recognition.recall_at_5": Quantity(title="Recall@5", unit="%", better="higher"),
+    "place_recognition.recall_at_10": Quantity(title="Recall@10", unit="%", better="higher"),
     "place_recognition.queries": Quantity(title="Queries", context=True),
     "place_recognition.distance_m": Quantity(title="Distance of a right reference"),
 }
+
+
+RANKS = (1, 5, 10)
+"""Numbers of references of which one must be right."""
 
 
 class RankedReferences(Value):
@@ -30,7 +35,7 @@ class RankedReferences(Value):
 class RankReferences(Stage):
     """Ranks references by their similarity to the present image at the heading at which that is largest."""
 
-    best: Annotated[int, Bounds(ge=1)] = 5
+    best: Annotated[int, Bounds(ge=1)] = 10
     """How many are kept."""
 
     class Out(Outputs):
@@ -47,20 +52,24 @@ class RankReferences(Stage):
 
 
 class PlaceRecognition(Stage):
-    """Measures recall@1 and recall@5: how often one of the most similar references was taken close by.
+    """Measures recall@1, @5 and @10: how often one of the most similar references was taken close by.
 
     Of the last log, under `place_recognition`: the share of images (`queries`) for which one of the best N references
-    lies within `distance_m` of the true position. An image counts where the map has such a reference at all. A filter
-    that compares only references near its belief is measured on those.
+    lies within `distance_m` of the true position. An image counts where the map has such a reference at all.
+    `at_distances`: the same at several distances, a list for each figure. A filter that compares only references near
+    its belief is measured on those.
     """
 
     distance_m: Annotated[float, Bounds(gt=0)] = 2.0
     """Largest distance (m) between the true position and where a right reference was taken."""
+    distances_m: tuple[Annotated[float, Bounds(gt=0)], ...] = (0.5, 1.0, 2.0, 5.0)
+    """Distances (m) of the table."""
 
     class Out(Outputs):
-        """`metrics`: absent where truth, or the truth of the map's poses, is not known."""
+        """Absent where truth, or the truth of the map's poses, is not known."""
 
         metrics: Metrics | None = None
+        table: Table | None = None
 
     def step(self, ctx: Context, drive: Drive, ranked: Sequence[RankedReferences | None], map: ReferenceGraph) -> Out:
         """The whole run at once."""
@@ -69,9 +78,12 @@ class PlaceRecognition(Stage):
         if map.pose_source != "truth" or not len(last) or not len(map):
             return self.Out()
         lists = [entry.references if (entry := ranked[row]) is not None else np.empty(0, np.int64) for row in last.row]
-        found = recalls(last.truth[:, :2], lists, map.poses[:, :2], self.distance_m)
+        given = last.truth[:, :2], lists, map.poses[:, :2]
+        found = recalls(*given, self.distance_m)
+        rows = [recalls(*given, distance) for distance in self.distances_m]
+        found["at_distances"] = {name: [row[name] for row in rows] for name in rows[0]} if rows else {}
         headlines = ("place_recognition.recall_at_1", "place_recognition.recall_at_5")
-        return self.Out(metrics=Metrics({"place_recognition": found}, QUANTITIES, headlines))
+        return self.Out(metrics=Metrics({"place_recognition": found}, QUANTITIES, headlines), table=_tabled(rows))
 
 
 def recalls(
@@ -82,12 +94,28 @@ def recalls(
     counts = have_a_point_within(cells, positions, float(np.nextafter(distance_m, np.inf)))
     hits = []
     for position, best in zip(positions[counts], itertools.compress(ranked, counts), strict=True):
-        near = np.hypot(*(references[best[:5]] - position).T) <= distance_m
-        hits.append((near[:1].any(), near.any()))
-    first, five = np.array(hits, np.float64).reshape(-1, 2).mean(axis=0) if hits else (None, None)
+        near = np.hypot(*(references[best[: max(RANKS)]] - position).T) <= distance_m
+        hits.append([near[:rank].any() for rank in RANKS])
+    shares = np.array(hits, np.float64).mean(axis=0).tolist() if hits else [None] * len(RANKS)
     return {
         "queries": len(hits),
         "distance_m": distance_m,
-        "recall_at_1": None if first is None else float(first),
-        "recall_at_5": None if five is None else float(five),
+        **{f"recall_at_{rank}": share for rank, share in zip(RANKS, shares, strict=True)},
     }
+
+
+def _tabled(rows: Sequence[dict[str, Any]]) -> Table:
+    def percent(share: float | None) -> str:
+        return "–" if share is None else f"{100 * share:.1f}"
+
+    return Table(
+        name="place_recognition",
+        title="Recall of place recognition",
+        caption="Share of images for which one of the N most similar references was taken within a distance; images "
+        "without any such reference in the map do not count.",
+        columns=("within (m)", *(f"recall@{rank} (%)" for rank in RANKS), "images"),
+        rows=tuple(
+            (f"{row['distance_m']:g}", *(percent(row[f"recall_at_{rank}"]) for rank in RANKS), row["queries"])
+            for row in rows
+        ),
+    )

@@ -6,11 +6,13 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.drive import Array, Drive, known
 
 QUANTITIES = {
-    "absolute_trajectory_error_m": Quantity(title="Absolute trajectory error (ATE)", better="lower"),
+    "absolute_trajectory_error_m": Quantity(title="Absolute trajectory error (ATE), aligned", better="lower"),
+    "unaligned_trajectory_error_m": Quantity(title="Absolute trajectory error (ATE), not aligned", better="lower"),
     "relative_position_error_m": Quantity(title="Relative pose error (RPE), position", better="lower"),
     "relative_heading_error_deg": Quantity(title="Relative pose error (RPE), heading", better="lower"),
     "relative_error_distance_m": Quantity(title="Distance of relative pose errors"),
@@ -22,7 +24,8 @@ class RelativeErrors(Stage):
 
     Sturm et al. 2012 ("A benchmark for the evaluation of RGB-D SLAM systems", section on metrics), in the plane and
     without scale: `absolute_trajectory_error_m` is the distance that is left after the rigid motion that fits the
-    estimate to the truth best in the least squares sense; `relative_position_error_m` and `relative_heading_error_deg`
+    estimate to the truth best in the least squares sense, `unaligned_trajectory_error_m` the same without alignment,
+    which counts where the map's frame is given; `relative_position_error_m` and `relative_heading_error_deg`
     compare estimated and true motion between frames a given distance apart, every frame being a start. The last log is
     measured; nothing is given without ground truth.
     """
@@ -51,7 +54,10 @@ def trajectory_metrics(drive: Drive, distance_m: float) -> dict[str, Any]:
         return {}
     estimate, truth = drive.estimate[scored], drive.truth[scored]
     starts, ends = pairs_apart(truth, distance_m)
-    result: dict[str, Any] = {"absolute_trajectory_error_m": _summary(absolute_trajectory_errors(estimate, truth))}
+    result: dict[str, Any] = {
+        "absolute_trajectory_error_m": _summary(absolute_trajectory_errors(estimate, truth)),
+        "unaligned_trajectory_error_m": _summary(position_errors(estimate, truth)),
+    }
     if len(starts):
         metres, degrees = relative_pose_errors(estimate, truth, starts, ends)
         result["relative_position_error_m"] = _summary(metres)

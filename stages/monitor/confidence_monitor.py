@@ -13,7 +13,7 @@ from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.consistency import consistency, log_odds_of_right
 from omninav.stages.geometry.probability.evidence import evidence_novelty
 from omninav.stages.values.belief import Particles, PoseEstimate
-from omninav.stages.values.confidence import WrongPoseAgreement, PoseConfidence
+from omninav.stages.values.confidence import PoseConfidence, WrongPoseAgreement
 from omninav.stages.values.drive import pose_row
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph

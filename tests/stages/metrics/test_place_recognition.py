@@ -39,3 +39,16 @@ def test_a_run_whose_best_reference_is_always_the_nearest_has_full_recall_and_no
     found = PlaceRecognition().step(CTX, run.drive, ranked, run.map).metrics.values["place_recognition"]
     assert found["recall_at_1"] == pytest.approx(1.0)
     assert PlaceRecognition().step(CTX, run.blind, ranked, run.map).metrics is None
+
+
+def test_recall_is_told_for_several_numbers_and_distances():
+    ranked = [np.array([5, 4, 3, 2, 1, 0]), np.array([1, 0, 2, 3, 4, 5])]
+    found = [recalls(np.full((2, 2), (3.0, 0.0)), ranked, REFERENCES, metres) for metres in (2.0, 4.0, 8.0)]
+    assert [each["queries"] for each in found] == [0, 2, 2]
+    assert (found[1]["recall_at_1"], found[1]["recall_at_5"], found[1]["recall_at_10"]) == (0.0, 0.5, 1.0)
+    assert found[2]["recall_at_1"] == 0.5
+    run = small_run(frames=20)
+    lists = [RankedReferences(np.array([0])) for _ in run.truth]
+    out = PlaceRecognition(distances_m=(0.5, 100.0)).step(CTX, run.drive, lists, run.map)
+    assert out.metrics.values["place_recognition"]["at_distances"]["recall_at_1"][1] == 1.0
+    assert [row[0] for row in out.table.rows] == ["0.5", "100"]

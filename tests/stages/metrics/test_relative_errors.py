@@ -78,6 +78,7 @@ def test_the_stage_names_its_figures_and_gives_none_without_truth():
     found = RelativeErrors().step(Context("relative"), run.drive).metrics.values
     assert set(found) == {
         "absolute_trajectory_error_m",
+        "unaligned_trajectory_error_m",
         "relative_position_error_m",
         "relative_heading_error_deg",
         "relative_error_distance_m",

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.monitor.wrong_pose_agreement import LearnWrongPoseAgreement
 from omninav.stages.monitor.confidence_monitor import ConfidenceMonitor, ConfidenceMonitorState
+from omninav.stages.monitor.wrong_pose_agreement import LearnWrongPoseAgreement
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.confidence import WrongPoseAgreement
 from omninav.stages.values.length_scale import LengthScale
