@@ -10,7 +10,7 @@ from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.small_files import read_yaml
 
 from .page import number
-from .verdicts import Case, Verdict, in_words
+from .verdicts import Verdict, in_words
 
 CLAIMS = "claims.yaml"
 """The list's name, in the folder of the pages."""
@@ -120,25 +120,25 @@ def _unknown(where: str, name: str, options: Sequence[str], kind: str) -> Proble
 
 def _ours(verdict: Verdict) -> str:
     """The measure, and our figure with what it is compared with; of several cases the least and the greatest."""
-    known = [case for case in verdict.cases if case.ours is not None]
+    known = [(case, case.ours) for case in verdict.cases if case.ours is not None]
     if not known:
         return f"{verdict.measure}: –"
+    case, ours = known[0]
+    measure = f"{verdict.measure}{', ratio' if case.ratio else ''}"
     if len(verdict.cases) == 1:
-        beside = "" if known[0].other is None else f", beside {_figure(known[0].other)} ({known[0].against})"
-        return f"{verdict.measure}{_ratio(known[0])}: {_figure(known[0].ours)}{beside}"
-    figures = sorted(case.ours for case in known if case.ours is not None)
-    held = sum(case.holds is True for case in verdict.cases)
-    spread = f"{_figure(figures[0])} to {_figure(figures[-1])}"
-    return f"{verdict.measure}{_ratio(known[0])}: {spread}; {held} of {len(verdict.cases)} cases hold"
+        beside = "" if case.other is None else f", beside {_figure(case.other)} ({case.against})"
+        return f"{measure}: {_figure(ours)}{beside}"
+    figures = sorted(figure for _, figure in known)
+    held = [case.holds for case in verdict.cases]
+    undecided = f", {held.count(None)} undecided" if None in held else ""
+    cases = f"{held.count(True)} of {len(held)} cases hold{undecided}"
+    return f"{measure}: {_figure(figures[0])} to {_figure(figures[-1])}; {cases}"
 
 
-def _ratio(case: Case) -> str:
-    return ", ratio" if case.ratio else ""
-
-
-def _figure(value: float | None) -> str:
-    size = abs(value or 0.0)
-    return number(value, 0 if size >= 100.0 else 1 if size >= 10.0 else 2)
+def _figure(value: float) -> str:
+    """Three digits or four; whole numbers as such."""
+    whole = float(value).is_integer() or abs(value) >= 100.0
+    return number(value, 0 if whole else 1 if abs(value) >= 10.0 else 2)
 
 
 def _counts(verdicts: Sequence[str]) -> str:

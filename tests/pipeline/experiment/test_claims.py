@@ -28,7 +28,7 @@ def folder(tmp_path: Path) -> Path:
     found = [
         verdict("it holds", ("first, 60", True, 3.0), ("second, 60", False, 1234.5)),
         verdict("… too", ("first, 60", True, 4.25)),
-        verdict("… too", ("second, 60", None, 5.0)),
+        verdict("… too", ("second, 60", None, 5.25)),
     ]
     (pages / "one.verdicts.json").write_text(json.dumps([each.plain() for each in found]))
     return pages
@@ -48,9 +48,9 @@ def test_each_claim_stands_with_its_verdict_and_figure(folder: Path) -> None:
     text = (folder.parent / "papers.md").read_text()
     link = "| they say so | Table 1 | [one](pages/one.md)"
     for row in (
-        f"{link}: it holds | does not hold | Error (cm): 3.00 to 1234; 1 of 2 cases hold |",
-        f"{link}: it holds (second) | does not hold | Error (cm): 1234, beside 9.00 (the limit) |",
-        f"{link}: … too (second, 60) | undecided | Error (cm): 5.00, beside 9.00 (the limit) |",
+        f"{link}: it holds | does not hold | Error (cm): 3 to 1234; 1 of 2 cases hold |",
+        f"{link}: it holds (second) | does not hold | Error (cm): 1234, beside 9 (the limit) |",
+        f"{link}: … too (second, 60) | undecided | Error (cm): 5.25, beside 9 (the limit) |",
         "| they say so | Table 1 | needs two of them | no experiment |  |",
         "| they say so | Table 1 | no third | not testable here |  |",
         "5 claims: 3 have an experiment (holds: 0; does not hold: 2; undecided: 1), 1 have none and 1 cannot be tested",
