@@ -119,7 +119,7 @@ def _unknown(where: str, name: str, options: Sequence[str], kind: str) -> Proble
 
 
 def _ours(verdict: Verdict) -> str:
-    """The measure, and our figure with what it is compared with; of several cases the least and the greatest."""
+    """The measure, our figure, what it is compared with and the difference's interval; of several cases the range."""
     known = [(case, case.ours) for case in verdict.cases if case.ours is not None]
     if not known:
         return f"{verdict.measure}: –"
@@ -127,7 +127,8 @@ def _ours(verdict: Verdict) -> str:
     measure = f"{verdict.measure}{', ratio' if case.ratio else ''}"
     if len(verdict.cases) == 1:
         beside = "" if case.other is None else f", beside {_figure(case.other)} ({case.against})"
-        return f"{measure}: {_figure(ours)}{beside}"
+        between = "" if case.interval is None else f", difference {' to '.join(map(_figure, case.interval))}"
+        return f"{measure}: {_figure(ours)}{beside}{between}"
     figures = sorted(figure for _, figure in known)
     held = [case.holds for case in verdict.cases]
     undecided = f", {held.count(None)} undecided" if None in held else ""

@@ -13,7 +13,7 @@ GOOD = "experiment: one, statement: it holds"
 
 
 def verdict(statement: str, *cases: tuple[str, bool | None, float]) -> Verdict:
-    plain = (Case(where, ours, 9.0, "the limit", ours - 9.0, (-1.0, 1.0), holds, 7, 7) for where, holds, ours in cases)
+    plain = (Case(where, ours, 9.0, "the limit", ours - 9.0, (-1.0, 1.5), holds, 7, 7) for where, holds, ours in cases)
     return Verdict(statement, "Error (cm)", "", tuple(plain))
 
 
@@ -49,8 +49,8 @@ def test_each_claim_stands_with_its_verdict_and_figure(folder: Path) -> None:
     link = "| they say so | Table 1 | [one](pages/one.md)"
     for row in (
         f"{link}: it holds | does not hold | Error (cm): 3 to 1234; 1 of 2 cases hold |",
-        f"{link}: it holds (second) | does not hold | Error (cm): 1234, beside 9 (the limit) |",
-        f"{link}: … too (second, 60) | undecided | Error (cm): 5.25, beside 9 (the limit) |",
+        f"{link}: it holds (second) | does not hold | Error (cm): 1234, beside 9 (the limit), difference -1 to 1.50 |",
+        f"{link}: … too (second, 60) | undecided | Error (cm): 5.25, beside 9 (the limit), difference -1 to 1.50 |",
         "| they say so | Table 1 | needs two of them | no experiment |  |",
         "| they say so | Table 1 | no third | not testable here |  |",
         "5 claims: 3 have an experiment (holds: 0; does not hold: 2; undecided: 1), 1 have none and 1 cannot be tested",
