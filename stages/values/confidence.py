@@ -1,6 +1,6 @@
 """How far an estimate is to be trusted."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from omninav.pipeline import Bounds, Value
 
@@ -15,5 +15,7 @@ class PoseConfidence(Value):
 
 class WrongPoseAgreement(Value):
     """How often the best match of an image of the map lies where a robot wrongly believes to be: a share in [0, 1]."""
+
+    costly: ClassVar[bool] = True
 
     share: Probability
