@@ -69,7 +69,8 @@ def claim_tables(path: Path, found: Mapping[str, Sequence[Verdict]]) -> tuple[Pa
             except ProblemsFound as error:
                 problems += error.problems
                 continue
-            lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+            escaped = (" ".join(cell.split()).replace("|", r"\|") for cell in cells)
+            lines.append(f"| {' | '.join(escaped)} |")
             verdicts.append(cells[3])
         blocks.append("\n".join(lines))
     if problems:
