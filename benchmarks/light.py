@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from variants import DataSet, data_sets
+from variants import LIGHTS, DataSet, data_sets
 
 import omninav
 from omninav import Context
@@ -25,12 +25,6 @@ from omninav.stages.recordings.opening import open_recording
 from omninav.stages.unwarp.table import PanoramaTable
 from omninav.stages.values.image import Image, Panorama, Pixels
 
-LIGHTS: Mapping[str, Mapping[str, float]] = {
-    "as is": {},
-    "dim": {"gamma": 1.4, "gain": 0.35},
-    "warm": {"blue": 0.55, "red": 1.25},
-    "side": {"gain": 0.775, "side": 0.677},
-}
 HSV = ["features=hsv_histogram"]
 LAB = ["features=colour_histogram", "nodes.features.space=lab", "nodes.features.bins=[0,16,16]"]
 LOCAL = "nodes.features.grey_world=local"

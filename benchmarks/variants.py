@@ -1,8 +1,9 @@
-"""What each variant costs and how well it does on four data sets: the table of docs/which_variant.md.
+"""How well each variant does on several data sets, also in other light, and its costs: docs/which_variant.md.
 
-    python benchmarks/variants.py --data FOLDER --write docs/which_variant.md
+    python benchmarks/variants.py --data FOLDER --level FOLDER --write docs/which_variant.md
 
-Every run is a process of its own, and reads nothing from a cache.
+`--level`: a folder with the drives of benchmarks/game_level.py. Finished figures are kept in `--runs`, so that this can
+be stopped and typed again. Time and memory are those of a process of its own that reads nothing from a cache.
 """
 
 import argparse
@@ -16,10 +17,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
+from typing import Any
 
-MAPPED = ("plain_matching", "omniview_mcl", "retrieval_mcl", "particle_cml_baseline", "topological_localisation")
+import omninav
+
+SEEING_PANORAMAS = ("plain_matching", "omniview_mcl", "omninav", "retrieval_mcl", "particle_cml_baseline")
+"""They learn a map and describe panoramas, whose light can be changed between tour and drive."""
+MAPPED = (*SEEING_PANORAMAS, "topological_localisation")
 LEARNING = ("omniview_cml", "particle_cml")
+LIGHTS: Mapping[str, Mapping[str, float]] = {
+    "as is": {},
+    "dim": {"gamma": 1.4, "gain": 0.35},
+    "warm": {"blue": 0.55, "red": 1.25},
+    "side": {"gain": 0.775, "side": 0.677},
+}
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+
+Figures = dict[str, dict[str, dict[str, float]]]
+"""By variant, then by data set and light: median, 90 % (m) and share lost once converged, each the median of seeds."""
 
 
 @dataclass(frozen=True)
@@ -42,25 +57,33 @@ def data_sets(data: Path) -> list[DataSet]:
     ]
 
 
+def game_level(folder: Path) -> DataSet:
+    """The drives that benchmarks/game_level.py wrote."""
+    return DataSet("game level", str(folder / "tour.mcap"), str(folder / "drive.mcap"))
+
+
 def simulated(folder: Path, world: str) -> DataSet:
     """A tour and a drive of the simulator, recorded into a folder."""
     for route in ("tour", "drive"):
         if not (folder / f"{route}.mcap").exists():
-            omninav("simulate", f"world={world}", f"route={route}", f"log={folder}/{route}.mcap")
-    return DataSet(
-        f"simulated {world}", *(f"{folder}/{name}" for name in ("tour.mcap", "drive.mcap", "tour.grid/map.yaml"))
-    )
+            process_memory("simulate", f"world={world}", f"route={route}", f"log={folder}/{route}.mcap")
+    return DataSet(world, *(f"{folder}/{name}" for name in ("tour.mcap", "drive.mcap", "tour.grid/map.yaml")))
 
 
-def words(variant: str, on: DataSet) -> list[str]:
-    """What is typed to run a variant on a data set."""
+def words(variant: str, on: DataSet, light: str = "as is") -> list[str]:
+    """What is typed to run a variant on a data set, the drive in another light."""
     if variant in LEARNING:
         return [f"variant={variant}", f"log=[{on.tour},{on.drive}]"]
-    grid = [f"grid={on.grid}"] if variant == "retrieval_mcl" else []
-    return [f"variant={variant}", f"tour={on.tour}", f"log={on.drive}", *grid]
+    typed = [f"variant={variant}", f"tour={on.tour}", f"log={on.drive}"]
+    typed += [f"grid={on.grid}"] if variant == "retrieval_mcl" else []
+    if LIGHTS[light]:
+        typed += ["perturbation=changed_light", "+wires.perturbation={panorama: unwarp.panorama}"]
+        typed += ["wires.features.panorama=perturbation.panorama"]
+        typed += [f"nodes.perturbation.{name}={value}" for name, value in LIGHTS[light].items()]
+    return typed
 
 
-def omninav(*arguments: str) -> float:
+def process_memory(*arguments: str) -> float:
     """Run a command line and return the process's largest memory in MB. Raises where it fails."""
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
     process = subprocess.Popen(
@@ -78,59 +101,83 @@ def omninav(*arguments: str) -> float:
     return usage.ru_maxrss / 1024
 
 
-def measured(variant: str, on: DataSet, seeds: int, runs: Path) -> dict[str, float]:
-    """Medians over the seeds: error (m) and share lost once converged, milliseconds per image, megabytes."""
-    found: list[dict[str, float]] = []
-    for seed in range(seeds):
-        folder = runs / f"{variant} {on.name} {seed}".replace(" ", "_")
-        shutil.rmtree(folder, ignore_errors=True)
-        own = [f"seed={seed}", f"hydra.run.dir={folder}", "cache=null"]  # every stage runs
-        memory = omninav(*words(variant, on), *own)
-        metrics, timing = (json.loads((folder / name).read_text()) for name in ("metrics.json", "timing.json"))
-        after = metrics["after_convergence"]
-        figures = {"error": after["position_error_m"]["median"], "lost": after["loss_rate"]}
-        found.append(figures | {"step": timing["step"]["p50_ms"], "memory": memory})
+def errors(typed: list[str], seed: int, runs: Path) -> dict[str, float]:
+    """Of one run: median, 90 % (m) and share lost, once converged; of all frames where it never was."""
+    run = omninav.run(*typed, f"seed={seed}", f"runs={runs}", f"cache={runs / 'cache'}", "plots=none", progress=False)
+    whole: Any = run.metrics
+    after = whole["after_convergence"]
+    found = after if after and after["position_error_m"] else whole
+    shutil.rmtree(run.folder)
+    error = found["position_error_m"]
+    return {"error": error["median"], "p90": error["p90"], "lost": found["loss_rate"]}
+
+
+def over_seeds(typed: list[str], seeds: int, runs: Path) -> dict[str, float]:
+    """The median over seeds of each figure."""
+    found = [errors(typed, seed, runs) for seed in range(seeds)]
     return {name: statistics.median(each[name] for each in found) for name in found[0]}
 
 
-def table(figures: Mapping[str, Mapping[str, Mapping[str, float]]], seeds: int) -> str:
-    """Markdown: a row per variant; its error on each data set, and over them its largest time and memory."""
-    sets = list(dict.fromkeys(name for by_set in figures.values() for name in by_set))
+def costs(variant: str, on: DataSet, runs: Path) -> dict[str, float]:
+    """Milliseconds per image (median) and megabytes, of a process of its own."""
+    folder = runs / "cost"
+    shutil.rmtree(folder, ignore_errors=True)
+    memory = process_memory(*words(variant, on), "seed=0", f"hydra.run.dir={folder}", "cache=null")
+    return {"step": json.loads((folder / "timing.json").read_text())["step"]["p50_ms"], "memory": memory}
+
+
+def tables(figures: Figures, seeds: int) -> str:
+    """Markdown: of each data set a row per variant and a column per light; then what each variant costs."""
     lines = [
-        f"| variant | {' | '.join(f'{name} (m)' for name in sets)} | ms per image | MB |",
-        f"|---{'|---:' * (len(sets) + 2)}|",
+        BEGIN,
+        "Medians over seeds of: median / 90 % of the position error (m), and the share lost where there was one.",
+        "",
     ]
+    for on in dict.fromkeys(key.split(", ")[0] for by_set in figures.values() for key in by_set):
+        lines += [f"| {on} | {' | '.join(LIGHTS)} |", f"|---{'|---:' * len(LIGHTS)}|"]
+        for variant, by_set in figures.items():
+            shown = [cell(by_set[key]) if (key := f"{on}, {light}") in by_set else "" for light in LIGHTS]
+            lines += [f"| `{variant}` | {' | '.join(shown)} |"] if any(shown) else []
+        lines.append("")
+    lines += ["| variant | ms per image | MB |", "|---|---:|---:|"]
     for variant, by_set in figures.items():
-        errors = [_error(by_set[name]) if name in by_set else "" for name in sets]
-        step, memory = (max(found[key] for found in by_set.values()) for key in ("step", "memory"))
-        lines.append(f"| `{variant}` | {' | '.join(errors)} | {step:.1f} | {memory:.0f} |")
-    seeds_said = "seed 0" if seeds == 1 else f"medians over {seeds} seeds"
-    return "\n".join([BEGIN, *lines, "", f"Measured on {date.today()}, {seeds_said}.", END])
+        measured = [found for found in by_set.values() if "step" in found]
+        step, memory = (max(found[key] for found in measured) for key in ("step", "memory"))
+        lines.append(f"| `{variant}` | {step:.1f} | {memory:.0f} |")
+    return "\n".join([*lines, "", f"Measured on {date.today()}, {seeds} seeds.", END])
 
 
-def _error(found: Mapping[str, float]) -> str:
-    return f"{found['error']:.2f}" + (f" ({100 * found['lost']:.0f} % lost)" if found["lost"] >= 0.005 else "")
+def cell(found: Mapping[str, float]) -> str:
+    """A table's cell."""
+    lost = f" ({100 * found['lost']:.0f} % lost)" if found["lost"] >= 0.005 else ""
+    return f"{found['error']:.2f} / {found['p90']:.2f}{lost}"
 
 
 def main() -> int:
-    """Measure all, or the variants that are named, and write or print the table."""
+    """Measure all, or the variants that are named, and write or print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, required=True, help="folder of the sample recordings")
-    parser.add_argument("--write", type=Path, help="page whose table is replaced")
+    parser.add_argument("--level", type=Path, help="folder of a game engine's level")
+    parser.add_argument("--write", type=Path, help="page whose tables are replaced")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--runs", type=Path, default=Path("runs/variants"), help="where finished figures are kept")
     parser.add_argument("variants", nargs="*", default=[*MAPPED, *LEARNING])
     given = parser.parse_args()
+    given.runs.mkdir(parents=True, exist_ok=True)
     kept = given.runs / "figures.json"
-    figures: dict[str, dict[str, dict[str, float]]] = json.loads(kept.read_text()) if kept.exists() else {}
-    for on in [simulated(given.runs, "home_store_demo"), *data_sets(given.data)]:
+    figures: Figures = json.loads(kept.read_text()) if kept.exists() else {}
+    sets = [*data_sets(given.data), *([game_level(given.level)] if given.level else [])]
+    for on in [*sets, simulated(given.runs, "home_store_demo")]:
         for variant in given.variants:
-            if on.name in figures.get(variant, {}):
-                continue
-            print(f"{variant} on {on.name} …", file=sys.stderr, flush=True)
-            figures.setdefault(variant, {})[on.name] = measured(variant, on, given.seeds, given.runs)
-            kept.write_text(json.dumps(figures, indent=1))
-    shown = table(figures, given.seeds)
+            for light in LIGHTS if variant in SEEING_PANORAMAS else ("as is",):
+                key, by_set = f"{on.name}, {light}", figures.setdefault(variant, {})
+                if key in by_set:
+                    continue
+                print(f"{variant}: {key} …", file=sys.stderr, flush=True)
+                by_set[key] = over_seeds(words(variant, on, light), given.seeds, given.runs)
+                by_set[key] |= costs(variant, on, given.runs) if light == "as is" else {}
+                kept.write_text(json.dumps(figures, indent=1))
+    shown = tables(figures, given.seeds)
     if given.write is None:
         print(shown)
     else:
