@@ -1,0 +1,103 @@
+"""The homing vector of two whole images, where their features do not tell."""
+
+import math
+from dataclasses import replace
+from typing import Annotated
+
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State
+from omninav.stages.camera.model import Camera
+from omninav.stages.camera.panorama import camera_behind
+from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.values.homing import HomingVector
+from omninav.stages.values.image import Image, Panorama
+
+from .column_table import ColumnTable
+from .column_warping import Columns, warped
+
+
+class WarpingVectorState(State):
+    """`target`: the number of the target; `nearness`: at the first vector towards it, 0 before that."""
+
+    target: int = -1
+    nearness: float = 0.0
+
+
+class WarpingVector(Stage):
+    """From the robot to the target view by warping whole columns of one image to those of the other.
+
+    Möller, Krzykawski & Gerstmayr 2010: for every direction and turn, how well do the columns of one view match those
+    of the other, each at the place and magnification in which a robot that has moved so would see it, at a distance of
+    its own? Columns count by how rare as good a match is. Where the local map has a vector of its own, by features,
+    that is given on: it is the more accurate one. The camera moves on a plane and stands upright.
+
+    `ratio` is over the nearness at the target's first vector, `distance` the same; metres are not known. Raises
+    BadInput for an image without its camera, and a camera that does not see the full circle.
+    """
+
+    columns: Annotated[int, Bounds(ge=24, le=720)] = 180
+    """Columns that an image is brought to; a multiple of 4."""
+    noise_levels: Annotated[float, Bounds(gt=0, le=255)] = 14.0
+    """Of 255, by which the same thing differs in two views."""
+    half_window: Annotated[int, Bounds(ge=0, le=10)] = 2
+    """Columns on both sides of one that are compared together with it."""
+    max_turn_deg: Annotated[float, Bounds(ge=0, le=180)] = 180.0
+    """To both sides, by which the target's heading may differ from the robot's; 180: by any. With a compass less."""
+    min_columns: Annotated[int, Bounds(ge=1)] = 20
+    """That match better than by chance; with fewer the target is lost."""
+
+    class Out(Outputs):
+        """Absent where there is no target."""
+
+        vector: HomingVector | None = None
+
+    def setup(self, ctx: Context) -> None:
+        """No tables yet: the camera comes with the first image."""
+        if self.columns % 4:
+            raise BadInput(f"columns: {self.columns} is no multiple of 4; write nodes.homing.columns=180")
+        self._table = ColumnTable(self.columns)
+        self._target: tuple[Image | Panorama, Columns] | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        state: WarpingVectorState,
+        image: Image | Panorama,
+        vector: HomingVector,
+        target: Image | Panorama | None = None,
+        camera: Camera | None = None,
+    ) -> Out:
+        """One homing vector; `vector`: the local map's, `target`: the image to go to."""
+        if vector.number != state.target:
+            state.target, state.nearness = vector.number, 0.0
+        if vector.state != "lost" or target is None:
+            return self.Out(vector=vector)
+        if self._target is None or self._target[0] is not target:
+            self._target = target, self._columns(target, camera)
+        here = self._columns(image, camera)
+        noise = (self.noise_levels / 255.0) ** 2
+        found = warped(here, self._target[1], noise, self.half_window, 2, math.radians(self.max_turn_deg))
+        if found.columns < self.min_columns:
+            ctx.count("too_few_columns")
+            why = f"{vector.why}; {found.columns} columns of the image match, {self.min_columns} are needed"
+            return self.Out(vector=replace(vector, why=why))
+        state.nearness = state.nearness or max(found.nearness, 1e-3)
+        ratio = found.nearness / state.nearness
+        return self.Out(
+            vector=HomingVector(
+                number=vector.number,
+                direction=float(wrap(found.direction)),
+                turn=float(wrap(found.turn)),
+                distance=ratio,
+                ratio=ratio,
+                nearness=found.nearness,
+                metres=None,
+                inliers=found.columns,
+                state="new",
+            )
+        )
+
+    def _columns(self, image: Image | Panorama, camera: Camera | None) -> Columns:
+        seen_by = camera_behind(image, camera)
+        if seen_by is None:
+            raise BadInput("homing: a camera's image without its camera; wire it: wires.homing.camera=source.camera")
+        return self._table.columns(image.pixels, seen_by)
