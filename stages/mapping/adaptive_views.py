@@ -22,7 +22,7 @@ from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import NoveltyThreshold
 
-from .before_threshold import BeforeThreshold, due
+from .before_threshold import BeforeThreshold, begin, due
 from .view_cap import within_cap
 from .view_events import view_event
 
@@ -115,10 +115,11 @@ class AdaptiveViews(Stage):
     ) -> Out:
         """Apply the updates of this tick."""
         map.keep_threshold(threshold)
+        before = map.ids
+        begin(updates, map, waiting)
         ready = due(() if updates is None else updates.items, threshold, map, waiting)
         if not ready:
             return self.Out(map=map)
-        before = map.ids
         changed: list[Ints] = []
         seen: dict[int, int] = {}
         full = False

@@ -1,10 +1,10 @@
-"""Holds updates back until there is a novelty threshold."""
+"""Holds updates back until there is a novelty threshold, and begins a map again."""
 
 from collections.abc import Iterable
 from dataclasses import field
 
 from omninav.pipeline import State
-from omninav.stages.values.map_update import MapUpdate
+from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import NoveltyThreshold
 
@@ -23,3 +23,12 @@ def due(
     now = len(before.waiting) if threshold is not None else 0 if len(map) else 1
     ready, before.waiting = before.waiting[:now], before.waiting[now:]
     return ready
+
+
+def begin(updates: MapUpdates | None, map: ViewMixtures, before: BeforeThreshold) -> None:
+    """Forget all where the updates say so, and keep the drives that they come with."""
+    if updates is not None and updates.relearn:
+        map.forget_all()
+        before.waiting = []
+    if updates is not None and updates.sessions is not None:
+        map.put(sessions=updates.sessions)

@@ -17,7 +17,7 @@ from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import NoveltyThreshold
 
 from .applied_update import AppliedUpdate, record_update
-from .before_threshold import BeforeThreshold, due
+from .before_threshold import BeforeThreshold, begin, due
 from .view_cap import within_cap
 from .view_events import view_event
 
@@ -78,8 +78,9 @@ class FusedMixtures(Stage):
         map.keep_threshold(threshold)
         updates = MapUpdates(()) if updates is None else updates
         open_from = math.inf if updates.open_from is None else updates.open_from
-        pending.open = [applied for applied in pending.open if applied.index >= open_from]
+        pending.open = [] if updates.relearn else [applied for applied in pending.open if applied.index >= open_from]
         before = map.ids.copy()
+        begin(updates, map, pending)
         new, changed = self._redo(ctx, updates.items, pending, map) if open_from < math.inf else (updates.items, [])
         seen: dict[int, int] = {}
         for update in due(new, threshold, map, pending):

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -16,17 +16,11 @@ from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.maps import ReferenceGraph
 
 from .appearance_length_scale import length_scale_of
+from .pose_graph_edges import Closures, odometry_sigmas
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float32]
-
-ODOMETRY_SIGMAS = (0.02, 0.02, 0.02)
-"""Standard deviation of odometry per metre (m, m, rad)."""
-TURN_SIGMA = 0.05
-"""The same of a turn, per radian."""
-MIN_SIGMAS = (0.005, 0.005, 0.0025)
-"""Of the shortest motion (m, m, rad): poses in a map are samples of a drive."""
 
 QUANTITIES = {
     "straightened.closures": Quantity(title="Places that the tour came back to", context=True),
@@ -34,14 +28,6 @@ QUANTITIES = {
     "straightened.moved_median_m": Quantity(title="References moved by, median", context=True),
     "straightened.moved_max_m": Quantity(title="References moved by, largest", context=True),
 }
-
-
-class Closures(NamedTuple):
-    """Pairs of references that show one place. `pairs` (C, 2), the earlier first; `turns` (C,): heading of the later in
-    the frame of the earlier (rad)."""
-
-    pairs: Ints
-    turns: Array
 
 
 def closures_by_appearance(
@@ -136,9 +122,6 @@ class StraightenMap(Stage):
     def _optimised(self, poses: Array, steps: Array, closures: Closures, unit: float) -> tuple[Array, Array]:
         """The poses, and the weights of the closures."""
         number = len(poses)
-        length = np.hypot(steps[:, 0], steps[:, 1])
-        drift = np.asarray(MIN_SIGMAS) + np.asarray(ODOMETRY_SIGMAS) * length[:, None]
-        drift[:, 2] += TURN_SIGMA * np.abs(steps[:, 2])
         loops = np.zeros((len(closures.pairs), 3))
         loops[:, 2] = closures.turns
         spread = [self.closure_sigma * unit, self.closure_sigma * unit, math.radians(self.closure_sigma_deg)]
@@ -146,7 +129,7 @@ class StraightenMap(Stage):
             poses,
             np.concatenate([np.column_stack([np.arange(number - 1), np.arange(1, number)]), closures.pairs]),
             np.concatenate([steps, loops]),
-            np.concatenate([drift, np.tile(spread, (len(loops), 1))]),
+            np.concatenate([odometry_sigmas(steps), np.tile(spread, (len(loops), 1))]),
             np.arange(number - 1 + len(loops)) >= number - 1,
         )
         return found, weights[number - 1 :]

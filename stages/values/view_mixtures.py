@@ -10,6 +10,7 @@ from omninav.pipeline.graph.contents import Covariances, RowsOf, Shape
 
 from .growable_arrays import GrowableArrays
 from .pose import PoseSource
+from .sessions import Sessions
 from .views import NoveltyThreshold, WholeView
 
 Array = npt.NDArray[np.float64]
@@ -27,7 +28,8 @@ class ViewMixtures(GrowableArrays, Value):
     `counts` (C,) how many observations each has taken in (eta). A component's heading is that of a robot that sees the
     view as it was kept: the pose that fits a view seen turned by t has the heading plus t. `steps`: views learned from
     so far. `next_id`: the id of the next view. `pose_source`: the source of the first pose. `threshold`: the settled
-    novelty threshold, None until there is one.
+    novelty threshold, None until there is one. `sessions`: the drives that the map was learned
+    from, to straighten it by later ones; None: not kept.
     """
 
     in_place = True
@@ -45,6 +47,7 @@ class ViewMixtures(GrowableArrays, Value):
     next_id: Annotated[int, Bounds(ge=0)]
     pose_source: PoseSource
     threshold: NoveltyThreshold | None = None
+    sessions: Sessions | None = None
 
     @classmethod
     def empty(cls) -> "ViewMixtures":
@@ -131,6 +134,10 @@ class ViewMixtures(GrowableArrays, Value):
     def take_poses_from(self, source: PoseSource) -> None:
         """Say where the first pose came from."""
         self.put(pose_source=source)
+
+    def forget_all(self) -> None:
+        """Drop all views; their ids are not used again."""
+        self.keep_views(np.zeros(len(self), np.bool_))
 
     def keep_threshold(self, threshold: NoveltyThreshold | None) -> None:
         """Keep the novelty threshold with which the map is learned, once that is settled."""

@@ -1,7 +1,8 @@
 """Whole views as one vector each, as maps learned during their use keep them."""
 
 from abc import abstractmethod
-from typing import Annotated
+from dataclasses import replace
+from typing import Annotated, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +29,15 @@ class WholeView(Value):
     def distances(self, kept: FloatArray) -> Array:
         """Distances to kept views (R, D) of the same kind: (R,), 0 for equal views, whatever the robot's heading."""
 
+    @property
+    def rows(self) -> FloatArray:
+        """All that is needed to compare the view with kept ones: (H, D), of which the first row is `values`."""
+        return self.values[None]
+
+    def like(self, rows: FloatArray) -> Self:
+        """A view of the same kind with these `rows`."""
+        return replace(self, values=rows[0])
+
     @abstractmethod
     def turns(self, kept: FloatArray) -> Array:
         """How far the robot stands turned, counter-clockwise, from its heading in each kept view (R, D): (R,) rad."""
@@ -41,6 +51,13 @@ class Coefficients(WholeView):
     """
 
     turned: Annotated[FloatArray, Shape("H", "D")]
+
+    @property
+    def rows(self) -> FloatArray:
+        return self.turned
+
+    def like(self, rows: FloatArray) -> Self:
+        return replace(self, values=rows[0], turned=rows)
 
     def distances(self, kept: FloatArray) -> Array:
         return turned_distances(self.turned, kept)

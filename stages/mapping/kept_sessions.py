@@ -1,0 +1,63 @@
+"""Keeps the views of all drives and the odometry between them."""
+
+import math
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.values.belief import GaussianMixture
+from omninav.stages.values.pose import Motion
+from omninav.stages.values.sessions import Sessions
+from omninav.stages.values.view_mixtures import ViewMixtures
+from omninav.stages.values.views import WholeView
+
+from .unimodality import unimodal_state
+
+Array = npt.NDArray[np.float64]
+MAX_SIGMA_DEG = 45.0
+"""Of a believed heading; an unknown one has 104 degrees."""
+
+
+class KeepSessions(Stage):
+    """Keeps each view, the odometry since the one before, and the pose that was believed.
+
+    A map of views holds what its drives taught, and no more the drives themselves; with them it can be straightened
+    (`StraightenSessions`) and learned again. Views of a robot that stands still are left out.
+    """
+
+    min_move_m: Annotated[float, Bounds(ge=0)] = 0.01
+    """Way between two views that are kept."""
+
+    class Out(Outputs):
+        """All drives so far, those of a known map among them."""
+
+        sessions: Sessions
+
+    def step(
+        self,
+        ctx: Context,
+        view: WholeView,
+        motion: Motion | None,
+        state: GaussianMixture,
+        kept: Sessions | None,
+        known: ViewMixtures | None = None,
+    ) -> Out:
+        """Keep one view."""
+        if kept is None:
+            earlier = Sessions.empty(view) if known is None or known.sessions is None else known.sessions
+            kept = replace(earlier, ticks=np.zeros(len(earlier), np.int64))  # the known map's own stay as they are
+        begins = ctx.tick.first_of_log or motion is None
+        if motion is not None:
+            kept.move(np.array([motion.x, motion.y, motion.turn]))
+        if begins or math.hypot(kept.since[0], kept.since[1]) >= self.min_move_m:
+            kept.keep(view, _believed(state), begins, ctx.tick.index)
+        return self.Out(sessions=kept)
+
+
+def _believed(state: GaussianMixture) -> Array | None:
+    # The pose (3,) where the state has one mode and a heading.
+    single = unimodal_state(state)
+    return None if single is None or single[1][2, 2] > math.radians(MAX_SIGMA_DEG) ** 2 else single[0]

@@ -1,0 +1,126 @@
+"""Straightens a map of views by the places that its drives came back to."""
+
+import math
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Tick
+from omninav.stages.values.belief import GaussianMixture
+from omninav.stages.values.map_update import MapUpdate, MapUpdates
+from omninav.stages.values.sessions import Sessions
+from omninav.stages.values.views import NoveltyThreshold
+
+from .session_graph import closures_between, placed, straightened_poses
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+QUANTITIES = {
+    "straightened.sessions": Quantity(title="Drives that the map was learned from", context=True),
+    "straightened.joined": Quantity(title="Of these joined by places that look alike", context=True),
+    "straightened.closures": Quantity(title="Places that the drives came back to", context=True),
+    "straightened.rejected": Quantity(title="Of these contradicted by the others", context=True),
+    "straightened.moved_rms_m": Quantity(title="Views moved by, root mean square", context=True),
+    "straightened.moved_max_m": Quantity(title="Views moved by, largest", context=True),
+}
+MIN_WEIGHT = 0.1
+"""Of a closure, below which the others have contradicted it."""
+
+
+class StraightenSessions(Stage):
+    """Learns a map again from all drives, once poses are known that make one place of what looks like one place.
+
+    Views that look alike although the robot drove on between them, and views of different drives that look alike,
+    close loops; a pose graph of odometry and closures gives all poses, with Cauchy's loss on closures, since some are
+    wrong. The map then forgets all and learns each view with its new pose. As a log begins this is done with the drives
+    before it; wired with `ticks`, a second node of this class does it with all of them after the last log. A drive that
+    nothing joins to the others is learned where it was believed to be. Where no closure is left, as in a first drive
+    without any crossing, nothing tells how odometry bent the map, and it stays as it is. Manifest fact
+    `map_straightened`.
+
+    Not in the papers. Pose graphs: Grisetti et al. 2010, "A tutorial on graph-based SLAM". Defaults:
+    docs/experiments/cml_straightened.md.
+    """
+
+    max_distance: Annotated[float, Bounds(ge=0, le=1)] = 0.6
+    """Distance up to which two views close a loop, as a share of the novelty threshold; 0: the map is left as it is."""
+    min_gap: Annotated[float, Bounds(gt=0)] = 5.0
+    """Way along one drive between the two, in distances over which views become new."""
+    closure_sigma: Annotated[float, Bounds(gt=0)] = 0.5
+    """Standard deviation of a closure's position, in the same unit."""
+    closure_sigma_deg: Annotated[float, Bounds(gt=0)] = 5.0
+    """Standard deviation of its heading."""
+    sigma_m: Annotated[float, Bounds(gt=0)] = 0.1
+    """Standard deviation with which the map learns a straightened position."""
+    sigma_deg: Annotated[float, Bounds(gt=0)] = 3.0
+    """The same of its heading."""
+    samples: Annotated[int, Bounds(ge=1)] = 1000
+    """Views that look for others, evenly spaced over drives of more."""
+
+    class Out(Outputs):
+        """The updates of the map: those that came in, or all that it is to hold."""
+
+        updates: MapUpdates | None = None
+        metrics: Metrics | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        sessions: Sessions | None,
+        updates: MapUpdates | None,
+        threshold: NoveltyThreshold | None,
+        ticks: Sequence[Tick] | None = None,
+    ) -> Out:
+        """Straighten as a log begins, or after the last one."""
+        last = ticks is not None
+        if sessions is None or not (last or (ctx.tick.first_of_log and len(sessions))):
+            return self.Out(updates=updates)
+        if threshold is None or not threshold.settled or not threshold.metres or not self.max_distance:
+            return self.Out(updates=updates)
+        unit = threshold.metres
+        closures = closures_between(sessions, self.max_distance * threshold.distance, self.min_gap * unit, self.samples)
+        if not len(closures.pairs):
+            return self._as_it_is(ctx, sessions, updates, last)
+        start, joined = placed(sessions, closures, self.min_gap * unit)
+        sigma_rad = math.radians(self.closure_sigma_deg)
+        poses, weights = straightened_poses(sessions, closures, start, self.closure_sigma * unit, sigma_rad)
+        kept = int((weights >= MIN_WEIGHT).sum())
+        if not kept:
+            return self._as_it_is(ctx, sessions, updates, last)
+        apart = ~joined[sessions.drives]
+        poses[apart] = sessions.believed[apart]
+        moved = np.hypot(*(poses - sessions.believed)[sessions.sure & ~apart, :2].T)
+        values: dict[str, float] = {
+            "sessions": len(joined),
+            "joined": int(joined.sum()),
+            "closures": len(weights),
+            "rejected": len(weights) - kept,
+            "moved_rms_m": float(np.sqrt((moved**2).mean())) if len(moved) else 0.0,
+            "moved_max_m": float(moved.max(initial=0.0)),
+        }
+        said = "by {closures} closures between {joined} of {sessions} drives, {rejected} of them rejected"
+        ctx.fact("map_straightened", (said + ", {moved_max_m:.2f} m at most").format(**values))
+        relearn = MapUpdates(
+            self._updates(sessions, poses, ~apart | sessions.sure), relearn=True, sessions=sessions if last else None
+        )
+        return self.Out(updates=relearn, metrics=Metrics({"straightened": values}, QUANTITIES) if last else None)
+
+    def _as_it_is(self, ctx: Context, sessions: Sessions, updates: MapUpdates | None, last: bool) -> Out:
+        ctx.fact("map_straightened", "no: the drives came back to no place, so nothing tells how odometry bent them")
+        items, open_from = ((), None) if updates is None else (updates.items, updates.open_from)
+        return self.Out(updates=MapUpdates(items, open_from, sessions=sessions) if last else updates)
+
+    def _updates(self, sessions: Sessions, poses: Array, learned: Bools) -> tuple[MapUpdate, ...]:
+        covariance = np.diag([self.sigma_m, self.sigma_m, math.radians(self.sigma_deg)]) ** 2
+        return tuple(
+            MapUpdate(
+                sessions.view(row),
+                GaussianMixture(poses[row][None], covariance[None], np.ones(1)),
+                int(sessions.ticks[row]),
+                reconstructed=True,
+            )
+            for row in np.flatnonzero(learned).tolist()
+        )

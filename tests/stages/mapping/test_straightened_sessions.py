@@ -1,0 +1,128 @@
+"""Maps of views that are straightened by the places that their drives came back to, and learned again."""
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.pipeline.engine.codec import decode, encode
+from omninav.stages.geometry.plane.se2 import between, chain
+from omninav.stages.mapping.kept_sessions import KeepSessions
+from omninav.stages.mapping.pose_graph_edges import Closures
+from omninav.stages.mapping.session_graph import closures_between, placed, straightened_poses
+from omninav.stages.mapping.straightened_sessions import StraightenSessions
+from omninav.stages.values.belief import GaussianMixture
+from omninav.stages.values.pose import Motion
+from omninav.stages.values.sessions import Sessions
+from omninav.stages.values.views import NoveltyThreshold, Spectrum
+
+LAP = np.concatenate([np.tile([0.2, 0.0, 0.0], (24, 1)), np.tile([0.2, 0.0, np.pi / 8], (8, 1))])
+TWICE = chain(np.tile(LAP, (4, 1))[:110])  # a stadium, one and three quarters times around
+AGAIN = chain(np.tile(LAP, (2, 1)))
+AWAY = TWICE[:25] + np.array([50.0, 0.0, 0.0])
+WAVES, PHASES = np.random.default_rng(0).normal(0.0, 2.0, (2, 8, 6)), np.linspace(0, 6, 48).reshape(8, 6)
+THRESHOLD = NoveltyThreshold(4.0, True, 0.4)
+
+
+def view(pose):
+    """A spectrum of 8 signals that change over half a metre and turn with the robot."""
+    size = 1.0 + np.sin(np.tensordot(pose[:2], WAVES, 1) + PHASES)
+    spectrum = size * np.exp(1j * (PHASES - np.arange(6) * pose[2]))
+    return Spectrum(np.concatenate([spectrum.real.ravel(), spectrum.imag.ravel()]).astype(np.float32), 8, 36)
+
+
+def drive(sessions, poses, drift=0.01, believed=True):
+    """Add a drive by odometry that turns too much by `drift` (rad) at each view."""
+    steps = between(poses[:-1], poses[1:]) + np.array([0.0, 0.0, drift])
+    sessions = Sessions.empty(view(poses[0])) if sessions is None else sessions
+    for row, pose in enumerate(poses):
+        if row:
+            sessions.move(steps[row - 1])
+        sessions.keep(view(pose), pose if believed else None, row == 0, len(sessions))
+    return sessions
+
+
+def straightened(sessions, **options):
+    ctx = Context("straightened", np.random.default_rng(0))
+    ctx.tick = Tick(index=len(sessions), stamp=0.0)
+    return StraightenSessions(**options).step(ctx, sessions, None, THRESHOLD, []), ctx
+
+
+def learned(out):
+    return np.concatenate([update.state.means for update in out.updates.items])
+
+
+def error(poses, truth):
+    return float(np.hypot(*(poses - truth)[:, :2].T).max())
+
+
+def test_a_drive_that_comes_back_is_straightened_and_learned_again():
+    sessions = drive(None, TWICE)
+    out, ctx = straightened(sessions)
+    assert out.updates.relearn
+    assert out.updates.sessions is sessions
+    assert error(learned(out), TWICE) < 0.4 * error(sessions.by_odometry, TWICE)
+    assert "closures" in ctx.facts["map_straightened"]
+    assert out.metrics.values["straightened"]["moved_max_m"] >= 0.0
+
+
+def test_a_drive_without_a_crossing_is_left_as_it_is_and_said_to_be():
+    out, ctx = straightened(drive(None, TWICE[:25]))
+    assert not out.updates.relearn
+    assert len(out.updates.sessions) == 25
+    assert ctx.facts["map_straightened"].startswith("no: ")
+
+
+def test_drives_without_a_common_frame_are_joined_where_they_look_alike():
+    sessions = drive(drive(None, TWICE), AGAIN, drift=-0.01, believed=False)
+    out, _ = straightened(sessions)
+    assert out.metrics.values["straightened"]["joined"] == 2
+    assert error(learned(out), np.concatenate([TWICE, AGAIN])) < 0.6
+
+
+def test_a_drive_elsewhere_stays_where_it_was_believed_to_be():
+    out, _ = straightened(drive(drive(None, TWICE), AWAY))
+    assert out.metrics.values["straightened"]["joined"] == 1
+    assert error(learned(out)[-25:], AWAY) < 1.0
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3])
+def test_wrong_closures_do_not_bend_the_map(share):
+    sessions = drive(None, TWICE)
+    right = closures_between(sessions, 0.6 * THRESHOLD.distance, 2.0, 1000)
+    number = round(share / (1.0 - share) * len(right.pairs))
+    rng = np.random.default_rng(1)
+    wrong = np.sort(np.column_stack([rng.integers(0, 50, number), rng.integers(55, 110, number)]))
+    both = Closures(np.concatenate([right.pairs, wrong]), np.append(right.turns, rng.uniform(-3, 3, number)))
+    start, _ = placed(sessions, both, 2.0)
+    poses, weights = straightened_poses(sessions, both, start, 0.2, 0.1)
+    assert error(poses, TWICE) < 0.4 * error(sessions.by_odometry, TWICE)
+    assert np.median(weights[len(right.pairs) :]) < 0.1 < np.median(weights[: len(right.pairs)])
+
+
+def test_a_map_of_one_view_stays():
+    out, _ = straightened(drive(None, TWICE[:1]))
+    assert not out.updates.relearn
+
+
+def kept(poses, restored_at=None):
+    sessions, stage = None, KeepSessions()
+    steps = between(poses[:-1], poses[1:])
+    for row, pose in enumerate(poses):
+        if row == restored_at:
+            sessions = decode(encode(sessions))
+        ctx = Context("sessions", np.random.default_rng(0))
+        ctx.tick = Tick(index=row, stamp=0.2 * row, first_of_log=row == 0)
+        state = GaussianMixture(pose[None], 0.01 * np.eye(3)[None], np.ones(1))
+        sessions = stage.step(ctx, view(pose), Motion(*steps[row - 1]) if row else None, state, sessions).sessions
+    return sessions
+
+
+def test_sessions_that_were_written_and_read_again_go_on_to_the_same_bytes():
+    assert encode(kept(TWICE[:40], restored_at=20)) == encode(kept(TWICE[:40]))
+
+
+def test_a_robot_that_stands_still_keeps_no_views():
+    poses = np.concatenate([TWICE[:3], np.tile(TWICE[2], (5, 1)), TWICE[3:5]])
+    sessions = kept(poses)
+    assert len(sessions) == 5
+    assert sessions.by_odometry == pytest.approx(between(TWICE[0], TWICE[:5]), abs=1e-9)
