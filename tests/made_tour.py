@@ -10,6 +10,7 @@ from omninav.pipeline import Context, Tick
 from omninav.stages.mapping.loop_closure import LoopClosure
 from omninav.stages.mapping.topological import TopologicalMapping
 from omninav.stages.mapping.view_comparison import ViewComparison
+from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
@@ -58,6 +59,7 @@ class Mapped(NamedTuple):
 
     map: TopologicalMap
     hypotheses: LoopHypotheses
+    views: ComparedViews
 
 
 def mapped(
@@ -86,4 +88,4 @@ def mapped(
         known=known,
     ).views
     found = closure.step(Context("loops"), views).hypotheses
-    return Mapped(mapping.step(Context("mapping"), views, found, known).map, found)
+    return Mapped(mapping.step(Context("mapping"), views, found, known).map, found, views)

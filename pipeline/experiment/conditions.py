@@ -11,7 +11,7 @@ from typing import Any
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, suggest
 from omninav.pipeline.report.progress import Progress
-from omninav.pipeline.run.artifact_specification import without_companions
+from omninav.pipeline.run.artifact_specification import without_plotted
 from omninav.pipeline.run.plan import Plan, plan
 
 from .repetition import artifact_key, condition_key, finished, known_digests
@@ -126,7 +126,7 @@ def check(experiment: Experiment, runs: Sequence[ConditionRun], compose: Compose
                 if run.overrides not in composed:
                     composed[run.overrides] = compose(run.overrides)
                 plain = json.loads(json.dumps(composed[run.overrides], default=str))
-                run.config = dict(without_companions(plain))
+                run.config = dict(without_plotted(plain))
                 run.planned = plan(run.config)
             except ProblemsFound as found:
                 problems += [Problem(f"{run.name}: {p.where}", p.what, p.hint) for p in found.problems]

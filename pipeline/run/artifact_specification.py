@@ -31,6 +31,8 @@ class ArtifactSpecification:
     """The artifact whose graph gives this one too, in the same run: it says how that graph is made."""
     required: bool = True
     """Whether nothing can run without it; else the wires from it are left out where it is neither given nor made."""
+    for_plots: bool = False
+    """Whether only plots read it: experiments do without."""
     made_from: tuple[str, ...] = ()
     """Settings that have to be given for it to be made. Found by composing, not written."""
     graph: dict[str, Any] | None = None
@@ -84,10 +86,9 @@ def without_absent(config: Mapping[str, Any]) -> Mapping[str, Any]:
     return without_artifacts(config, absent)
 
 
-def without_companions(config: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A configuration without the artifacts that come together with others and are not required: they are for plots."""
-    specs = read_specifications(config).items()
-    return without_artifacts(config, [name for name, spec in specs if spec.together_with and not spec.required])
+def without_plotted(config: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A configuration without the artifacts that only plots read."""
+    return without_artifacts(config, [name for name, spec in read_specifications(config).items() if spec.for_plots])
 
 
 def without_artifacts(config: Mapping[str, Any], names: Collection[str]) -> Mapping[str, Any]:

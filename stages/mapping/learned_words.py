@@ -1,4 +1,4 @@
-"""Learns the visual words of a map's references."""
+"""Learns the visual words of a map's references, or of a tour's views."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -8,9 +8,11 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.appearance.visual_words import learned_words, root_descriptors
+from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceEvent
-from omninav.stages.values.visual_words import VisualWords, words_of
+from omninav.stages.values.topological_map import LoopHypotheses
+from omninav.stages.values.visual_words import PlaceWords, VisualWords, words_of
 
 
 class LearnVisualWords(Stage):
@@ -51,3 +53,27 @@ def vocabulary_and_words(views: Sequence[npt.NDArray[np.uint8]], words: int, des
     together = np.concatenate([np.empty((0, 128), np.uint8), *(view for view in views if len(view))])
     rows = np.linspace(0, max(len(together) - 1, 0), min(len(together), words * descriptors_per_word)).astype(np.int64)
     return words_of(views, learned_words(root_descriptors(together[rows]), words))
+
+
+class LearnPlaceWords(Stage):
+    """Learns a vocabulary from all views of a tour, and finds the words of each, for a topological map.
+
+    A place is found again by its views that the map does not keep too: the words of one take a kilobyte.
+    """
+
+    words: Annotated[int, Bounds(ge=1)] = 2048
+    """Size of the vocabulary."""
+    descriptors_per_word: Annotated[int, Bounds(ge=1)] = 16
+    """Descriptors that the vocabulary is learned from, for each word."""
+
+    class Out(Outputs):
+        """The vocabulary, and the words of each view."""
+
+        words: PlaceWords
+
+    def step(self, ctx: Context, views: ComparedViews, hypotheses: LoopHypotheses) -> Out:
+        """The whole tour at once."""
+        ctx.doing("learning visual words")
+        descriptors = [found.descriptors for found in views.features]
+        made = vocabulary_and_words(descriptors, self.words, self.descriptors_per_word)
+        return self.Out(words=PlaceWords(made, hypotheses.place, views.poses, views.pose_source))

@@ -11,7 +11,8 @@ from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage,
 from omninav.stages.geometry.plane.point_cells import have_a_point_within, sort_into_cells
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.similarity import Similarities
+from omninav.stages.values.similarity import Answers, Similarities
+from omninav.stages.values.visual_words import PlaceWords
 
 QUANTITIES = {
     "place_recognition.recall_at_1": Quantity(title="Recall@1", unit="%", better="higher"),
@@ -71,11 +72,17 @@ class PlaceRecognition(Stage):
         metrics: Metrics | None = None
         table: Table | None = None
 
-    def step(self, ctx: Context, drive: Drive, ranked: Sequence[RankedReferences | None], map: ReferenceGraph) -> Out:
-        """The whole run at once."""
+    def step(
+        self,
+        ctx: Context,
+        drive: Drive,
+        ranked: Sequence[RankedReferences | Answers | None],
+        map: ReferenceGraph | PlaceWords | None = None,
+    ) -> Out:
+        """The whole run at once. `map`: what was ranked; of a topological map all views of its tour."""
         last = drive.last_log
         last = last.at(known(last.truth))
-        if map.pose_source != "truth" or not len(last) or not len(map):
+        if map is None or map.pose_source != "truth" or not len(last) or not len(map):
             return self.Out()
         lists = [entry.references if (entry := ranked[row]) is not None else np.empty(0, np.int64) for row in last.row]
         given = last.truth[:, :2], lists, map.poses[:, :2]

@@ -11,6 +11,8 @@ from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import RowsOf, Shape, Starts
 from omninav.stages.geometry.appearance import visual_words
 
+from .pose import PoseSource
+
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 
@@ -65,3 +67,20 @@ class WordSimilarities(Value):
     """Similarity of the present view to each view of a map by their visual words: `values` (V,) float32 in [0, 1]."""
 
     values: Annotated[Floats, Shape("V"), Bounds(ge=0, le=1)]
+
+
+class PlaceWords(Value):
+    """The visual words of all views of a tour, and the place of a topological map that each belongs to.
+
+    `words`: of each view, also of those that the map does not keep; `owner` (V,): its place. `poses` (V, 3): x, y (m),
+    heading (rad) where it was taken, from `pose_source`: for scoring only.
+    """
+
+    words: Annotated[VisualWords, Shape("V")]
+    owner: Annotated[Ints, Shape("V"), Bounds(ge=0)]
+    poses: Annotated[npt.NDArray[np.float64], Shape("V", 3)]
+    pose_source: PoseSource
+
+    def __len__(self) -> int:
+        """Number of places."""
+        return int(self.owner.max(initial=-1)) + 1

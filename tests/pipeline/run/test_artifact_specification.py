@@ -11,7 +11,7 @@ from omninav.pipeline.engine.codec import decode, encode, seal, unseal
 from omninav.pipeline.files import digest_file, write_whole
 from omninav.pipeline.graph.problems import ProblemsFound
 from omninav.pipeline.run import artifacts
-from omninav.pipeline.run.artifact_specification import read_specifications, without_companions
+from omninav.pipeline.run.artifact_specification import read_specifications, without_plotted
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import plan
 from omninav.pipeline.run.run_folder import RunFolder, start
@@ -66,6 +66,7 @@ def two_of_one_graph(tmp_path: Path) -> dict[str, Any]:
             "output": "source.number",
             "required": False,
             "together_with": "map",
+            "for_plots": True,
         },
     }
     return {
@@ -130,11 +131,11 @@ def test_what_comes_with_a_map_is_not_there_where_the_map_is_from_a_file(tmp_pat
 
 
 def test_repetitions_do_without_what_comes_with_a_map(tmp_path: Path) -> None:
-    config = without_companions(two_of_one_graph(tmp_path))
+    config = without_plotted(two_of_one_graph(tmp_path))
     planned = plan(config)
     assert [artifact.name for artifact in planned.artifacts] == ["map"]
     assert [wire.to_port for wire in planned.graph.wires] == ["number"]
-    assert without_companions(config) is config
+    assert without_plotted(config) is config
 
 
 @pytest.mark.parametrize(

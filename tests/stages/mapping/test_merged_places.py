@@ -1,0 +1,104 @@
+import numpy as np
+import pytest
+from made_tour import Landmarks, Mapped, along, mapped, scattered
+
+from omninav.pipeline import Context
+from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.mapping.learned_words import LearnPlaceWords
+from omninav.stages.mapping.merged_places import MergePlaces
+from omninav.stages.mapping.topological import TopologicalMapping
+from omninav.stages.match.place_words import MatchPlaceWords
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
+
+SQUARE = [(8.0, 8.0), (32.0, 8.0), (32.0, 32.0), (8.0, 32.0), (8.0, 8.0)]
+WORLD = Landmarks(scattered(40.0, 40.0))
+
+
+def merged(tour: Mapped, **parameters: float) -> LoopHypotheses:
+    return MergePlaces(**parameters).step(Context("places"), tour.views, tour.hypotheses).hypotheses
+
+
+def map_of(tour: Mapped, found: LoopHypotheses) -> TopologicalMap:
+    return TopologicalMapping().step(Context("mapping"), tour.views, found).map
+
+
+def side_by_side(map: TopologicalMap) -> int:
+    """Medoids that are within a metre of another."""
+    at = map.poses[map.places, :2]
+    apart = np.hypot(*(at[:, None] - at[None]).transpose(2, 0, 1)) + 99.0 * np.eye(len(at))
+    return int((apart.min(axis=1) < 1.0).sum())
+
+
+def own_is_closest(map: TopologicalMap, found: LoopHypotheses) -> float:
+    """Share of the tour's views whose place has the closest medoid."""
+    return float((map.nearest_places(found.poses) == found.place).mean())
+
+
+@pytest.fixture(scope="module")
+def twice() -> Mapped:
+    second = [(x + 0.3, y + 0.4) for x, y in SQUARE]
+    return mapped(WORLD, [along(SQUARE, 1.2) + along(second, 1.3)])
+
+
+def test_places_of_two_passes_do_not_stand_side_by_side(twice: Mapped) -> None:
+    found = merged(twice)
+    map = map_of(twice, found)
+    assert side_by_side(map) == 0
+    assert own_is_closest(map, found) > max(0.7, own_is_closest(twice.map, twice.hypotheses))
+
+
+def test_only_places_at_the_same_spot_are_merged(twice: Mapped) -> None:
+    found = merged(twice)
+    map = map_of(twice, found)
+    off = np.hypot(*(found.poses - map.poses[map.places[found.place]])[:, :2].T)
+    assert off.max() < 6.0
+    assert found.place.tolist() == merged(twice).place.tolist()
+
+
+def test_what_looks_alike_by_chance_stays_apart() -> None:
+    where, own = scattered(40.0, 40.0), np.arange(900)
+    copied, far = (np.flatnonzero(np.hypot(where[:, 0] - 20.0, where[:, 1] - y) < 3.0) for y in (8.0, 32.0))
+    number = min(len(copied), len(far))
+    where[far[:number]] = where[copied[:number]] + (0.0, 24.0, 0.0)
+    own[far[:number]] = own[copied[:number]]
+    out = mapped(Landmarks(where, own), [along(SQUARE, 1.2)])
+    found = merged(out)
+    map = map_of(out, found)
+    assert np.hypot(*(found.poses - map.poses[map.places[found.place]])[:, :2].T).max() < 6.0
+
+
+def test_places_of_a_known_map_stay_with_their_views() -> None:
+    known = mapped(WORLD, [along(SQUARE, 1.2)]).map
+    out = mapped(WORLD, [along([(8.0, 8.0), (20.0, 8.0), (20.0, 32.0), (8.0, 32.0)], 1.2)], known=known)
+    found = merged(out)
+    old = found.place[: len(known.owner)]
+    assert [len(set(old[known.owner == place])) for place in range(len(known))] == [1] * len(known)
+    assert found.place.max() + 1 > len(set(old))
+
+
+def test_images_that_have_nothing_in_common_are_places_of_their_own() -> None:
+    nowhere = mapped(Landmarks(scattered(1.0, 1.0)), [along([(50.0, 50.0), (60.0, 50.0)], 2.0)])
+    assert merged(nowhere).place.tolist() == [0, 1, 2, 3, 4]
+    assert merged(mapped(WORLD, [along(SQUARE[:2], 1.2)[:1]])).place.tolist() == [0]
+
+
+def test_a_place_is_known_by_the_words_of_all_its_views(twice: Mapped) -> None:
+    found = merged(twice)
+    map = map_of(twice, found)
+    words = LearnPlaceWords(words=900).step(Context("words"), twice.views, found).words
+    for row in range(0, len(found.poses), 5):
+        x, y, heading = (float(number) for number in found.poses[row])
+        out = MatchPlaceWords().step(Context("match"), WORLD.seen(Pose(x, y, heading + 1.0)), map, words)
+        assert out.similarities is not None
+        assert out.answers is not None
+        assert int(out.similarities.values.argmax()) == found.place[row]
+        assert row in out.answers.references
+
+
+def test_words_of_another_map_are_refused_and_a_map_without_words_says_nothing(twice: Mapped) -> None:
+    words = LearnPlaceWords(words=50).step(Context("words"), twice.views, merged(twice)).words
+    seen, stage = WORLD.seen(Pose(8.0, 8.0, 0.0)), MatchPlaceWords()
+    assert stage.step(Context("match"), seen, twice.map).similarities is None
+    with pytest.raises(BadInput, match="give those that were saved with it"):
+        stage.step(Context("match"), seen, map_of(twice, merged(twice, min_spacing=0.5)), words)
