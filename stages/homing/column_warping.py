@@ -156,8 +156,8 @@ def warped(
 ) -> Warp:
     """The direction and turn from the first view to the second for which the columns of both match best.
 
-    `noise`: the mean squared difference at which a match is a third as likely; `half_window`: columns on both sides that
-    are compared together; `step`: columns from one direction to the next that is tried, a divisor of their number;
+    `noise`: the mean squared difference at which a match is a third as likely; `half_window`: columns on both sides
+    that are compared together; `step`: columns from one direction to the next that is tried, a divisor of their number;
     `max_turn`: rad, to both sides. Both views are warped to the other, and the scores added (double search, Möller et
     al. 2010).
     """
