@@ -14,6 +14,9 @@ class TrajectoryFile(Stage):
     estimate have no row and are counted.
     """
 
+    name: str = "trajectory"
+    """The file's name without its ending."""
+
     class Out(Outputs):
         """Nothing: the files are the result."""
 
@@ -29,8 +32,8 @@ class TrajectoryFile(Stage):
         if ctx.folder is not None:
             for number, text in logs.items():
                 if len(logs) > 1:
-                    write_whole(ctx.folder / f"trajectory_{number}.tum", text)
-            write_whole(ctx.folder / "trajectory.tum", logs[max(logs)] if logs else "")
+                    write_whole(ctx.folder / f"{self.name}_{number}.tum", text)
+            write_whole(ctx.folder / f"{self.name}.tum", logs[max(logs)] if logs else "")
         return self.Out()
 
 

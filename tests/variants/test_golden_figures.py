@@ -8,7 +8,7 @@ from golden_figures import RUNS, measured, read_golden
 VARIANTS = Path(__file__).resolve().parents[2] / "conf" / "variant"
 NO_FIGURES = {
     *("camera_calibrate", "camera_look", "camera_record", "simulate_live"),
-    *("map_cut", "map_join", "map_show", "map_thin"),
+    *("map_cut", "map_export", "map_join", "map_show", "map_thin"),
 }
 """They write files, or drive for somebody else; tests of their own run them."""
 RELATIVE = 0.01

@@ -1,0 +1,186 @@
+"""Whether a localisation knows when it is lost, and what smoothing gains: the tables of docs/experiments/confidence.md.
+
+    python benchmarks/confidence.py --data FOLDER --runs FOLDER --seeds 2 3 4 --write docs/experiments/confidence.md
+
+Every recording as it is, in three kinds of changed light, and with a kidnapping; a world of the simulator where it was
+recorded into the folder of runs. A run that is there is not made again.
+"""
+
+import argparse
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from light import LIGHTS
+from variants import DataSet, data_sets, simulated
+
+import omninav
+from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
+from omninav.stages.geometry.plane.smoothing import smoothed, smoothed_with_lag
+from omninav.stages.geometry.probability.calibration import (
+    area_under_roc,
+    expected_calibration_error,
+    reliability,
+    squared_mahalanobis,
+)
+
+Array = npt.NDArray[np.float64]
+CUTS = {"house": (45, 90), "Sussex": (40, 90), "AntWorld": (150, 330)}
+"""Kidnappings: after so many images it goes on with which; in worlds of the simulator after 40 with image 85."""
+LOST_M, WITHIN_M, WITHIN_DEG = 2.5, 0.5, 10.0
+TRUTH_DEG = {"Sussex": 20.0}
+"""Tolerance in heading where the true one is known to ten degrees only."""
+LAG, WINDOW = 5, 50
+BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+
+
+@dataclass(frozen=True)
+class Frames:
+    """The frames of one run with truth and estimate; a row each."""
+
+    place: str
+    condition: str
+    estimate: Array
+    truth: Array
+    covariance: Array
+    confidence: Array
+    motion: Array
+
+    @property
+    def errors(self) -> Array:
+        return position_errors(self.estimate, self.truth)
+
+    @property
+    def right(self) -> npt.NDArray[np.bool_]:
+        limit = TRUTH_DEG.get(self.place, WITHIN_DEG)
+        return np.asarray((self.errors <= WITHIN_M) & (heading_errors_deg(self.estimate, self.truth) <= limit))
+
+
+def run(variant: str, on: DataSet, condition: str, seed: int, runs: Path) -> Frames:
+    """Make a run, or take the one that is there."""
+    folder = runs / f"{variant} {on.name} {condition} {seed}".replace(" ", "_")
+    if not (folder / "report.html").exists():
+        words = ["plots=none", f"cache={runs / 'cache'}"]
+        if condition == "kidnapped":
+            first, then = CUTS.get(on.name, (40, 85))
+            words.append(f"cuts=[[{first},{then}]]")
+        elif LIGHTS[condition]:
+            words += ["+wires.perturbation={panorama: unwarp.panorama}", "perturbation=changed_light"]
+            words += ["wires.features.panorama=perturbation.panorama"]
+            words += [f"nodes.perturbation.{key}={value}" for key, value in LIGHTS[condition].items()]
+        grid = {"grid": on.grid} if variant == "retrieval_mcl" else {}
+        omninav.run(variant, *words, folder=folder, progress=False, tour=on.tour, log=on.drive, seed=seed, **grid)
+    with (folder / "frames.csv").open() as file:
+        rows = list(csv.DictReader(file))
+
+    def columns(*names: str) -> Array:
+        return np.array([[float(row[name] or "nan") for name in names] for row in rows])
+
+    def poses(name: str, angle: str = "heading") -> Array:
+        return columns(*(f"{name}_{axis}" for axis in ("x", "y", angle)))
+
+    entries = ("xx", "xy", "xh", "xy", "yy", "yh", "xh", "yh", "hh")
+    covariance = columns(*(f"covariance_{entry}" for entry in entries)).reshape(-1, 3, 3)
+    known = np.isfinite(poses("truth")).all(axis=1) & np.isfinite(poses("estimate")).all(axis=1)
+    parts = poses("estimate"), poses("truth"), covariance, columns("confidence")[:, 0]
+    motion = np.nan_to_num(poses("motion", "turn"))
+    return Frames(on.name, condition, *(part[known] for part in parts), motion[known])
+
+
+def share(value: float | None) -> str:
+    """A share as text."""
+    return "–" if value is None else f"{value:.3f}"
+
+
+def told(runs: Sequence[Frames]) -> str:
+    """Cells of the first table: of all frames of some runs."""
+    right, lost = np.concatenate([each.right for each in runs]), np.concatenate([each.errors > LOST_M for each in runs])
+    confidence = np.concatenate([each.confidence for each in runs])
+    squares = np.concatenate(
+        [squared_mahalanobis((r.estimate - r.truth)[:, :2], r.covariance[:, :2, :2]) for r in runs]
+    )
+    squares = squares[np.isfinite(squares)]
+    within = [float((squares <= limit).mean()) for limit in (1.386, 5.991)]
+    cells = (
+        f"{100 * right.mean():.0f}",
+        f"{100 * lost.mean():.0f}",
+        share(area_under_roc(-confidence, ~right)),
+        share(area_under_roc(-confidence, lost)),
+        share(expected_calibration_error(reliability(confidence, right))),
+        *(f"{100 * covered:.0f}" for covered in within),
+        f"{np.median(squares):.1f}",
+    )
+    return " | ".join(cells)
+
+
+def by_smoothing(runs: Sequence[Frames]) -> str:
+    """Cells of the second table: median / 90 % (share lost) of the filter, some images late, and in the end."""
+    found: list[list[Array]] = [[], [], []]
+    for each in runs:
+        given = each.estimate, each.covariance, each.confidence, each.motion
+        late, end = smoothed_with_lag(*given, LAG, WINDOW), smoothed(*given)
+        for errors, poses in zip(found, (each.estimate, late, end), strict=True):
+            errors.append(position_errors(poses, each.truth))
+    cells = []
+    for errors in map(np.concatenate, found):
+        lost = 100 * (errors > LOST_M).mean()
+        cells.append(f"{np.median(errors):.2f} / {np.quantile(errors, 0.9):.2f} ({lost:.0f} %)")
+    return " | ".join(cells)
+
+
+def tables(variant: str, runs: Mapping[int, Sequence[Frames]]) -> list[str]:
+    """Markdown lines for one variant."""
+    every = [each for of_seed in runs.values() for each in of_seed]
+    places = list(dict.fromkeys(each.place for each in every))
+    conditions = list(dict.fromkeys(each.condition for each in every))
+    columns = ("right (%)", "lost (%)", "AUROC, wrong", "AUROC, lost", "ECE")
+    columns += ("in 50 % ellipse (%)", "in 95 % ellipse (%)", "squared error, median")
+    lines = [f"### `{variant}`", "", f"| frames of | {' | '.join(columns)} |", f"|---{'|---:' * len(columns)}|"]
+    groups = {place: [r for r in every if r.place == place] for place in places}
+    groups |= {name: [r for r in every if r.condition == name] for name in conditions}
+    lines += [f"| {name} | {told(some)} |" for name, some in groups.items()]
+    lines += [f"| seed {seed} | {told(of_seed)} |" for seed, of_seed in runs.items()]
+    lines += [f"| **all** | {told(every)} |", ""]
+    lines += ["| | filter | 5 images late | in the end |", "|---|---:|---:|---:|"]
+    for place in places:
+        for name in conditions:
+            some = [r for r in every if (r.place, r.condition) == (place, name)]
+            lines.append(f"| {place}, {name} | {by_smoothing(some)} |")
+    return [*lines, ""]
+
+
+def main() -> None:
+    """Print the tables, or write them into a page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, required=True, help="folder of the sample recordings")
+    parser.add_argument("--runs", type=Path, required=True, help="folder for the runs")
+    parser.add_argument("--variants", nargs="+", default=["omniview_mcl", "omninav"])
+    parser.add_argument("--worlds", nargs="*", default=["home_store_demo", "office"], help="of the simulator")
+    parser.add_argument("--seeds", nargs="+", type=int, default=[2, 3, 4])
+    parser.add_argument("--write", type=Path, help="the page that holds the tables")
+    given = parser.parse_args()
+    sets = [*data_sets(given.data)]
+    for world in given.worlds:
+        place = given.runs / world
+        place.mkdir(parents=True, exist_ok=True)
+        sets.append(simulated(place, world))
+    lines = [BEGIN]
+    for variant in given.variants:
+        found = {
+            seed: [run(variant, on, condition, seed, given.runs) for on in sets for condition in (*LIGHTS, "kidnapped")]
+            for seed in given.seeds
+        }
+        lines += tables(variant, found)
+    text = "\n".join([*lines, END])
+    if given.write is None:
+        print(text)
+        return
+    before, _, rest = given.write.read_text().partition(BEGIN)
+    given.write.write_text(before + text + rest.partition(END)[2])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,113 @@
+"""Trajectories that agree best with estimates and odometry, before and after."""
+
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from .pose_errors import heading_errors_deg, position_errors
+from .pose_graph import optimised_poses
+from .se2 import between, chain, compose
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+CORRELATED = 10.0
+"""Estimates of a filter that say what one would: each holds the images before it too."""
+MIN_SIGMAS = np.array([0.05, 0.05, np.radians(2.0)])
+"""Smallest standard deviation of an estimate (m, m, rad)."""
+MIN_TRUST = 0.01
+"""Smallest probability at which an estimate still counts."""
+ODOMETRY_SIGMA, TURN_SIGMA = 0.02, 0.05
+"""Standard deviation of odometry per metre (m and rad), and of its heading per radian of a turn."""
+STEP_SIGMAS = np.array([0.005, 0.005, 0.0025])
+"""Standard deviation of odometry where the robot stands (m, m, rad)."""
+JUMP_M, JUMP_DEG = 1.0, 20.0
+"""Differences beyond which estimates contradict odometry."""
+STRETCH, WITNESSES = 5, 10
+"""Estimates that odometry has to agree with to be contradicted by them, and how many on each side are asked."""
+MAX_POSES = 5000
+"""Poses of a graph; of a longer drive every second, every third, …, those between follow odometry."""
+
+
+def smoothed(estimates: Array, covariances: Array, trust: Array, motions: Array) -> Array:
+    """Poses (N, 3) of a drive by the estimates and odometry of all of it: (N, 3).
+
+    `estimates` (N, 3), NaN where there are none, with `covariances` (N, 3, 3) and `trust` (N,), the probability that
+    each is right; `motions` (N, 3): odometry since the pose before. A pose graph, in which odometry is firm and
+    estimates count by Cauchy's function, so that those which the others and odometry contradict count little. Where
+    trusted estimates on both sides contradict odometry, the robot was carried: there odometry is doubted as well.
+    """
+    motions = motions.copy()
+    motions[0] = 0.0
+    path = chain(motions)
+    known = np.flatnonzero(np.isfinite(estimates).all(axis=1))
+    rows = known[:: -(-len(known) // MAX_POSES)]
+    poses = _optimised(estimates[rows], covariances[rows], trust[rows], between(path[rows[:-1]], path[rows[1:]]))
+    nearest = np.maximum(np.searchsorted(rows, np.arange(len(path)), side="right") - 1, 0)
+    found: Array = compose(poses[nearest], between(path[rows[nearest]], path))
+    return found
+
+
+def smoothed_with_lag(
+    estimates: Array, covariances: Array, trust: Array, motions: Array, lag: int, window: int
+) -> Array:
+    """As `smoothed`, but each pose from the `window` frames up to it and `lag` frames after it: what a run could say
+    `lag` frames late; NaN where none of them has an estimate."""
+    found = np.full_like(estimates, np.nan)
+    there: Flags = np.asarray(np.isfinite(estimates).all(axis=1))
+    for frame in range(len(estimates)):
+        part = slice(max(0, frame - window), frame + lag + 1)
+        if there[part].any():
+            poses = smoothed(estimates[part], covariances[part], trust[part], motions[part])
+            found[frame] = poses[frame - part.start]
+    return found
+
+
+def _optimised(estimates: Array, covariances: Array, trust: Array, motions: Array) -> Array:
+    number = len(estimates)
+    if number == 1:
+        return estimates.copy()
+    variances = np.nan_to_num(np.diagonal(covariances, axis1=1, axis2=2)) * CORRELATED
+    spread = np.maximum(np.sqrt(variances), MIN_SIGMAS) / np.sqrt(np.maximum(trust, MIN_TRUST))[:, None]
+    drift = STEP_SIGMAS + ODOMETRY_SIGMA * np.hypot(motions[:, 0], motions[:, 1])[:, None]
+    drift[:, 2] += TURN_SIGMA * np.abs(motions[:, 2])
+    frames = np.arange(1, number + 1)  # pose 0 is the map's origin, from which estimates are measured
+    pairs = np.column_stack([np.zeros_like(frames), frames]), np.column_stack([frames, frames + 1])[:-1]
+    poses, _ = optimised_poses(
+        np.concatenate([np.zeros((1, 3)), estimates]),
+        np.concatenate(pairs),
+        np.concatenate([estimates, motions]),
+        np.concatenate([spread, drift]),
+        np.concatenate([np.ones(number, np.bool_), contradicted(estimates, trust, motions)]),
+    )
+    return poses[1:]
+
+
+def contradicted(estimates: Array, trust: Array, motions: Array) -> Flags:
+    """Which motions (N - 1, 3) lie between stretches of trusted estimates (N, 3) that contradict odometry: (N - 1,)."""
+    path = chain(np.concatenate([np.zeros((1, 3)), motions]))
+    moved = compose(estimates[:-1], motions)
+    jumps = _apart(moved, estimates[1:])
+    number = np.cumsum(np.concatenate([[False], jumps | ((trust[1:] >= 0.5) != (trust[:-1] >= 0.5))]))
+    stretches = [np.flatnonzero(number == each) for each in np.unique(number[trust >= 0.5])]
+    stretches = [stretch for stretch in stretches if len(stretch) >= STRETCH]
+    doubtful = np.zeros(len(motions), np.bool_)
+    for before, after in pairwise(stretches):
+        there = path[after[0]]
+        ahead, behind = (_carried(estimates, path, rows, there) for rows in (before[-WITNESSES:], after[:WITNESSES]))
+        if _apart(ahead[None], behind[None])[0]:
+            doubtful[before[-1] : after[0]] = True
+    return doubtful
+
+
+def _carried(estimates: Array, path: Array, rows: npt.NDArray[np.int64], there: Array) -> Array:
+    """Where odometry leads from estimates, in the middle: (3,)."""
+    poses = compose(estimates[rows], between(path[rows], there))
+    heading = np.arctan2(np.median(np.sin(poses[:, 2])), np.median(np.cos(poses[:, 2])))
+    return np.array([*np.median(poses[:, :2], axis=0), heading])
+
+
+def _apart(poses: Array, others: Array) -> Flags:
+    far: Flags = (position_errors(poses, others) > JUMP_M) | (heading_errors_deg(poses, others) > JUMP_DEG)
+    return far

@@ -1,0 +1,119 @@
+"""Writes a map's images as the folder that navigators which drive from image to image take for a map."""
+
+import math
+import os
+import shutil
+from pathlib import Path
+from typing import Annotated
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
+from omninav.pipeline.engine.artifact import read_artifact
+from omninav.pipeline.files import user_path
+from omninav.stages.values.image import Pixels
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.thumbnails import Thumbnails
+
+from .saved import MapOfPlaces, SavedMap, read_saved
+
+BESIDE = "thumbnails.omap"
+"""Where the run that learned a map leaves its images."""
+
+
+class ExportMap(Stage):
+    """Writes the images of a map's references or views as `0.png`, `1.png`, … into a new folder, and nothing else.
+
+    In the order of the tour: the topological map of ViNT, NoMaD and GNM (`deployment/topomaps/images/NAME`) and of
+    PlaceNav (`placenav/topomaps/images/NAME`), which know one path without branches. Raises BadInput where the map's
+    images are missing or another map's, or the folder holds something.
+    """
+
+    maps: str | tuple[str, ...] | None = None
+    """The map (.omap)."""
+    images: str | None = None
+    """The images of its references (.omap); null: `thumbnails.omap` beside the map."""
+    spacing: Annotated[float, Bounds(ge=0, le=1e6)] = 0.0
+    """Smallest distance (m) between where two images that follow each other were taken."""
+    field_deg: Annotated[float, Bounds(gt=0, le=360)] | None = None
+    """Degrees around straight ahead that are cut out of panoramas; null: whole images."""
+    out: str = "topomap"
+    """The folder to write."""
+
+    class Out(Outputs):
+        """Nothing: it writes files."""
+
+    def step(self, ctx: Context) -> Out:
+        """Export the map."""
+        (source,) = read_saved(self.maps, at_most=1)
+        folder, thumbnails = self._folder(), self._thumbnails(source)
+        if self.field_deg is not None and not _has_panoramas(source.map):
+            raise BadInput(f"field_deg={self.field_deg:g}: the images of {source.path} are no panoramas; leave it out")
+        poses, order = _in_order(source.map)
+        there = order[np.diff(thumbnails.ends)[order] > 0]
+        kept = there[spaced(poses[there], self.spacing)]
+        if not len(kept):
+            raise BadInput(f"{source.path}: it has no image to write")
+        part = folder.with_name(f"{folder.name}.{os.getpid()}.part")
+        part.mkdir(parents=True)
+        try:
+            for number, row in enumerate(kept.tolist()):
+                encoded = cv2.imencode(".png", self._cut(thumbnails.image(row)))[1]
+                (part / f"{number}.png").write_bytes(encoded.tobytes())
+            os.replace(part, folder)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+        missing = f"; {len(order) - len(there)} have none" if len(there) < len(order) else ""
+        print(f"{folder}: images of {len(kept)} of {len(order)} views, 0.png to {len(kept) - 1}.png{missing}")
+        return self.Out()
+
+    def _folder(self) -> Path:
+        folder = user_path(self.out)
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise BadInput(f"out={self.out}: it is there, and not an empty folder; type another name")
+        return folder
+
+    def _thumbnails(self, source: SavedMap) -> Thumbnails:
+        file = source.path.with_name(BESIDE) if self.images is None else user_path(self.images)
+        if self.images is None and not file.exists():
+            raise BadInput(
+                f"{source.path}: a map holds no images, and there is no {BESIDE} beside it; export the map in the "
+                f"folder of a run that learned it from a tour, or type images=FOLDER/{BESIDE}"
+            )
+        images = read_artifact(file)
+        if not isinstance(images, Thumbnails):
+            raise BadInput(f"{file}: it holds a {type(images).__name__}, expected images of a map ({BESIDE})")
+        views = len(source.map) if isinstance(source.map, ReferenceGraph) else len(source.map.views)
+        if len(images) != views:
+            raise BadInput(f"{file}: it has {len(images)} images, {source.path} has {views} views: another map's")
+        return images
+
+    def _cut(self, pixels: Pixels) -> Pixels:
+        if self.field_deg is None:
+            return pixels
+        columns = pixels.shape[1]
+        wide = max(1, round(columns * self.field_deg / 360.0))
+        left = (columns - wide) // 2  # forward is in the middle
+        return pixels[:, left : left + wide]
+
+
+def spaced(poses: npt.NDArray[np.float64], spacing: float) -> npt.NDArray[np.int64]:
+    """Rows of poses (N, >= 2) of which each lies at least `spacing` metres from the one before it that is kept."""
+    kept: list[int] = []
+    for row, (x, y) in enumerate(poses[:, :2].tolist()):
+        if not kept or math.dist(poses[kept[-1], :2], (x, y)) >= spacing:
+            kept.append(row)
+    return np.array(kept, np.int64)
+
+
+def _has_panoramas(map: MapOfPlaces) -> bool:
+    return isinstance(map, ReferenceGraph) and map.features.shape[1] > 1
+
+
+def _in_order(map: MapOfPlaces) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+    """Where views were taken, and their rows in the order of the tour."""
+    if isinstance(map, ReferenceGraph):
+        return map.poses, np.arange(len(map))
+    return map.poses, np.argsort(map.frames, kind="stable")

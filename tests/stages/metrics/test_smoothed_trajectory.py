@@ -1,0 +1,94 @@
+"""What is seen later tells where the robot was before."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_run import collected, small_run
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.geometry.plane.pose_errors import position_errors
+from omninav.stages.geometry.plane.se2 import chain
+from omninav.stages.geometry.plane.smoothing import contradicted, smoothed, smoothed_with_lag
+from omninav.stages.metrics.smoothed_trajectory import SmoothTrajectory
+from omninav.stages.plots.trajectory_file import TrajectoryFile
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.pose import Pose
+
+FRAMES = 80
+CTX = Context("smoothing")
+
+
+def driven(seed: int = 0, lost: int = 20) -> tuple[np.ndarray, ...]:
+    """A round: the truth, estimates 0.2 m off that lie elsewhere in the first frames, their covariances, motions."""
+    rng = np.random.default_rng(seed)
+    motions = np.tile((0.25, 0.0, 2 * np.pi / FRAMES), (FRAMES, 1))
+    motions[0] = 0.0
+    truth = chain(motions)
+    estimates = truth + rng.normal(0.0, (0.2, 0.2, 0.05), (FRAMES, 3))
+    estimates[:lost, :2] += rng.normal(0.0, 5.0, (lost, 2))
+    covariances = np.tile(np.diag([0.04, 0.04, 0.0025]), (FRAMES, 1, 1))
+    return truth, estimates, covariances, motions + rng.normal(0.0, 0.002, (FRAMES, 3))
+
+
+def test_frames_before_the_filter_found_itself_are_put_right_and_the_others_get_better():
+    truth, estimates, covariances, motions = driven()
+    found = smoothed(estimates, covariances, np.ones(FRAMES), motions)
+    before, after = position_errors(estimates, truth), position_errors(found, truth)
+    assert after[:20].max() < 0.5 < np.median(before[:20])
+    assert after[20:].mean() < 0.6 * before[20:].mean()
+
+
+def test_a_pose_told_some_frames_late_is_better_than_at_once_and_worse_than_in_the_end():
+    truth, *given = (part[:30] for part in driven(lost=0))
+    estimates, covariances, motions = given
+    trust = np.ones(30)
+    late = [smoothed_with_lag(estimates, covariances, trust, motions, lag, 20) for lag in (0, 6)]
+    errors = [position_errors(each, truth).mean() for each in (*late, smoothed(estimates, covariances, trust, motions))]
+    assert errors[2] < errors[1] < errors[0]
+
+
+def test_odometry_is_doubted_where_trusted_estimates_on_both_sides_contradict_it():
+    truth, estimates, covariances, motions = driven(lost=0)
+    carried = estimates + np.where(np.arange(FRAMES) >= 40, 8.0, 0.0)[:, None] * (1.0, 0.0, 0.0)
+    assert np.flatnonzero(contradicted(carried, np.ones(FRAMES), motions[1:])).tolist() == [39]
+    assert not contradicted(estimates, np.ones(FRAMES), motions[1:]).any()
+    found = smoothed(carried, covariances, np.ones(FRAMES), motions)
+    moved = truth + np.where(np.arange(FRAMES) >= 40, 8.0, 0.0)[:, None] * (1.0, 0.0, 0.0)
+    assert position_errors(found, moved).max() < 0.5
+
+
+def test_frames_without_an_estimate_follow_odometry():
+    truth, estimates, covariances, motions = driven(lost=0)
+    estimates[30:40] = np.nan
+    found = smoothed(estimates, covariances, np.ones(FRAMES), motions)
+    assert position_errors(found, truth)[30:40].max() < 0.4
+
+
+def test_every_log_is_smoothed_and_written(tmp_path: Path):
+    drive = small_run(frames=40, logs=2).drive
+    out = SmoothTrajectory().step(CTX, drive)
+    assert out.drive is not None
+    assert (
+        out.metrics.values["smoothed"]["position_error_m"]["mean"]
+        < position_errors(drive.last_log.estimate, drive.last_log.truth).mean() + 0.01
+    )
+    ctx = Context("file")
+    ctx.folder = tmp_path
+    TrajectoryFile(name="trajectory_smoothed").step(ctx, out.drive)
+    assert len((tmp_path / "trajectory_smoothed.tum").read_text().splitlines()) == 40
+    assert (tmp_path / "trajectory_smoothed_0.tum").is_file()
+
+
+def test_without_odometry_nothing_is_smoothed():
+    pose = Pose(0.0, 0.0, 0.0)
+    estimates = [PoseEstimate(pose, np.eye(3), 1.0, pose)] * 3
+    drive = collected([Tick(n, n) for n in range(3)], [pose] * 3, estimates=estimates)
+    assert SmoothTrajectory().step(CTX, drive).drive is None
+    assert SmoothTrajectory(lag=2).step(CTX, small_run(frames=12).blind).metrics is None
+
+
+def test_one_estimate_is_kept_as_it_is():
+    estimates = np.array([[1.0, 2.0, 0.3]])
+    found = smoothed(estimates, np.eye(3)[None], np.ones(1), np.zeros((1, 3)))
+    assert found == pytest.approx(estimates)
