@@ -88,7 +88,7 @@ def contradicted(estimates: Array, trust: Array, motions: Array) -> Flags:
     """Which motions (N - 1, 3) lie between stretches of trusted estimates (N, 3) that contradict odometry: (N - 1,)."""
     path = chain(np.concatenate([np.zeros((1, 3)), motions]))
     moved = compose(estimates[:-1], motions)
-    jumps = _apart(moved, estimates[1:])
+    jumps = _disagree(moved, estimates[1:])
     number = np.cumsum(np.concatenate([[False], jumps | ((trust[1:] >= 0.5) != (trust[:-1] >= 0.5))]))
     stretches = [np.flatnonzero(number == each) for each in np.unique(number[trust >= 0.5])]
     stretches = [stretch for stretch in stretches if len(stretch) >= STRETCH]
@@ -96,7 +96,7 @@ def contradicted(estimates: Array, trust: Array, motions: Array) -> Flags:
     for before, after in pairwise(stretches):
         there = path[after[0]]
         ahead, behind = (_carried(estimates, path, rows, there) for rows in (before[-WITNESSES:], after[:WITNESSES]))
-        if _apart(ahead[None], behind[None])[0]:
+        if _disagree(ahead[None], behind[None])[0]:
             doubtful[before[-1] : after[0]] = True
     return doubtful
 
@@ -108,6 +108,6 @@ def _carried(estimates: Array, path: Array, rows: npt.NDArray[np.int64], there: 
     return np.array([*np.median(poses[:, :2], axis=0), heading])
 
 
-def _apart(poses: Array, others: Array) -> Flags:
+def _disagree(poses: Array, others: Array) -> Flags:
     far: Flags = (position_errors(poses, others) > JUMP_M) | (heading_errors_deg(poses, others) > JUMP_DEG)
     return far
