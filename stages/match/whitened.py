@@ -1,0 +1,51 @@
+"""Similarity by the angle between views, after whitening by the map's own."""
+
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Stage
+from omninav.stages.geometry.appearance.segments import cosine_similarities
+from omninav.stages.geometry.appearance.whitening import Whitening, learned_whitening
+from omninav.stages.values.features import SegmentFeatures
+from omninav.stages.values.maps import ReferenceGraph
+
+from .reference_match import ReferenceMatch
+
+MAX_LEARNED = 1024
+"""References, at even steps, that a whitening is learned from."""
+
+
+class WhitenedMatch(ReferenceMatch, Stage):
+    """Similarity by the cosine of the angle between whole views whose segments are whitened by the map's references.
+
+    A network that was trained elsewhere gives vectors that are all alike in a place of which it has seen no image.
+    Whitening by the segments of the map's own references (Jégou & Chum 2012) leaves what differs there. It follows
+    from the references alone, so that a map carries its own. 1 is the same direction; 0 a right angle or more. Raises
+    BadInput where the map has other features.
+    """
+
+    components: Annotated[int, Bounds(ge=1)] = 64
+    """Principal components that are kept."""
+
+    def setup(self, ctx: Context) -> None:
+        """Nothing learned yet: the map comes with the first image."""
+        self._learned: tuple[ReferenceGraph, int, Whitening] | None = None
+
+    def compare(
+        self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
+    ) -> npt.NDArray[np.float32]:
+        if not len(map):
+            return np.zeros((0 if chosen is None else len(chosen), self.headings), np.float32)
+        whitening = self._whitening(map)
+        some = whitening.of(np.asarray(map.features[:] if chosen is None else map.features[chosen], np.float32))
+        return cosine_similarities(some, whitening.of(features.values), self.headings)
+
+    def _whitening(self, map: ReferenceGraph) -> Whitening:
+        """Learned once, and again where the map has grown."""
+        if self._learned is None or self._learned[0] is not map or self._learned[1] != len(map):
+            rows = np.unique(np.linspace(0, len(map) - 1, min(len(map), MAX_LEARNED)).astype(np.int64))
+            segments = np.asarray(map.features[rows]).reshape(-1, map.features.shape[2])
+            self._learned = map, len(map), learned_whitening(segments, self.components)
+        return self._learned[2]
