@@ -1,6 +1,7 @@
 """How near the image is that shares most visual words: the tables of docs/experiments/words.md.
 
     python benchmarks/words.py --data FOLDER
+    python benchmarks/words.py --data FOLDER --filter   # variant=omniview_mcl candidates=words, two seeds
 
 Metres between the most similar image of the map and the truth, median / mean / 90 %, every third image of the drive, in
 the lights of `benchmarks/light.py`; and of how many images the most similar reference by colours at the best heading is
@@ -18,6 +19,7 @@ import numpy.typing as npt
 from light import LIGHTS, hsv, in_light, views
 from variants import DataSet, data_sets
 
+import omninav
 from omninav import Context
 from omninav.stages.features.grey_world import grey_world_pixels
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
@@ -90,15 +92,46 @@ def measured(on: DataSet, sizes: tuple[int, ...]) -> None:
         print(f"| {on.name} | {name} | {' | '.join(errors(s, places, truth) for s in by_light.values())} |", flush=True)
 
 
+def filtered(on: DataSet, power: float) -> None:
+    """Print a row: the filter with words under a grey world, started anywhere."""
+    changed = ["wires.features.panorama=perturbation.panorama", "wires.local_features.image=perturbation.panorama"]
+    given = [
+        "candidates=words",
+        f"nodes.match.word_power={power}",
+        "nodes.features.grey_world=local",
+        "perturbation=changed_light",
+        "plots=none",
+    ]
+    wires = ["+wires.perturbation={panorama: unwarp.panorama}", *changed]
+    cells = []
+    for light in LIGHTS.values():
+        shown = []
+        for seed in (0, 1):
+            lit = [f"nodes.perturbation.{key}={value}" for key, value in light.items()]
+            words = [*given, *wires, *lit]
+            run = omninav.run("omniview_mcl", *words, progress=False, tour=on.tour, log=on.drive, seed=seed)
+            after: Any = run.metrics["after_convergence"]
+            error = after["position_error_m"] or run.metrics["position_error_m"]
+            lost = run.metrics["loss_rate"] if after["loss_rate"] is None else after["loss_rate"]
+            shown.append(f"{error['median']:.2f} / {error['p90']:.2f} ({100 * lost:.0f} %)")
+        cells.append(", ".join(shown))
+    print(f"| {on.name} | grey world times words^{power} | {' | '.join(cells)} |", flush=True)
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, required=True, help="folder of the sample recordings")
+    parser.add_argument("--filter", action="store_true", help="the filter instead of the nearest image")
     given = parser.parse_args()
     cv2.setNumThreads(1)
     print(f"| recording | compared by | {' | '.join(LIGHTS)} |\n|---|---|{'---|' * len(LIGHTS)}")
     for on in data_sets(given.data):
-        measured(on, SIZES)
+        if given.filter:
+            for power in (0.05, POWER):
+                filtered(on, power)
+        else:
+            measured(on, SIZES)
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from omninav.stages.geometry.appearance.segments import similarities
 from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.visual_words import WordSimilarities
 
 from .reference_match import ReferenceMatch
 
@@ -19,10 +20,15 @@ class HistogramIntersection(ReferenceMatch, Stage):
     """
 
     def step(  # type: ignore[override]
-        self, ctx: Context, features: SegmentHistograms, map: ReferenceGraph, candidates: Candidates | None = None
+        self,
+        ctx: Context,
+        features: SegmentHistograms,
+        map: ReferenceGraph,
+        candidates: Candidates | None = None,
+        words: WordSimilarities | None = None,
     ) -> ReferenceMatch.Out:
         """Compare one view."""
-        return super().step(ctx, features, map, candidates)
+        return super().step(ctx, features, map, candidates, words)
 
     def compare(
         self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None

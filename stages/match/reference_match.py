@@ -13,17 +13,22 @@ from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
+from omninav.stages.values.visual_words import WordSimilarities
 
 
 @dataclass(kw_only=True, eq=False)
 class ReferenceMatch(ABC):
     """Compares a view with a map's references at all headings: a mixin, beside `Stage`.
 
-    Without `candidates` all references are compared.
+    Without `candidates` all references are compared. Where `words` are given, the similarity by visual words, which is
+    the same at all headings, is a factor of each reference's.
     """
 
     headings: Annotated[int, Bounds(ge=1)] = 36
     """Headings at which each reference is compared, evenly spaced over the circle."""
+    word_power: Annotated[float, Bounds(ge=0)] = 0.0
+    """Exponent of the similarity by visual words (`candidates=words`); 0: words only choose candidates. 0.25 finds nearer
+    images, yet a filter tracks worse by it (docs/experiments/words.md)."""
 
     class Out(Outputs):
         """Similarities of view and references."""
@@ -31,12 +36,19 @@ class ReferenceMatch(ABC):
         similarities: Similarities
 
     def step(
-        self, ctx: Context, features: SegmentFeatures, map: ReferenceGraph, candidates: Candidates | None = None
+        self,
+        ctx: Context,
+        features: SegmentFeatures,
+        map: ReferenceGraph,
+        candidates: Candidates | None = None,
+        words: WordSimilarities | None = None,
     ) -> Out:
         """Compare one view."""
         check_same_kind(features, map)
         candidates = candidates or Candidates()
         values = self.compare(map, features, candidates.references)
+        if words is not None and self.word_power:
+            values = values * words.factors(len(map), candidates.references, self.word_power)[:, None]
         return self.Out(
             similarities=Similarities(
                 values, candidates.references, candidates.sampling_weight, *self.how_compared(features)

@@ -16,6 +16,9 @@ from .pose import PoseSource
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 
+MIN_SIMILARITY = 0.01
+"""Of references that share no word with a view: they may be right all the same, and are not ruled out."""
+
 
 class VisualWords(Value):
     """A vocabulary of local features, and which of its words each view of a map holds.
@@ -67,6 +70,19 @@ class WordSimilarities(Value):
     """Similarity of the present view to each view of a map by their visual words: `values` (V,) float32 in [0, 1]."""
 
     values: Annotated[Floats, Shape("V"), Bounds(ge=0, le=1)]
+
+    def factors(self, references: int, chosen: Ints | None, power: float) -> Floats:
+        """Factors (N,) in (0, 1] of the `chosen` ones of a map's so many references; None: of all.
+
+        `values` to a power. Those of references that a map has learned since are as the best, and all are 1 for a view
+        without words: nothing is known of them.
+        """
+        best = float(self.values.max(initial=0.0))
+        if best == 0.0:
+            return np.ones(references if chosen is None else len(chosen), np.float32)
+        each = np.full(references, best, np.float32)
+        each[: len(self.values)] = np.maximum(self.values, MIN_SIMILARITY)
+        return np.asarray((each if chosen is None else each[chosen]) ** np.float32(power), np.float32)
 
 
 class PlaceWords(Value):

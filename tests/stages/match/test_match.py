@@ -11,6 +11,7 @@ from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentColours, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
+from omninav.stages.values.visual_words import WordSimilarities
 
 SEGMENTS = 12
 
@@ -74,3 +75,14 @@ def test_the_best_match_counts_in_the_map_s_own_indices() -> None:
     assert best is not None
     assert best.pose.x == map.poses[11, 0]
     assert BestMatch().step(Context("f"), Similarities(np.zeros((0, 36), np.float32)), map).belief is None
+
+
+def test_visual_words_are_a_factor_of_each_reference() -> None:
+    features = np.random.default_rng(0).dirichlet(np.ones(20), (3, 12)).astype(np.float32)
+    map = ReferenceGraph(np.zeros((3, 3)), features, "histograms", np.zeros((0, 2), np.int64), "truth")
+    words = WordSimilarities(np.array([1.0, 0.25, 0.04], np.float32))
+    given = Context("match"), SegmentHistograms(features[1]), map, Candidates(np.array([0, 2]), np.ones(2))
+    plain = HistogramIntersection().step(*given).similarities.values
+    both = HistogramIntersection(word_power=0.5).step(*given, words).similarities.values
+    assert both == pytest.approx(plain * [[1.0], [0.2]])
+    assert np.array_equal(HistogramIntersection(word_power=0.0).step(*given, words).similarities.values, plain)
