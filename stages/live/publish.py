@@ -184,7 +184,7 @@ class PublishMessages(Stage):
     """As the source's."""
     domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
     """As the source's."""
-    topics: tuple[str, ...] = ("/estimate/path", "/map", "/grid", "/plan", "/homing")
+    topics: tuple[str, ...] = ("/estimate/path", "/estimate/confidence", "/map", "/grid", "/plan", "/homing")
     """Topics of `result.mcap` that are published, under their names there, latched."""
     grid: str = "/grid"
     """What `/grid` is published as: nav2 reads its map on `/map`."""

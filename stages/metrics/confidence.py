@@ -13,6 +13,8 @@ from omninav.stages.values.drive import Array, Drive, known
 QUANTITIES = {
     "confidence.confident_share": Quantity(title="Frames with a confident estimate", unit="%", better="higher"),
     "confidence.first_confident_frame": Quantity(title="First confident frame", better="lower", absent="never"),
+    "confidence.probability": Quantity(title="Confidence, median", unit="%", better="higher"),
+    "confidence.doubtful_share": Quantity(title="Frames with a confidence below a half", unit="%", better="lower"),
     "confidence.spread_m": Quantity(title="Spread of the belief, median", better="lower"),
     "confidence.weight": Quantity(title="Belief in the estimate, median", unit="%", better="higher"),
     "confidence.path_m": Quantity(title="Length of the estimated path", context=True),
@@ -34,10 +36,11 @@ class Confidence(Stage):
     Under `confidence`, of the last log. An estimate is confident where it holds at least `min_weight` of the belief
     and its position's largest standard deviation is at most `max_sigma_m`; that says how sure the method is, not that
     it is right. `spread_m`: that standard deviation, `weight`: that share (medians); none of them for a method whose
-    belief is always a single pose. `path_m` and `odometry_path_m`: lengths of the estimated path and of odometry's;
-    `step_off_odometry_m` and `turn_off_odometry_deg`: how far the estimate's motion from frame to frame is from
-    odometry's (medians): jumps of the estimate are large there. `similarity` of the best match, where the comparison
-    has one.
+    belief is always a single pose. `probability`: the confidence that a monitor states (median), `doubtful_share`: the
+    share of frames in which it is below a half. `path_m` and `odometry_path_m`: lengths of the estimated path and of
+    odometry's; `step_off_odometry_m` and `turn_off_odometry_deg`: how far the estimate's motion from frame to frame
+    is from odometry's (medians): jumps of the estimate are large there. `similarity` of the best match, where the
+    comparison has one.
     """
 
     min_weight: Annotated[float, Bounds(ge=0, le=1)] = MIN_WEIGHT
@@ -55,9 +58,8 @@ class Confidence(Stage):
         if drive.has_truth or not known(drive.estimate).any():
             return self.Out()
         values = confidence_of(drive.last_log, self.min_weight, self.max_sigma_m)
-        headlines = tuple(
-            f"confidence.{name}" for name in ("confident_share", "spread_m", "similarity") if name in values
-        )
+        shown = ("confident_share", "probability", "spread_m", "similarity")
+        headlines = tuple(f"confidence.{name}" for name in shown if name in values)
         return self.Out(metrics=Metrics({"confidence": values}, QUANTITIES, headlines or ("confidence.path_m",)))
 
 
@@ -92,6 +94,10 @@ def confidence_of(drive: Drive, min_weight: float, max_sigma_m: float) -> dict[s
         values["weight"] = float(np.median(drive.mode_weight[there]))
         if (sigmas_of(drive)[there] > 0.0).any():
             values["spread_m"] = float(np.nanmedian(sigmas_of(drive)[there]))
+    stated = drive.confidence[np.isfinite(drive.confidence)]
+    if len(stated):
+        values["probability"] = float(np.median(stated))
+        values["doubtful_share"] = float((stated < 0.5).mean())
     path = drive.estimate[there]
     values["path_m"] = float(np.hypot(*np.diff(path[:, :2], axis=0).T).sum())
     odometry = drive.odometry()

@@ -18,6 +18,7 @@ from omninav.stages.plots.foxglove_server import FoxgloveServer
 from omninav.stages.plots.small_panorama import SmallPanorama
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.command import Command
+from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.image import Panorama
@@ -63,7 +64,9 @@ def logs(tmp_path_factory) -> dict[str, Path]:
     seen = VisualDistances(np.arange(5.0), np.zeros(5), np.arange(5))
     route = PlannedRoute(np.arange(3), "under way", 0)
     driving = {"command": Command(0.2, 0.1), "vector": VECTOR, "route": route, "similarities": seen}
-    write_result(folders["graph"], run, plan=PLAN, panorama=PANORAMA, similarities=similarities)
+    write_result(
+        folders["graph"], run, plan=PLAN, panorama=PANORAMA, similarities=similarities, confidence=PoseConfidence(0.8)
+    )
     write_result(folders["mixtures"], run, gaussians, learned)
     write_result(folders["places"], run, [believed] * 21, places, **driving)
     return folders

@@ -1,5 +1,6 @@
 """What a run says of itself without ground truth."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -49,6 +50,13 @@ def test_figures_of_a_run_without_truth():
     assert values["turn_off_odometry_deg"] == pytest.approx(0.0)
     assert values["similarity"] == pytest.approx(0.8)
     assert values["similarity_p10"] == pytest.approx(0.72)
+
+
+def test_a_stated_confidence_is_told_where_there_is_one():
+    assert "probability" not in Confidence().step(Context("confidence"), drive()).metrics.values["confidence"]
+    stated = dataclasses.replace(drive(), confidence=np.array([0.2, 0.9, 0.6, np.nan]))
+    values = Confidence().step(Context("confidence"), stated).metrics.values["confidence"]
+    assert (values["probability"], values["doubtful_share"]) == pytest.approx((0.6, 1 / 3))
 
 
 def test_where_there_is_truth_errors_say_more():
