@@ -1,12 +1,16 @@
 """Joins saved maps."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from omninav.pipeline import BadInput, Context, Outputs, Stage
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import PoseSource
 from omninav.stages.values.topological_map import TopologicalMap
 
+from .aligned import aligned
 from .places import joined_places
 from .references import joined_references
 from .saved import MapOfPlaces, SavedMap, read_saved, refuse_other_views, target, write_saved
@@ -15,15 +19,17 @@ from .saved import MapOfPlaces, SavedMap, read_saved, refuse_other_views, target
 class JoinMaps(Stage):
     """Writes one map of the references, or places, of several.
 
-    All must be of one kind, with views made in the same way, and their poses in one frame. No edge or link is added
-    between them. Raises BadInput where a map does not fit the first.
+    All must be of one kind, with views made in the same way. Maps of references whose poses are in frames of their own
+    are aligned by references that look alike, and straightened together (`aligned`). No edge or link is added between
+    maps. Raises BadInput where a map does not fit the first, and where too little that looks alike joins it to the
+    others.
     """
 
     maps: str | tuple[str, ...] | None = None
     """The maps (.omap), at least two."""
     same_frame: bool = False
-    """States that the poses of all maps are in one frame. It need not be said of poses from ground truth; poses from
-    odometry start again with every tour."""
+    """States that the poses of all maps are in one frame, so that they stay. It need not be said of poses from ground
+    truth; those from odometry start again with every tour, and are aligned by what looks alike."""
     out: str = "joined.omap"
     """The file to write."""
 
@@ -35,23 +41,32 @@ class JoinMaps(Stage):
         sources = read_saved(self.maps, at_least=2)
         path = target(self.out, sources)
         refuse_other_views(sources)
-        map = joined([source.map for source in sources], self._pose_source(sources))
+        given: list[PoseSource] = [source.map.pose_source for source in sources]
+        frame: PoseSource = next((source for source in given if source != "truth"), "truth")
+        map = joined([source.map for source in sources], frame)
+        if frame != "truth" and not self.same_frame:
+            map = _in_one_frame(sources, map)
         write_saved(path, map, sources, "join")
         what = "references" if isinstance(map, ReferenceGraph) else "places"
         print(f"{path}: {len(map)} {what} of {len(sources)} maps ({' + '.join(str(len(one.map)) for one in sources)})")
         return self.Out()
 
-    def _pose_source(self, sources: Sequence[SavedMap]) -> PoseSource:
-        given: list[PoseSource] = [source.map.pose_source for source in sources]
-        if set(given) == {"truth"}:
-            return "truth"
-        if not self.same_frame:
-            own = next(source for source in sources if source.map.pose_source != "truth")
-            raise BadInput(
-                f"{own.path}: its poses are from {own.map.pose_source}, whose frame may not be that of the other maps; "
-                "type same_frame=true if it is"
-            )
-        return next(source for source in given if source != "truth")
+
+def _in_one_frame(sources: Sequence[SavedMap], map: MapOfPlaces) -> MapOfPlaces:
+    """The joined map with the poses of all in the frame of the first. Raises BadInput where nothing tells them."""
+    found = None
+    if isinstance(map, ReferenceGraph):
+        found = aligned([source.map for source in sources if isinstance(source.map, ReferenceGraph)])
+    left = [source for source, fits in zip(sources, found.joined, strict=True) if not fits] if found else sources[1:]
+    if found is None or left:
+        raise BadInput(
+            f"{left[0].path}: its poses are from {left[0].map.pose_source}, whose frame may not be that of the other "
+            "maps, and too little in it looks like them to tell; type same_frame=true if it is"
+        )
+    assert isinstance(map, ReferenceGraph)
+    moved = np.hypot(*(found.poses - map.poses)[:, :2].T)
+    print(f"aligned by {found.closures} pairs of references that look alike; moved by {moved.max():.2f} m at most")
+    return replace(map, poses=found.poses)
 
 
 def joined(maps: Sequence[MapOfPlaces], pose_source: PoseSource) -> MapOfPlaces:

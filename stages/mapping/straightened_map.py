@@ -6,21 +6,14 @@ from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Tick
-from omninav.stages.geometry.appearance.segments import EXPONENTS, MAX_DISTANCES, similarities
-from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
-from omninav.stages.geometry.plane.pose_graph import optimised_poses
+from omninav.stages.geometry.appearance.closures import closures_by_appearance
+from omninav.stages.geometry.appearance.length_scale import length_scale
+from omninav.stages.geometry.appearance.segments import MAX_DISTANCES
+from omninav.stages.geometry.plane.drive_graph import straightened_drives
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.maps import ReferenceGraph
-
-from .appearance_length_scale import length_scale_of
-from .pose_graph_edges import Closures, odometry_sigmas
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Floats = npt.NDArray[np.float32]
 
 QUANTITIES = {
     "straightened.closures": Quantity(title="Places that the tour came back to", context=True),
@@ -28,35 +21,6 @@ QUANTITIES = {
     "straightened.moved_median_m": Quantity(title="References moved by, median", context=True),
     "straightened.moved_max_m": Quantity(title="References moved by, largest", context=True),
 }
-
-
-def closures_by_appearance(
-    features: Floats, driven: Array, histograms: bool, scale: float, headings: int, min_excess: float, min_gap: float,
-    samples: int,
-) -> Closures:  # fmt: skip
-    """The most similar reference of each, among those at least `min_gap` metres before or behind along the drive.
-
-    `features` (R, segments, bins); `driven` (R,): metres from the start to each. A pair counts where its similarity
-    keeps `min_excess` of what exceeds the background, the median over the map: (S - median) / (1 - median). Of more
-    than `samples` references so many, evenly spaced, look for a partner.
-    """
-    found: dict[tuple[int, int], float] = {}
-    queries = np.unique(np.linspace(0, len(features) - 1, min(samples, len(features))).astype(np.int64))
-    for one in queries.tolist():
-        apart = np.flatnonzero(np.abs(driven - driven[one]) >= min_gap)
-        if not len(apart):
-            continue
-        values = similarities(features, features[one], headings, histograms, True, EXPONENTS["sqrt"], None, scale)
-        best = values.max(axis=1)
-        background = float(np.median(best))
-        other = int(apart[best[apart].argmax()])
-        if best[other] - background < min_excess * (1.0 - background):
-            continue
-        turn = angle_of_peak(values[other])  # of the robot at `one`, seen from `other`
-        pair = (other, one) if other < one else (one, other)
-        found.setdefault(pair, turn if other < one else -turn)
-    pairs = np.array(sorted(found), np.int64).reshape(-1, 2)
-    return Closures(pairs, np.array([found[one, other] for one, other in pairs.tolist()]))
 
 
 class StraightenMap(Stage):
@@ -94,7 +58,7 @@ class StraightenMap(Stage):
         """The finished map; `ticks` are collected so that it is finished."""
         if map.pose_source == "truth":
             return self.Out(map=map)
-        unit = length_scale_of(map) if map.features.shape[1] > 1 else None
+        unit = length_scale(map.poses, map.features, map.kind) if map.features.shape[1] > 1 else None
         if unit is None:
             ctx.fact("map_straightened", "no: a map needs ten views, all around the robot")
             return self.Out(map=map)
@@ -107,7 +71,8 @@ class StraightenMap(Stage):
         if not len(closures.pairs):
             ctx.fact("map_straightened", "no: the tour came back to no place, so nothing tells how odometry bent it")
             return self.Out(map=map)
-        poses, weights = self._optimised(map.poses, steps, closures, unit)
+        spread = self.closure_sigma * unit, math.radians(self.closure_sigma_deg)
+        poses, weights = straightened_drives(map.poses, np.zeros(len(map), np.int64), closures, *spread)
         moved = np.hypot(*(poses - map.poses)[:, :2].T)
         values = {
             "closures": len(closures.pairs),
@@ -118,18 +83,3 @@ class StraightenMap(Stage):
         ctx.fact("map_straightened", "by {closures} closures, {moved_max_m:.2f} m at most".format(**values))
         metrics = Metrics({"straightened": values}, QUANTITIES)
         return self.Out(map=replace(map, poses=poses), metrics=metrics)
-
-    def _optimised(self, poses: Array, steps: Array, closures: Closures, unit: float) -> tuple[Array, Array]:
-        """The poses, and the weights of the closures."""
-        number = len(poses)
-        loops = np.zeros((len(closures.pairs), 3))
-        loops[:, 2] = closures.turns
-        spread = [self.closure_sigma * unit, self.closure_sigma * unit, math.radians(self.closure_sigma_deg)]
-        found, weights = optimised_poses(
-            poses,
-            np.concatenate([np.column_stack([np.arange(number - 1), np.arange(1, number)]), closures.pairs]),
-            np.concatenate([steps, loops]),
-            np.concatenate([odometry_sigmas(steps), np.tile(spread, (len(loops), 1))]),
-            np.arange(number - 1 + len(loops)) >= number - 1,
-        )
-        return found, weights[number - 1 :]

@@ -8,12 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage, Tick
+from omninav.stages.geometry.plane.drive_graph import placed_drives, straightened_drives
+from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.sessions import Sessions
 from omninav.stages.values.views import NoveltyThreshold
 
-from .session_graph import closures_between, placed, straightened_poses
+from .session_closures import closures_between
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -84,13 +86,17 @@ class StraightenSessions(Stage):
         closures = closures_between(sessions, self.max_distance * threshold.distance, self.min_gap * unit, self.samples)
         if not len(closures.pairs):
             return self._as_it_is(ctx, sessions, updates, last)
-        start, joined = placed(sessions, closures, self.min_gap * unit)
+        drives = sessions.drives
+        own = compose(sessions.believed[0], sessions.by_odometry)
+        start, joined = placed_drives(own, drives, closures, self.min_gap * unit)
         sigma_rad = math.radians(self.closure_sigma_deg)
-        poses, weights = straightened_poses(sessions, closures, start, self.closure_sigma * unit, sigma_rad)
+        poses, weights = straightened_drives(
+            start, drives, closures, self.closure_sigma * unit, sigma_rad, sessions.motions
+        )
         kept = int((weights >= MIN_WEIGHT).sum())
         if not kept:
             return self._as_it_is(ctx, sessions, updates, last)
-        apart = ~joined[sessions.drives]
+        apart = ~joined[drives]
         poses[apart] = sessions.believed[apart]
         moved = np.hypot(*(poses - sessions.believed)[sessions.sure & ~apart, :2].T)
         values: dict[str, float] = {

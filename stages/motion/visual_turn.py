@@ -28,9 +28,9 @@ class VisualTurn(OdometryNoiseModel, Stage):
 
     Not in the papers. What bends a path is the heading, and what a camera sees ahead and behind tells turns far better
     than wheels do: to 0.15 degrees a step in the house, odometry to 0.6 (docs/experiments/cml_straightened.md).
-    Of translation nothing is learned, but that half of the correction turns it. A gap between the two that is wider
-    than odometry's noise (`OdometryNoiseModel`'s) explains counts as vision's, so that the farther a visual turn lies
-    from the measured one the less it is believed: strips of few pixels see turns that are none.
+    Of translation nothing is learned, but that half of the correction turns it. A gap between the two that odometry's
+    noise (`OdometryNoiseModel`'s) does not explain counts as vision's, so that the farther a visual turn lies from the
+    measured one the less it is believed: strips of few pixels see turns that are none.
     """
 
     scale: Annotated[float, Bounds(ge=1)] = 3.0
@@ -39,6 +39,9 @@ class VisualTurn(OdometryNoiseModel, Stage):
     """Its smallest standard deviation."""
     max_sigma_deg: Annotated[float, Bounds(ge=0)] = 2.0
     """Its largest one, beyond which odometry alone counts; 0: always."""
+
+    explained_sigmas: Annotated[float, Bounds(gt=0)] = 1.5
+    """Gap between the two turns that odometry explains, in its standard deviations."""
 
     class Out(Outputs):
         """The corrected motion."""
@@ -62,7 +65,7 @@ class VisualTurn(OdometryNoiseModel, Stage):
             return self.Out(motion=motion)
         variance = model.sigmas[0] ** 2 + model.sigmas[2] ** 2
         gap = float(wrap(seen.turn - motion.turn))
-        change = gap * variance / max(variance + sigma**2, gap**2)
+        change = gap * variance / max(variance + sigma**2, (gap / self.explained_sigmas) ** 2)
         cos, sin = math.cos(change / 2.0), math.sin(change / 2.0)
         turned = replace(
             motion,

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.mapping.appearance_length_scale import AppearanceLengthScale, excess_by_distance
+from omninav.stages.geometry.appearance.length_scale import excess_by_distance
+from omninav.stages.mapping.appearance_length_scale import AppearanceLengthScale
 from omninav.stages.values.maps import ReferenceGraph
 
 STEP, PLACES = 0.1, 100
@@ -36,7 +37,7 @@ def test_views_reach_as_far_however_many_ways_pictures_look_from_each_place(dire
 
 
 def test_in_a_large_map_what_is_near_and_some_of_the_rest_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    module = "omninav.stages.mapping.appearance_length_scale"
+    module = "omninav.stages.geometry.appearance.length_scale"
     monkeypatch.setattr(f"{module}.MAX_COMPARED", 70)
     monkeypatch.setattr(f"{module}.NEAREST_COMPARED", 25)
     map = along_a_wall(1, 1)

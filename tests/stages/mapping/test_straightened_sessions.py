@@ -5,10 +5,10 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
-from omninav.stages.geometry.plane.se2 import between, chain
+from omninav.stages.geometry.plane.drive_graph import Closures, straightened_drives
+from omninav.stages.geometry.plane.se2 import between, chain, compose
 from omninav.stages.mapping.kept_sessions import KeepSessions
-from omninav.stages.mapping.pose_graph_edges import Closures
-from omninav.stages.mapping.session_graph import closures_between, placed, straightened_poses
+from omninav.stages.mapping.session_closures import closures_between
 from omninav.stages.mapping.straightened_sessions import StraightenSessions
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import Motion
@@ -93,9 +93,9 @@ def test_wrong_closures_do_not_bend_the_map(share):
     rng = np.random.default_rng(1)
     wrong = np.sort(np.column_stack([rng.integers(0, 50, number), rng.integers(55, 110, number)]))
     both = Closures(np.concatenate([right.pairs, wrong]), np.append(right.turns, rng.uniform(-3, 3, number)))
-    start, _ = placed(sessions, both, 2.0)
-    poses, weights = straightened_poses(sessions, both, start, 0.2, 0.1)
-    assert error(poses, TWICE) < 0.4 * error(sessions.by_odometry, TWICE)
+    start = compose(TWICE[0], sessions.by_odometry)
+    poses, weights = straightened_drives(start, sessions.drives, both, 0.2, 0.1, sessions.motions)
+    assert error(poses, TWICE) < 0.4 * error(start, TWICE)
     assert np.median(weights[len(right.pairs) :]) < 0.1 < np.median(weights[: len(right.pairs)])
 
 
