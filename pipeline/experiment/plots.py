@@ -4,7 +4,7 @@ import itertools
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -32,11 +32,10 @@ def plots_of(experiment: Experiment, results: Results) -> list[PagePlot]:
     page, found = experiment.page, []
     for index, name in enumerate(page.drawn or list(experiment.measures)[:1]):
         measure = experiment.measures[name]
-        content = (
-            _lines(experiment, results, name, page.along, page.panels)
-            if page.along
-            else _bars(experiment, results, name)
-        )
+        if page.along:
+            content = _lines(experiment, results, name, page.along, page.panels)
+        else:  # of more rows than there are colours bars cannot be told apart
+            content = (_bars if len(row_labels(experiment)) <= len(PALETTE) else _points)(experiment, results, name)
         caption = f"{measure.title}: mean, and standard deviation over the repetitions"
         if experiment.published.get(name) and not page.along:
             caption += "; diamonds are the paper's figures"
@@ -166,12 +165,7 @@ def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
         axes = drawn.canvas.subplots()
         for index, labels in enumerate(rows):
             at = np.arange(len(columns)) + (index - (len(rows) - 1) / 2) * width
-            found = [
-                list(samples(experiment, results, name, labels | {experiment.page.columns: c}).values())
-                for c in columns
-            ]
-            heights = [float(np.mean(v)) if v else np.nan for v in found]
-            spreads = [float(np.std(v)) if v else np.nan for v in found]
+            heights, spreads = _means([(labels, column) for column in columns], experiment, results, name)
             all_heights += heights
             colour = PALETTE[index % len(PALETTE)]
             title = ", ".join(labels.values())
@@ -202,6 +196,43 @@ def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
     return drawn.content
 
 
+def _points(experiment: Experiment, results: Results, name: str) -> bytes:
+    """A line of points for each row of the table, one for each column; error bars are the spread."""
+    columns, rows = experiment.labels(experiment.page.columns), row_labels(experiment)
+    places = -np.arange(len(rows), dtype=np.float64)  # the first row on top
+    figures: list[float] = []
+    with plot(8.0, 1.3 + 0.28 * len(rows)) as drawn:
+        axes = drawn.canvas.subplots()
+        for index, column in enumerate(columns):
+            means, spreads = _means([(labels, column) for labels in rows], experiment, results, name)
+            figures += means
+            axes.errorbar(
+                means,
+                places - 0.1 * (index - (len(columns) - 1) / 2),
+                xerr=spreads,
+                color=PALETTE[index % len(PALETTE)],
+                fmt="os^Dvx"[index % 6],
+                markersize=4.5,
+                capsize=2.0,
+                elinewidth=0.8,
+                label=column,
+            )
+        axes.set_yticks(places, [", ".join(labels.values()) for labels in rows])
+        axes.set_xlabel(experiment.measures[name].title)
+        _scale(axes, figures, axis="x")
+        _legend_above(drawn.canvas, [axes])
+    return drawn.content
+
+
+def _means(
+    cells: Sequence[tuple[Labels, str]], experiment: Experiment, results: Results, name: str
+) -> tuple[list[float], list[float]]:
+    """Mean and standard deviation over the repetitions of cells of the table, each a row's labels and a column."""
+    by = experiment.page.columns
+    found = [list(samples(experiment, results, name, labels | {by: column}).values()) for labels, column in cells]
+    return [float(np.mean(v)) if v else np.nan for v in found], [float(np.std(v)) if v else np.nan for v in found]
+
+
 def _legend_above(canvas: Any, grid: Any) -> None:
     """One legend for all panels, where it hides none of the lines."""
     lines: dict[str, Any] = {}
@@ -212,14 +243,13 @@ def _legend_above(canvas: Any, grid: Any) -> None:
         canvas.legend(lines.values(), lines.keys(), loc="outside upper left", ncols=min(3, len(lines)))
 
 
-def _scale(axes: Any, heights: Sequence[float], ratio: float = 20.0) -> None:
+def _scale(axes: Any, figures: Sequence[float], ratio: float = 20.0, axis: Literal["x", "y"] = "y") -> None:
     """From zero up; in powers of ten where the highest is more than `ratio` times the lowest."""
-    above = [height for height in heights if height > 0]
+    above = [figure for figure in figures if figure > 0]
     if above and max(above) > ratio * min(above):
-        axes.set_yscale("log")
-        axes.set_ylim(bottom=0.5 * min(above))
+        axes.set(**{f"{axis}scale": "log", f"{axis}lim": (0.5 * min(above), None)})
     else:
-        axes.set_ylim(bottom=0)
+        axes.set(**{f"{axis}lim": (0, None)})
 
 
 def row_labels(experiment: Experiment) -> list[Labels]:
