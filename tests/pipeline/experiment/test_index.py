@@ -15,8 +15,8 @@ from omninav.pipeline.graph.problems import BadInput
 PAGES = Path(__file__).resolve().parents[3] / "docs" / "experiments"
 COMMIT = r"commit [0-9a-f]{12}( with changes that are not committed)?"
 MADE = re.compile(
-    rf"(Made with omninav [\d.]+, {COMMIT}|The commit at which this page was made is not recorded: [^\n]+)\.\n"
-    rf"(\nJudged again with omninav [\d.]+, {COMMIT}: [^\n]+\.\n)?\Z"
+    rf"(Made with omninav [\w.]+, {COMMIT}|The commit at which this page was made is not recorded: [^\n]+)\.\n"
+    rf"(\nJudged again with omninav [\w.]+, {COMMIT}: [^\n]+\.\n)?\Z"
 )
 
 
