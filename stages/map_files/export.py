@@ -13,6 +13,7 @@ import numpy.typing as npt
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.artifact import read_artifact
 from omninav.pipeline.files import user_path
+from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.thumbnails import Thumbnails
@@ -48,7 +49,8 @@ class ExportMap(Stage):
     def step(self, ctx: Context) -> Out:
         """Export the map."""
         (source,) = read_saved(self.maps, at_most=1)
-        folder, thumbnails = self._folder(), self._thumbnails(source)
+        folder = self._folder()
+        file, thumbnails = self._thumbnails(source)
         if self.field_deg is not None and not _has_panoramas(source.map):
             raise BadInput(f"field_deg={self.field_deg:g}: the images of {source.path} are no panoramas; leave it out")
         poses, order = _in_order(source.map)
@@ -60,7 +62,11 @@ class ExportMap(Stage):
         part.mkdir(parents=True)
         try:
             for number, row in enumerate(kept.tolist()):
-                encoded = cv2.imencode(".png", self._cut(thumbnails.image(row)))[1]
+                try:
+                    image = thumbnails.image(row)
+                except Undecodable as error:
+                    raise BadInput(f"{file}: image {row} cannot be decoded: {error}") from None
+                encoded = cv2.imencode(".png", self._cut(image))[1]
                 (part / f"{number}.png").write_bytes(encoded.tobytes())
             os.replace(part, folder)
         finally:
@@ -75,7 +81,7 @@ class ExportMap(Stage):
             raise BadInput(f"out={self.out}: it is there, and not an empty folder; type another name")
         return folder
 
-    def _thumbnails(self, source: SavedMap) -> Thumbnails:
+    def _thumbnails(self, source: SavedMap) -> tuple[Path, Thumbnails]:
         file = source.path.with_name(BESIDE) if self.images is None else user_path(self.images)
         if self.images is None and not file.exists():
             raise BadInput(
@@ -88,7 +94,7 @@ class ExportMap(Stage):
         views = len(source.map) if isinstance(source.map, ReferenceGraph) else len(source.map.views)
         if len(images) != views:
             raise BadInput(f"{file}: it has {len(images)} images, {source.path} has {views} views: another map's")
-        return images
+        return file, images
 
     def _cut(self, pixels: Pixels) -> Pixels:
         if self.field_deg is None:

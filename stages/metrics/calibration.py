@@ -76,8 +76,8 @@ class Calibration(Stage):
         return self.Out(metrics=metrics, figure=figure)
 
     def _drawn(self, found: Reliability, stated: Drive, right: Flags) -> Figure:
-        chart = Chart((0.0, 1.0), (0.0, 1.0), "stated probability", "share of frames within the tolerance", equal=True,
-                      height=(190.0, 300.0))  # fmt: skip
+        chart = Chart((0.0, 1.0), (0.0, 1.0), "stated probability", "share of frames within the tolerance",
+                      height=(260.0, 260.0))  # fmt: skip
         chart.base.line(np.array([(0.0, 0.0), (1.0, 1.0)]), "quiet", dashed=True)
         points = np.column_stack([found.stated, found.observed])
         chart.base.line(points, "blue")

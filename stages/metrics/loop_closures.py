@@ -147,7 +147,7 @@ def _drawn(support: Array, right: npt.NDArray[np.bool_]) -> Figure | None:
     if area is None:
         return None
     precision, recall = precision_recall(support, right)
-    chart = Chart((0.0, 1.0), (0.0, 1.0), "recall", "precision", equal=True, height=(190.0, 300.0))
+    chart = Chart((0.0, 1.0), (0.0, 1.0), "recall", "precision", height=(260.0, 260.0))
     ends = np.column_stack([recall, precision])  # each step is as high as the precision where it ends
     begins = np.column_stack([np.append(0.0, recall[:-1]), precision])
     points = np.stack([begins, ends], axis=1).reshape(-1, 2)

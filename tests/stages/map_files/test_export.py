@@ -83,3 +83,11 @@ def test_a_folder_that_holds_something_is_left_alone(tmp_path: Path):
     name = saved(tmp_path)
     with pytest.raises(BadInput, match="it is there, and not an empty folder"):
         ExportMap(maps=name, out=str(tmp_path)).step(CTX)
+
+
+def test_an_image_that_is_none_is_named_and_nothing_is_left(tmp_path: Path):
+    name = saved(tmp_path)
+    write_artifact(tmp_path / "thumbnails.omap", joined([grey(0), b"no image", *[grey(n) for n in range(2, 6)]]))
+    with pytest.raises(BadInput, match=r"thumbnails\.omap: image 1 cannot be decoded"):
+        ExportMap(maps=name, out=str(tmp_path / "out")).step(CTX)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["map.omap", "thumbnails.omap"]
