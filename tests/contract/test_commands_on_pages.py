@@ -58,7 +58,9 @@ def test_a_command_on_a_page_composes(line: str, monkeypatch: pytest.MonkeyPatch
 def composed(words: list[str]) -> None:
     """Compose and build what a command describes; of an experiment its variant with what is typed for conditions."""
     own = [word for word in words if word.lstrip("+").partition("=")[0].partition(".")[0] in OWN]
-    rest = [word for word in words if word not in own and not word.startswith("map=")]  # a saved map is not there
+    rest = [
+        word for word in words if word not in own and not word.startswith(("map=", "words="))
+    ]  # no saved map is there
     if any(word.startswith("+experiment=") for word in own):
         config: Any = OmegaConf.to_container(compose("config", overrides=own), resolve=True)
         if not rest:
