@@ -4,11 +4,14 @@ import math
 from typing import Annotated
 
 import numpy as np
+import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.probability.particles import systematic
 from omninav.stages.values.belief import Likelihood, Particles
+
+Array = npt.NDArray[np.float64]
 
 
 class UniformRecovery(Stage):
@@ -40,16 +43,29 @@ class UniformRecovery(Stage):
                 "fusion: random particles are drawn from proposals; wire fusion.proposals to a sensor that gives them "
                 "(nodes.sensor.proposals above 0), or type nodes.fusion.random_particles=0"
             )
-        weights = particles.weights * likelihood.values
-        total = float(weights.sum())
-        if not (math.isfinite(total) and total > 0.0):
-            ctx.count("belief_without_support", detail="fusion: no particle explains the image; weights kept")
-            weights = particles.weights
         number = min(self.random_particles, self.number)
-        poses = np.empty((0, 3))
-        if number < self.number:
-            poses = particles.poses[systematic(weights, self.number - number, float(ctx.rng.random()))]
-        if proposals is not None and number:
-            drawn = systematic(proposals.weights, number, float(ctx.rng.random()))
-            poses = np.concatenate([poses, proposals.poses[drawn]])
+        poses = resampled(ctx, particles, weighed(ctx, particles, likelihood), self.number, number, proposals)
         return self.Out(belief=Particles(poses, np.full(self.number, 1.0 / self.number)))
+
+
+def weighed(ctx: Context, particles: Particles, likelihood: Likelihood) -> Array:
+    """The particles' weights after the image, before them where it leaves none: (N,), not normalised."""
+    weights = particles.weights * likelihood.values
+    total = float(weights.sum())
+    if math.isfinite(total) and total > 0.0:
+        return weights
+    ctx.count("belief_without_support", detail="fusion: no particle explains the image; weights kept")
+    return particles.weights
+
+
+def resampled(
+    ctx: Context, particles: Particles, weights: Array, number: int, random: int, proposals: Particles | None
+) -> Array:
+    """Poses (number, 3) drawn by weight, `random` of them from the proposals."""
+    poses = np.empty((0, 3))
+    if random < number:
+        poses = particles.poses[systematic(weights, number - random, float(ctx.rng.random()))]
+    if proposals is not None and random:
+        drawn = systematic(proposals.weights, random, float(ctx.rng.random()))
+        poses = np.concatenate([poses, proposals.poses[drawn]])
+    return poses

@@ -7,6 +7,7 @@ from omninav.pipeline import Context, Stage
 from omninav.stages.geometry.appearance.segments import similarities
 from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visual_words import WordSimilarities
 
@@ -26,9 +27,10 @@ class HistogramIntersection(ReferenceMatch, Stage):
         map: ReferenceGraph,
         candidates: Candidates | None = None,
         words: WordSimilarities | None = None,
+        length_scale: LengthScale | None = None,
     ) -> ReferenceMatch.Out:
         """Compare one view."""
-        return super().step(ctx, features, map, candidates, words)
+        return super().step(ctx, features, map, candidates, words, length_scale)
 
     def compare(
         self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None

@@ -1,7 +1,7 @@
 """What all comparisons of a view with the references of a map have in common."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -9,11 +9,15 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentFeatures
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Similarities
 from omninav.stages.values.visual_words import WordSimilarities
+
+from .calibration import MapCalibration
 
 
 @dataclass(kw_only=True, eq=False)
@@ -31,9 +35,13 @@ class ReferenceMatch(ABC):
     similar image is nearer, yet a filter tracks worse (docs/experiments/words.md)."""
 
     class Out(Outputs):
-        """Similarities of view and references."""
+        """Similarities of view and references, and what they say of the place; the latter absent in a small map."""
 
         similarities: Similarities
+        calibration: SimilarityCalibration | None = None
+
+    def __post_init__(self) -> None:
+        self._calibration = MapCalibration()
 
     def step(
         self,
@@ -42,18 +50,24 @@ class ReferenceMatch(ABC):
         map: ReferenceGraph,
         candidates: Candidates | None = None,
         words: WordSimilarities | None = None,
+        length_scale: LengthScale | None = None,
     ) -> Out:
-        """Compare one view."""
+        """Compare one view; `length_scale` is for the calibration only, which knows no `words`."""
         check_same_kind(features, map)
         candidates = candidates or Candidates()
         values = self.compare(map, features, candidates.references)
         if words is not None and self.word_power:
             values = values * words.factors(len(map), candidates.references, self.word_power)[:, None]
-        return self.Out(
-            similarities=Similarities(
-                values, candidates.references, candidates.sampling_weight, *self.how_compared(features)
-            )
+        similarities = Similarities(
+            values, candidates.references, candidates.sampling_weight, *self.how_compared(features)
         )
+        if not ctx.is_read("calibration"):
+            return self.Out(similarities=similarities)
+
+        def of_view(view: int, chosen: npt.NDArray[np.int64]) -> npt.NDArray[np.float32]:
+            return self.compare(map, replace(features, values=np.asarray(map.features[view])), chosen)
+
+        return self.Out(similarities=similarities, calibration=self._calibration.of(ctx, map, of_view, length_scale))
 
     @abstractmethod
     def compare(

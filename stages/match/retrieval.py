@@ -11,11 +11,14 @@ from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import LANES, Rows, turned_views
 from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentHistograms
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Answers, Similarities
 
+from .calibration import MapCalibration
 from .reference_match import check_same_kind
 
 Floats = npt.NDArray[np.float32]
@@ -110,15 +113,24 @@ class Retrieval(Stage):
     """References in `answers`, each at its best heading."""
 
     class Out(Outputs):
-        """Similarities of view and references, and the most similar references."""
+        """Similarities of view and references, the most similar references, and what similarities say of the place."""
 
         similarities: Similarities
         answers: Answers | None = None
+        calibration: SimilarityCalibration | None = None
+
+    def __post_init__(self) -> None:
+        self._calibration = MapCalibration()
 
     def step(
-        self, ctx: Context, features: SegmentHistograms, map: ReferenceGraph, candidates: Candidates | None = None
+        self,
+        ctx: Context,
+        features: SegmentHistograms,
+        map: ReferenceGraph,
+        candidates: Candidates | None = None,
+        length_scale: LengthScale | None = None,
     ) -> Out:
-        """Query the map with one view."""
+        """Query the map with one view; `length_scale` is for the calibration only."""
         if features.directions is None:
             check_same_kind(features, map)
             headings = self.headings if len(features.values) > 1 else 1
@@ -129,9 +141,17 @@ class Retrieval(Stage):
         candidates = candidates or Candidates()
         values = normalised_intersections(map.features, queries, features.scales, candidates.references)
         similarities = Similarities(values, candidates.references, candidates.sampling_weight)
-        if not len(map) or not ctx.is_read("answers"):
-            return self.Out(similarities=similarities)
-        return self.Out(similarities=similarities, answers=best_answers(similarities, self.best))
+        answers = best_answers(similarities, self.best) if len(map) and ctx.is_read("answers") else None
+        calibration = None
+        if ctx.is_read("calibration"):
+
+            def of_view(view: int, chosen: Ints) -> Floats:
+                turned = turned_views(np.asarray(map.features[view]), headings)
+                return normalised_intersections(map.features, turned, features.scales, chosen)
+
+            headings = self.headings if map.features.shape[1] > 1 else 1
+            calibration = self._calibration.of(ctx, map, of_view, length_scale)
+        return self.Out(similarities=similarities, answers=answers, calibration=calibration)
 
 
 def best_answers(similarities: Similarities, number: int) -> Answers:

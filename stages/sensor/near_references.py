@@ -1,6 +1,7 @@
 """Weights particles by the similarities of the references near them."""
 
 import math
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -11,11 +12,13 @@ from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.geometry.probability.evidence import best_headings, contrast_power, evidence_novelty
 from omninav.stages.values.belief import Likelihood, Particles
+from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.similarity import Similarities, SimilarityField
 
+from .calibrated_similarity import Outliers, likelihood_ratios
 from .compared_rows import ComparedRows
 
 Array = npt.NDArray[np.float64]
@@ -153,6 +156,10 @@ class NearReferences(Stage):
     that power, background and mean likelihood are estimates for the whole map. The mean likelihood is that of a robot
     kidnapped just now, to which the image is new: it takes the full power. Defaults:
     docs/experiments/omniview_mcl_defaults.md.
+
+    With a `calibration` (likelihood=calibrated) the weight is the likelihood ratio of the right against a wrong place,
+    which the map's own views have shown, in place of a power; `power`, `contrast` and the background's are not used.
+    Its logarithm is interpolated as similarities are, and an unknown place has ratio 1.
     """
 
     power: Annotated[float, Bounds(gt=0)] | None = None
@@ -168,9 +175,12 @@ class NearReferences(Stage):
     fade_distance: Annotated[float, Bounds(gt=0)] = 1.5
     """Distance, in length scales, over which a reference loses its influence (sigma of a Gaussian)."""
     independence_distance: Annotated[float, Bounds(ge=0)] = 0.75
-    """Distance driven, in length scales, after which an image is fully new evidence; 0: always. Needs `motion`."""
+    """Distance driven, in length scales, after which an image is fully new evidence; 0: always. Needs `motion`. With a
+    `calibration`, in the distances over which its evidence was measured to lose its correlation."""
     min_novelty: Annotated[float, Bounds(ge=0, le=1)] = 0.05
     """Novelty of an image where the robot stands."""
+    outliers: Outliers = 0.1
+    """Share of images that their place does not explain, with a `calibration`: blocked, changed, or beside the map."""
     length_scale_m: Annotated[float, Bounds(gt=0)] = 0.5
     """Appearance length scale where the port `length_scale` is not wired."""
 
@@ -193,6 +203,7 @@ class NearReferences(Stage):
         map: ReferenceGraph,
         motion: Motion | None = None,
         length_scale: LengthScale | None = None,
+        calibration: SimilarityCalibration | None = None,
     ) -> Out:
         """Weight all particles."""
         unit = self.length_scale_m if length_scale is None else length_scale.metres
@@ -205,16 +216,40 @@ class NearReferences(Stage):
             self._rows = ComparedRows(len(map))
             self._map, self._length = map, len(map)
         candidates, rows = self._rows.of(similarities.candidates)
+        driven = None if motion is None else math.hypot(motion.x, motion.y)
+        if calibration is not None:
+            far = self.independence_distance * calibration.correlation_m
+            novelty = evidence_novelty(driven, far, self.min_novelty)
+            return self._calibrated(similarities, particles, map, rows, unit, calibration, novelty)
         best, each = best_headings(np.ascontiguousarray(values)), similarities.sampling_weight
         places, distance = map.poses[candidates], self.background_distance * unit
         floor = background_similarity(best, places, distance, self.background_quantile, each)
         power = contrast_power(best, self.contrast, each) if self.power is None else self.power
-        driven = None if motion is None else math.hypot(motion.x, motion.y)
         novelty = evidence_novelty(driven, self.independence_distance * unit, self.min_novelty)
         top = max(float(best.max()), 1e-12)
         field = similarity_field(similarities, floor, top, power)
         expected = self._expected(particles.poses, map, rows, values, unit, floor)
         likelihood = Likelihood((expected / top) ** (power * novelty), field.mean, novelty)
+        return self.Out(likelihood=likelihood, field=field)
+
+    def _calibrated(
+        self,
+        similarities: Similarities,
+        particles: Particles,
+        map: ReferenceGraph,
+        rows: Ints,
+        unit: float,
+        calibration: SimilarityCalibration,
+        novelty: float,
+    ) -> Out:
+        ratios = likelihood_ratios(similarities, calibration, self.outliers)
+        top = max(float(ratios.max()), 1.0)
+        near = self._cells.of(particles.poses)
+        expected = expected_similarity(
+            particles.poses, map.poses, near, rows, np.log(ratios), self.fade_distance * unit, 0.0
+        )
+        field = similarity_field(replace(similarities, values=ratios / np.float32(top)), 1.0 / top, 1.0, 1.0)
+        likelihood = Likelihood(np.exp(novelty * (expected - math.log(top))), field.mean, novelty)
         return self.Out(likelihood=likelihood, field=field)
 
     def _expected(

@@ -1,6 +1,7 @@
 """Weights particles by the views whose visibility areas they lie in."""
 
 import math
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -9,17 +10,23 @@ import numpy.typing as npt
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.probability.evidence import best_headings, contrast_power, evidence_novelty
 from omninav.stages.values.belief import Likelihood, Particles
+from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
-from omninav.stages.values.similarity import Similarities
+from omninav.stages.values.similarity import Similarities, SimilarityField
 from omninav.stages.values.visibility import VisibilityAreas
 
+from .calibrated_similarity import Outliers, likelihood_ratios
 from .compared_rows import ComparedRows
+from .near_references import similarity_field
 from .visibility_index import looks_at, seen_from, sees_any
 from .visibility_similarity import CUTOFF_SIGMAS, Window, mean_seen, sums_by_turn
 
 Array = npt.NDArray[np.float64]
+
+BACKGROUND_WEIGHT = math.exp(-0.5)
+"""Of what is not known, with a `calibration`: as much as a view taken one sigma away."""
 
 
 class Visibility(Stage):
@@ -33,8 +40,10 @@ class Visibility(Stage):
     lambda, which differs from the turn of its heading by the parallax of its motion.
 
     Similarities hardly differ between places (erratum 45), and so do their means: they may be raised to a `power`
-    before they are averaged. Defaults: docs/experiments/retrieval_mcl_defaults.md. Raises BadInput where areas and map
-    do not belong together.
+    before they are averaged. Defaults: docs/experiments/retrieval_mcl_defaults.md. With a `calibration`
+    (likelihood=calibrated) likelihood ratios of the right against a wrong place, which the map's own views have shown,
+    are averaged in place of powers, and where no view was taken near the mean fades to that of the whole database:
+    docs/experiments/retrieval_mcl_calibrated.md. Raises BadInput where areas and map do not belong together.
     """
 
     field_of_view: Literal["auto", "forward", "panoramic"] = "auto"
@@ -51,18 +60,22 @@ class Visibility(Stage):
     contrast: Annotated[float, Bounds(gt=0)] = 2.0
     """Nats of log likelihood per standard deviation of log S over the references, where `power` is null."""
     independence_distance: Annotated[float, Bounds(ge=0)] = 0.0
-    """Distance driven, in length scales, after which an image is fully new evidence; 0: always, as in the paper."""
+    """Distance driven, in length scales, after which an image is fully new evidence; 0: always, as in the paper. With a
+    `calibration`, in the distances over which its evidence was measured to lose its correlation."""
     min_novelty: Annotated[float, Bounds(ge=0, le=1)] = 0.05
     """Novelty of an image where the robot stands, with `independence_distance` and `motion`."""
+    outliers: Outliers = 0.1
+    """Share of images that their place does not explain, with a `calibration`: blocked, changed, or beside the map."""
     length_scale_m: Annotated[float, Bounds(gt=0)] = 0.5
     """Appearance length scale where the port `length_scale` is not wired."""
     retrieval: bool = True
     """False: the ablation of section VI-E, in which all particles in any visibility area weigh 1 and all others 0."""
 
     class Out(Outputs):
-        """Likelihood of each particle."""
+        """Likelihood of each particle, and the weights over the whole map."""
 
         likelihood: Likelihood
+        field: SimilarityField | None = None
 
     def setup(self, ctx: Context) -> None:
         """Forget the areas of an earlier map."""
@@ -77,6 +90,7 @@ class Visibility(Stage):
         areas: VisibilityAreas,
         motion: Motion | None = None,
         length_scale: LengthScale | None = None,
+        calibration: SimilarityCalibration | None = None,
     ) -> Out:
         """Weight all particles."""
         values = similarities.values
@@ -97,17 +111,34 @@ class Visibility(Stage):
             return self.Out(likelihood=Likelihood(sees_any(particles.poses, self._cells).astype(np.float64)))
         compared, rows = self._rows.of(similarities.candidates)
         each = np.ones(len(values)) if similarities.sampling_weight is None else similarities.sampling_weight
-        best = best_headings(np.ascontiguousarray(values))
-        power = contrast_power(best, self.contrast, similarities.sampling_weight) if self.power is None else self.power
-        raised: Array = (values.astype(np.float64) / max(float(best.max()), 1e-12)) ** power
+        raised, floor = self._raised(similarities, calibration)
         background_level = float(np.average(raised.mean(axis=1), weights=each))
+        background_weight = BACKGROUND_WEIGHT if calibration is not None and sigma < math.inf else 0.0
         panoramic = values.shape[1] > 1 if self.field_of_view == "auto" else self.field_of_view == "panoramic"
         groups = None if similarities.candidates is None else self._looks.groups_with(compared)
         groups, summed = self._summed.of(groups)
         sums, number = sums_by_turn(self._looks, groups, rows, raised if panoramic else raised[:, :1], each)
         window = None if panoramic else math.radians(self.window_deg), self.window_shape, sigma
-        mean = mean_seen(particles.poses, self._cells, summed, sums, number, background_level, *window)
+        background = background_level, *window, background_weight
+        mean = mean_seen(particles.poses, self._cells, summed, sums, number, *background)
         unit = self.length_scale_m if length_scale is None else length_scale.metres
+        unit = unit if calibration is None else calibration.correlation_m
         driven = None if motion is None else math.hypot(motion.x, motion.y)
         novelty = evidence_novelty(driven, self.independence_distance * unit, self.min_novelty)
-        return self.Out(likelihood=Likelihood(mean**novelty, background_level, novelty))
+        likelihood = Likelihood(mean**novelty, background_level, novelty)
+        if not ctx.is_read("field"):
+            return self.Out(likelihood=likelihood)
+        weighed = replace(similarities, values=raised.astype(np.float32))
+        return self.Out(likelihood=likelihood, field=similarity_field(weighed, floor, 1.0, 1.0))
+
+    def _raised(self, similarities: Similarities, calibration: SimilarityCalibration | None) -> tuple[Array, float]:
+        # What is averaged, 1 at most, and up to where it says nothing.
+        if calibration is not None:
+            ratios = likelihood_ratios(similarities, calibration, self.outliers).astype(np.float64)
+            top = max(float(ratios.max()), 1.0)
+            return ratios / top, 1.0 / top
+        values, each = similarities.values, similarities.sampling_weight
+        best = best_headings(np.ascontiguousarray(values))
+        power = contrast_power(best, self.contrast, each) if self.power is None else self.power
+        top = max(float(best.max()), 1e-12)
+        return (values.astype(np.float64) / top) ** power, (float(np.median(best)) / top) ** power

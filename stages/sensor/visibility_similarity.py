@@ -74,6 +74,7 @@ def mean_seen(
     window: float | None = None,
     shape: Window = "step",
     distance_sigma_m: float = math.inf,
+    background_weight: float = 0.0,
 ) -> Array:
     """Mean similarity of the views whose areas hold a pose, equations 7 and 8: (N, 3) -> (N,).
 
@@ -83,12 +84,17 @@ def mean_seen(
     falls to 0 there (`triangle`), or has it as standard deviation (`gaussian`). Without one they see all around, and
     look up their turn relative to each point. p(M_j | l) of equation 6 falls with the distance d to where a group was
     taken as exp(-d^2 / (2 distance_sigma^2)) and is 0 beyond three sigmas; with an infinite sigma it is the paper's.
-    `background_level`: the result where K = 0.
+    `background_level`: the result where K = 0; where K > 0 it counts as much as `background_weight` of a view.
     """
     farthest = math.pi if window is None else min(CUTOFF_SIGMAS * window if shape == "gaussian" else window, math.pi)
     min_cosine = math.cos(farthest) if farthest < math.pi else -2.0
     ahead = window is not None, window or math.pi, min_cosine, WINDOW_SHAPES[shape]
-    return _seen(np.ascontiguousarray(poses), *cells, summed, sums, number, background_level, distance_sigma_m, *ahead)
+    # fmt: off
+    return _seen(
+        np.ascontiguousarray(poses), *cells, summed, sums, number, background_level, background_weight,
+        distance_sigma_m, *ahead,
+    )
+    # fmt: on
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -106,6 +112,7 @@ def _seen(
     sums: Floats,
     number: Floats,
     background_level: float,
+    background_weight: float,
     distance_sigma_m: float,
     ahead: bool,
     window: float,
@@ -150,7 +157,7 @@ def _seen(
             for k in range(many):
                 aside = math.atan2(up[k] * cosine - right[k] * sine, right[k] * cosine + up[k] * sine) / window
                 weight[k] *= 1.0 - abs(aside) if shape == 1 else _gaussian(np.float32(aside * aside))
-        total, mass = np.float32(0), np.float32(0)
+        total, mass = np.float32(background_weight * background_level), np.float32(background_weight)
         for k in range(many):
             g = kept[k]
             value = sums[g, 0]

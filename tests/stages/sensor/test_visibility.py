@@ -9,11 +9,13 @@ import pytest
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.probability.evidence import contrast_power, evidence_novelty
+from omninav.stages.sensor.calibrated_similarity import likelihood_ratios
 from omninav.stages.sensor.line_of_sight import axes_of, visibility_areas
-from omninav.stages.sensor.visibility import Visibility
+from omninav.stages.sensor.visibility import BACKGROUND_WEIGHT, Visibility
 from omninav.stages.sensor.visibility_index import looks_at, seen_from
 from omninav.stages.sensor.visibility_similarity import CUTOFF_SIGMAS, mean_seen, sums_by_turn
 from omninav.stages.values.belief import Particles
+from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.grid import FREE, OCCUPIED, OccupancyGrid
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
@@ -50,11 +52,18 @@ def wrapped(angle: float) -> float:
 
 
 def by_equation_7(
-    areas: VisibilityAreas, pose: np.ndarray, values: np.ndarray, otherwise: float, window, around, near=None
+    areas: VisibilityAreas,
+    pose: np.ndarray,
+    values: np.ndarray,
+    otherwise: float,
+    window,
+    around,
+    near=None,
+    unknown=0.0,
 ):
     """The mean over all views j whose area holds the pose, with d(psi), worked view by view."""
     row, column = np.floor((pose[1::-1] - np.array(areas.origin[::-1])) / areas.resolution).astype(int)
-    total = mass = 0.0
+    total, mass = unknown * otherwise, unknown
     headings = values.shape[1]
     for reference, sector in np.argwhere(areas.target >= 0):
         t = areas.target[reference, sector]
@@ -268,6 +277,27 @@ def test_images_of_a_standing_robot_are_little_evidence_with_an_independence_dis
     moving, standing = at(Motion(0.3, 0.0, 0.0)), at(Motion(0.0, 0.0, 0.1))
     assert (moving.novelty, standing.novelty) == pytest.approx((1.0, 0.05))
     assert np.allclose(standing.values, moving.values**0.05)
+
+
+def test_calibrated_views_count_less_the_farther_off_they_were_taken_and_an_unknown_place_as_the_whole_map():
+    areas = visibility_areas(REFERENCES, ROOM, axes_of(1))
+    values, poses = RNG.uniform(0.5, 1.0, (25, 1)).astype(np.float32), some_poses(200)
+    calibration = SimilarityCalibration(slope=3.0, middle=0.5, images=50, right_distance_m=0.5, correlation_m=2.0)
+    stage, particles = Visibility(distance_sigma_m=0.4, window_deg=20.0), Particles(poses, np.full(200, 1 / 200))
+    stage.setup(Context("sensor"))
+    found = stage.step(
+        Context("sensor"), Similarities(values), particles, a_map(), areas, None, LengthScale(0.4), calibration
+    )
+    ratios = likelihood_ratios(Similarities(values), calibration, 0.1).astype(float)
+    raised = ratios / ratios.max()
+    mean = float(raised.mean())
+    assert found.likelihood.mean_likelihood == pytest.approx(mean)
+    expected = [
+        by_equation_7(areas, pose, raised, mean, WINDOWS["step"], False, 0.4, BACKGROUND_WEIGHT) for pose in poses
+    ]
+    assert np.allclose(found.likelihood.values, expected, atol=1e-5)
+    assert found.field is not None
+    assert found.field.floor == pytest.approx(1.0 / float(ratios.max()))
 
 
 def test_the_field_of_view_follows_from_the_match_or_is_given():

@@ -1,0 +1,55 @@
+"""Augmented MCL: random particles where the likelihood has fallen, against table 8.3 worked by hand."""
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.stages.fusion.augmented_recovery import (
+    AugmentedRecovery,
+    AugmentedRecoveryState,
+    probability_explained,
+)
+from omninav.stages.values.belief import Likelihood, Particles
+
+NUMBER = 1000
+HERE = Particles(np.zeros((NUMBER, 3)), np.full(NUMBER, 1 / NUMBER))
+THERE = Particles(np.full((50, 3), 9.0), np.full(50, 0.02))
+
+
+def likelihood(value: float, mean: float | None = 0.1, novelty: float = 1.0) -> Likelihood:
+    return Likelihood(np.full(NUMBER, value**novelty), mean, novelty)
+
+
+def injected(images: list[Likelihood], proposals: Particles | None = THERE) -> list[int]:
+    stage, state, found = AugmentedRecovery(number=NUMBER, slow=0.01, fast=0.1), AugmentedRecoveryState(), []
+    for image in images:
+        out = stage.step(Context("fusion", np.random.default_rng(0)), HERE, image, proposals, state).belief
+        assert len(out.poses) == NUMBER
+        assert out.weights.sum() == pytest.approx(1.0)
+        found.append(int((out.poses[:, 0] > 1).sum()))
+    return found
+
+
+def test_a_fall_of_the_likelihood_injects_the_share_of_table_8_3():
+    # p = 0.9 / (0.9 + 0.1) = 0.9, then 0.1 / (0.1 + 0.1) = 0.5: w_slow = 0.896, w_fast = 0.86; 1 - 0.86 / 0.896.
+    assert injected([likelihood(0.9), likelihood(0.9), likelihood(0.1)]) == [0, 0, int(NUMBER * (1 - 0.86 / 0.896))]
+
+
+def test_a_belief_that_explains_images_as_ever_or_better_injects_nothing():
+    assert injected([likelihood(0.1), likelihood(0.1), likelihood(0.9), likelihood(0.9)]) == [0, 0, 0, 0]
+
+
+def test_a_lost_robot_injects_more_with_each_image():
+    found = injected([likelihood(0.9)] * 5 + [likelihood(0.01)] * 8)
+    assert found[:5] == [0] * 5
+    assert all(np.diff(found[5:]) > 0)
+    assert found[-1] > NUMBER / 3
+
+
+def test_an_image_of_a_standing_robot_is_judged_as_if_it_were_new():
+    assert probability_explained(HERE, likelihood(0.9, novelty=0.1)) == pytest.approx(0.9)
+
+
+def test_without_proposals_or_a_mean_over_the_map_nothing_is_injected():
+    assert injected([likelihood(0.9), likelihood(0.01)], None) == [0, 0]
+    assert injected([likelihood(0.9, None), likelihood(0.01, None)]) == [0, 0]

@@ -1,0 +1,65 @@
+"""Sensors that weigh by calibrated likelihood ratios."""
+
+import math
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context
+from omninav.stages.sensor.calibrated_similarity import likelihood_ratios
+from omninav.stages.sensor.near_references import NearReferences
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.calibration import SimilarityCalibration
+from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Motion
+from omninav.stages.values.similarity import Similarities
+
+CALIBRATION = SimilarityCalibration(slope=4.0, middle=1.0, images=100, right_distance_m=0.5, correlation_m=2.0)
+PLACES = np.column_stack([np.arange(20.0), np.zeros(20), np.zeros(20)])
+WALK = ReferenceGraph(PLACES, np.zeros((20, 1, 1), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth")
+
+
+def similarities() -> Similarities:
+    values = np.random.default_rng(1).uniform(0.2, 0.4, (20, 8)).astype(np.float32)
+    values[5, 0] = 0.9
+    return Similarities(values)
+
+
+def weighed(poses: np.ndarray, motion: Motion | None = None, calibration: SimilarityCalibration = CALIBRATION):
+    particles = Particles(poses, np.full(len(poses), 1 / len(poses)))
+    stage = NearReferences(independence_distance=1.0)
+    ctx = Context("sensor")
+    stage.setup(ctx)
+    return stage.step(ctx, similarities(), particles, WALK, motion, LengthScale(0.5), calibration)
+
+
+def test_at_a_reference_the_weight_is_its_ratio_over_the_largest():
+    ratios = likelihood_ratios(similarities(), CALIBRATION, 0.1)
+    found = weighed(PLACES).likelihood.values
+    top = float(ratios.max())
+    assert top == ratios[5, 0]
+    # Its own reference has nearly all of the weight; a ratio below 1 counts as unknown.
+    assert found[5] == pytest.approx(1.0, abs=0.02)
+    assert found[12] == pytest.approx(max(float(ratios[12, 0]), 1.0) / top, rel=0.1)
+
+
+def test_far_from_all_references_the_ratio_is_one():
+    top = float(likelihood_ratios(similarities(), CALIBRATION, 0.1).max())
+    assert weighed(np.array([[5.0, 40.0, 0.0]])).likelihood.values[0] == pytest.approx(1 / top, rel=1e-5)
+
+
+def test_evidence_is_new_after_the_distance_over_which_it_was_correlated():
+    full = weighed(PLACES).likelihood
+    half = weighed(PLACES, Motion(1.0, 0.0, 0.0)).likelihood
+    assert half.novelty == pytest.approx(0.5)
+    assert np.allclose(half.values, np.sqrt(full.values))
+    assert half.mean_likelihood == full.mean_likelihood
+    assert weighed(PLACES, Motion(3.0, 0.0, 0.0)).likelihood.novelty == 1.0
+
+
+def test_a_calibration_that_says_nothing_weighs_all_places_alike():
+    nothing = SimilarityCalibration(0.0, 0.0, 100, 0.5, 2.0)
+    values = weighed(PLACES, calibration=nothing).likelihood.values
+    assert values.max() / values.min() == pytest.approx(1.0, abs=1e-5)
+    assert math.isfinite(float(values.sum()))
