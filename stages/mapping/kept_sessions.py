@@ -47,7 +47,9 @@ class KeepSessions(Stage):
     ) -> Out:
         """Keep one view."""
         if kept is None:
-            earlier = Sessions.empty(view) if known is None or known.sessions is None else known.sessions
+            earlier = None if known is None else known.sessions
+            if earlier is None or earlier.views.shape[1:] != view.rows.shape:
+                earlier = Sessions.empty(view)
             kept = replace(earlier, ticks=np.zeros(len(earlier), np.int64))  # the known map's own stay as they are
         begins = ctx.tick.first_of_log or motion is None
         if motion is not None:

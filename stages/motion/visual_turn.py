@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage, State
-from omninav.stages.geometry.appearance.turn_by_flow import turn_by_flow
+from omninav.stages.geometry.appearance.turn_by_flow import smoothness, turn_by_flow
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.pose import GuessedMotion, Motion
@@ -30,7 +30,8 @@ class VisualTurn(OdometryNoiseModel, Stage):
     than wheels do: to 0.15 degrees a step in the house, odometry to 0.6 (docs/experiments/cml_straightened.md).
     Of translation nothing is learned, but that half of the correction turns it. A gap between the two that odometry's
     noise (`OdometryNoiseModel`'s) does not explain counts as vision's, so that the farther a visual turn lies from the
-    measured one the less it is believed: strips of few pixels see turns that are none.
+    measured one the less it is believed. Panoramas made of fewer columns than they have see turns that are none and
+    are not asked.
     """
 
     scale: Annotated[float, Bounds(ge=1)] = 3.0
@@ -40,8 +41,11 @@ class VisualTurn(OdometryNoiseModel, Stage):
     max_sigma_deg: Annotated[float, Bounds(ge=0)] = 2.0
     """Its largest one, beyond which odometry alone counts; 0: always."""
 
-    explained_sigmas: Annotated[float, Bounds(gt=0)] = 1.5
+    explained_sigmas: Annotated[float, Bounds(gt=0)] = 2.0
     """Gap between the two turns that odometry explains, in its standard deviations."""
+    max_smoothness: Annotated[float, Bounds(gt=0, le=4)] = 2.7
+    """Mean squared difference of pixels two columns apart over that of neighbours, above which odometry alone counts:
+    some 2 where each column has detail of its own, towards 4 where columns are interpolated."""
 
     class Out(Outputs):
         """The corrected motion."""
@@ -55,6 +59,9 @@ class VisualTurn(OdometryNoiseModel, Stage):
         grey = np.asarray(cv2.cvtColor(panorama.pixels, cv2.COLOR_BGR2GRAY), np.uint8)
         last, before.grey = before.grey, grey
         if motion is None or last.shape != grey.shape:
+            return self.Out(motion=motion)
+        if smoothness(grey) > self.max_smoothness:
+            ctx.count("turn_not_seen")
             return self.Out(motion=motion)
         model = self.model(motion)
         direction = model.steps[0] if abs(model.steps[1]) > 1e-9 else 0.0

@@ -73,7 +73,7 @@ class Sessions(GrowableArrays, Value):
     @property
     def drives(self) -> Ints:
         """The drive of each view, numbered from 0: (N,)."""
-        numbers: Ints = np.cumsum(self.begins) - 1
+        numbers: Ints = np.maximum(np.cumsum(self.begins) - 1, 0)
         return numbers
 
     @property
@@ -86,5 +86,5 @@ class Sessions(GrowableArrays, Value):
     def by_odometry(self) -> Array:
         """Pose of each view in the frame in which its drive begins, at the origin: (N, 3)."""
         drives = self.drives
-        parts = [chain(self.motions[drives == drive]) for drive in range(int(self.begins.sum()))]
+        parts = [chain(self.motions[drives == drive]) for drive in np.unique(drives)]
         return np.concatenate([np.empty((0, 3)), *parts])

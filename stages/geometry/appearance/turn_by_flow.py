@@ -50,6 +50,13 @@ def turn_by_flow(before: Grey, after: Grey, turn: float, direction: float) -> Fl
     return FlowTurn(2.0 * math.pi * shift / columns - rest, sigma)
 
 
+def smoothness(view: Grey) -> float:
+    """Mean squared difference of pixels two columns apart over that of neighbours; 0 where all are equal."""
+    values = view.astype(np.float32)
+    near, far = (float(np.square(np.roll(values, step, axis=1) - values).mean()) for step in (1, 2))
+    return far / near if near else 0.0
+
+
 def _flow(before: Grey, after: Grey) -> tuple[Array, Array]:
     """Azimuths (N,) of points in the first panorama, and by how much they changed, counter-clockwise (rad)."""
     columns = before.shape[1]

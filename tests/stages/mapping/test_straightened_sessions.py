@@ -13,6 +13,7 @@ from omninav.stages.mapping.straightened_sessions import StraightenSessions
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.sessions import Sessions
+from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import NoveltyThreshold, Spectrum
 
 LAP = np.concatenate([np.tile([0.2, 0.0, 0.0], (24, 1)), np.tile([0.2, 0.0, np.pi / 8], (8, 1))])
@@ -126,3 +127,22 @@ def test_a_robot_that_stands_still_keeps_no_views():
     sessions = kept(poses)
     assert len(sessions) == 5
     assert sessions.by_odometry == pytest.approx(between(TWICE[0], TWICE[:5]), abs=1e-9)
+
+
+def test_drives_of_which_no_beginning_is_known_are_one_drive():
+    sessions = drive(None, TWICE)
+    sessions.put(begins=np.zeros(len(sessions), np.bool_))
+    assert not sessions.drives.any()
+    assert len(straightened(sessions)[0].updates.items) == len(TWICE)
+
+
+def test_drives_with_other_views_are_not_gone_on_with():
+    known = ViewMixtures.empty()
+    known.put(sessions=drive(None, TWICE[:3]))
+    ctx = Context("sessions", np.random.default_rng(0))
+    ctx.tick = Tick(0, 0, first_of_log=True)
+    other = Spectrum(np.ones(8, np.float32), 2, 36)
+    state = GaussianMixture(np.zeros((1, 3)), 0.01 * np.eye(3)[None], np.ones(1))
+    assert len(KeepSessions().step(ctx, other, None, state, None, known).sessions) == 1
+    assert len(KeepSessions().step(ctx, view(TWICE[0]), None, state, None, known).sessions) == 4
+    assert len(known.sessions) == 3

@@ -1,0 +1,87 @@
+"""Straightens where the views of a topological map were taken by the places that the tour came back to."""
+
+import math
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.stages.geometry.appearance.visual_distance import compare
+from omninav.stages.geometry.plane.drive_graph import Closures, placed_drives, straightened_drives
+from omninav.stages.values.compared_views import ComparedViews
+
+Array = npt.NDArray[np.float64]
+
+MIN_WEIGHT = 0.1
+"""Of a closure, below which the others have contradicted it."""
+QUANTITIES = {
+    "straightened.closures": Quantity(title="Views of places that the tour came back to", context=True),
+    "straightened.rejected": Quantity(title="Of these contradicted by the others", context=True),
+    "straightened.moved_rms_m": Quantity(title="Views moved by, root mean square", context=True),
+    "straightened.moved_max_m": Quantity(title="Views moved by, largest", context=True),
+}
+
+
+class StraightenViews(Stage):
+    """Moves the poses of a tour's views, where they are odometry, so that what looks like one place is one place.
+
+    Two views of different times, or of different tours, that are as alike as two that follow each other close a loop. A
+    pose graph of odometry and closures gives the poses, with Cauchy's loss on closures, since some are wrong. Places
+    and links do not depend on poses, which are for scoring and drawing. Poses that are ground truth stay, and so do
+    those of a tour that comes back to no place. Manifest fact `map_straightened`.
+    """
+
+    min_gap: Annotated[int, Bounds(ge=2)] = 10
+    """Views of one tour between the two of a closure."""
+    closure_sigma: Annotated[float, Bounds(gt=0)] = 0.5
+    """Standard deviation of a closure's position, in ways from one view to the next."""
+    closure_sigma_deg: Annotated[float, Bounds(gt=0)] = 5.0
+    """Standard deviation of its heading."""
+
+    class Out(Outputs):
+        """The views with straightened poses, or as they were."""
+
+        views: ComparedViews
+        metrics: Metrics | None = None
+
+    def step(self, ctx: Context, views: ComparedViews) -> Out:
+        """Straighten a whole tour, or several."""
+        if views.pose_source == "truth" or len(views) < 2:
+            return self.Out(views=views)
+        follows = np.flatnonzero(np.diff(views.tours) == 0)
+        found = self._closures(views, views.distances[follows, follows + 1])
+        ways = np.hypot(*(views.poses[follows + 1] - views.poses[follows])[:, :2].T)
+        unit = float(np.median(ways)) if len(ways) else 0.0
+        if not len(found.pairs) or not unit:
+            ctx.fact("map_straightened", "no: the tour came back to no place, so nothing tells how odometry bent it")
+            return self.Out(views=views)
+        drives = np.unique(views.tours, return_inverse=True)[1].astype(np.int64)
+        start, joined = placed_drives(views.poses, drives, found, self.min_gap * unit)
+        usable = joined[drives[found.pairs]].all(axis=1)
+        found = Closures(found.pairs[usable], found.turns[usable])
+        spread = self.closure_sigma * unit, math.radians(self.closure_sigma_deg)
+        poses, weights = straightened_drives(start, drives, found, *spread)
+        moved = np.hypot(*(poses - views.poses)[:, :2].T)
+        values = {
+            "closures": len(weights),
+            "rejected": int((weights < MIN_WEIGHT).sum()),
+            "moved_rms_m": float(np.sqrt((moved**2).mean())),
+            "moved_max_m": float(moved.max()),
+        }
+        ctx.fact("map_straightened", "by {closures} closures, {moved_max_m:.2f} m at most".format(**values))
+        return self.Out(views=replace(views, poses=poses), metrics=Metrics({"straightened": values}, QUANTITIES))
+
+    def _closures(self, views: ComparedViews, usual: Array) -> Closures:
+        # For each view the most alike of those before it that are no neighbours along its tour.
+        limit = float(np.median(usual[np.isfinite(usual)])) if np.isfinite(usual).any() else 0.0
+        pairs = []
+        for view in range(1, len(views)):
+            near = (views.tours[:view] == views.tours[view]) & (np.arange(view) > view - self.min_gap)
+            distances = np.where(near, math.inf, views.distances[view, :view])
+            if distances.min() <= limit:
+                pairs.append((int(distances.argmin()), view))
+        options = views.comparison_options()
+        turns = [compare(views.view_features(one), views.view_features(other), options).turn for one, other in pairs]
+        return Closures(np.array(pairs, np.int64).reshape(-1, 2), np.array(turns, np.float64))
