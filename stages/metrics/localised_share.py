@@ -10,6 +10,8 @@ from omninav.stages.values.drive import Array, Drive, known
 
 THRESHOLDS = {"fine": (0.25, 2.0), "medium": (0.5, 5.0), "coarse": (5.0, 10.0)}
 """Largest errors in position (m) and heading (degrees): Sattler et al. 2018."""
+FOUND_M = 1.0
+"""Position error (m) below which a lost robot has found itself, or `lost_m` where that is smaller."""
 
 QUANTITIES = {
     **{
@@ -30,7 +32,8 @@ class LocalisedShare(Stage):
     (`medium`), 5 m and 10 degrees (`coarse`), as the benchmarks of visual localisation count (Sattler et al. 2018,
     "Benchmarking 6DOF outdoor visual localization in changing conditions", section 5). `relocalisation`: `times_lost`,
     how often the position error rose above `lost_m`, a global start included; `frames` and `metres` of true path, the
-    medians, until it stayed below 1 m and 20 degrees for ten frames; `never`: how often it did not until the end.
+    medians, until it stayed below 1 m (`lost_m` where that is less) and 20 degrees for ten frames; `never`: how often
+    it did not until the end.
     """
 
     lost_m: Annotated[float, Bounds(gt=0)] = 2.5
@@ -59,7 +62,7 @@ def relocalisations(position_m: Array, heading_deg: Array, truth: Array, lost_m:
     frames, metres, begins, never = [], [], 0, 0
     while (lost := np.flatnonzero(position_m[begins:] > lost_m)).size:
         begins += int(lost[0])
-        settled = first_settled(position_m[begins:], heading_deg[begins:])
+        settled = first_settled(position_m[begins:], heading_deg[begins:], min(FOUND_M, lost_m))
         if settled is None:
             never += 1
             break

@@ -36,6 +36,12 @@ def test_frames_and_metres_until_a_lost_robot_is_found_again():
     assert (still["times_lost"], still["frames"], still["never"]) == (1, None, 1)
 
 
+def test_an_error_between_a_small_lost_m_and_one_metre_is_not_found_again():
+    stage = LocalisedShare(lost_m=0.5)
+    found = stage.step(Context("localised"), driven([0.7] * 20 + [0.1] * 12)).metrics.values["relocalisation"]
+    assert found == {"times_lost": 1, "frames": 20.0, "metres": 10.0, "never": 0}
+
+
 def test_trajectory_error_without_alignment_keeps_what_alignment_takes_away():
     found = RelativeErrors().step(Context("errors"), driven([2.0] * 8, degrees=0.0)).metrics.values
     assert found["unaligned_trajectory_error_m"]["rmse"] == pytest.approx(2.0)
