@@ -27,12 +27,12 @@ NEARNESSES = np.array([0.0, 0.03, 0.07, 0.12, 0.18, 0.25, 0.33, 0.42, 0.52, 0.64
 """The way to the target over a column's distance: what is tried. Each stands for what is closest to it."""
 PRIOR = np.gradient(NEARNESSES) / np.gradient(NEARNESSES).sum()
 """All alike up to the largest."""
-NO_MATCH = 0.7
+NO_MATCH = 0.85
 """Share of columns that are taken to have no match: they are hidden in one of the views."""
 
 
-NOISE_FACTORS = (0.33, 1.0, 2.5)
-"""Multiples of the noise that may be a column's own."""
+NOISE_FACTORS = (0.01, 0.03, 0.1, 0.3, 1.0)
+"""Multiples of the noise that may be a column's own: of the variance, so 1.4 to 14 of 14 levels."""
 
 
 class Columns(NamedTuple):
@@ -76,6 +76,21 @@ def column_distances(first: Columns, second: Columns) -> Floats:
             cells += a.shape[1]
         out[:, :, plane] = np.maximum(out[:, :, plane], 0.0) / cells if cells else np.inf
     return out
+
+
+def _varied(first: Columns, second: Columns, noise: float) -> tuple[Columns, Columns]:
+    """The views without a side of the horizon that looks the same all around: bare ground only dilutes the rest."""
+    kept = [
+        all(view[side].shape[1] and view[side].var(axis=0).mean() > noise for view in (first, second))
+        for side in (0, 1)
+    ]
+    if not any(kept):
+        return first, second
+    one, other = (
+        Columns(*(rows if keep else rows[:, :0] for rows, keep in zip(view, kept, strict=True)))
+        for view in (first, second)
+    )
+    return one, other
 
 
 def averaged_beside(distances: Floats, half_window: int) -> Floats:
@@ -163,7 +178,7 @@ def warped(
     """
     count = len(first.above)
     directions = np.arange(0, count, step)
-    distances = averaged_beside(column_distances(first, second), half_window)
+    distances = averaged_beside(column_distances(*_varied(first, second, noise)), half_window)
     there, ratios = _scores(distances, noise, directions)
     swapped = np.ascontiguousarray(distances.transpose(1, 0, 2)[:, :, ::-1])
     back, _ = _scores(swapped, noise, directions)

@@ -37,8 +37,8 @@ class WarpingVector(Stage):
     columns: Annotated[int, Bounds(ge=24, le=720)] = 180
     """Columns that an image is brought to; a multiple of 4."""
     noise_levels: Annotated[float, Bounds(gt=0, le=255)] = 14.0
-    """Of 255, by which the same thing differs in two views."""
-    half_window: Annotated[int, Bounds(ge=0, le=10)] = 2
+    """Of 255, by which the same thing may differ in two views; where less does, that counts for more."""
+    half_window: Annotated[int, Bounds(ge=0, le=10)] = 1
     """Columns on both sides of one that are compared together with it."""
     max_turn_deg: Annotated[float, Bounds(ge=0, le=180)] = 180.0
     """To both sides, by which the target's heading may differ from the robot's; 180: by any. With a compass less."""
