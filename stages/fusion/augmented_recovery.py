@@ -12,10 +12,11 @@ from .uniform_recovery import resampled, weighed
 
 
 class AugmentedRecoveryState(State):
-    """Long and short average of how well the belief explains the images; below 0 before the first."""
+    """Long and short average of how well the belief explains the images of a log, and their number."""
 
-    slow: float = -1.0
-    fast: float = -1.0
+    slow: float = 0.0
+    fast: float = 0.0
+    images: int = 0
 
 
 class AugmentedRecovery(Stage):
@@ -51,10 +52,12 @@ class AugmentedRecovery(Stage):
     ) -> Out:
         """Fuse prediction and observation."""
         explained = probability_explained(particles, likelihood)
-        if ctx.tick.first_of_log or averages.slow < 0.0:
-            averages.slow = averages.fast = explained
-        averages.slow += self.slow * (explained - averages.slow)
-        averages.fast += self.fast * (explained - averages.fast)
+        averages.images = 1 if ctx.tick.first_of_log else averages.images + 1
+        equal = (
+            1.0 / averages.images
+        )  # plain means at first: what a belief that is all over the map explains is unusual
+        averages.slow += max(self.slow, equal) * (explained - averages.slow)
+        averages.fast += max(self.fast, equal) * (explained - averages.fast)
         share = max(0.0, 1.0 - averages.fast / averages.slow) if averages.slow > 0.0 else 0.0
         wanted = 0 if proposals is None else int(share * self.number)
         poses = resampled(ctx, particles, weighed(ctx, particles, likelihood), self.number, wanted, proposals)

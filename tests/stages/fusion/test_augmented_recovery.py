@@ -31,8 +31,14 @@ def injected(images: list[Likelihood], proposals: Particles | None = THERE) -> l
 
 
 def test_a_fall_of_the_likelihood_injects_the_share_of_table_8_3():
-    # p = 0.9 / (0.9 + 0.1) = 0.9, then 0.1 / (0.1 + 0.1) = 0.5: w_slow = 0.896, w_fast = 0.86; 1 - 0.86 / 0.896.
-    assert injected([likelihood(0.9), likelihood(0.9), likelihood(0.1)]) == [0, 0, int(NUMBER * (1 - 0.86 / 0.896))]
+    # p = 0.9 / (0.9 + 0.1) = 0.9 twenty times, then 0.1 / (0.1 + 0.1) = 0.5: w_slow = 0.9 - 0.4 / 21, w_fast = 0.86.
+    share = 1 - 0.86 / (0.9 - 0.4 / 21)
+    assert injected([likelihood(0.9)] * 20 + [likelihood(0.1)]) == [0] * 20 + [int(NUMBER * share)]
+
+
+def test_the_first_images_count_alike_so_that_a_start_anywhere_does_not_stay_the_usual_case():
+    lost = [likelihood(0.9)] * 30 + [likelihood(0.01)] * 5
+    assert injected([likelihood(0.01), *lost])[-1] > 0.8 * injected([likelihood(0.9), *lost])[-1]
 
 
 def test_a_belief_that_explains_images_as_ever_or_better_injects_nothing():
@@ -40,9 +46,9 @@ def test_a_belief_that_explains_images_as_ever_or_better_injects_nothing():
 
 
 def test_a_lost_robot_injects_more_with_each_image():
-    found = injected([likelihood(0.9)] * 5 + [likelihood(0.01)] * 8)
-    assert found[:5] == [0] * 5
-    assert all(np.diff(found[5:]) > 0)
+    found = injected([likelihood(0.9)] * 30 + [likelihood(0.01)] * 8)
+    assert found[:30] == [0] * 30
+    assert all(np.diff(found[30:]) > 0)
     assert found[-1] > NUMBER / 3
 
 
@@ -51,5 +57,5 @@ def test_an_image_of_a_standing_robot_is_judged_as_if_it_were_new():
 
 
 def test_without_proposals_or_a_mean_over_the_map_nothing_is_injected():
-    assert injected([likelihood(0.9), likelihood(0.01)], None) == [0, 0]
-    assert injected([likelihood(0.9, None), likelihood(0.01, None)]) == [0, 0]
+    assert injected([likelihood(0.9)] * 20 + [likelihood(0.01)], None) == [0] * 21
+    assert injected([likelihood(0.9, None)] * 20 + [likelihood(0.01, None)]) == [0] * 21
