@@ -5,7 +5,6 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csr_matrix
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import RowsOf, Shape, Starts
@@ -44,6 +43,8 @@ class VisualWords(Value):
 
         `descriptors` (N, D): of the view's local features. 0 for all where it has none.
         """
+        from scipy.sparse import csr_matrix  # slow to import, and not needed without words
+
         view = np.zeros(len(self.centres), np.float32)
         words, counts = visual_words.word_counts(visual_words.root_descriptors(descriptors), self.centres)
         view[words] = visual_words.weighted(words, counts, self.rarity)
