@@ -20,7 +20,7 @@ TURN_SIGMA = 0.05
 MIN_SIGMAS = (0.005, 0.005, 0.0025)
 """Of the shortest motion (m, m, rad): poses in a map are samples of a drive."""
 MIN_CLOSURES = 3
-"""Closures that join a drive to others."""
+"""Closures that agree on where a drive began, to join it to others."""
 HEADING_SCALE = math.radians(20.0)
 """Difference of heading at which closures agree half on where a drive began."""
 
@@ -45,7 +45,7 @@ def placed_drives(own: Array, drives: Ints, closures: Closures, scale_m: float) 
     """Poses (N, 3) of all drives in the frame of the first, and which drives (D,) closures join to it.
 
     `own` (N, 3): poses, each in the frame of its drive; `drives` (N,): numbers from 0. A drive is put where most of its
-    closures with drives that are joined agree, to within `scale_m`; without three of them nothing joins it, and its
+    closures with drives that are joined agree, to within `scale_m`; without three that do nothing joins it, and its
     poses stay.
     """
     poses, joined = own.copy(), np.arange(int(drives.max()) + 1) == 0
@@ -56,16 +56,19 @@ def placed_drives(own: Array, drives: Ints, closures: Closures, scale_m: float) 
             back = (drives[one] == drive) & joined[drives[other]]
             seen, known = (np.concatenate([a[forth], b[back]]) for a, b in ((other, one), (one, other)))
             turns = np.concatenate([closures.turns[forth], -closures.turns[back]])
-            if len(seen) < MIN_CLOSURES:
+            if not len(seen):
                 continue
             here = compose(poses[known], np.column_stack([np.zeros((len(known), 2)), turns]))
             starts = compose(here, between(own[seen], np.zeros(3)))  # where the drive's frame lies, each closure thinks
             expected = compose(starts[:, None], own[seen][None])  # (hypotheses, closures)
             missed = np.hypot(expected[..., 0] - here[:, 0], expected[..., 1] - here[:, 1]) / scale_m
             turned = wrap(expected[..., 2] - here[:, 2]) / HEADING_SCALE
-            agreed = (1.0 / (1.0 + missed**2 + turned**2)).sum(axis=1)
+            apart = missed**2 + turned**2
+            best = (1.0 / (1.0 + apart)).sum(axis=1).argmax()
+            if (apart[best] <= 1.0).sum() < MIN_CLOSURES:
+                continue
             rows = drives == drive
-            poses[rows] = compose(starts[agreed.argmax()], own[rows])
+            poses[rows] = compose(starts[best], own[rows])
             joined[drive] = True
     return poses, joined
 

@@ -5,7 +5,7 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
-from omninav.stages.geometry.plane.drive_graph import Closures, straightened_drives
+from omninav.stages.geometry.plane.drive_graph import Closures, placed_drives, straightened_drives
 from omninav.stages.geometry.plane.se2 import between, chain, compose
 from omninav.stages.mapping.kept_sessions import KeepSessions
 from omninav.stages.mapping.session_closures import closures_between
@@ -78,6 +78,15 @@ def test_drives_without_a_common_frame_are_joined_where_they_look_alike():
     out, _ = straightened(sessions)
     assert out.metrics.values["straightened"]["joined"] == 2
     assert error(learned(out), np.concatenate([TWICE, AGAIN])) < 0.6
+
+
+@pytest.mark.parametrize(("turns", "fits"), [((0.0, 2.0, -2.0), False), ((0.0, 0.1, -0.1), True)])
+def test_closures_join_a_drive_only_where_they_agree(turns, fits):
+    own = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)] * 2)
+    closures = Closures(np.array([(0, 3), (1, 4), (2, 5)]), np.array(turns))
+    poses, joined = placed_drives(own, np.repeat([0, 1], 3), closures, 5.0)
+    assert joined.tolist() == [True, fits]
+    assert fits or (poses == own).all()
 
 
 def test_a_drive_elsewhere_stays_where_it_was_believed_to_be():
