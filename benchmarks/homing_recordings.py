@@ -104,17 +104,18 @@ class Methods:
         return found
 
 
-def measure(name: str, log: str, camera: Camera | None, parity: int | None, number: int) -> None:
+def measure(name: str, log: str, camera: Camera | None, parity: int | None, number: int, only: str | None) -> None:
     """Print a row per method: the figures of each bin of distance, and of all."""
     methods = Methods()
     rows: dict[str, Callable[[Pair], HomingVector]] = {
         "features": methods.features,
         "warping": methods.warping,
-        "features, else warping": lambda pair: methods.warping(pair, methods.features(pair)),
+        "both": lambda pair: methods.warping(pair, methods.features(pair)),
     }
     drawn = list(pairs(log, camera, parity, number))
     if drawn[0].camera.wraps:
         rows["warping with a compass"] = lambda pair: methods.warping(pair, compass=pair.turn)
+    rows = {method: row for method, row in rows.items() if only in (None, method)}
     metres = np.array([pair.metres for pair in drawn])
     for method, vector_of in rows.items():
         vector_of(drawn[0])  # compiled
@@ -138,16 +139,18 @@ def main() -> None:
     parser.add_argument("--data", type=Path, required=True, help="folder of the sample recordings")
     parser.add_argument("--development", action="store_true", help="the pairs that parameters were chosen on")
     parser.add_argument("--pairs", type=int, default=200, help="pairs of each recording")
+    parser.add_argument("--method", help="one alone: features, warping, both, warping with a compass")
     given = parser.parse_args()
+    many, only = given.pairs, given.method
     ants, sussex = given.data / "antworld-rendered", given.data / "sussex-outdoor-route"
     bins = [f"{low:g} to {high:g} m" for low, high in itertools.pairwise(BINS)]
     print(f"| recording | method | {' | '.join(bins)} | all | ms |\n|---|---|{'---|' * (len(bins) + 2)}")
     parity, route = (0, "ant1_route1") if given.development else (1, "ant1_route2")
-    measure("AntWorld, grid", f"antworld:{ants / 'grid_200mm'}", ANTWORLD, parity, given.pairs)
-    measure(f"AntWorld, {route}", f"antworld:{ants / route}", ANTWORLD, None, given.pairs)
+    measure("AntWorld, grid", f"antworld:{ants / 'grid_200mm'}", ANTWORLD, parity, many, only)
+    measure(f"AntWorld, {route}", f"antworld:{ants / route}", ANTWORLD, None, many, only)
     if not given.development:
-        measure("house", str(given.data / "photoreal-house" / "tour.mcap"), None, None, given.pairs)
-        measure("Sussex", f"sussex_training:{sussex}", None, None, given.pairs)
+        measure("house", str(given.data / "photoreal-house" / "tour.mcap"), None, None, many, only)
+        measure("Sussex", f"sussex_training:{sussex}", None, None, many, only)
 
 
 if __name__ == "__main__":

@@ -27,8 +27,8 @@ class WarpingVector(Stage):
 
     Möller, Krzykawski & Gerstmayr 2010: for every direction and turn, how well do the columns of one view match those
     of the other, each at the place and magnification in which a robot that has moved so would see it, at a distance of
-    its own? Columns count by how rare as good a match is. Where the local map has a vector of its own, by features,
-    that is given on: it is the more accurate one. The camera moves on a plane and stands upright.
+    its own? Columns count by how rare as good a match is. Where enough features agree, the local map's own vector
+    is given on: it is the more accurate one. The camera moves on a plane and stands upright.
 
     `ratio` is over the nearness at the target's first vector, `distance` the same; metres are not known. Raises
     BadInput for an image without its camera, and a camera that does not see the full circle.
@@ -42,8 +42,10 @@ class WarpingVector(Stage):
     """Columns on both sides of one that are compared together with it."""
     max_turn_deg: Annotated[float, Bounds(ge=0, le=180)] = 180.0
     """To both sides, by which the target's heading may differ from the robot's; 180: by any. With a compass less."""
+    min_features: Annotated[int, Bounds(ge=0)] = 18
+    """That must agree with the local map's vector where it is of two views alone; with fewer, whole images decide."""
     min_columns: Annotated[int, Bounds(ge=1)] = 20
-    """That match better than by chance; with fewer the target is lost."""
+    """That match better than by chance; with fewer the local map's vector stays, or the target is lost."""
 
     class Out(Outputs):
         """Absent where there is no target."""
@@ -69,7 +71,8 @@ class WarpingVector(Stage):
         """One homing vector; `vector`: the local map's, `target`: the image to go to."""
         if vector.number != state.target:
             state.target, state.nearness = vector.number, 0.0
-        if vector.state != "lost" or target is None:
+        weak = vector.state == "lost" or (vector.state == "new" and vector.inliers < self.min_features)
+        if not weak or target is None:
             return self.Out(vector=vector)
         if self._target is None or self._target[0] is not target:
             self._target = target, self._columns(target, camera)
@@ -78,8 +81,10 @@ class WarpingVector(Stage):
         found = warped(here, self._target[1], noise, self.half_window, 2, math.radians(self.max_turn_deg))
         if found.columns < self.min_columns:
             ctx.count("too_few_columns")
-            why = f"{vector.why}; {found.columns} columns of the image match, {self.min_columns} are needed"
-            return self.Out(vector=replace(vector, why=why))
+            if vector.state == "lost":
+                why = f"{vector.why}; {found.columns} columns of the image match, {self.min_columns} are needed"
+                vector = replace(vector, why=why)
+            return self.Out(vector=vector)
         state.nearness = state.nearness or max(found.nearness, 1e-3)
         ratio = found.nearness / state.nearness
         return self.Out(

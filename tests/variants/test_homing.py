@@ -50,3 +50,24 @@ def test_the_report_shows_what_it_followed_and_the_drive_as_a_video(whole: Path)
 def test_killed_on_its_way_it_goes_on_to_the_same_bytes(whole: Path, tmp_path: Path):
     run = killed_and_resumed(tmp_path, *WORDS, after_s=4.0)  # the local map has been made
     assert_same_bytes(run, whole, "metrics.json", "result.mcap", "drive.mp4")
+
+
+WARPED = (
+    "variant=homing_field",
+    "homing=warping",
+    "nodes.source.target=[5.0,5.0,0.4]",
+    "nodes.source.spacing_m=0.4",
+    "nodes.source.radius_m=1.2",
+    "nodes.local_map.min_inliers=100000",  # no features ever suffice
+    "checkpoint_s=0.05",
+    "cache=null",
+    "plots=none",
+)
+
+
+def test_warping_finds_the_target_without_features_and_goes_on_to_the_same_bytes(tmp_path: Path):
+    run = killed_and_resumed(tmp_path / "killed", *WARPED, after_s=0.3)
+    field = json.loads((run / "metrics.json").read_text())["homing_field"]
+    assert field["found_rate"] == 1.0
+    assert field["median_deg"] < 10.0
+    assert_same_bytes(run, finished(tmp_path / "whole", *WARPED), "metrics.json")
