@@ -20,6 +20,9 @@ MIN_TRUST = 0.01
 """Smallest probability at which an estimate still counts."""
 ODOMETRY_SIGMA, TURN_SIGMA = 0.02, 0.05
 """Standard deviation of odometry per metre (m and rad), and of its heading per radian of a turn."""
+OFF_SCALE, SPAN = 0.08, 10
+"""By how much of itself odometry's length may differ from that of trusted estimates so many poses apart, and be
+believed as above: filters that lag behind make up to 0.07 of it."""
 STEP_SIGMAS = np.array([0.005, 0.005, 0.0025])
 """Standard deviation of odometry where the robot stands (m, m, rad)."""
 JUMP_M, JUMP_DEG = 1.0, 20.0
@@ -70,7 +73,7 @@ def _optimised(estimates: Array, covariances: Array, trust: Array, motions: Arra
         return estimates.copy()
     variances = np.nan_to_num(np.diagonal(covariances, axis1=1, axis2=2)) * CORRELATED
     spread = np.maximum(np.sqrt(variances), MIN_SIGMAS) / np.sqrt(np.maximum(trust, MIN_TRUST))[:, None]
-    drift = STEP_SIGMAS + ODOMETRY_SIGMA * np.hypot(motions[:, 0], motions[:, 1])[:, None]
+    drift = STEP_SIGMAS + odometry_sigma(estimates, trust, motions) * np.hypot(motions[:, 0], motions[:, 1])[:, None]
     drift[:, 2] += TURN_SIGMA * np.abs(motions[:, 2])
     frames = np.arange(1, number + 1)  # pose 0 is the map's origin, from which estimates are measured
     pairs = np.column_stack([np.zeros_like(frames), frames]), np.column_stack([frames, frames + 1])[:-1]
@@ -82,6 +85,21 @@ def _optimised(estimates: Array, covariances: Array, trust: Array, motions: Arra
         np.concatenate([np.ones(number, np.bool_), contradicted(estimates, trust, motions)]),
     )
     return poses[1:]
+
+
+def odometry_sigma(estimates: Array, trust: Array, motions: Array) -> float:
+    """Standard deviation of odometry (N - 1, 3) per metre, by the way between trusted estimates (N, 3).
+
+    Twice the share by which odometry is too long or too short (a guessed speed, another wheel), where that is much.
+    """
+    path = chain(np.concatenate([np.zeros((1, 3)), motions]))
+    ways, driven = (between(poses[:-SPAN], poses[SPAN:])[:, :2] for poses in (estimates, path))
+    squares = np.square(driven).sum(axis=1)
+    asked = (trust[:-SPAN] >= 0.5) & (trust[SPAN:] >= 0.5) & (squares > 0.01)
+    if asked.sum() < SPAN:
+        return ODOMETRY_SIGMA
+    off = abs(float(np.median((ways * driven).sum(axis=1)[asked] / squares[asked])) - 1.0)
+    return 2.0 * off if off > OFF_SCALE else ODOMETRY_SIGMA
 
 
 def contradicted(estimates: Array, trust: Array, motions: Array) -> Flags:

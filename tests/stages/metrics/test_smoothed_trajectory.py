@@ -58,6 +58,13 @@ def test_odometry_is_doubted_where_trusted_estimates_on_both_sides_contradict_it
     assert position_errors(found, moved).max() < 0.5
 
 
+@pytest.mark.parametrize("scale", [0.5, 1.2, 2.0])
+def test_odometry_of_another_length_makes_estimates_no_worse(scale):
+    truth, estimates, covariances, motions = driven(lost=0)
+    found = smoothed(estimates, covariances, np.ones(FRAMES), motions * (scale, scale, 1.0))
+    assert position_errors(found, truth).mean() < position_errors(estimates, truth).mean()
+
+
 def test_frames_without_an_estimate_follow_odometry():
     truth, estimates, covariances, motions = driven(lost=0)
     estimates[30:40] = np.nan
