@@ -1,9 +1,10 @@
 """How well each variant does on several data sets, also in other light, and its costs: docs/which_variant.md.
 
     python benchmarks/variants.py --data FOLDER --level FOLDER --write docs/which_variant.md
+    python benchmarks/variants.py --data FOLDER --costs --write docs/which_variant.md          # on a machine at rest
 
 `--level`: a folder with the drives of benchmarks/game_level.py. Finished figures are kept in `--runs`, so that this can
-be stopped and typed again. Time and memory are those of a process of its own that reads nothing from a cache.
+be stopped and typed again. Time and memory (`--costs`) are of a process of its own, without a cache.
 """
 
 import argparse
@@ -32,6 +33,7 @@ LIGHTS: Mapping[str, Mapping[str, float]] = {
     "side": {"gain": 0.775, "side": 0.677},
 }
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
+COSTS_BEGIN, COSTS_END = "<!-- costs: begin -->", "<!-- costs: end -->"
 
 Figures = dict[str, dict[str, dict[str, float]]]
 """By variant, then by data set and light: median, 90 % (m) and share lost once converged, each the median of seeds."""
@@ -127,30 +129,36 @@ def costs(variant: str, on: DataSet, runs: Path) -> dict[str, float]:
 
 
 def tables(figures: Figures, seeds: int) -> str:
-    """Markdown: of each data set a row per variant and a column per light; then what each variant costs."""
-    lines = [
-        BEGIN,
-        "Medians over seeds of: median / 90 % of the position error (m), and the share lost where there was one.",
-        "",
-    ]
+    """Markdown: of each data set a row per variant and a column per light."""
+    lines = [BEGIN]
     for on in dict.fromkeys(key.split(", ")[0] for by_set in figures.values() for key in by_set):
         lines += [f"| {on} | {' | '.join(LIGHTS)} |", f"|---{'|---:' * len(LIGHTS)}|"]
         for variant, by_set in figures.items():
             shown = [cell(by_set[key]) if (key := f"{on}, {light}") in by_set else "" for light in LIGHTS]
             lines += [f"| `{variant}` | {' | '.join(shown)} |"] if any(shown) else []
         lines.append("")
-    lines += ["| variant | ms per image | MB |", "|---|---:|---:|"]
-    for variant, by_set in figures.items():
-        measured = [found for found in by_set.values() if "step" in found]
-        step, memory = (max(found[key] for found in measured) for key in ("step", "memory"))
+    return "\n".join([*lines, f"Measured on {date.today()}, {seeds} seeds.", END])
+
+
+def costs_table(measured: Mapping[str, list[dict[str, float]]]) -> str:
+    """Markdown: the largest time and memory of each variant."""
+    lines = [COSTS_BEGIN, "| variant | ms per image | MB |", "|---|---:|---:|"]
+    for variant, of_sets in measured.items():
+        step, memory = (max(found[name] for found in of_sets) for name in ("step", "memory"))
         lines.append(f"| `{variant}` | {step:.1f} | {memory:.0f} |")
-    return "\n".join([*lines, "", f"Measured on {date.today()}, {seeds} seeds.", END])
+    return "\n".join([*lines, "", f"Measured on {date.today()}, seed 0.", COSTS_END])
+
+
+def replaced(page: str, shown: str) -> str:
+    """The page with another table between the first and the last line of this one."""
+    begin, end = shown.split("\n")[0], shown.split("\n")[-1]
+    return page[: page.index(begin)] + shown + page[page.index(end) + len(end) :]
 
 
 def cell(found: Mapping[str, float]) -> str:
     """A table's cell."""
     lost = f" ({100 * found['lost']:.0f} % lost)" if found["lost"] >= 0.005 else ""
-    return f"{found['error']:.2f} / {found['p90']:.2f}{lost}"
+    return f"{found['error']:.2f}" + (f" / {found['p90']:.2f}" if "p90" in found else "") + lost
 
 
 def main() -> int:
@@ -161,28 +169,30 @@ def main() -> int:
     parser.add_argument("--write", type=Path, help="page whose tables are replaced")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--runs", type=Path, default=Path("runs/variants"), help="where finished figures are kept")
+    parser.add_argument("--costs", action="store_true", help="time and memory instead of errors")
     parser.add_argument("variants", nargs="*", default=[*MAPPED, *LEARNING])
     given = parser.parse_args()
     given.runs.mkdir(parents=True, exist_ok=True)
     kept = given.runs / "figures.json"
     figures: Figures = json.loads(kept.read_text()) if kept.exists() else {}
     sets = [*data_sets(given.data), *([game_level(given.level)] if given.level else [])]
-    for on in [*sets, simulated(given.runs, "home_store_demo")]:
-        for variant in given.variants:
-            for light in LIGHTS if variant in SEEING_PANORAMAS else ("as is",):
-                key, by_set = f"{on.name}, {light}", figures.setdefault(variant, {})
-                if key in by_set:
-                    continue
-                print(f"{variant}: {key} …", file=sys.stderr, flush=True)
-                by_set[key] = over_seeds(words(variant, on, light), given.seeds, given.runs)
-                by_set[key] |= costs(variant, on, given.runs) if light == "as is" else {}
-                kept.write_text(json.dumps(figures, indent=1))
-    shown = tables(figures, given.seeds)
+    sets.append(simulated(given.runs, "home_store_demo"))
+    if given.costs:
+        shown = costs_table({name: [costs(name, on, given.runs) for on in sets] for name in given.variants})
+    else:
+        for on in sets:
+            for variant in given.variants:
+                for light in LIGHTS if variant in SEEING_PANORAMAS else ("as is",):
+                    key, by_set = f"{on.name}, {light}", figures.setdefault(variant, {})
+                    if key not in by_set:
+                        print(f"{variant}: {key} …", file=sys.stderr, flush=True)
+                        by_set[key] = over_seeds(words(variant, on, light), given.seeds, given.runs)
+                        kept.write_text(json.dumps(figures, indent=1))
+        shown = tables(figures, given.seeds)
     if given.write is None:
         print(shown)
     else:
-        page = given.write.read_text()
-        given.write.write_text(page[: page.index(BEGIN)] + shown + page[page.index(END) + len(END) :])
+        given.write.write_text(replaced(given.write.read_text(), shown))
     return 0
 
 

@@ -66,7 +66,8 @@ def composed(words: list[str]) -> None:
         if not rest:
             return  # what its conditions are is checked where all experiments are
         rest = [f"variant={config['experiment']['variant']}", *rest]
-    if len(rest) < len(words) and "variant=omniview_mcl" in rest:
+    named = [word for word in rest if word.startswith("variant=")]
+    if len(rest) < len(words) and named in ([], ["variant=omniview_mcl"]):
         rest.append("tour=T")
 
     def of_variant(variant: str) -> Any:
