@@ -22,8 +22,9 @@ class LearnWrongPoseAgreement(Stage):
     """Puts a robot at wrong places of the map, and looks how often an image's best match agrees with them.
 
     Sample images of the map are compared with those that are farther away than a length scale, so that each is new to
-    the map. Wrong poses are those of all other images outside the tolerance. Nothing but the map is needed. Manifest
-    fact `wrong_pose_agreement`.
+    the map. Wrong poses are those of all other images outside the tolerance. Nothing but the map is needed: views are
+    compared by their best segments (`match=selective`), whatever the variant compares by. Manifest fact
+    `wrong_pose_agreement`.
     """
 
     samples: Annotated[int, Bounds(ge=1)] = 100

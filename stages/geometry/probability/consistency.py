@@ -23,8 +23,9 @@ def log_odds_of_right(
     `consistent`: 1 where an image agrees, 0 where it does not; `weights`: how many images it counts as. While the
     estimate is right, the share of consistent images is not known (light, people): uniform. While it is wrong, the
     share has a Beta distribution with mean `when_wrong`, as if known from `strength` images. Before each image
-    the robot may have been carried elsewhere, or found itself again, with a probability of `kidnapping` times the
-    image's novelty. Likelihoods are Beta-binomial; of several changes one is the most likely.
+    the robot may have been carried elsewhere, so that an estimate that was right is wrong since, or the other way
+    round, with a probability of `kidnapping` times the image's novelty. Likelihoods are Beta-binomial; more than one
+    such change is not considered.
     """
     agree = np.concatenate([[0.0], np.cumsum(weights * consistent)])
     other = np.concatenate([[0.0], np.cumsum(weights * (1.0 - consistent))])
