@@ -47,6 +47,12 @@ class Pair:
     metres: float
 
 
+def to_the_right(camera: Camera) -> float:
+    """By how much (rad) a robot has turned whose strip moved to the right by a column."""
+    step = 2 * math.pi / camera.width
+    return step if getattr(camera, "sense", "clockwise") == "clockwise" else -step
+
+
 def pairs(log: str, camera: Camera | None, parity: int | None, number: int) -> Iterator[Pair]:
     """Pairs of a recording; strips are turned by rolling their columns, other images are as they are."""
     recording = open_recording(log)
@@ -65,7 +71,7 @@ def pairs(log: str, camera: Camera | None, parity: int | None, number: int) -> I
         turned = 0.0
         if seen_by.wraps:
             columns = int(rng.integers(seen_by.width))
-            present, turned = np.roll(present, columns, axis=1), 2 * math.pi * columns / seen_by.width
+            present, turned = np.roll(present, columns, axis=1), to_the_right(seen_by) * columns
         x, y = truth[target, :2] - truth[here, :2]
         heading = truth[here, 2] + turned
         made += 1
@@ -97,7 +103,7 @@ class Methods:
         stage.setup(self._ctx)
         target = pair.target
         if compass is not None:
-            columns = round(pair.turn / (2 * math.pi) * pair.camera.width)
+            columns = round(pair.turn / to_the_right(pair.camera))
             target = Image(np.roll(target.pixels, -columns, axis=1))
         found = stage.step(self._ctx, WarpingVectorState(), pair.here, given, target, pair.camera).vector
         assert found is not None
