@@ -173,7 +173,7 @@ class Routes:
         return self.corner + (self.cells[cells][:, ::-1] + 0.5) * CELL / UNITS
 
     def far_points(self, start: int, number: int, within: float) -> list[int]:
-        """Cells, each as far as can be from those before, `within` metres on the way from the first."""
+        """Cells, each as far as can be from those before, `within` metres on the path from the first."""
         reach = dijkstra(self.graph, False, start)
         far, found = np.where(reach * CELL / UNITS <= within, reach, 0.0), [start]
         while len(found) < number:
@@ -181,7 +181,7 @@ class Routes:
             far = np.minimum(far, dijkstra(self.graph, False, found[-1]))
         return found
 
-    def way(self, points: list[int]) -> Array:
+    def path(self, points: list[int]) -> Array:
         """Through all points, as (N, 2) metres, 2 cm apart and without corners."""
         cells: list[int] = []
         for one, other in itertools.pairwise(points):
@@ -197,7 +197,7 @@ class Routes:
         return gaussian_filter1d(dense, 0.35 / 0.02, axis=0, mode="nearest")
 
     def nearest_first(self, points: list[int]) -> list[int]:
-        """The points in an order that saves way, and back to the first."""
+        """The points in an order that keeps the drive short, and back to the first."""
         ordered, left = [points[0]], points[1:]
         while left:
             reach = dijkstra(self.graph, False, ordered[-1])
@@ -210,21 +210,21 @@ def _unit(values: Array) -> Array:
     return values / values.std()
 
 
-def driven(way: Array) -> Array:
-    """Poses (N, 3) at every reading of odometry: the robot turns on the spot where the way is sharper than it can."""
-    poses = [np.array([*way[0], math.atan2(*(way[10] - way[0])[::-1])])]
+def driven(path: Array) -> Array:
+    """Poses (N, 3) at every reading of odometry: the robot turns on the spot where the path is sharper than it can."""
+    poses = [np.array([*path[0], math.atan2(*(path[10] - path[0])[::-1])])]
     at = 0
-    while at < len(way) - 1:
+    while at < len(path) - 1:
         ahead = at + 1
-        while ahead < len(way) - 1 and np.hypot(*(way[ahead] - poses[-1][:2])) < STEP_M:
+        while ahead < len(path) - 1 and np.hypot(*(path[ahead] - poses[-1][:2])) < STEP_M:
             ahead += 1
-        to = way[ahead] - poses[-1][:2]
+        to = path[ahead] - poses[-1][:2]
         turn = float(wrap(math.atan2(to[1], to[0]) - poses[-1][2]))
         if abs(turn) > 4 * STEP_RAD:
             poses.append(poses[-1] + (0.0, 0.0, math.copysign(STEP_RAD, turn)))
             continue
         heading = poses[-1][2] + float(np.clip(turn, -STEP_RAD, STEP_RAD))
-        poses.append(np.array([*way[ahead], heading]))
+        poses.append(np.array([*path[ahead], heading]))
         at = ahead
     return np.array(poses)
 
@@ -267,7 +267,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder to write to")
     parser.add_argument("--level", default="map01", help="of Freedoom, phase 2: map01 to map32")
     parser.add_argument("--seed", type=int, default=0, help="of routes and of odometry's errors")
-    parser.add_argument("--within", type=float, default=40.0, help="metres on the way from the start that are visited")
+    parser.add_argument("--within", type=float, default=40.0, help="metres on the path from the start that are visited")
     parser.add_argument("--people", action="store_true", help="figures stand about in the drive")
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
@@ -278,7 +278,7 @@ def main() -> None:
         if name == "tour":
             points = routes.nearest_first(routes.far_points(routes.nearest(level.start), POINTS, given.within))
         chosen = points if name == "tour" else rng.permutation(points[:-1])[: POINTS // 2].tolist()
-        poses = driven(routes.way(chosen))
+        poses = driven(routes.path(chosen))
         write(level, poses, given.out / f"{name}.mcap", GAMMA[name], rng)
         metres = np.hypot(*np.diff(poses[:, :2], axis=0).T).sum()
         print(f"{given.out / name}.mcap: {-(-len(poses) // STEPS_PER_IMAGE)} images, {metres:.0f} m")
