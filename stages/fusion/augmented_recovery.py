@@ -53,9 +53,7 @@ class AugmentedRecovery(Stage):
         """Fuse prediction and observation."""
         explained = probability_explained(particles, likelihood)
         averages.images = 1 if ctx.tick.first_of_log else averages.images + 1
-        equal = (
-            1.0 / averages.images
-        )  # plain means at first: what a belief that is all over the map explains is unusual
+        equal = 1.0 / averages.images  # plain means at first: a belief all over the map explains unusually little
         averages.slow += max(self.slow, equal) * (explained - averages.slow)
         averages.fast += max(self.fast, equal) * (explained - averages.fast)
         share = max(0.0, 1.0 - averages.fast / averages.slow) if averages.slow > 0.0 else 0.0
