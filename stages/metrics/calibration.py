@@ -5,17 +5,15 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Figure, Metrics, Outputs, Quantity, Stage
-from omninav.pipeline.report.chart import Chart
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.geometry.probability.calibration import (
-    Flags,
-    Reliability,
     area_under_roc,
     expected_calibration_error,
     reliability,
     squared_mahalanobis,
 )
+from omninav.stages.values.confidence import ConfidenceReliability
 from omninav.stages.values.drive import Drive, known
 
 QUANTITIES = {
@@ -49,10 +47,10 @@ class Calibration(Stage):
     """Position error (m) above which the robot counts as lost."""
 
     class Out(Outputs):
-        """Both absent without ground truth, `figure` without a confidence."""
+        """Both absent without ground truth, `reliability` without a confidence."""
 
         metrics: Metrics | None = None
-        figure: Figure | None = None
+        reliability: ConfidenceReliability | None = None
 
     def step(self, ctx: Context, drive: Drive) -> Out:
         """The whole run at once."""
@@ -60,7 +58,7 @@ class Calibration(Stage):
         last = last.at(known(last.truth) & known(last.estimate))
         values = covered(last)
         stated = last.at(np.isfinite(last.confidence))
-        figure = None
+        held = None
         if len(stated):
             errors = position_errors(stated.estimate, stated.truth)
             right = (errors <= self.within_m) & (heading_errors_deg(stated.estimate, stated.truth) <= self.within_deg)
@@ -71,28 +69,9 @@ class Calibration(Stage):
                 "lost_auroc": area_under_roc(-stated.confidence, errors > self.lost_m),
                 "right_share": float(right.mean()),
             }
-            figure = self._drawn(found, stated, right)
+            held = ConfidenceReliability(*found, self.within_m, self.within_deg)
         metrics = Metrics({"calibration": values}, QUANTITIES, ("calibration.expected_error",)) if values else None
-        return self.Out(metrics=metrics, figure=figure)
-
-    def _drawn(self, found: Reliability, stated: Drive, right: Flags) -> Figure:
-        chart = Chart((0.0, 1.0), (0.0, 1.0), "stated probability", "share of frames within the tolerance",
-                      height=(260.0, 260.0))  # fmt: skip
-        chart.base.line(np.array([(0.0, 0.0), (1.0, 1.0)]), "quiet", dashed=True)
-        points = np.column_stack([found.stated, found.observed])
-        chart.base.line(points, "blue")
-        chart.base.discs(points, 3.0 + 9.0 * np.sqrt(found.counts / found.counts.sum()), "blue", 0.7)
-        chart.name("as observed, larger for more frames", "blue", "dot")
-        chart.name("as it should be", "quiet", "dashes")
-        return Figure(
-            name="reliability",
-            title="Does the confidence hold?",
-            caption=f"Frames by the probability that was stated for an estimate within {self.within_m:g} m and "
-            f"{self.within_deg:g} degrees, and how many were. Below the dashed line it was too sure.",
-            content=chart.svg(),
-            media_type="image/svg+xml",
-            order=12,
-        )
+        return self.Out(metrics=metrics, reliability=held)
 
 
 def covered(drive: Drive) -> dict[str, Any]:

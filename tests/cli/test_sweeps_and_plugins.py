@@ -57,7 +57,7 @@ def test_jobs_in_several_processes_give_the_same_and_leave_their_exit_code(
     (sweep,) = (tmp_path / "runs").glob("*_sweep")
     statuses = [json.loads((sweep / str(n) / "manifest.json").read_text())["status"] for n in range(4)]
     assert statuses == ["complete", "complete", "complete", "failed"]
-    alone = omninav("seed=0", SHORT, f"cache={shared_cache}", check=True)
+    alone = omninav("features=hsv_histogram", "seed=0", SHORT, f"cache={shared_cache}", check=True)
     assert alone.returncode == 0
     same = tmp_path / "runs" / "latest" / "trajectory.tum"
     assert (sweep / "0" / "trajectory.tum").read_bytes() == same.read_bytes()

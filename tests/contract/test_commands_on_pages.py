@@ -68,7 +68,7 @@ def composed(words: list[str]) -> None:
         rest = [f"variant={config['experiment']['variant']}", *rest]
     named = [word for word in rest if word.startswith("variant=")]
     if len(rest) < len(words) and named in ([], ["variant=omniview_mcl"]):
-        rest.append("tour=T")
+        rest += ["tour=T", *(() if any(word.startswith("log=") for word in rest) else ("log=L",))]
 
     def of_variant(variant: str) -> Any:
         return compose("config", overrides=[f"variant={variant}"])

@@ -26,7 +26,7 @@ def test_a_drive_is_localised_the_same_in_a_map_that_stays_in_its_file(
     settings = (f"map={demo / 'map.omap'}", f"log={DRIVE}", "nodes.source.stop=8", "plots=none", "cache=null", *words)
     for limit, folder in ((chunks.IN_MEMORY, "memory"), (0, "file")):
         monkeypatch.setattr(chunks, "IN_MEMORY", limit)
-        assert main(["variant=omniview_mcl", *settings, f"hydra.run.dir={folder}"]) == 0
+        assert main([*settings, f"hydra.run.dir={folder}"]) == 0
         assert bool(read) == (folder == "file")
     for name in ("trajectory.tum", "metrics.json", "map.omap"):
         assert (tmp_path / "file" / name).read_bytes() == (tmp_path / "memory" / name).read_bytes()

@@ -41,6 +41,8 @@ def test_a_saved_map_without_its_words_is_refused_in_one_line(made: Path, omnina
 
 
 def test_a_variant_whose_map_has_no_words_is_named(omninav) -> None:
-    ended = omninav("check", "variant=topological_nav", "goal=1", "candidates=words")
+    ended = omninav("check", "variant=particle_cml_baseline", "candidates=words")
     assert ended.returncode == 2
-    assert "artifacts.words.variant: there is no variant 'topological_nav_map_words' to make it with" in ended.stderr
+    assert (
+        "artifacts.words.variant: there is no variant 'particle_cml_baseline_map_words' to make it with" in ended.stderr
+    )

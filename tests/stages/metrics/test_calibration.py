@@ -15,6 +15,7 @@ from omninav.stages.geometry.probability.calibration import (
 from omninav.stages.geometry.probability.consistency import log_odds_of_right
 from omninav.stages.metrics.calibration import Calibration
 from omninav.stages.plots.confidence_over_time import ConfidenceOverTime
+from omninav.stages.plots.reliability_diagram import ReliabilityDiagram
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.drive import Drive
@@ -72,8 +73,10 @@ def test_a_confidence_that_falls_where_the_robot_is_lost_tells_all_of_it():
     out = Calibration().step(Context("calibration"), made([0.9] * 300 + [0.1] * 100))
     found = out.metrics.values["calibration"]
     assert found["lost_auroc"] == 1.0
-    assert out.figure is not None
-    assert b"stated probability" in out.figure.content
+    drawn = ReliabilityDiagram().step(Context("plot"), out.reliability).figure
+    assert drawn is not None
+    assert b"confidence" in drawn.content
+    assert "0.5 m and 10 degrees" in drawn.caption
     blind = Calibration().step(Context("calibration"), made([0.9] * 100 + [0.1] * 300)).metrics.values["calibration"]
     assert blind["lost_auroc"] < 0.9
     assert blind["expected_error"] > found["expected_error"]
@@ -87,7 +90,8 @@ def test_ellipses_hold_as_many_true_positions_as_they_say_and_fewer_where_they_a
     assert found["ellipse_50"] == pytest.approx(0.5, abs=0.06)
     assert found["ellipse_95"] == pytest.approx(0.95, abs=0.03)
     assert found["nees"] == pytest.approx(2.0, abs=0.3)
-    assert out.figure is None
+    assert out.reliability is None
+    assert ReliabilityDiagram().step(Context("plot"), out.reliability).figure is None
     assert "expected_error" not in found
     small = made([None] * 400, sigma=0.1).at(np.arange(300))
     assert Calibration().step(Context("calibration"), small).metrics.values["calibration"]["ellipse_50"] < 0.2

@@ -1,0 +1,40 @@
+"""Plots whether stated probabilities come true."""
+
+import numpy as np
+
+from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline.report.chart import Chart
+from omninav.stages.values.confidence import ConfidenceReliability
+
+
+class ReliabilityDiagram(Stage):
+    """Plots the share of estimates that were within the tolerance over the confidence that was stated for them."""
+
+    class Out(Outputs):
+        """`figure`: absent where there is no confidence, or no ground truth."""
+
+        figure: Figure | None = None
+
+    def step(self, ctx: Context, reliability: ConfidenceReliability | None = None) -> Out:
+        """The whole run at once."""
+        if reliability is None:
+            return self.Out()
+        chart = Chart((0.0, 1.0), (0.0, 1.0), "confidence", "share of frames within the tolerance",
+                      height=(260.0, 260.0))  # fmt: skip
+        chart.base.line(np.array([(0.0, 0.0), (1.0, 1.0)]), "quiet", dashed=True)
+        points = np.column_stack([reliability.stated, reliability.observed])
+        chart.base.line(points, "blue")
+        chart.base.discs(points, 3.0 + 9.0 * np.sqrt(reliability.counts / reliability.counts.sum()), "blue", 0.7)
+        chart.name("as observed, larger for more frames", "blue", "dot")
+        chart.name("as it should be", "quiet", "dashes")
+        figure = Figure(
+            name="reliability",
+            title="Reliability diagram of the confidence",
+            caption="Frames by the probability that was stated for an estimate within "
+            f"{reliability.within_m:g} m and {reliability.within_deg:g} degrees, and how many were. Below the dashed "
+            "line it was too sure.",
+            content=chart.svg(),
+            media_type="image/svg+xml",
+            order=12,
+        )
+        return self.Out(figure=figure)
