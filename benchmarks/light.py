@@ -7,7 +7,7 @@ Errors in metres: median / mean / 90 % of the nearest image; median / 90 % (shar
 """
 
 import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -83,20 +83,25 @@ def filtered(on: DataSet) -> None:
     """Print a row per feature: the filter, seeds 0 and 1."""
     wires = ["+wires.perturbation={panorama: unwarp.panorama}", "wires.features.panorama=perturbation.panorama"]
     for name, words in TYPED.items():
-        cells = []
-        for light in LIGHTS.values():
-            changed = [f"nodes.perturbation.{key}={value}" for key, value in light.items()]
-            shown = []
-            for seed in (0, 1):
-                given = [*wires, *changed, *words, "perturbation=changed_light", "plots=none"]
-                drive = {"tour": on.tour, "log": on.drive, "seed": seed}
-                run = omninav.run("omniview_mcl", *given, progress=False, **drive)
-                after: Any = run.metrics["after_convergence"]
-                error = after["position_error_m"] or run.metrics["position_error_m"]
-                lost = run.metrics["loss_rate"] if after["loss_rate"] is None else after["loss_rate"]
-                shown.append(f"{error['median']:.2f} / {error['p90']:.2f} ({100 * lost:.0f} %)")
-            cells.append(", ".join(shown))
-        print(f"| {on.name} | {name} | {' | '.join(cells)} |", flush=True)
+        print(f"| {on.name} | {name} | {' | '.join(in_each_light(on, [*wires, *words]))} |", flush=True)
+
+
+def in_each_light(on: DataSet, words: Sequence[str]) -> list[str]:
+    """A cell for each light: `omniview_mcl` with these words, seeds 0 and 1, the drive's images changed."""
+    cells = []
+    for light in LIGHTS.values():
+        changed = [f"nodes.perturbation.{key}={value}" for key, value in light.items()]
+        shown = []
+        for seed in (0, 1):
+            given = [*words, *changed, "perturbation=changed_light", "plots=none"]
+            drive = {"tour": on.tour, "log": on.drive, "seed": seed}
+            run = omninav.run("omniview_mcl", *given, progress=False, **drive)
+            after: Any = run.metrics["after_convergence"]
+            error = after["position_error_m"] or run.metrics["position_error_m"]
+            lost = run.metrics["loss_rate"] if after["loss_rate"] is None else after["loss_rate"]
+            shown.append(f"{error['median']:.2f} / {error['p90']:.2f} ({100 * lost:.0f} %)")
+        cells.append(", ".join(shown))
+    return cells
 
 
 def main() -> None:

@@ -16,10 +16,9 @@ from typing import Any
 import cv2
 import numpy as np
 import numpy.typing as npt
-from light import LIGHTS, hsv, in_light, views
+from light import LIGHTS, hsv, in_each_light, in_light, views
 from variants import DataSet, data_sets
 
-import omninav
 from omninav import Context
 from omninav.stages.features.grey_world import grey_world_pixels
 from omninav.stages.features.rotation_reduced_sift import RotationReducedSift
@@ -99,23 +98,10 @@ def filtered(on: DataSet, power: float) -> None:
         "candidates=words",
         f"nodes.match.word_power={power}",
         "nodes.features.grey_world=local",
-        "perturbation=changed_light",
-        "plots=none",
+        "+wires.perturbation={panorama: unwarp.panorama}",
+        *changed,
     ]
-    wires = ["+wires.perturbation={panorama: unwarp.panorama}", *changed]
-    cells = []
-    for light in LIGHTS.values():
-        shown = []
-        for seed in (0, 1):
-            lit = [f"nodes.perturbation.{key}={value}" for key, value in light.items()]
-            words = [*given, *wires, *lit]
-            run = omninav.run("omniview_mcl", *words, progress=False, tour=on.tour, log=on.drive, seed=seed)
-            after: Any = run.metrics["after_convergence"]
-            error = after["position_error_m"] or run.metrics["position_error_m"]
-            lost = run.metrics["loss_rate"] if after["loss_rate"] is None else after["loss_rate"]
-            shown.append(f"{error['median']:.2f} / {error['p90']:.2f} ({100 * lost:.0f} %)")
-        cells.append(", ".join(shown))
-    print(f"| {on.name} | grey world times words^{power} | {' | '.join(cells)} |", flush=True)
+    print(f"| {on.name} | grey world times words^{power} | {' | '.join(in_each_light(on, given))} |", flush=True)
 
 
 def main() -> None:

@@ -1,5 +1,7 @@
 """Views compared after whitening by the map's own references."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -29,9 +31,9 @@ def a_map(number: int = 30) -> ReferenceGraph:
     return ReferenceGraph(np.zeros((number, 3)), views(number), "descriptors", edges, "truth")
 
 
-def matched(stage: CosineMatch | WhitenedMatch, view: np.ndarray, map: ReferenceGraph, **more: object) -> Similarities:
+def matched(stage: CosineMatch | WhitenedMatch, view: np.ndarray, map: ReferenceGraph, **more: Any) -> Similarities:
     stage.setup(Context("match"))
-    return stage.step(Context("match"), SegmentDescriptors.of(view), map, **more).similarities  # type: ignore[arg-type]
+    return stage.step(Context("match"), SegmentDescriptors.of(view), map, **more).similarities
 
 
 def test_whitened_vectors_have_equal_variances_and_no_mean():
