@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Stage
-from omninav.stages.geometry.appearance.segments import euclidean_similarities
+from omninav.stages.geometry.appearance.segments import euclidean_similarities, largest_distance
 from omninav.stages.values.features import SegmentFeatures
 from omninav.stages.values.maps import ReferenceGraph
 
@@ -21,3 +21,6 @@ class L2Match(ReferenceMatch, Stage):
         self, map: ReferenceGraph, features: SegmentFeatures, chosen: npt.NDArray[np.int64] | None
     ) -> npt.NDArray[np.float32]:
         return euclidean_similarities(map.features, features.values, self.headings, features.kind, chosen)
+
+    def how_compared(self, features: SegmentFeatures) -> tuple[None, float]:
+        return None, largest_distance(len(features.values), features.kind)

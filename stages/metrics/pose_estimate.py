@@ -1,5 +1,8 @@
 """The pose that a belief stands for."""
 
+from dataclasses import replace
+from typing import Literal
+
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.stages.values.belief import Belief, PoseEstimate
 
@@ -11,6 +14,10 @@ class BeliefEstimate(Stage):
     metres, radians.
     """
 
+    taken: Literal["mode", "mean"] = "mode"
+    """The pose that is measured and acted upon: the heaviest `mode`, or the `mean` of the whole belief, as in Wolf,
+    Burgard & Burkhardt 2005, section VI-B (erratum 47 in docs/papers.md). Covariance and share are the mode's."""
+
     class Out(Outputs):
         """`estimate`: mode, covariance, share of the belief, mean."""
 
@@ -18,4 +25,5 @@ class BeliefEstimate(Stage):
 
     def step(self, ctx: Context, belief: Belief) -> Out:
         """One belief, one estimate."""
-        return self.Out(estimate=belief.estimate())
+        estimate = belief.estimate()
+        return self.Out(estimate=replace(estimate, pose=estimate.mean) if self.taken == "mean" else estimate)

@@ -26,6 +26,7 @@ def _similarity(
     features: Floats,
     view: Floats,
     histograms: bool,
+    whole: bool,
     nearest: Shorts,
     fade_distance_m: float,
     background_level: float,
@@ -65,16 +66,18 @@ def _similarity(
                 for b in range(bins):
                     row[b] += sooner * one[b] + later * other[b]
                 at = then
+        squared = np.float32(0)
         for s in range(segments):
             common = np.float32(0)
             mine, seen = expected[s], view[s]
-            if histograms:
+            if histograms and not whole:
                 for b in range(bins):
                     common += mine[b] if mine[b] < seen[b] else seen[b]
                 similarity[s] = common
             else:
                 for b in range(bins):
                     common += (mine[b] - seen[b]) ** 2
+                squared += common
                 similarity[s] = max(np.float32(1) - np.float32(np.sqrt(common)) / scale, np.float32(0))
         for p in range(len(network)):
             a, c = similarity[network[p, 0]], similarity[network[p, 1]]
@@ -85,6 +88,8 @@ def _similarity(
             total += similarity[k]
             score = total * factors[k]
             best = score if score > best else best
+        if whole:
+            best = max(np.float32(1) - np.float32(np.sqrt(squared)) / scale, np.float32(0))
         known = math.exp(-0.5 * closest / (fade_distance_m * fade_distance_m))
         faded = known * best + (1.0 - known) * background_level
         out[n] = faded if faded > background_level else background_level
@@ -100,16 +105,18 @@ def similarity_of_expected(
     nearest: Shorts,
     fade_distance_m: float,
     background_level: float,
-    exponent: float = 0.5,
+    exponent: float | None = 0.5,
     colour_scale: float = MAX_COLOUR_DISTANCE,
 ) -> Array:
     """Selective similarity of a view (segments, bins) to the one expected at each pose: (N, 3) -> (N,).
 
     The expected view is the mean of the references `nearest` (N, k) to the pose, -1 for none (`references` (R, 3),
     `features` (R, segments, bins)), each turned to the pose's heading, with weights 1 / (d^2 + (d_min / 2)^2). S as in
-    `segments.similarities`. It fades to `background_level` as in `expected_similarity`.
+    `segments.similarities`; with no `exponent` by the norm of the whole difference, as in
+    `segments.euclidean_similarities`, of which `colour_scale` is then the largest. It fades to `background_level` as in
+    `expected_similarity`.
     """
-    network, factors = sorting_network(len(view)), penalties(len(view), exponent)
+    network, factors = sorting_network(len(view)), penalties(len(view), 0.0 if exponent is None else exponent)
     poses, view = np.ascontiguousarray(poses), np.ascontiguousarray(view, np.float32)
     scale = np.float32(colour_scale)
     found: Array = _similarity(
@@ -118,6 +125,7 @@ def similarity_of_expected(
         features,
         view,
         histograms,
+        exponent is None,
         nearest,
         fade_distance_m,
         background_level,
@@ -134,8 +142,8 @@ class ExpectedObservation(NearReferences):
     Gross & Koenig 2004, section 2, to the letter: S is the similarity "between the expected observation of the sample
     in its current pose and the actual observation". The features of the nearest references are averaged and turned to
     the particle's heading, then compared; `near_references` interpolates similarities instead, at a tenth of the cost.
-    Everything else is as there. Penalty and colour scale are those of the `similarities`. Raises BadInput where these
-    compare no segments (`match=l2`).
+    Everything else is as there. Penalty and scale are those of the `similarities`, and so is the norm of the whole
+    difference (`match=l2`, non-selective). Raises BadInput where these compare otherwise (`match=cosine`).
     """
 
     def step(  # type: ignore[override]
@@ -149,10 +157,10 @@ class ExpectedObservation(NearReferences):
         length_scale: LengthScale | None = None,
     ) -> NearReferences.Out:
         """Weight all particles."""
-        if similarities.exponent is None:
+        if similarities.exponent is None and similarities.colour_scale is None:
             raise BadInput(
-                "sensor: expected_observation compares the segments as the match does, and this match compares whole "
-                "views; use match=selective or match=histogram_intersection, or sensor=near_references"
+                "sensor: expected_observation compares as the match does, and does not know how this one does; use "
+                "match=selective, match=histogram_intersection or match=l2, or sensor=near_references"
             )
         self._view, self._exponent = features, similarities.exponent
         self._colour_scale = similarities.colour_scale or MAX_COLOUR_DISTANCE

@@ -19,8 +19,8 @@ class Similarities(Value):
     estimates for the whole map.
 
     How they were compared, so that other stages can compare in the same way: S = max_k (sum of the k largest s_j)
-    k^-exponent n^-(1-exponent) over the n segments, with `exponent` None where S is something else; of all but
-    histograms, s_j = 1 - |difference| / `colour_scale`.
+    k^-exponent n^-(1-exponent) over the n segments, where of all but histograms s_j = 1 - |difference| /
+    `colour_scale`; with `exponent` None S = 1 - |whole difference| / `colour_scale`, and with both something else.
     """
 
     values: Annotated[npt.NDArray[np.float32], Shape("references", "headings"), Bounds(ge=0, le=1)]

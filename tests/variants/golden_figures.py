@@ -34,6 +34,8 @@ RUNS: dict[str, tuple[str, ...]] = {
     "omniview_cml": (BOTH, "nodes.novelty_threshold.views=30"),
     "omniview_cml_map": (MAPPED, "nodes.novelty_threshold.views=30"),
     "omniview_mcl": (TOUR, DRIVE),
+    "omniview_mcl_as_printed": (TOUR, DRIVE),
+    "omniview_mcl_as_printed_map": (MAPPED,),
     "omniview_mcl_map": (MAPPED,),
     "omniview_mcl_map_words": (MAPPED,),
     "particle_cml": (BOTH, "nodes.novelty_threshold.views=30", "nodes.source.stop=40"),
@@ -41,6 +43,8 @@ RUNS: dict[str, tuple[str, ...]] = {
     "particle_cml_baseline_map": (MAPPED, EVERY_SECOND),
     "plain_matching": (TOUR, DRIVE),
     "retrieval_mcl": (TOUR, DRIVE, f"grid={DATA / 'map.yaml'}", EVERY_SECOND),
+    "retrieval_mcl_as_printed": (TOUR, DRIVE, f"grid={DATA / 'map.yaml'}", EVERY_SECOND),
+    "retrieval_mcl_as_printed_map": (MAPPED, EVERY_SECOND),
     "retrieval_mcl_map": (MAPPED, EVERY_SECOND),
     "retrieval_mcl_map_words": (MAPPED, EVERY_SECOND),
     "simulate": (

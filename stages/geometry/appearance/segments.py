@@ -200,20 +200,25 @@ def _compare_many(expected: Floats, observed: Floats, network: Ints, factors: Fl
         out[n] = best
 
 
+def largest_distance(segments: int, kind: FeatureKind) -> float:
+    """The largest distance of two views: sqrt(2 n) for n histograms, sqrt(3 n) 255 for n colours, 2 sqrt(n) for n unit
+    vectors."""
+    return float(np.sqrt(segments) * MAX_DISTANCES[kind])
+
+
 def euclidean_similarities(
     references: Rows, view: Floats, headings: int, kind: FeatureKind, chosen: Ints | None = None
 ) -> Floats:
     """1 - |difference| / the largest possible one, over whole views: (chosen, headings) float32 in [0, 1].
 
-    The non-selective comparison by the L2 norm of the difference vector (Gross & Koenig 2004, section 2). The largest
-    difference is sqrt(2 n) for n histograms, sqrt(3 n) 255 for n colours, and 2 sqrt(n) for n unit vectors.
+    The non-selective comparison by the L2 norm of the difference vector (Gross & Koenig 2004, section 2).
     """
     some = references[:] if chosen is None else references[chosen]
     query = turned_views(view, headings).reshape(headings, -1)
     flat = np.ascontiguousarray(some, np.float32).reshape(len(some), -1)
     # |a - b|^2 = a.a + b.b - 2 a.b
     squared = (flat * flat).sum(axis=1)[:, None] + (query * query).sum(axis=1) - 2 * (flat @ query.T)
-    largest = np.sqrt(2.0 * len(view)) if kind == "histograms" else np.sqrt(len(view)) * MAX_DISTANCES[kind]
+    largest = largest_distance(len(view), kind)
     alike: Floats = (1.0 - np.sqrt(np.maximum(squared, 0.0)) / largest).astype(np.float32)
     return np.clip(alike, 0.0, 1.0)
 

@@ -7,6 +7,7 @@ from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import selective_similarity, turned_view
 from omninav.stages.geometry.plane.nearest_cells import NearestCells
+from omninav.stages.match.cosine import CosineMatch
 from omninav.stages.match.l2 import L2Match
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.sensor.expected_observation import ExpectedObservation, similarity_of_expected
@@ -70,11 +71,33 @@ def test_the_view_is_compared_as_the_match_compares_it(match: SelectiveMatch | L
     stage, ctx = ExpectedObservation(length_scale_m=0.1, power=5.0), Context("sensor", np.random.default_rng(0))
     stage.setup(ctx)
     belief = Particles(REFERENCES, np.full(40, 1 / 40))
-    if isinstance(match, L2Match):
-        with pytest.raises(BadInput, match="use match=selective"):
-            stage.step(ctx, alike, SegmentColours(seen), belief, map)
-        return
     likelihood = stage.step(ctx, alike, SegmentColours(seen), belief, map).likelihood.values
     # A particle at a reference is as likely as the best of the compared ones, and no other is much likelier.
     assert likelihood[4] == pytest.approx(1.0, abs=0.05)
     assert likelihood.max() < 1.05
+
+
+def test_by_the_norm_of_the_whole_difference_a_segment_that_differs_much_counts_more() -> None:
+    # Two views, each 40 from the one expected in all: spread over nine segments, and in one of them.
+    expected, spread, gathered = (np.full((9, 3), 100.0, np.float32) for _ in range(3))
+    spread[:, 0] += 40 / 9
+    gathered[0, 0] += 40
+    near, scale = np.zeros((1, 1), np.int32), 442.0
+    found = [
+        similarity_of_expected(
+            np.zeros((1, 3)), np.zeros((1, 3)), expected[None], view, False, near, 1.0, 0.0, None, scale
+        )
+        for view in (spread, gathered)
+    ]
+    assert found[0] == pytest.approx(1 - 40 / 3 / scale, abs=1e-5)
+    assert found[1] == pytest.approx(1 - 40 / scale, abs=1e-5)
+
+
+def test_whatever_compares_otherwise_is_refused() -> None:
+    map = ReferenceGraph(REFERENCES, FEATURES, "histograms", np.zeros((0, 2), np.int64), "truth")
+    stage, ctx = ExpectedObservation(), Context("sensor", np.random.default_rng(0))
+    stage.setup(ctx)
+    seen, belief = SegmentHistograms(FEATURES[4]), Particles(REFERENCES, np.full(40, 1 / 40))
+    alike = CosineMatch().step(Context("match"), seen, map).similarities
+    with pytest.raises(BadInput, match="use match=selective"):
+        stage.step(ctx, alike, seen, belief, map)
