@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help ros2 demo test lint format docs bench soak scale kills fuzz clean
+.PHONY: help ros2 demo test lint format docs bench soak scale kills fuzz mutants clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z0-9]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -52,6 +52,11 @@ fuzz: export OPENBLAS_NUM_THREADS = 1
 fuzz: $(VENV)/.installed  ## read hostile inputs of every format on all cores (SECONDS=600 SEED=1)
 	PYTHONPATH=tests $(BIN)/python -m hostile.fuzz --seconds $(SECONDS) --seed $(SEED)
 
+mutants: export OPENBLAS_NUM_THREADS = 1
+mutants: $(VENV)/.mutants  ## try small slips in the code that judges, fuses and maps (ALL=1 ONLY=stages/fusion)
+	$(BIN)/python tests/mutants/campaign.py $(ONLY) $(if $(ALL),--all) $(if $(TESTS),--tests $(TESTS)) \
+		--sample $(or $(SAMPLE),60) --seed $(SEED)
+
 ros2: .venv-ros2/.installed  ## real rclpy, for live tests (Python 3.11)
 
 clean:  ## remove the virtual environment and all build and check caches
@@ -72,6 +77,10 @@ $(VENV)/.demo: pyproject.toml
 
 $(VENV)/.installed: $(VENV)/.demo
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	touch $@
+
+$(VENV)/.mutants: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[mutants]'
 	touch $@
 
 # The library particles asks for numpy below 2, without need.
