@@ -23,7 +23,7 @@ def auxiliary_filter(
     """
     number = len(before.poses)
     first_stage = _likelihood(
-        move_poses(before.poses, model.steps, (0.0, 0.0, 0.0), np.zeros((3, number))), hypothesis, floor
+        move_poses(before.poses, model.steps, model.sigmas, np.zeros((3, number))), hypothesis, floor
     )
     selection = before.weights * first_stage
     if not selection.sum() > 0.0:

@@ -60,4 +60,4 @@ def cluster_gaussians(
         mean, covariance = weighted_moments(particles.poses[members], particles.weights[members])
         means[row], covariances[row] = mean, floored(covariance, floor)
     kept = weights[chosen]
-    return GaussianMixture(means, covariances, kept / kept.sum() if len(kept) else kept)
+    return GaussianMixture(means, covariances, kept / kept.sum())

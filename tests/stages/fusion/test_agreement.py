@@ -102,3 +102,56 @@ def test_with_an_outlier_probability_a_belief_outlives_one_look_alike() -> None:
 def test_equal_seeds_give_equal_beliefs() -> None:
     one, other = fuse(around(0.0), at(9.0)), fuse(around(0.0), at(9.0))
     assert np.array_equal(one.poses, other.poses)
+
+
+def test_agreement_is_the_mean_density_by_the_particles_weights() -> None:
+    # A quarter of the weight stands at the peak of two equal Gaussians, 0.5 (2 pi)^-1.5; the rest is far from both.
+    both = GaussianMixture(np.array([[0.0, 0.0, 0.0], [500.0, 0.0, 0.0]]), np.stack([np.eye(3)] * 2), np.full(2, 3.0))
+    particles = Particles(np.array([[0.0, 0.0, 0.0], [90.0, 0.0, 0.0]]), np.array([0.25, 0.75]))
+    agreement = 0.25 * 0.5 * (2 * math.pi) ** -1.5
+    for above, agreed in ((agreement * 0.99, True), (agreement * 1.01, False)):
+        ctx = Context("fusion", np.random.default_rng(1))
+        out = Agreement(agree_above=above).step(ctx, particles, both).belief
+        assert ctx.counts == ({"agreed": 1} if agreed else {"disagreed": 1})
+        assert (out.poses[:, 0] == 0.0).all() == agreed
+
+
+def test_the_outlier_probability_mixes_the_density_with_its_mean() -> None:
+    # Half of the weight at the peak p: the mean is p / 2, and the two halves weigh 0.8 p + 0.1 p and 0.1 p.
+    particles = Particles(np.array([[0.0, 0.0, 0.0]] * 50 + [[9.0, 0.0, 0.0]] * 50), np.full(100, 0.01))
+    out = fuse(particles, at(0.0), outlier_probability=0.2)
+    assert (out.poses[:, 0] == 0.0).sum() == 90
+    assert out.weights == pytest.approx(np.full(100, 0.01))
+
+
+def test_what_is_kept_has_its_share_of_the_weight_and_its_own_proportions() -> None:
+    particles = Particles(np.array([[float(n), 0.0, 0.0] for n in range(4)]), np.array([0.1, 0.2, 0.3, 0.4]))
+    out = fuse(particles, at(900.0), keep=0.5)
+    old, new = out.poses[:, 0] < 10.0, out.poses[:, 0] > 800.0
+    assert (old.sum(), new.sum()) == (2, 2)
+    assert np.diff(out.poses[old, 0]) > 0.0
+    before = 0.1 * (1.0 + out.poses[old, 0])
+    assert out.weights[old] == pytest.approx(0.5 * before / before.sum())
+    assert out.weights[new] == pytest.approx([0.25, 0.25])
+
+
+def test_all_of_the_belief_can_be_kept_and_a_kept_part_without_weight_gets_none() -> None:
+    particles = Particles(np.array([[float(n), 0.0, 0.0] for n in range(4)]), np.array([0.1, 0.2, 0.3, 0.4]))
+    same = fuse(particles, at(900.0), keep=1.0)
+    assert same.poses.tolist() == particles.poses.tolist()
+    assert same.weights == pytest.approx(particles.weights)
+    anew = fuse(particles, at(900.0), keep=0.0)
+    assert anew.poses[:, 0].min() > 800.0
+    assert anew.weights == pytest.approx([0.25] * 4)
+    lone = Particles(np.array([[float(n), 0.0, 0.0] for n in range(100)]), np.array([1.0] + [0.0] * 99))
+    seed = next(s for s in range(9) if 0 not in np.random.default_rng(s).permutation(100)[:50])
+    out = fuse(lone, at(900.0), seed=seed, keep=0.5)
+    assert out.weights[out.poses[:, 0] < 200.0].tolist() == [0.0] * 50
+    assert out.weights.sum() == pytest.approx(1.0)
+
+
+def test_a_lone_new_particle_has_all_the_weight_that_is_not_kept() -> None:
+    particles = Particles(np.array([[float(n), 0.0, 0.0] for n in range(5)]), np.full(5, 0.2))
+    out = fuse(particles, at(900.0))
+    assert out.weights == pytest.approx([0.2] * 5)
+    assert (out.poses[:, 0] > 800.0).tolist() == [False] * 4 + [True]

@@ -58,3 +58,72 @@ def test_as_an_option_it_gives_the_belief_of_importance_sampling_up_to_chance() 
     means = [float(belief.weights @ belief.poses[:, 0]) for belief in beliefs]
     assert means[0] == pytest.approx(means[1], abs=0.01)
     assert not np.array_equal(beliefs[0].weights, beliefs[1].weights)
+
+
+def few(*places: float, weights: tuple[float, ...] | None = None) -> Particles:
+    poses = np.array([[x, 0.0, 0.0] for x in places])
+    return Particles(poses, np.full(len(places), 1 / len(places)) if weights is None else np.array(weights))
+
+
+def test_particles_are_selected_by_their_predicted_poses() -> None:
+    # After a metre ahead two of four stand at 1 and 5 m; the view is at 5 m, so that those at 4 m go on.
+    still = UncertainMotion((0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
+    out = auxiliary_filter(few(0.0, 0.0, 4.0, 4.0), still, at(5.0, 0.1), 0.0, np.random.default_rng(1))
+    assert out is not None
+    assert out.poses[:, 0].tolist() == [5.0] * 4
+    assert out.weights == pytest.approx([0.25] * 4)
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.3])
+def test_weights_are_the_view_at_the_pose_over_the_view_at_the_prediction(sigma: float) -> None:
+    # Densities of one Gaussian of 0.3 m in x: their ratio needs no normalisation.
+    ahead = UncertainMotion((0.0, 1.0, 0.0), (0.0, sigma, 0.0))
+    out = auxiliary_filter(few(0.0, 0.0), ahead, at(1.2, 0.3), 0.0, np.random.default_rng(1))
+    assert out is not None
+    likely = np.exp(-0.5 * ((out.poses[:, 0] - 1.2) / 0.3) ** 2)
+    assert out.weights == pytest.approx(likely / likely.sum())
+    assert len(set(out.poses[:, 0])) == (2 if sigma else 1)
+
+
+def test_the_scale_of_the_hypothesis_does_not_matter_beside_the_floor() -> None:
+    # A hypothesis's weights need not sum to 1, p(y|x) is that of their shares: a floor as high as its peak counts 1.
+    one, third = at(1.0, 0.3), at(1.0, 0.3)
+    third.weights[:] = 1 / 3
+    peak = (2 * np.pi) ** -1.5 / 0.3
+    wide = UncertainMotion((0.0, 1.0, 0.0), (0.0, 0.5, 0.0))
+    beliefs = [auxiliary_filter(few(0.0, 0.5), wide, view, peak, np.random.default_rng(1)) for view in (one, third)]
+    for belief in beliefs:
+        assert belief is not None
+        likely = 1.0 + np.exp(-0.5 * ((belief.poses[:, 0] - 1.0) / 0.3) ** 2)
+        first = 1.0 + np.exp(-0.5 * ((np.array([1.0, 1.5]) - 1.0) / 0.3) ** 2)
+        assert belief.weights == pytest.approx(likely / first / (likely / first).sum())
+
+
+def test_a_view_that_fits_no_prediction_gives_no_belief_unless_there_is_a_floor() -> None:
+    rng, far = np.random.default_rng(1), at(99.0, 0.3)
+    assert auxiliary_filter(few(0.0, 4.0), AHEAD, far, 0.0, rng) is None
+    out = auxiliary_filter(few(0.0, 4.0, weights=(0.75, 0.25)), AHEAD, far, 1e-3, rng)
+    assert out is not None
+    assert out.weights == pytest.approx([0.5, 0.5])
+
+
+def test_a_view_that_fits_the_predictions_but_no_pose_gives_no_belief() -> None:
+    wide = UncertainMotion((0.0, 1.0, 0.0), (0.0, 1000.0, 0.0))
+    assert auxiliary_filter(few(0.0, 0.0), wide, at(1.0, 0.01), 0.0, np.random.default_rng(1)) is None
+
+
+def test_where_the_filter_finds_nothing_the_belief_is_that_of_importance_sampling() -> None:
+    # Before the motion nothing would have led there; the particles, as they moved, agree with the view.
+    there, elsewhere = few(5.0, 5.0), few(-50.0, -50.0)
+    stage = Agreement(sampling="auxiliary")
+    out = stage.step(Context("fusion"), there, at(5.0, 0.3), elsewhere, AHEAD).belief
+    assert out.poses[:, 0].tolist() == [5.0, 5.0]
+
+
+def test_the_outlier_probability_is_the_floor_of_the_auxiliary_filter() -> None:
+    # Half of the particles are at the peak p: the agreement is p / 2, the floor of q = 0.2 p / 10, at the peak 1.1 p.
+    still = UncertainMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    half = few(*([0.0] * 60 + [9.0] * 60))
+    stage = Agreement(sampling="auxiliary", outlier_probability=0.2)
+    out = stage.step(Context("fusion"), half, at(0.0, 0.3), half, still).belief
+    assert (out.poses[:, 0] == 0.0).sum() == pytest.approx(120 * 1.1 / 1.2, abs=1)

@@ -111,11 +111,71 @@ def test_the_number_follows_the_cells_the_belief_fills() -> None:
     assert len(wide.poses) == 5000
 
 
+def test_without_adaptation_the_number_stays_however_narrow_the_belief_is() -> None:
+    assert (
+        len(fuse(ImportanceResampling(number=800, min_particles=50), belief(800, spread=0.01), np.ones(800)).poses)
+        == 800
+    )
+
+
+def with_recovery(weight: float, kidnapping_probability: float, novelty: float = 1.0) -> Particles:
+    """Eight particles at 0 and two recovery particles at 5 of this weight, after an image that all explain alike and
+    that proposes 9; of the ten that follow two are recovery particles."""
+    poses = np.array([[0.0, 0.0, 0.0]] * 8 + [[5.0, 0.0, 0.0]] * 2)
+    weights = np.array([(1.0 - weight) / 8] * 8 + [weight / 2] * 2)
+    stage = ImportanceResampling(number=10, recovery_share=0.2, kidnapping_probability=kidnapping_probability)
+    proposals = Particles(np.array([[9.0, 0.0, 0.0]] * 2), np.array([0.5, 0.5]))
+    likelihood = Likelihood(np.ones(10), 1.0, novelty)
+    return stage.step(Context("fusion"), Particles(poses, weights, 2), likelihood, proposals).belief
+
+
+def test_of_a_mixture_the_uniform_part_has_the_weight_of_a_kidnapping() -> None:
+    # p = 0.4 and an image of half novelty: 0.2 of the weight is uniform, 0.8 of it the belief's.
+    out = with_recovery(0.1, 0.4, novelty=0.5)
+    assert out.recovery_particles == 2
+    assert out.weights.sum() == pytest.approx(1.0)
+    assert out.poses[:8, 0].tolist() == [0.0] * 8
+    assert len(set(out.weights[:8])) == 1
+    # Drawn by fit, 1, 1 and twice the novelty of 0.5: in all 3, so that each of two drawn counts 1.5 w / fit.
+    recovery = {5.0: 0.8 * 0.05 / 1.0 * 1.5, 9.0: 0.2 * 0.5 / 0.5 * 1.5}
+    expected = np.array([recovery[x] for x in out.poses[8:, 0]])
+    assert out.weights[8:] / out.weights[0] == pytest.approx(expected / (0.8 * 0.9 / 8))
+
+
+@pytest.mark.parametrize(("weight", "joined"), [(0.42, True), (0.38, False)])
+def test_recovery_particles_that_outweigh_their_share_are_resampled_with_the_others(
+    weight: float, joined: bool
+) -> None:
+    # Half of the weight goes to the uniform part: 10 x 0.5 x 0.42 is more than two particles, 10 x 0.5 x 0.38 is not.
+    out = with_recovery(weight, 0.5)
+    assert out.recovery_particles == 2
+    assert out.poses[8:, 0].tolist() == ([9.0, 9.0] if joined else [5.0, 9.0])
+    assert (5.0 in out.poses[:8, 0]) == joined
+
+
+def test_particles_are_resampled_where_their_effective_size_is_below_its_share() -> None:
+    # Weights 0.4, 0.4, 0.1, 0.1: 1 / 0.34 = 2.94 of 4.
+    poses, weights = np.arange(12.0).reshape(4, 3), np.array([0.4, 0.4, 0.1, 0.1])
+    for below, kept in ((0.73, True), (0.74, False)):
+        out = fuse(ImportanceResampling(number=4, resample_below=below), Particles(poses, np.full(4, 0.25)), weights)
+        assert (out.weights == pytest.approx(weights)) == kept
+        assert (out.weights == pytest.approx(np.full(4, 0.25))) != kept
+
+
+def test_without_recovery_particles_nothing_is_proposed() -> None:
+    there = Particles(np.full((5, 3), 77.0), np.full(5, 0.2))
+    stage = ImportanceResampling(number=20, recovery_share=0.0, kidnapping_probability=0.5)
+    out = fuse(stage, belief(20), np.ones(20), anywhere=1.0, proposals=there)
+    assert len(out.poses) == 20
+    assert out.poses[:, 0].max() < 77.0
+    assert out.weights.sum() == pytest.approx(1.0)
+
+
 def test_the_kld_bound_is_fox_s() -> None:
     # Chi-square quantile by scipy, not the Wilson-Hilferty approximation: n = chi2_{k-1, 0.99} / (2 e).
     from scipy.stats import chi2
 
-    for cells in (5, 50, 500):
+    for cells in (2, 5, 50, 500):
         assert kld_number(cells, 0.05, 0.99) == pytest.approx(chi2.ppf(0.99, cells - 1) / 0.1, rel=0.01)
     assert kld_number(1, 0.05, 0.99) == 1
 

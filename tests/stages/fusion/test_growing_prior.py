@@ -5,6 +5,7 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.fusion.growing_prior import MixtureInMap, ParticlesInMap
 from omninav.stages.values.pose import Pose
+from omninav.stages.values.requests import Restart
 from omninav.stages.values.view_mixtures import ViewMixtures
 
 
@@ -71,3 +72,62 @@ def test_asked_for_truth_a_log_without_it_is_an_error() -> None:
 def test_there_is_no_belief_to_begin_with_in_the_middle_of_a_log() -> None:
     assert ParticlesInMap().step(context(first=False), two_places(), None).belief is None
     assert MixtureInMap().step(context(first=False), two_places(), None).belief is None
+
+
+def moments_of(stage: ParticlesInMap | MixtureInMap, map: ViewMixtures, truth: Pose | None = None, **ports: Restart):
+    """Mean and standard deviations of the first belief, headings around 0."""
+    belief = stage.step(context(first=not ports), map, truth, **ports).belief
+    assert belief is not None
+    if isinstance(stage, ParticlesInMap):
+        assert belief.weights == pytest.approx(np.full(stage.number, 1.0 / stage.number))
+        return belief.poses.mean(axis=0), belief.poses.std(axis=0)
+    assert belief.weights.tolist() == [1.0]
+    return belief.means[0], np.sqrt(np.diagonal(belief.covariances[0]))
+
+
+PRIORS = [ParticlesInMap, MixtureInMap]
+
+
+@pytest.mark.parametrize("prior", PRIORS)
+@pytest.mark.parametrize("known", [True, False], ids=["in a map", "in no map"])
+def test_a_start_in_a_map_is_less_certain_than_one_that_begins_it(prior: type, known: bool) -> None:
+    map = two_places() if known else ViewMixtures.empty()
+    sigmas = (0.1, 0.1, 0.1) if known else (0.3, 0.3, np.radians(4.0))
+    for at, place in (("origin", (0.0, 0.0, 0.0)), ("truth", (3.0, 4.0, 1.0))):
+        stage = prior(at=at, initial_sigma_m=0.3, initial_sigma_deg=4.0)
+        mean, spread = moments_of(stage, map, Pose(3.0, 4.0, 1.0))
+        assert mean == pytest.approx(place, abs=0.05)
+        assert spread == pytest.approx(sigmas, rel=0.1)
+
+
+@pytest.mark.parametrize("prior", PRIORS)
+def test_who_asks_to_start_again_says_where_or_means_anywhere_in_the_map(prior: type) -> None:
+    mean, spread = moments_of(prior(at="origin"), two_places(), restart=Restart((6.0, 7.0, -1.0, 0.3, 0.2)))
+    assert mean == pytest.approx([6.0, 7.0, -1.0], abs=0.05)
+    assert spread == pytest.approx([0.3, 0.3, 0.2], rel=0.1)
+    mean, spread = moments_of(prior(at="origin"), two_places(), restart=Restart())
+    assert mean[:2] == pytest.approx([5.0, 0.0], abs=0.5)
+    assert spread == pytest.approx([25.01**0.5, 0.1, np.pi / 3**0.5], rel=0.1)
+
+
+@pytest.mark.parametrize("prior", PRIORS)
+def test_headings_of_a_start_are_within_half_a_turn(prior: type) -> None:
+    belief = prior(at=(0.0, 0.0, 4.0, 0.1, 0.1)).step(context(), ViewMixtures.empty(), None).belief
+    assert belief is not None
+    pose = belief.estimate().pose
+    assert pose.heading == pytest.approx(4.0 - 2 * np.pi, abs=0.01)
+
+
+def test_an_unknown_start_in_a_map_of_one_place_is_no_narrower_than_a_known_one_and_turns_any_way() -> None:
+    map = ViewMixtures.empty()
+    row = map.add_view(np.zeros(1, np.float32), "Coefficients")
+    bent = np.diag([1e-6, 4e-6, 1e-6])
+    bent[0, 2] = bent[2, 0] = 5e-7
+    map.add_component(row, np.array([1.0, 2.0, 3.0]), bent, 0.5, 1.0)
+    belief = MixtureInMap(initial_sigma_m=0.2).step(context(), map, None).belief
+    assert belief is not None
+    covariance = belief.covariances[0]
+    assert covariance[:2, :2] == pytest.approx(np.eye(2) * 0.04)
+    assert covariance[2].tolist() == [0.0, 0.0, np.pi**2 / 3.0]
+    assert covariance[:, 2].tolist() == covariance[2].tolist()
+    assert belief.means[0, :2] == pytest.approx([1.0, 2.0])

@@ -73,6 +73,12 @@ def test_all_samples_may_be_random():
     assert (out.poses[:, 0] > 40).all()
 
 
+def test_proposals_that_are_not_asked_for_are_not_drawn():
+    out, _ = fuse(UniformRecovery(random_particles=0), belief(5000), np.ones(5000), anywhere())
+    assert len(out.poses) == 5000
+    assert (out.poses[:, 0] < 40).all()
+
+
 def test_random_samples_that_nobody_proposes_are_refused_in_one_line():
     with pytest.raises(BadInput, match=r"fusion\.proposals"):
         fuse(UniformRecovery(), belief(10), np.ones(10), None)

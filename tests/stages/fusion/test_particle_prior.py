@@ -1,0 +1,70 @@
+"""The first particles of a log."""
+
+import numpy as np
+import pytest
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.fusion.particle_prior import ParticlePrior
+from omninav.stages.values.belief import Particles
+from omninav.stages.values.grid import FreeSpace
+from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.requests import Restart
+
+FEATURES, EDGES = np.zeros((1, 1, 1), np.float32), np.zeros((0, 2), np.int64)
+MAP = ReferenceGraph(np.array([[5.0, 5.0, 0.0]]), FEATURES, "histograms", EDGES, "truth")
+TRUTH = Pose(3.0, 4.0, 3.1)
+
+
+def begun(stage: ParticlePrior, first: bool = True, **ports: object) -> Particles | None:
+    ctx = Context("start", np.random.default_rng(0))
+    ctx.tick = Tick(7, 7, first_of_log=first)
+    return stage.step(ctx, ports.pop("map", MAP), ports.pop("truth", TRUTH), **ports).belief  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("scale", "reach"), [(None, 1.5), (LengthScale(0.2), 0.6)])
+def test_a_uniform_start_reaches_some_length_scales_from_each_reference(
+    scale: LengthScale | None, reach: float
+) -> None:
+    belief = begun(ParticlePrior(number=2000, radius=3.0), length_scale=scale)
+    assert belief is not None
+    from_reference = np.hypot(belief.poses[:, 0] - 5.0, belief.poses[:, 1] - 5.0)
+    assert from_reference.max() == pytest.approx(reach, rel=0.02)
+    assert from_reference.max() <= reach
+    assert (from_reference < reach / 2).mean() == pytest.approx(0.25, abs=0.05)  # uniform over a disc
+    assert belief.weights.sum() == pytest.approx(1.0)
+    assert len(set(belief.weights)) == 1
+
+
+def test_free_space_comes_before_the_references_of_a_map() -> None:
+    belief = begun(ParticlePrior(number=50), area=FreeSpace(np.array([[50.5, 50.5]]), 1.0))
+    assert belief is not None
+    assert belief.poses[:, 0].min() >= 50.0
+
+
+@pytest.mark.parametrize(
+    ("at", "spread"),
+    [("truth", (0.1, 0.1, 0.1)), ("origin", (0.1, 0.1, 0.1)), ((0.0, 0.0, 3.1, 0.4, 0.2), (0.4, 0.4, 0.2))],
+)
+def test_a_known_start_has_the_spread_that_is_said_and_headings_within_half_a_turn(
+    at: object, spread: tuple[float, float, float]
+) -> None:
+    belief = begun(ParticlePrior(at=at, number=4000))  # type: ignore[arg-type]
+    assert belief is not None
+    assert belief.poses[:, :2].std(axis=0) == pytest.approx(spread[:2], rel=0.1)
+    mean = np.angle(np.exp(1j * belief.poses[:, 2]).mean())
+    assert np.angle(np.exp(1j * (belief.poses[:, 2] - mean))).std() == pytest.approx(spread[2], rel=0.1)
+    assert np.abs(belief.poses[:, 2]).max() <= np.pi
+    assert mean == pytest.approx(0.0 if at == "origin" else 3.1, abs=0.02)
+
+
+def test_a_belief_begins_again_where_somebody_asks_for_it() -> None:
+    stage = ParticlePrior(at="origin", number=500)
+    assert begun(stage, first=False) is None
+    there = begun(stage, first=False, restart=Restart((9.0, -9.0, 0.0, 0.1, 0.1)))
+    anywhere = begun(stage, first=False, restart=Restart())
+    assert there is not None
+    assert anywhere is not None
+    assert there.poses.mean(axis=0) == pytest.approx([9.0, -9.0, 0.0], abs=0.03)
+    assert anywhere.poses[:, :2].mean(axis=0) == pytest.approx([5.0, 5.0], abs=0.2)
