@@ -1,7 +1,13 @@
+import dataclasses
+
 import numpy as np
 import pytest
+from made_places import made_map
 
-from omninav.stages.metrics.loop_closures import average_precision, precision_recall
+from omninav.pipeline import Context
+from omninav.pipeline.engine.artifact import artifact_bytes
+from omninav.stages.metrics.loop_closures import LoopClosures, average_precision, precision_recall
+from omninav.stages.values.topological_map import LoopHypotheses
 
 
 def test_average_precision_is_one_where_all_right_hypotheses_have_more_support_than_the_wrong_ones():
@@ -27,3 +33,85 @@ def test_precision_and_recall_worked_by_hand():
     precision, recall = precision_recall(np.array([0.9, 0.7, 0.7, 0.1]), np.array([True, False, True, False]))
     assert precision == pytest.approx([1.0, 2 / 3, 2 / 4])
     assert recall == pytest.approx([0.5, 1.0, 1.0])
+
+
+MAP = made_map([(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (9.0, 9.0)], {(0, 1): 2, (1, 2): 0})
+"""Three places in a row, and one that no path leads to; the two path images of the first link stand at its place."""
+STRETCHES = [(5, 0.0, 0.0), (5, 10.0, 0.0), (10, 50.0, 50.0), (5, 0.0, 2.0), (5, 10.0, 2.5), (10, 0.0, -7.0)]
+"""Pictures, and where the first of them was taken; the others lie half a metre further east each."""
+PAIRS = [(2, 22), (7, 27), (2, 32), (4, 5), (9, 19)]
+"""2 m apart, 2.5 m, 7 m, 8 m in one stretch of the drive, and far."""
+
+
+def hypotheses(pose_source="truth"):
+    numbers = np.repeat(np.arange(len(STRETCHES)), [number for number, *_ in STRETCHES])
+    poses = np.array([(x + 0.5 * k, y, 0.0) for number, x, y in STRETCHES for k in range(number)])
+    support = np.array([0.9, 0.4, 0.6, 0.8, 0.1])
+    masses = np.stack([support, np.zeros(5), 1.0 - support], axis=1)
+    place = np.array([0, 1, 3, 0, 1, 2])[numbers]
+    accepted = np.array([True, False, True, True, False])
+    return LoopHypotheses(
+        poses, numbers, numbers, place, numbers * 0, np.array(PAIRS), np.ones(5), masses, masses, accepted, pose_source
+    )
+
+
+def measured(hypotheses, map=MAP, **parameters):
+    out = LoopClosures(**parameters).step(Context("loops"), hypotheses, map)
+    return out.metrics.values, out.figure
+
+
+def test_a_hypothesis_is_right_where_some_images_of_both_were_taken_within_near_m():
+    loops = measured(hypotheses())[0]["loops"]
+    counts = ("hypotheses", "accepted", "rejected", "wrong", "precision", "recall")
+    assert [loops[name] for name in counts] == [5, 3, 2, 2, pytest.approx(1 / 3), 0.5]
+    assert [loops["loop_closures"][name] for name in counts] == [4, 2, 2, 1, 0.5, 0.5]
+    assert loops["loop_closures"]["average_precision"] == pytest.approx((1.0 + 2.0 / 3.0) / 2.0)
+    assert [loops["merged"][name] for name in counts] == [4, 2, 2, 0, 1.0, 1.0]
+    nearer, farther = (measured(hypotheses(), near_m=near)[0]["loops"]["loop_closures"] for near in (2.4, 7.0))
+    assert (nearer["precision"], nearer["recall"]) == (0.5, 1.0)
+    assert (farther["precision"], farther["recall"]) == (1.0, pytest.approx(2 / 3))
+
+
+def test_a_loop_closure_leaps_over_at_least_so_many_images():
+    assert measured(hypotheses(), min_images_between=11)[0]["loops"]["loop_closures"]["hypotheses"] == 3
+    assert measured(hypotheses(), min_images_between=1)[0]["loops"]["loop_closures"]["hypotheses"] == 5
+
+
+def test_other_thresholds_of_support_accept_what_lies_above_them():
+    found = measured(hypotheses())[0]["loops"]["at_supports"]
+    assert found["support"] == [round(k / 20, 2) for k in range(1, 20)]
+    assert found["accepted"] == [4] + [3] * 6 + [2] * 4 + [1] * 6 + [0] * 2
+    assert found["wrong"] == [2] + [1] * 10 + [0] * 8
+    assert found["precision"][-3:] == [1.0, None, None]
+
+
+def test_the_curve_is_drawn_where_a_loop_closure_is_right():
+    figure = measured(hypotheses())[1]
+    assert "2 of 4 right" in figure.caption
+    assert "83.3 %" in figure.caption
+    assert measured(hypotheses(), near_m=0.5)[1] is None
+
+
+def test_without_truth_it_is_not_said_what_is_right():
+    values, figure = measured(hypotheses("odometry"))
+    assert figure is None
+    assert values["loops"]["precision"] is values["loops"]["loop_closures"]["average_precision"] is None
+    assert values["loops"]["at_supports"]["recall"] == [None] * 19
+    assert (values["loops"]["accepted"], values["loops"]["merged"]["accepted"]) == (3, 2)
+
+
+def test_a_map_is_measured_by_its_places_parts_paths_and_bytes():
+    held = measured(hypotheses())[0]["map"]
+    size = len(artifact_bytes(MAP))
+    assert held == {
+        "size_bytes": size,
+        "places": 4,
+        "links": 2,
+        "parts": 2,
+        "views": 6,
+        "place_size_bytes": size / 4,
+        "pose_source": "truth",
+        "step_m": {"median": 1.5, "p90": pytest.approx(3.7), "max": 4.0},
+    }
+    alone = dataclasses.replace(made_map([(0.0, 0.0)], {}), pose_source="odometry")
+    assert "step_m" not in measured(hypotheses(), alone)[0]["map"]

@@ -1,18 +1,21 @@
-"""The pose that stands for a belief."""
+import math
 
 import numpy as np
 import pytest
 
 from omninav.pipeline import Context
 from omninav.stages.metrics.pose_estimate import BeliefEstimate
-from omninav.stages.values.belief import Particles
+from omninav.stages.values.belief import GaussianMixture
 
-POSES = np.concatenate([np.tile([1.0, 0.0, 0.0], (60, 1)), np.tile([9.0, 0.0, 0.0], (40, 1))])
-SPLIT = Particles(POSES, np.full(100, 0.01))
+BELIEF = GaussianMixture(
+    np.array([[0.0, 0.0, 0.0], [4.0, 8.0, math.pi / 2]]), np.stack([np.eye(3)] * 2), np.array([0.75, 0.25])
+)
 
 
-@pytest.mark.parametrize(("taken", "x"), [("mode", 1.0), ("mean", 4.2)])
-def test_a_split_belief_is_its_heavier_mode_or_its_mean(taken, x):
-    estimate = BeliefEstimate(taken=taken).step(Context("estimate"), SPLIT).estimate
-    assert estimate.pose.x == pytest.approx(x)
-    assert (estimate.mean.x, estimate.mode_weight) == (pytest.approx(4.2), pytest.approx(0.6))
+def test_the_pose_that_is_told_is_the_heaviest_mode_unless_the_mean_is_asked_for():
+    mode = BeliefEstimate().step(Context("estimate"), BELIEF).estimate
+    mean = BeliefEstimate(taken="mean").step(Context("estimate"), BELIEF).estimate
+    assert (mode.pose.x, mode.pose.y, mode.pose.heading) == (0.0, 0.0, 0.0)
+    assert (mean.pose.x, mean.pose.y) == pytest.approx((1.0, 2.0))
+    assert mean.pose == mean.mean
+    assert mean.mode_weight == mode.mode_weight == 0.75

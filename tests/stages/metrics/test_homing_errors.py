@@ -1,0 +1,92 @@
+import math
+
+import pytest
+from small_run import collected
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.metrics.homing_errors import HomingErrors
+from omninav.stages.values.homing import HomingVector, PathProgress
+from omninav.stages.values.pose import Pose
+
+EAST, NORTH = 0.0, math.pi / 2
+HOME = (2.0, 1.0, NORTH)
+PATH = [HOME, (2.0, 5.0, EAST), (2.0, 3.0, EAST), (2.0, 1.25, NORTH), (2.0, 0.5, NORTH + 0.1)]
+"""Carried 4 m to the north of home, it drives back, comes as close as 0.25 m and ends 0.5 m beyond."""
+
+
+def vector(direction, turn=0.0, inliers=10, state="tracking"):
+    return HomingVector(0, direction, turn, 1.0, 1.0, 1.0, None, inliers, state)
+
+
+def at(arrived):
+    return PathProgress(path=0, at=0, of=1, target=0, last=True, docking=False, arrived=arrived)
+
+
+VECTORS = [
+    vector(1.0, 1.0, 99),  # before it was carried away: not measured
+    vector(-math.pi / 2 + 0.2, math.pi / 2 - 0.3, 30),
+    vector(0.0, 0.0, 50, "lost"),
+    vector(2.0, 0.0, 10),  # within 0.3 m, where the direction hardly matters
+    vector(-0.1 + 0.4, -0.1, 14),
+]
+
+
+def homing(path=PATH, vectors=VECTORS, arrived=(True, False, False, True, True), **parameters):
+    ticks = [Tick(k, 2 * k * 10**9) for k in range(len(path))]
+    drive = collected(ticks, [pose and Pose(*pose) for pose in path])
+    metrics = HomingErrors(**parameters).step(Context("homing"), drive, vectors, [at(each) for each in arrived]).metrics
+    return metrics and metrics.values["homing"]
+
+
+def test_the_error_at_the_end_is_that_of_the_last_pose_however_close_it_came_before():
+    found = homing()
+    assert found["end_error_m"] == pytest.approx(0.5)
+    assert found["end"] == {"error_m": {"mean": pytest.approx(0.5), "std": 0.0}, "frames": 1}
+    assert found["end_turn_deg"] == pytest.approx(math.degrees(0.1))
+
+
+def test_it_begins_where_it_was_carried_to():
+    found = homing()
+    assert found["start_m"] == pytest.approx(4.0)
+    assert (found["arrived"], found["time_s"]) == (1, 4.0)
+    assert found["first"] == {
+        "direction_error_deg": pytest.approx(math.degrees(0.2)),
+        "turn_error_deg": pytest.approx(math.degrees(0.3)),
+        "inliers": 30,
+    }
+
+
+def test_errors_of_the_direction_are_those_of_found_vectors_farther_away_than_from_m():
+    found = homing()
+    assert found["lost_rate"] == pytest.approx(1 / 4)
+    assert found["inliers"] == 14.0
+    degrees = [math.degrees(error) for error in (0.3, 0.38, 0.4)]
+    assert list(found["direction_error_deg"].values()) == pytest.approx(degrees)
+    assert homing(from_m=0.1)["direction_error_deg"]["max"] > 60.0
+
+
+def test_a_vector_at_from_m_itself_is_not_measured():
+    path = [(0.0, 0.0, EAST), (4.0, 0.0, EAST), (0.5, 0.0, EAST)]
+    vectors = [None, vector(math.pi + 0.1), vector(math.pi + 0.7)]
+    found = homing(path, vectors, (False,) * 3, from_m=0.5)
+    assert found["direction_error_deg"]["max"] == pytest.approx(math.degrees(0.1))
+
+
+def test_who_never_says_that_it_arrived_has_not():
+    found = homing(arrived=(True, True, False, False, False))
+    assert (found["arrived"], found["time_s"]) == (0, None)
+
+
+def test_where_the_target_was_never_found_no_error_is_told():
+    lost = [None, *[vector(0.0, inliers=3, state="lost")] * 4]
+    found = homing(vectors=lost)
+    assert found["lost_rate"] == 1.0
+    assert found["inliers"] is None
+    assert found["direction_error_deg"] == {"median": None, "p90": None, "max": None}
+    assert found["first"] == {"direction_error_deg": None, "turn_error_deg": None, "inliers": 3}
+    assert found["end_error_m"] == pytest.approx(0.5)
+
+
+def test_without_a_vector_or_with_a_gap_in_the_truth_nothing_is_measured():
+    assert homing(vectors=[VECTORS[0], None, None, None, None]) is None
+    assert homing(path=[*PATH[:2], None, *PATH[3:]]) is None

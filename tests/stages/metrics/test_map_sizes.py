@@ -1,0 +1,120 @@
+"""The size of maps, the density of views, and how far references lie from where they were taken."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from small_run import collected, mixture_run, reference_graph, small_run
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.metrics.map_pose_errors import MapPoseErrors
+from omninav.stages.metrics.map_size import MapSize
+from omninav.stages.metrics.view_map_size import ViewMapSize, visited_area
+from omninav.stages.values.maps import ReferenceEvent
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.view_mixtures import ViewMixtures
+
+CTX = Context("map")
+
+
+def test_a_map_of_references_is_as_large_as_its_arrays():
+    found = MapSize().step(CTX, reference_graph(40)).metrics.values["map"]
+    size = 40 * 10 * 20 * 4 + 40 * 3 * 8 + 39 * 2 * 8
+    assert found == {
+        "size_bytes": size,
+        "references": 40,
+        "edges": 39,
+        "reference_size_bytes": size / 40,
+        "pose_source": "truth",
+    }
+    assert MapSize().step(CTX, reference_graph(0)).metrics.values["map"]["reference_size_bytes"] is None
+
+
+def test_a_map_of_views_is_as_large_as_its_arrays_and_as_dense_as_what_was_visited():
+    run = small_run(frames=12)
+    map = mixture_run(run)[0]
+    found = ViewMapSize(near_m=1.0).step(CTX, run.drive, map).metrics.values["map"]
+    views, parts = len(map), len(map.weights)
+    assert (views, parts) == (10, 11)
+    assert found["size_bytes"] == views * (6 * 4 + 2 * 8) + parts * (8 + 3 * 8 + 9 * 8 + 8 + 8)
+    assert (found["references"], found["components"]) == (views, parts)
+    assert found["reference_size_bytes"] == found["size_bytes"] / views
+    assert found["references_per_m2"] == pytest.approx(views / found["visited_area_m2"])
+    empty = ViewMapSize().step(CTX, collected([Tick(0, 0)], [None]), ViewMixtures.empty()).metrics.values["map"]
+    assert (empty["visited_area_m2"], empty["reference_size_bytes"], empty["references_per_m2"]) == (0.0, None, None)
+
+
+def test_the_area_is_that_of_the_true_path_or_of_the_estimates_where_there_is_no_truth():
+    run = small_run(frames=12)
+    map = mixture_run(run)[0]
+    true, blind = (ViewMapSize().step(CTX, each, map).metrics.values["map"] for each in (run.drive, run.blind))
+    assert true["visited_area_m2"] == visited_area(run.drive.truth[:, :2], 1.0)
+    assert blind["visited_area_m2"] == visited_area(run.drive.estimate[:, :2], 1.0)
+    assert true["visited_area_m2"] != blind["visited_area_m2"]
+
+
+@pytest.mark.parametrize("near", [0.5, 1.0, 3.0])
+def test_the_visited_area_is_that_of_discs_and_of_strips(near):
+    spots = np.random.default_rng(0).uniform(-100.0, 100.0, (400, 2)) * near * 10
+    assert visited_area(spots, near) / len(spots) == pytest.approx(math.pi * near**2, rel=0.04)
+    line = np.stack([np.linspace(0.0, 100.0 * near, 4001), np.full(4001, 0.3 * near)], axis=1)
+    assert visited_area(line, near) == pytest.approx(2 * near * 100 * near + math.pi * near**2, rel=0.05)
+    assert visited_area(np.repeat(spots[:1], 9, axis=0), near) == visited_area(spots[:1], near)
+
+
+def learned(by_odometry, source="odometry", truths=((0, 0), (2, 0), (2, 2), (0, 2), (5, 5))):
+    """Reference k comes in frame 2 k; its true pose is `truths[k]`."""
+    map = dataclasses.replace(reference_graph(len(by_odometry)), pose_source=source)
+    map.put(poses=np.array([(x, y, 0.0) for x, y in by_odometry], np.float64).reshape(-1, 3))
+    events, truth = [], []
+    for reference, spot in enumerate(truths[: len(by_odometry)]):
+        events += [ReferenceEvent(reference, "far"), None]
+        truth += [None if spot is None else Pose(*map_floats(spot), 0.0), Pose(90.0, 90.0, 0.0)]
+    return events, truth, map
+
+
+def map_floats(spot):
+    return (float(number) for number in spot)
+
+
+SQUARE = [(0, 0), (2, 0), (2, 2), (0, 2)]
+
+
+def test_references_are_measured_after_the_map_was_laid_over_the_truth():
+    turned = [(10 - y, 3 + x) for x, y in SQUARE]
+    wide = [(2 * x, 2 * y) for x, y in SQUARE]
+    events, truth, map = learned(wide)
+    found = MapPoseErrors().step(CTX, events, truth, map, learned(turned)[2]).metrics.values["map_error"]
+    assert found["references"] == 4
+    assert found["as_driven_m"] == pytest.approx(math.sqrt(2))
+    assert found["straightened_m"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_an_error_is_the_root_mean_square():
+    bent = [(0, 0), (2, 0), (4, 0), (6, 1)]
+    events, truth, map = learned(bent, truths=((0, 0), (2, 0), (4, 0), (6, 0)))
+    found = MapPoseErrors().step(CTX, events, truth, map, map).metrics.values["map_error"]
+    angle = math.atan2(sum(y * (x - 3.0) for x, y in bent), sum((x - 3.0) ** 2 for x, _ in bent))
+    cos, sin = math.cos(angle), math.sin(angle)
+    left = [
+        math.dist((cos * (x - 3.0) + sin * (y - 0.25), -sin * (x - 3.0) + cos * (y - 0.25)), (x - 3.0, 0.0))
+        for x, y in bent
+    ]
+    assert found["as_driven_m"] == pytest.approx(math.sqrt(sum(error**2 for error in left) / 4))
+
+
+def test_a_reference_without_a_true_pose_does_not_count_and_two_are_too_few():
+    wrong = [*SQUARE[:3], (77, 77)]
+    events, truth, map = learned(wrong, truths=((0, 0), (2, 0), (2, 2), None))
+    found = MapPoseErrors().step(CTX, events, truth, map, map).metrics.values["map_error"]
+    assert (found["references"], found["as_driven_m"]) == (3, pytest.approx(0.0, abs=1e-12))
+    few = learned(wrong, truths=((0, 0), (2, 0), None, None))
+    assert MapPoseErrors().step(CTX, *few, few[2]).metrics is None
+
+
+def test_a_map_of_true_poses_or_of_none_is_not_measured():
+    true = learned(SQUARE, source="truth")
+    assert MapPoseErrors().step(CTX, *true, true[2]).metrics is None
+    empty = learned([])
+    assert MapPoseErrors().step(CTX, *empty, empty[2]).metrics is None
