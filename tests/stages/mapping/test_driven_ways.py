@@ -1,0 +1,168 @@
+"""Ways between places, names, loops and spread of small topological maps, worked by hand."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_places import made_map
+from made_views import between_looks, made_views
+
+from omninav.pipeline import Context
+from omninav.stages.mapping.topological import (
+    TopologicalMapping,
+    driven_ways,
+    known_ways,
+    no_segments,
+    spread_to_medoids,
+    with_loops,
+    with_names,
+)
+from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
+from omninav.stages.values.rooms import Rooms
+from omninav.stages.values.topological_map import DRIVEN, LOOP, LoopHypotheses, stored
+
+
+def ways(looks: list[float], place: list[int], medoids: list[int], tour: list[int] | None = None) -> dict:
+    numbers = np.ones(len(place), np.int64) if tour is None else np.array(tour)
+    found = driven_ways(between_looks(looks), np.array(place), numbers, np.array(medoids))
+    return {pair: way.tolist() for pair, way in found.items()}
+
+
+def test_a_way_leads_from_medoid_to_medoid_along_the_drive() -> None:
+    assert ways([0, 1, 2, 10, 11, 12], [0, 0, 0, 1, 1, 1], [1, 4]) == {(0, 1): [1, 2, 3, 4]}
+
+
+def test_where_a_medoid_is_of_another_pass_the_way_begins_and_ends_with_it() -> None:
+    # A second pass (views 5 to 8) is the only one from 0 to 1; both medoids are of the first, by way of 2.
+    looks, place = [0, 0.1, 50, 10, 50, 0.3, 0.2, 10.4, 10.2], [0, 0, 2, 1, 2, 0, 0, 1, 1]
+    assert ways(looks, place, [1, 3, 2])[(0, 1)] == [1, 6, 7, 8, 3]
+
+
+def test_of_several_passes_the_one_counts_that_comes_nearest_to_both_medoids() -> None:
+    # 0 to 1 is driven at 0.5 and 10.5, then (from elsewhere) at 0 and 10, the medoids, and back again at 10.1 and 0.1.
+    looks, place = [0.5, 10.5, 50, 0.0, 10.0, 50, 10.1, 0.1], [0, 1, 2, 0, 1, 2, 1, 0]
+    assert ways(looks, place, [3, 4, 2])[(0, 1)] == [3, 4]
+    assert ways(looks, place, [7, 6, 2])[(0, 1)] == [7, 6]  # as it was driven back, turned round
+
+
+def test_of_passes_that_are_as_near_the_shortest_counts() -> None:
+    looks, place = [0.0, 0.1, 10.0, 50, 0.0, 10.0], [0, 0, 1, 2, 0, 1]
+    found = ways(looks, place, [0, 2, 3])
+    assert found[(0, 1)] in ([0, 1, 2], [0, 4, 5, 2])
+    assert len(found[(0, 1)]) == 3
+    later = ways([0.0, 10.0, 50, 0.0, 0.1, 10.0], [0, 1, 2, 0, 0, 1], [0, 1, 2])
+    assert later[(0, 1)] == [0, 1]
+
+
+def test_places_are_joined_in_the_order_in_which_they_were_first_driven() -> None:
+    assert set(ways([0, 10, 0, 20], [0, 1, 0, 2], [0, 1, 3])) == {(0, 1), (0, 2)}
+    assert set(ways([10, 0, 10], [1, 0, 1], [1, 0])) == {(1, 0)}
+
+
+def test_no_way_leads_from_tour_to_tour_nor_within_a_known_map() -> None:
+    looks, place = [0.0, 10, 20, 30, 40, 50], [0, 1, 2, 3, 4, 5]
+    found = ways(looks, place, [0, 1, 2, 3, 4, 5], [0, 0, 1, 1, 2, 2])
+    assert set(found) == {(2, 3), (4, 5)}
+    assert ways([0.0, 0.1, 0.2], [0, 0, 0], [1], [1, 1, 2]) == {}  # one place, left with a tour
+
+
+def test_known_ways_are_kept_between_what_their_places_have_become() -> None:
+    known = made_map([(0, 0), (1, 0), (2, 0), (3, 0)], {(0, 1): 2, (1, 2): 1, (2, 3): 0}, [(0, 3)])
+    # Its views are 4 medoids and 3 path images. Places 2 and 3 have become one, so that (0, 3) is (0, 2) now.
+    place = np.array([5, 1, 2, 2, 5, 5, 1])
+    found = known_ways(known, place)
+    assert {pair: (way.tolist(), kind) for pair, (way, kind) in found.items()} == {
+        (5, 1): ([4, 5], DRIVEN),
+        (1, 2): ([6], DRIVEN),
+        (5, 2): ([], LOOP),
+    }
+    # Places 0 and 2 have become one: the way back from there to 1 is one way with that to it.
+    assert set(known_ways(known, np.array([0, 1, 0, 3, 0, 0, 1]))) == {(0, 1), (0, 3)}
+
+
+def test_links_of_loops_are_new_ones_each_once_and_none_to_itself() -> None:
+    map = made_map([(0, 0), (1, 0), (2, 0), (3, 0)], {(0, 1): 2, (1, 2): 0})
+    pairs = np.array([[1, 0], [3, 1], [1, 3], [2, 2], [0, 2]])
+    found = with_loops(map, pairs)
+    assert found.links.tolist() == [[0, 1], [1, 2], [1, 3], [0, 2]]
+    assert found.kinds.tolist() == [DRIVEN, DRIVEN, LOOP, LOOP]
+    assert [found.path_of(link).tolist() for link in range(4)] == [[4, 5], [], [], []]
+    assert with_loops(map, np.empty((0, 2), np.int64)).links.tolist() == map.links.tolist()
+
+
+def test_a_place_keeps_its_own_name_before_that_of_its_room() -> None:
+    map = made_map([(1.0, 1.0), (9.0, 1.0), (99.0, 1.0)], {}, names=["desk", "", ""])
+    rooms = Rooms(("hall",), np.array([[0.0, 0.0, 10.0, 10.0]]))
+    assert with_names(map, rooms).names == ("desk", "hall", "")
+
+
+RNG = np.random.default_rng(0)
+LOOKS, BEARINGS = RNG.integers(0, 255, (40, 128)).astype(np.uint8), RNG.uniform(-math.pi, math.pi, 40)
+
+
+def patches(rows: list[int] | range, turned: float = 0.0) -> LocalFeatures:
+    """These of forty patches all around, as a robot sees them that is turned; of the odd ones only half as far."""
+    at = BEARINGS[list(rows)] - turned
+    number = len(at)
+    return LocalFeatures(
+        np.column_stack([np.cos(at), np.sin(at), 0.0 * at]),
+        np.zeros((number, 2)),
+        LOOKS[list(rows)],
+        np.zeros((number, 3), np.float32),
+        np.ones(number, np.float32),
+    )
+
+
+def test_the_patches_that_a_view_keeps_are_those_found_again_around_it() -> None:
+    # View 2 has 40 patches; its neighbours on both sides show 10 to 29 and 20 to 34: the ten in both come first.
+    seen = [range(40), range(10, 30), range(40), range(20, 35), range(40)]
+    views = replace(made_views(between_looks([0.0, 9.0, 20.0, 31.0, 43.0])), features=tuple(map(patches, seen)))
+    place = np.arange(5)
+    hypotheses = LoopHypotheses(
+        views.poses, place, place, place, views.tours, np.empty((0, 2), np.int64), np.empty(0), np.empty((0, 3)),
+        np.empty((0, 3)), np.empty(0, np.bool_), "odometry",
+    )  # fmt: skip
+    stage = TopologicalMapping(max_patches=12, window=1, min_path_matches=1)
+    made = stage.step(Context("mapping"), views, hypotheses).map
+    kept = made.views.features(2).descriptors
+    assert [next(n for n in range(40) if (LOOKS[n] == row).all()) for row in kept] == [10, 11, *range(20, 30)]
+    assert len(made.views.features(1).descriptors) == 12
+    # A view of another tour is no neighbour: of equals the strongest stay.
+    apart = replace(views, tours=np.array([1, 1, 2, 3, 3]))
+    kept = stage.step(Context("mapping"), apart, hypotheses).map.views.features(2).descriptors
+    np.testing.assert_array_equal(kept, LOOKS[:12])
+
+
+def test_the_spread_is_the_root_mean_square_over_all_views_but_the_medoids() -> None:
+    map = made_map([(0.0, 0.0), (5.0, 0.0)], {})
+    looks = [patches(range(20)), patches(range(20), 0.3), patches(range(20)), patches([*range(15), *range(25, 30)])]
+    views = replace(made_views(between_looks([0.0] * 4)), features=tuple(looks), segments=(None,) * 4)
+    # The map keeps views 0 and 2 as they are; 1 has the same patches, turned: nothing between them but min_angle;
+    # of 3 only 15 match: 20 / 15 times as far.
+    stored_views = stored([looks[0], looks[2]], [no_segments()] * 2, [views.descriptors[0]] * 2)
+    map = replace(map, views=stored_views, frames=np.array([0, 20]))
+    least = 0.01 / (2 * math.pi)
+    spread = spread_to_medoids(map, views, np.array([0, 0, 1, 1]))
+    assert spread == pytest.approx(math.sqrt((least**2 + (20 / 15 * least) ** 2) / 2), rel=1e-3)
+    assert spread_to_medoids(map, views, np.array([0, 5, 1, 5])) == 0.0
+    nothing = replace(views, features=(looks[0], patches(range(30, 40)), looks[2], patches(range(30, 40))))
+    assert spread_to_medoids(map, nothing, np.array([0, 0, 1, 1])) == 0.0
+
+
+def test_only_the_heaviest_segments_of_a_view_are_kept() -> None:
+    weights = np.array([9.0, 5.0, 2.0], np.float32)
+    segments = VerticalSegments(
+        np.arange(3.0), np.zeros((3, 2)), np.zeros((3, 10), np.float32), weights, np.zeros((3, 2, 2))
+    )
+    views = replace(made_views(between_looks([0.0, 9.0])), features=(patches(range(5)),) * 2, segments=(segments, None))
+    place = np.arange(2)
+    hypotheses = LoopHypotheses(
+        views.poses, place, place, place, views.tours, np.array([[0, 1]]), np.empty(0), np.empty((0, 3)),
+        np.empty((0, 3)), np.array([False]), "odometry",
+    )  # fmt: skip
+    made = TopologicalMapping(max_segments=2).step(Context("mapping"), views, hypotheses).map
+    assert made.views.columns(0).weights.tolist() == [9.0, 5.0]
+    assert len(made.views.columns(1)) == 0
+    assert made.links.tolist() == [[0, 1]]
+    assert made.frames.tolist() == [0, 10]
