@@ -17,7 +17,6 @@ import os
 import pickle
 import random
 import shutil
-import signal
 import sys
 import tempfile
 import time
@@ -32,7 +31,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 from mutations import Mutant, mutants  # noqa: E402
-from session import MutantSession, printed_to  # noqa: E402
+from session import MutantSession, ends_after, printed_to  # noqa: E402
 
 REPOSITORY = HERE.parents[1]
 FOLDERS = {
@@ -46,8 +45,8 @@ ENOUGH = 0.90
 LEFT_OUT = (".git", ".venv*", "build", "runs", "site", "__pycache__", ".*_cache", ".hypothesis", "node_modules")
 OPTIONS = "-x -s --import-mode=importlib -p no:cacheprovider -p no:xdist -p no:anyio"
 PYTEST = ("-o", "addopts=" + OPTIONS)
-UNIMPORTED_S = 60.0
-"""How long the tests of a mutant may take that is imported anew."""
+UNIMPORTED_S = 60
+"""How long the tests of a mutant may work that is imported anew."""
 Ends = dict[Mutant, tuple[str, list[str]]]
 """What became of each mutant, and the tests that were asked."""
 
@@ -160,7 +159,7 @@ def written_and_asked(mutant: Mutant, tests: list[str], place: Path, number: int
     enter(place)
     sys.dont_write_bytecode = True
     printed_to(Path(os.devnull))
-    signal.alarm(int(UNIMPORTED_S))
+    ends_after(UNIMPORTED_S)
     os._exit(int(pytest.main([*PYTEST, *tests])))
 
 

@@ -1,13 +1,14 @@
 """One session of pytest in which every mutant of a folder runs, each in a process of its own.
 
 Tests are collected once. They run once under coverage, so that of each line it is known which tests reach it and how
-long they take. Then each mutant gets a fork of this process, in which the changed function's code is put in the place
+long they work. Then each mutant gets a fork of this process, in which the changed function's code is put in the place
 of the original's, for whoever imported it; the tests that reach its line run, quick ones first, until one fails.
 """
 
 import gc
 import os
 import pickle
+import resource
 import signal
 import sys
 import tempfile
@@ -22,7 +23,7 @@ from _pytest.runner import runtestprotocol
 from mutations import Function, Mutant
 
 QUICK_S = 3.0
-"""A test that takes longer is asked only where no quicker one reaches the line."""
+"""A test that works longer is asked only where no quicker one reaches the line."""
 SETUP = "set-up of "
 
 Reached = dict[str, dict[int, set[int]]]
@@ -81,7 +82,7 @@ class MutantSession:
         return (yield)
 
     def _observed(self) -> tuple[Reached, list[float]]:
-        """Which tests reach which lines, and the seconds that each takes; in another process, which then ends."""
+        """Which tests reach which lines, and the seconds that each works; in another process, which then ends."""
         kept = Path(tempfile.mkstemp(dir=self.root)[1])
         child = os.fork()
         if child == 0:
@@ -101,10 +102,10 @@ class MutantSession:
         measured.start()
         seconds, failed = [], []
         for item, after in zip(self.items, [*self.items[1:], None], strict=True):
-            began = time.monotonic()
+            began = time.process_time()
             if any(report.failed for report in runtestprotocol(item, nextitem=after, log=False)):
                 failed.append(item.nodeid)
-            seconds.append(time.monotonic() - began)
+            seconds.append(time.process_time() - began)
         measured.stop()
         of_context: dict[str, set[int]] = {}
         for k, item in enumerate(self.items):
@@ -145,7 +146,7 @@ class MutantSession:
         if child:
             return child
         printed_to(Path(os.devnull))
-        signal.alarm(int(allowed))
+        ends_after(int(allowed))
         for function in targets:
             function.__code__ = code
         failed = False
@@ -160,6 +161,12 @@ class MutantSession:
         child, status = os.wait()
         if child in running:
             self.ends[running.pop(child)] = "survived" if status == 0 else "killed"
+
+
+def ends_after(seconds: int) -> None:
+    """This process is killed after so many seconds of work, and after ten times as many that it may wait."""
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+    signal.alarm(10 * seconds)
 
 
 def printed_to(file: Path) -> None:
