@@ -173,8 +173,8 @@ EXPERIMENT = {
     "about": "A small gain lags behind, a large one lets noise through.",
     "variant": "thermometer",
     "sweep": {"gain": {"0.05": "smoothing.gain=0.05", "0.4": "smoothing.gain=0.4", "1.0": "smoothing.gain=1.0"}},
-    "scenarios": {"calm": "room.swing=1.0", "lively": "room.swing=3.0"},
-    "repetitions": 4,
+    "scenarios": {f"swing {swing}": f"room.swing={swing}" for swing in (1.0, 1.4, 1.8, 2.2, 2.6, 3.0)},
+    "repetitions": 2,
     "measures": {
         "error": {"title": "Error (K)", "path": ["error_k.mean"], "digits": 2},
         "rise": {"title": "Largest rise (K)", "path": ["course.error_k"], "aggregate": "largest_rise", "digits": 2},

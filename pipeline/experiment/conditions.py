@@ -15,7 +15,7 @@ from omninav.pipeline.run.artifact_specification import without_plotted
 from omninav.pipeline.run.plan import Plan, plan
 
 from .repetition import artifact_key, condition_key, finished, known_digests
-from .specification import Condition, Experiment
+from .specification import DEVELOPMENT, Condition, Experiment
 from .verdicts import Results, key_of
 
 Compose = Callable[[Sequence[str]], dict[str, Any]]
@@ -66,7 +66,7 @@ def condition_runs(experiment: Experiment, folder: Path, overrides: Sequence[str
             experiment, folder, overrides, condition, scenario, (experiment.set, condition.overrides, own), seeds=seeds
         )
         for condition in experiment.conditions()
-        for scenario, own in (experiment.scenarios or {"": ""}).items()
+        for scenario, own in experiment.all_scenarios.items()
     ]
 
 
@@ -88,7 +88,7 @@ def reference_runs(experiment: Experiment, folder: Path, overrides: Sequence[str
                     variant=reference.variant,
                 )
                 for condition in conditions
-                for scenario, own in (experiment.scenarios or {"": ""}).items()
+                for scenario, own in experiment.all_scenarios.items()
             ]
         )
     return found
@@ -176,12 +176,11 @@ def find_results(experiment: Experiment, runs: Sequence[ConditionRun]) -> None:
             run.error = str(wrong)
 
 
-def results_by_condition(experiment: Experiment, runs: Sequence[ConditionRun]) -> Results:
-    """What has run, by condition and repetition: a number for each seed in each scenario."""
-    found: dict[tuple[tuple[str, str], ...], dict[int, dict[str, Any]]] = {}
-    scenarios = list(experiment.scenarios) or [""]
+def results_by_condition(runs: Sequence[ConditionRun], development: bool = False) -> Results:
+    """What has run, by condition, and by scenario and seed: in the scenarios that count, or in that of development."""
+    found: dict[tuple[tuple[str, str], ...], dict[tuple[str, int], dict[str, Any]]] = {}
     for run in runs:
-        first = scenarios.index(run.scenario) * experiment.repetitions
-        of_condition = found.setdefault(key_of(run.condition.labels), {})
-        of_condition |= {first + seed: result for seed, result in run.results.items()}
+        if (run.scenario == DEVELOPMENT) is development:
+            of_condition = found.setdefault(key_of(run.condition.labels), {})
+            of_condition |= {(run.scenario, seed): result for seed, result in run.results.items()}
     return found

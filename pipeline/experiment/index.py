@@ -1,39 +1,30 @@
-"""Tables of finished experiments, and of what papers claim: from verdict files, judged again by today's rule."""
+"""Tables of finished experiments, and of what papers claim, from verdict files."""
 
 import json
 import re
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.graph.problems import BadInput
-from omninav.pipeline.run.provenance import git_commit
 
 from .claims import BEGIN as CLAIMS_BEGIN
 from .claims import CLAIMS, claim_tables
 from .claims import END as CLAIMS_END
-from .page import made_with
-from .verdicts import Verdict, headline, in_words, judged_again, verdict_of
+from .verdicts import Verdict, headline, verdict_of
 
 BEGIN, END = "<!-- table: omninav experiments -->", "<!-- end of the table -->"
-HEAD = ("page", "command", "verdict", "does not hold", "undecided")
-VERDICT_WORDS = "holds|does not hold|undecided"
-RULE = "a claim of fewer than six repetitions is undecided"
+HEAD = ("page", "command", "scenarios", "verdict", "does not hold", "undecided")
 
 
-def write_index(folder: Path) -> tuple[list[str], list[Path]]:
-    """Judge the pages of a folder again; write the table of them into its README.md, and that of its `claims.yaml`.
+def write_index(folder: Path) -> list[Path]:
+    """Write the table of a folder's pages into its README.md, and that of its `claims.yaml` into the page it names.
 
-    Of each `NAME.verdicts.json` and `NAME.md`: where today's rule judges a claim otherwise, both files are changed, and
-    the page says at which commit. Returns the names of those, and the pages with tables. Each table goes between two
-    marks of its page. Raises BadInput where a file is not as a page is written, ProblemsFound for a list of claims that
-    names what is not there.
+    Returns both. Each table goes between two marks of its page. Raises BadInput where a file is not as a page is
+    written, ProblemsFound for a list of claims that names what is not there.
     """
-    here = made_with(version("omninav"), git_commit(), "Judged again with")  # before a file of the checkout changes
     readme = folder / "README.md"
     _between(readme, BEGIN, END, "")
-    changed = [path.name.partition(".")[0] for path in verdict_files(folder) if _judge_again(path, here)]
     written = {readme: _between(readme, BEGIN, END, index_table(folder))}
     if (folder / CLAIMS).exists():
         found = {page_of(path).stem: read_verdicts(path) for path in verdict_files(folder)}
@@ -41,7 +32,7 @@ def write_index(folder: Path) -> tuple[list[str], list[Path]]:
         written[page] = _between(page, CLAIMS_BEGIN, CLAIMS_END, f"\n{tables}\n")
     for page, text in written.items():
         write_whole(page, text)
-    return changed, list(written)
+    return list(written)
 
 
 def _between(page: Path, begin: str, end: str, content: str) -> str:
@@ -68,9 +59,15 @@ def index_table(folder: Path) -> str:
         page, verdicts = page_of(path), read_verdicts(path)
         title, command = _title_and_command(page)
         others = ["; ".join(v.claim.rstrip(".") for v in verdicts if v.holds is held) for held in (False, None)]
-        cells = (f"[{title}]({page.name})", f"`{command}`", f"**{headline(verdicts)}**", *others)
+        cells = (f"[{title}]({page.name})", f"`{command}`", _scenarios(verdicts), f"**{headline(verdicts)}**", *others)
         lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
     return "\n".join(lines) + "\n"
+
+
+def _scenarios(verdicts: Sequence[Verdict]) -> str:
+    """Over how many scenarios the claims were judged; of a page of before scenarios counted, that it is one."""
+    number = max((case.scenarios for verdict in verdicts for case in verdict.cases), default=0)
+    return str(number) if number else "earlier rule"
 
 
 def read_verdicts(path: Path) -> list[Verdict]:
@@ -84,31 +81,6 @@ def read_verdicts(path: Path) -> list[Verdict]:
 def page_of(verdicts: Path) -> Path:
     """The page beside a verdict file."""
     return verdicts.with_name(verdicts.name.removesuffix(".verdicts.json") + ".md")
-
-
-def _judge_again(path: Path, here: str) -> bool:
-    stated = read_verdicts(path)
-    verdicts = [judged_again(verdict) for verdict in stated]
-    if [verdict.plain() for verdict in verdicts] == [verdict.plain() for verdict in stated]:
-        return False
-    page = page_of(path)
-    text = f"{_with_verdicts(page, verdicts).rstrip()}\n\n{here}: {RULE}. The figures are as they were made.\n"
-    write_whole(page, text)
-    write_whole(path, json.dumps([verdict.plain() for verdict in verdicts], indent=1, ensure_ascii=False) + "\n")
-    return True
-
-
-def _with_verdicts(page: Path, verdicts: Sequence[Verdict]) -> str:
-    """A page's text with other verdicts: in the last cell of each case's row, and behind the claim in its first row."""
-    lines = _read(page).split("\n")
-    rows = [number for number, line in enumerate(lines) if re.search(rf"\| ({VERDICT_WORDS}) \|$", line)]
-    cases = [(verdict, case) for verdict in verdicts for case in verdict.cases]
-    if len(rows) != len(cases):
-        raise BadInput(f"{page}: {len(rows)} rows of verdicts, but {len(cases)} in the file beside it; write it again")
-    for number, (verdict, case) in zip(rows, cases, strict=True):
-        line = re.sub(rf"\| ({VERDICT_WORDS}) \|$", f"| {in_words(case.holds)} |", lines[number])
-        lines[number] = re.sub(rf": \*\*({VERDICT_WORDS})\*\* \|", f": **{in_words(verdict.holds)}** |", line, count=1)
-    return "\n".join(lines)
 
 
 def _title_and_command(page: Path) -> tuple[str, str]:

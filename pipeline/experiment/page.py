@@ -18,7 +18,7 @@ from omninav.pipeline.report.rendering import render
 from .conditions import ConditionRun
 from .plots import plots_of, row_labels
 from .specification import Experiment, Measure, figure_of
-from .verdicts import Case, Results, Verdict, in_words, judge, key_of, pooled, samples
+from .verdicts import MIN_SCENARIOS, Case, Results, Verdict, in_words, judge, key_of, over_runs, pooled, samples
 
 STYLES = {"holds": "held", "does not hold": "broken", "undecided": "quiet"}
 """The CSS class of a verdict."""
@@ -45,10 +45,11 @@ class PageContent:
         return [*self.conditions, *(run for several in self.references for run in several)]
 
 
-def write_page(content: PageContent, results: Results, folder: Path) -> Path:
+def write_page(content: PageContent, results: Results, development: Results, folder: Path) -> Path:
     """Write `<name>.md`, `<name>.html`, its plots and `verdicts.json` into the experiment's folder.
 
-    All of it follows from the results as they stand; conditions that failed or are still to run are named.
+    All of it follows from the results as they stand; conditions that failed or are still to run are named. Those of
+    `development` stand beside the others in the tables, and nothing else is made of them.
     """
     experiment, conditions = content.experiment, content.conditions
     verdicts = judge(experiment, results)
@@ -64,7 +65,7 @@ def write_page(content: PageContent, results: Results, folder: Path) -> Path:
         "profile": content.profile,
         "command": shlex.join(content.argv),
         "verdicts": [_verdict(experiment, verdict) for verdict in verdicts],
-        "tables": [_table(experiment, results, name) for name in experiment.measures],
+        "tables": [_table(experiment, results, development, name) for name in experiment.measures],
         "reference_runs": [_reference(content, number) for number in range(len(experiment.reference_runs))],
         "recordings": [(name, _facts(facts)) for name, facts in content.recordings],
         "conditions": rows,
@@ -77,6 +78,7 @@ def write_page(content: PageContent, results: Results, folder: Path) -> Path:
         "missing": sum(len(run.missing) for run in content.all_runs if not run.error),
         "repetitions": experiment.runs_of_a_condition,
         "seeds": experiment.repetitions,
+        "min_scenarios": MIN_SCENARIOS,
         "plots": plots,
     }
     write_whole(folder / f"{experiment.name}.md", render("experiment.md", **values))
@@ -103,19 +105,24 @@ def made_with(version: str, commit: str | None, words: str = "Made with") -> str
     return f"{words} omninav {version}{at}"
 
 
-def mean_and_spread(values: Sequence[float], digits: int) -> str:
-    """Mean ± standard deviation; the one value where it is alone, a dash where there is nothing."""
-    if len(values) < 2:
-        return number(values[0], digits) if values else "–"
+def summary(measure: Measure, values: Sequence[float]) -> str:
+    """Mean ± standard deviation, or the figure that the measure judges; a dash where there is nothing."""
+    digits = measure.digits
+    if not values or len(values) == 1 or measure.over_runs != "mean":
+        return number(over_runs(measure, values) if values else None, digits)
     mean, spread = float(np.mean(values)), float(np.std(values))
     spread = spread if spread > 1e-9 * abs(mean) else 0.0  # equal figures, but for rounding
     return f"{number(mean, digits)} ± {number(spread, digits)}"
 
 
-def beyond_the_mean(values: Sequence[float], ran: int, digits: int) -> list[str]:
-    """What a mean does not show: the median where it differs, and how many of those that ran have a figure at all."""
-    mean, median = (number(float(of(values)), digits) if values else "" for of in (np.mean, np.median))
-    parts = [f"median {median}"] if mean != median else []
+def beyond_the_mean(measure: Measure, values: Sequence[float], ran: int) -> list[str]:
+    """What it does not show: the median where it differs, and how many of those that ran have a figure at all."""
+    shown, median = (
+        (number(of, measure.digits) for of in (over_runs(measure, values), float(np.median(values))))
+        if values
+        else ("", "")
+    )
+    parts = [f"median {median}"] if shown != median else []
     return [*parts, f"{len(values)} of {ran}"] if len(values) < ran else parts
 
 
@@ -149,7 +156,7 @@ def _case(case: Case, measure: Measure) -> dict[str, str]:
     }
 
 
-def _table(experiment: Experiment, results: Results, name: str) -> dict[str, Any]:
+def _table(experiment: Experiment, results: Results, development: Results, name: str) -> dict[str, Any]:
     measure, page = experiment.measures[name], experiment.page
     columns = experiment.labels(page.columns)
     printed = bool(experiment.published.get(name))
@@ -160,13 +167,16 @@ def _table(experiment: Experiment, results: Results, name: str) -> dict[str, Any
             here = labels | {page.columns: column}
             ran = len(results.get(key_of(here), {}))
             found = list(samples(experiment, results, name, here).values())
-            more = beyond_the_mean(found, ran, measure.digits)
+            more = beyond_the_mean(measure, found, ran)
+            chosen_on = list(samples(experiment, development, name, here).values())
+            if chosen_on and not measure.pooled:
+                more.append(f"development {number(over_runs(measure, chosen_on), measure.digits)}")
             if measure.pooled:
                 whole = pooled(experiment, results, name, here)
                 found, more = [] if whole is None else [whole], []
             cells.append(
                 {
-                    "ours": mean_and_spread(found, measure.digits),
+                    "ours": summary(measure, found),
                     "more": ", ".join(more),
                     "paper": number(experiment.published_figure(name, here), measure.digits),
                 }

@@ -10,9 +10,10 @@ import numpy as np
 
 from omninav.pipeline.report.plot_style import PALETTE, plot
 
+from .intervals import Array
 from .series import series_at
-from .specification import Condition, Curve, Experiment, Labels, space_of
-from .verdicts import Array, Results, key_of, samples
+from .specification import Condition, Curve, Experiment, Labels, Measure, space_of
+from .verdicts import Results, key_of, over_runs, samples
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,8 @@ def plots_of(experiment: Experiment, results: Results) -> list[PagePlot]:
             content = _lines(experiment, results, name, page.along, page.panels)
         else:  # of more rows than there are colours bars cannot be told apart
             content = (_bars if len(row_labels(experiment)) <= len(PALETTE) else _points)(experiment, results, name)
-        caption = f"{measure.title}: mean, and standard deviation over the repetitions"
+        what = "mean, and standard deviation over" if measure.over_runs == "mean" else f"{measure.over_runs} of"
+        caption = f"{measure.title}: {what} the repetitions"
         if experiment.published.get(name) and not page.along:
             caption += "; diamonds are the paper's figures"
         file = experiment.name + (f"_{name}" if index else "")
@@ -134,11 +136,11 @@ def _lines(experiment: Experiment, results: Results, name: str, along: str, pane
                     for x in experiment.labels(along)
                 ]
                 known = [(x, list(found.values())) for x, found in points if found]
-                heights += [float(np.mean(values)) for _, values in known]
+                heights += [over_runs(measure, values) for _, values in known]
                 axes.errorbar(
                     [x for x, _ in known],
-                    [float(np.mean(v)) for _, v in known],
-                    yerr=[float(np.std(v)) for _, v in known],
+                    [over_runs(measure, v) for _, v in known],
+                    yerr=[_spread(measure, v) for _, v in known],
                     color=PALETTE[index % len(PALETTE)],
                     marker="os^Dvx"[index % 6],
                     markersize=4,
@@ -227,10 +229,15 @@ def _points(experiment: Experiment, results: Results, name: str) -> bytes:
 def _means(
     cells: Sequence[tuple[Labels, str]], experiment: Experiment, results: Results, name: str
 ) -> tuple[list[float], list[float]]:
-    """Mean and standard deviation over the repetitions of cells of the table, each a row's labels and a column."""
-    by = experiment.page.columns
+    """Figure and spread over the repetitions of cells of the table, each a row's labels and a column."""
+    measure, by = experiment.measures[name], experiment.page.columns
     found = [list(samples(experiment, results, name, labels | {by: column}).values()) for labels, column in cells]
-    return [float(np.mean(v)) if v else np.nan for v in found], [float(np.std(v)) if v else np.nan for v in found]
+    return [over_runs(measure, v) if v else np.nan for v in found], [_spread(measure, v) for v in found]
+
+
+def _spread(measure: Measure, figures: Sequence[float]) -> float:
+    """Standard deviation over the repetitions; of a largest figure there is none."""
+    return float(np.std(figures)) if figures and measure.over_runs == "mean" else np.nan
 
 
 def _legend_above(canvas: Any, grid: Any) -> None:

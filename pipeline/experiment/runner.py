@@ -83,12 +83,12 @@ class ExperimentRun:
 
     def write_page(self) -> Path:
         """The page as things stand."""
-        results = results_by_condition(self.experiment, self.conditions)
+        results, beside = results_by_condition(self.conditions), results_by_condition(self.conditions, development=True)
         recordings = [(each.name, each.facts) for each in self.recordings]
         page = PageContent(
             self.experiment, self.profile, self.argv, self.conditions, self.references, recordings, self._made_with()
         )
-        return write_page(page, results, self.folder)
+        return write_page(page, results, beside, self.folder)
 
     def _record(self, workers: Workers) -> None:
         self.recordings = recordings_of(self.all_runs, self.folder)

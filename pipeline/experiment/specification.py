@@ -14,6 +14,8 @@ from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 
 from .series import Aggregate, figure_at
 
+DEVELOPMENT = "development"
+"""The scenario that is run and shown, and never judged: choices were made on it."""
 MAX_RUNS = 100_000
 """Conditions of an experiment, and repetitions of each."""
 Labels = dict[str, str]
@@ -40,6 +42,8 @@ class Measure:
     """Stages whose time together (ms), step by step, is the figure."""
     pooled: bool = False
     """Whether the figure is the standard deviation over all frames of all repetitions."""
+    over_runs: Literal["mean", "largest", "smallest"] = "mean"
+    """Which figure of the repetitions' is judged: with `largest`, that of the worst of them."""
 
 
 Other = float | str | Mapping[str, Any]
@@ -50,9 +54,9 @@ Other = float | str | Mapping[str, Any]
 class Claim:
     """Something the paper states (or that we expect), as a comparison that comes out true or false.
 
-    It has one case for each condition with the labels of `of`, and makes one comparison. By the mean alone: `at_most`,
-    `at_least`. By the whole 95 % interval: `below`, `above`, `not_above` (better, or worse by less than `MARGIN` of the
-    other side), `no_worse` (the interval includes 0 or lies below it: weaker). With all other conditions: `lowest`.
+    It has one case for each condition with the labels of `of`, and makes one comparison, by the whole 95 % interval:
+    `at_most`, `at_least`, `below`, `above`, or `not_above` (better, or worse by less than `MARGIN` of the other side);
+    with all other conditions `lowest`. It is false where the whole interval lies on the other side, else undecided.
     """
 
     statement: str
@@ -64,7 +68,6 @@ class Claim:
     below: Other | None = None
     above: Other | None = None
     not_above: Other | None = None
-    no_worse: Other | None = None
     lowest: bool = False
     """Whether the figure is `not_above` that of each other condition."""
     among: tuple[str, ...] = ()
@@ -147,8 +150,10 @@ class Experiment:
     repetitions: int = 50
     """Each condition is run with the seeds 0 to `repetitions` - 1."""
     scenarios: Mapping[str, str] = field(default_factory=dict)
-    """Label -> overrides. Each condition is run in each of them with every seed, and all count as its repetitions, so
-    that intervals cover more than the seeds."""
+    """Label -> overrides: other worlds, days, routes. Each condition is run in each of them with every seed. A claim is
+    decided by six or more, which intervals resample first."""
+    development: str = ""
+    """Overrides of one more scenario, on which choices were made: it stands beside the others and is never judged."""
     without: tuple[Mapping[str, Any], ...] = ()
     """Labels of conditions that are not run."""
     published: Mapping[str, Any] = field(default_factory=dict)
@@ -178,8 +183,14 @@ class Experiment:
 
     @property
     def runs_of_a_condition(self) -> int:
-        """How often each condition is run: every seed in every scenario."""
+        """How many repetitions of each condition count: every seed in every scenario."""
         return self.repetitions * max(1, len(self.scenarios))
+
+    @property
+    def all_scenarios(self) -> dict[str, str]:
+        """Scenarios, with the one of development last; a nameless one where there are none."""
+        beside = {DEVELOPMENT: self.development} if self.development else {}
+        return {**(self.scenarios or {"": ""}), **beside}
 
     def labels(self, factor: str) -> list[str]:
         """The labels of a factor, in the file's order."""
@@ -250,6 +261,11 @@ def _without_null(entries: Any) -> Any:
 
 def _contradictions(experiment: Experiment) -> "list[Problem]":
     problems = []
+    if DEVELOPMENT in experiment.scenarios:
+        hint = f"development: {experiment.scenarios[DEVELOPMENT]}"
+        problems.append(
+            Problem("experiment.scenarios", "development is an entry of its own, which is not judged", hint)
+        )
     factors = list(experiment.sweep)
     if not 1 <= experiment.repetitions <= MAX_RUNS:
         problems.append(Problem("experiment.repetitions", f"expected at least 1, and at most {MAX_RUNS:,}"))
@@ -302,8 +318,12 @@ def _faults(experiment: Experiment, claim: Claim) -> "list[str]":
             faults.append(f"{side}: a ratio is compared with a number")
     if claim.ratio_to is not None and claim.lowest:
         faults.append("lowest: a ratio is compared with a number")
-    if claim.measure in experiment.measures and experiment.measures[claim.measure].pooled:
+    measure = experiment.measures.get(claim.measure)
+    if measure is not None and measure.pooled:
         faults.append(f"{claim.measure} is pooled over the repetitions, which leaves nothing to judge it by")
+    with_conditions = claim.lowest or any(isinstance(getattr(claim, side), Mapping) for side in sides)
+    if measure is not None and measure.over_runs != "mean" and (with_conditions or claim.ratio_to is not None):
+        faults.append(f"{claim.measure} is the {measure.over_runs} of the repetitions, which is compared with a number")
     return faults
 
 
@@ -332,8 +352,8 @@ def space_of(result: Mapping[str, Any]) -> dict[str, Any]:
     return {**result["metrics"], "timing": result["timing"], "facts": result["facts"]}
 
 
-Side = Literal["at_most", "at_least", "below", "above", "not_above", "no_worse"]
-SIDES: tuple[Side, ...] = ("at_most", "at_least", "below", "above", "not_above", "no_worse")
+Side = Literal["at_most", "at_least", "below", "above", "not_above"]
+SIDES: tuple[Side, ...] = ("at_most", "at_least", "below", "above", "not_above")
 
 
 def comparison_of(claim: Claim) -> Side | Literal["lowest"]:

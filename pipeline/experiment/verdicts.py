@@ -1,35 +1,38 @@
 """Claims against results: means, bootstrap intervals of paired differences, and whether each claim holds."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from .intervals import Array, bootstrap_interval
 from .series import figure_at, pooled_deviation
-from .specification import Claim, Experiment, Labels, Side, comparison_of, figure_of, space_of
+from .specification import Claim, Experiment, Labels, Measure, Side, comparison_of, figure_of, space_of
 
-Array = npt.NDArray[np.float64]
-Results = Mapping[tuple[tuple[str, str], ...], Mapping[int, Mapping[str, Any]]]
-"""Labels of a condition (as `key_of` gives them) -> seed -> result."""
+Repetition = tuple[str, int]
+"""Scenario ('' where there is none) and seed."""
+Results = Mapping[tuple[tuple[str, str], ...], Mapping[Repetition, Mapping[str, Any]]]
+"""Labels of a condition (as `key_of` gives them) -> repetition -> result."""
+Samples = Mapping[Repetition, float]
+"""A measure's figure in each repetition."""
 
-RESAMPLES = 4999
-CONFIDENCE = 0.95
-MIN_REPETITIONS = 6
-"""With fewer neither an interval nor a mean says what the next repetition would do: no verdict is made from them."""
+MIN_SCENARIOS = 6
+"""With fewer worlds, days or routes nothing says what the next one would give, however many seeds there are of each."""
+ROUNDING = 1e-9
 MARGIN = 0.05
 """Share of the other side by which `not_above` may be above it: no amount of data shows that two figures are equal."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A claim for one condition: our mean, what it is compared with, the difference's interval, whether it holds.
+    """A claim for one condition: our figure, what it is compared with, the difference's interval, whether it holds.
 
-    `difference` is ours less the other side; `interval` its 95 % bootstrap interval over the repetitions. `holds` is
-    None where a condition has no results, and where the repetitions cannot decide. `judged` of `repetitions` have a
-    figure (steps until converged are those of the ones that converged): with fewer than all a claim may fail and does
-    not hold. `ratio`: the figures are ratios of means.
+    `difference` is ours less the other side; `interval` its 95 % bootstrap interval over `scenarios` and the seeds in
+    each (None of a largest figure, which no resampling makes larger). `holds` is None where a condition has no results,
+    and where the repetitions cannot decide. `judged` of `repetitions` have a figure (steps until converged are those of
+    the ones that converged): with fewer than all a claim may fail and does not hold. `ratio`: the figures are ratios of
+    means.
     """
 
     where: str
@@ -42,6 +45,8 @@ class Case:
     judged: int = 0
     repetitions: int = 0
     ratio: bool = False
+    scenarios: int = 0
+    """Independent ones among the judged; 0 in files of before there were six."""
 
 
 @dataclass(frozen=True)
@@ -80,12 +85,6 @@ def verdict_of(plain: Mapping[str, Any]) -> Verdict:
     return Verdict(plain["claim"], plain["measure"], plain["paper"], tuple(cases))
 
 
-def judged_again(verdict: Verdict) -> Verdict:
-    """A verdict of an earlier day by today's rule, as far as its figures tell: few repetitions decide nothing."""
-    few = [replace(case, holds=None) if case.judged < MIN_REPETITIONS else case for case in verdict.cases]
-    return replace(verdict, cases=tuple(few))
-
-
 def in_words(holds: bool | None) -> str:
     """What a claim or a case comes to."""
     return {True: "holds", False: "does not hold", None: "undecided"}[holds]
@@ -105,14 +104,26 @@ def key_of(labels: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     return tuple(sorted((factor, str(label)) for factor, label in labels.items()))
 
 
-def samples(experiment: Experiment, results: Results, measure: str, labels: Labels) -> dict[int, float]:
-    """A measure's figure in each repetition of a condition, by seed; those without one are left out."""
+def samples(experiment: Experiment, results: Results, measure: str, labels: Labels) -> dict[Repetition, float]:
+    """A measure's figure in each repetition of a condition; those without one are left out."""
     found = {}
-    for seed, result in sorted(results.get(key_of(labels), {}).items()):
+    for repetition, result in sorted(results.get(key_of(labels), {}).items()):
         figure = figure_of(experiment.measures[measure], result)
         if figure is not None:
-            found[seed] = figure
+            found[repetition] = figure
     return found
+
+
+def over_runs(measure: Measure, figures: Iterable[float]) -> float:
+    """One figure of those of the repetitions: their mean, or the largest or smallest where the measure says so."""
+    found = np.fromiter(figures, dtype=np.float64)
+    match measure.over_runs:
+        case "largest":
+            return float(found.max())
+        case "smallest":
+            return float(found.min())
+        case _:
+            return float(found.mean())
 
 
 def pooled(experiment: Experiment, results: Results, measure: str, labels: Labels) -> float | None:
@@ -131,35 +142,6 @@ def pooled(experiment: Experiment, results: Results, measure: str, labels: Label
             means, deviations, counts = zip(*whole, strict=True)
             return described.scale * pooled_deviation(means, deviations, counts)
     return None
-
-
-def bootstrap_interval(values: Array, over: Array | None = None) -> tuple[float, float]:
-    """95 % interval of the mean by resampling (percentile bootstrap, 4999 resamples, always the same ones).
-
-    With `over` (N,) that of the ratio of the two means, resampled in pairs. Equal values, or a single one, give an
-    interval of no width.
-    """
-    columns = (values,) if over is None else (values, over)
-    if len(values) < 2 or all(np.ptp(column) == 0.0 for column in columns):
-        mean = float(values.mean()) if over is None else float(values.mean() / over.mean())
-        return mean, mean
-    from scipy.stats import bootstrap  # type: ignore[attr-defined]
-
-    def statistic(*drawn: Array, axis: int) -> Array:
-        means = [column.mean(axis=axis) for column in drawn]
-        return np.asarray(means[0] if over is None else means[0] / means[1])
-
-    found = bootstrap(
-        columns,
-        statistic,
-        n_resamples=RESAMPLES,
-        confidence_level=CONFIDENCE,
-        method="percentile",
-        paired=over is not None,
-        vectorized=True,
-        rng=np.random.default_rng(0),
-    ).confidence_interval
-    return float(found.low), float(found.high)
 
 
 def judge(experiment: Experiment, results: Results) -> list[Verdict]:
@@ -191,25 +173,28 @@ def _case(experiment: Experiment, claim: Claim, side: Side, labels: Labels, resu
     if isinstance(other, Mapping):
         return _against_condition(experiment, claim, side, labels, other, results)
     where, against = _where(experiment, labels), "the paper's figure" if other == "published" else "the limit"
+    measure = experiment.measures[claim.measure]
     limit = experiment.published_figure(claim.measure, labels) if other == "published" else float(other)
     limit = None if limit is None else claim.scale * limit
-    ours, over = samples(experiment, results, claim.measure, labels), None
-    seeds, ran = sorted(ours), len(results.get(key_of(labels), {}))
+    ours, theirs = samples(experiment, results, claim.measure, labels), None
+    ran = _ran(results, labels, labels)
     if claim.ratio_to is not None:
         facing = _facing(labels, claim.ratio_to)
         theirs = samples(experiment, results, claim.measure, facing)
-        seeds, ran = sorted(set(ours) & set(theirs)), _ran(results, labels, facing)
-        over = np.array([theirs[seed] for seed in seeds])
+        ran = _ran(results, labels, facing)
         where = f"{where} / {_changed(labels, facing)}"
-    if not seeds or limit is None or (over is not None and over.mean() == 0.0):
-        return Case(where, None if over is not None else _mean(ours), limit, against, None, None, None)
-    values = np.array([ours[seed] for seed in seeds])
-    ours_mean = float(values.mean() if over is None else values.mean() / over.mean())
-    low, high = (end - limit for end in bootstrap_interval(values, over))
-    holds = _holds(side, ours_mean - limit, (low, high), abs(limit), len(seeds), ran)
-    return Case(
-        where, ours_mean, limit, against, ours_mean - limit, (low, high), holds, len(seeds), ran, over is not None
-    )
+        both = sorted(set(ours) & set(theirs))
+        ours, theirs = {each: ours[each] for each in both}, {each: theirs[each] for each in both}
+    ratio = theirs is not None
+    if not ours or limit is None or (theirs is not None and sum(theirs.values()) == 0.0):
+        return Case(where, None if ratio else _mean(measure, ours), limit, against, None, None, None)
+    found = over_runs(measure, ours.values()) / (over_runs(measure, theirs.values()) if theirs is not None else 1.0)
+    interval = None
+    if measure.over_runs == "mean":
+        low, high = bootstrap_interval(_by_scenario(ours), _by_scenario(theirs) if theirs is not None else None)
+        interval = low - limit, high - limit
+    holds = _holds(side, interval or (found - limit, found - limit), abs(limit), ours, ran)
+    return Case(where, found, limit, against, found - limit, interval, holds, len(ours), ran, ratio, _scenarios(ours))
 
 
 def _against_condition(
@@ -223,39 +208,40 @@ def _against_condition(
     return _against_samples(side, _where(experiment, labels), ours, theirs, against, ran=_ran(results, labels, facing))
 
 
-def _against_samples(
-    side: Side, where: str, ours: Mapping[int, float], theirs: Mapping[int, float], against: str, ran: int
-) -> Case:
+def _against_samples(side: Side, where: str, ours: Samples, theirs: Samples, against: str, ran: int) -> Case:
     both = sorted(set(ours) & set(theirs))
     if not both:
-        return Case(where, _mean(ours), _mean(theirs), against, None, None, None)
-    differences = np.array([ours[seed] - theirs[seed] for seed in both])
-    interval = bootstrap_interval(differences)
-    mean = float(differences.mean())
-    ours_mean = float(np.mean([ours[seed] for seed in both]))
-    holds = _holds(side, mean, interval, abs(ours_mean - mean), len(both), ran)
-    return Case(where, ours_mean, ours_mean - mean, against, mean, interval, holds, len(both), ran)
+        alone, beside = (float(np.mean(list(each.values()))) if each else None for each in (ours, theirs))
+        return Case(where, alone, beside, against, None, None, None)
+    differences = {each: ours[each] - theirs[each] for each in both}
+    interval = bootstrap_interval(_by_scenario(differences))
+    mean = float(np.mean(list(differences.values())))
+    ours_mean = float(np.mean([ours[each] for each in both]))
+    holds = _holds(side, interval, abs(ours_mean - mean), differences, ran)
+    judged, scenarios = len(both), _scenarios(differences)
+    return Case(where, ours_mean, ours_mean - mean, against, mean, interval, holds, judged, ran, scenarios=scenarios)
 
 
-def _holds(
-    side: Side, difference: float, interval: tuple[float, float], other: float, judged: int, ran: int
-) -> bool | None:
-    """Whether a comparison comes out true; None where the repetitions do not decide it."""
-    low, high = interval
-    holds: bool | None
-    if judged < MIN_REPETITIONS:
-        holds = None
-    elif side == "at_most":
-        holds = difference <= 1e-9
-    elif side == "at_least":
-        holds = difference >= -1e-9
-    elif side == "not_above":  # better or within the margin; worse; or not decided
-        holds = True if high <= MARGIN * other else False if low > 0.0 else None
-    elif side == "no_worse":
-        holds = low <= 0.0
-    else:
-        holds = high < 0.0 if side == "below" else low > 0.0
-    return None if holds and judged < ran else holds  # a claim about survivors holds for nobody else
+def _holds(side: Side, interval: tuple[float, float], other: float, judged: Samples, ran: int) -> bool | None:
+    """Whether a comparison comes out true, by the whole interval; None where the repetitions do not decide it."""
+    if _scenarios(judged) < MIN_SCENARIOS:
+        return None
+    low, high = interval if side in ("at_most", "below", "not_above") else (-interval[1], -interval[0])
+    strict = side in ("below", "above")  # equal is not better
+    allowed = MARGIN * other if side == "not_above" else 0.0
+    if high < 0.0 or (high <= allowed + ROUNDING and not strict):
+        return True if len(judged) == ran else None  # a claim about survivors holds for nobody else
+    return False if low > ROUNDING or (strict and low >= 0.0) else None
+
+
+def _by_scenario(figures: Samples) -> list[Array]:
+    """The figures of each scenario, both in order."""
+    names = sorted({scenario for scenario, _ in figures})
+    return [np.array([figures[each] for each in sorted(figures) if each[0] == name]) for name in names]
+
+
+def _scenarios(figures: Samples) -> int:
+    return len({scenario for scenario, _ in figures})
 
 
 def _lowest(experiment: Experiment, claim: Claim, labels: Labels, results: Results) -> Case:
@@ -270,7 +256,7 @@ def _lowest(experiment: Experiment, claim: Claim, labels: Labels, results: Resul
             theirs = samples(experiment, results, claim.measure, facing)
             cases.append(_against_samples("not_above", where, ours, theirs, against, _ran(results, labels, facing)))
     if not cases:
-        return Case(where, _mean(ours), None, "no other", None, None, None)
+        return Case(where, _mean(experiment.measures[claim.measure], ours), None, "no other", None, None, None)
     worst = {False: 0, None: 1, True: 2}
     return min(cases, key=lambda case: (worst[case.holds], -(case.difference or 0.0)))
 
@@ -293,5 +279,5 @@ def _where(experiment: Experiment, labels: Labels) -> str:
     return ", ".join(labels[factor] for factor in experiment.sweep if factor in labels)
 
 
-def _mean(values: Mapping[int, float]) -> float | None:
-    return float(np.mean(list(values.values()))) if values else None
+def _mean(measure: Measure, values: Samples) -> float | None:
+    return over_runs(measure, values.values()) if values else None

@@ -85,21 +85,21 @@ def experiment(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_an_experiment_judges_its_claims(experiment: Path):
     smoothing, less = json.loads((experiment / "verdicts.json").read_text())
     assert smoothing["holds"] is True
-    assert smoothing["cases"][0]["repetitions"] == 2 * 4
+    assert smoothing["cases"][0]["repetitions"] == 6 * 2
     assert less["holds"] is False
 
 
 def test_what_the_source_computes_is_recorded_once_for_each_scenario(experiment: Path):
     recorded = [json.loads(path.read_text()) for path in (experiment / "recordings").glob("*/facts.json")]
-    assert [each["facts"] for each in recorded] == [{"length_s": 40}, {"length_s": 40}]
+    assert [each["facts"] for each in recorded] == 6 * [{"length_s": 40}]
     page = (experiment / "gains.md").read_text()
-    assert page.count("* Recording `room of 40 readings") == 2
+    assert page.count("* Recording `room of 40 readings") == 6
 
 
 def test_the_page_of_an_experiment_states_how_large_each_condition_was(experiment: Path):
     page = (experiment / "gains.md").read_text()
     assert "| condition | repetitions | Readings |" in page
-    assert "| gain 0.4, scenario calm | 4/4 | 40 |" in page
+    assert "| gain 0.4, scenario swing 1.4 | 2/2 | 40 |" in page
     assert (experiment / "gains_curve_1.png").stat().st_size > 1000
 
 

@@ -11,6 +11,7 @@ from omninav.pipeline.engine.artifact import check_artifact
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.experiment.conditions import open_inputs
 from omninav.pipeline.experiment.runner import ExperimentRun
+from omninav.pipeline.experiment.specification import DEVELOPMENT
 from omninav.pipeline.graph.graph import LIFETIMES
 from omninav.pipeline.graph.ground_truth import truth_readers
 from omninav.pipeline.graph.problems import BadInput
@@ -70,8 +71,10 @@ def _check_experiment(run: ExperimentRun) -> int:
     runs = sum(len(each.seeds) for each in run.all_runs)
     print(f"{experiment.name}, profile {run.profile}: nothing wrong with it")
     over = f" in each of {len(experiment.scenarios)} scenarios" if experiment.scenarios else ""
+    over += f", and in that of {DEVELOPMENT}" if experiment.development else ""
+    repetitions = f"{experiment.repetitions} repetition{'s' if experiment.repetitions > 1 else ''}"
     conditions = len(experiment.conditions())
-    print(f"{conditions} conditions ({factors}), each with {experiment.repetitions} repetitions{over}")
+    print(f"{conditions} conditions ({factors}), each with {repetitions}{over}")
     references = len(run.all_runs) - len(run.conditions)
     print(f"{runs} runs in all" + (f", {references} of them reference runs" if references else ""))
     print(f"claims to be judged: {len(experiment.claims)}")

@@ -7,12 +7,9 @@ from omninav.pipeline.graph.problems import BadInput
 
 
 def command(arguments: list[str]) -> int:
-    """Judge the pages in a folder by today's rule, and write their table and that of the papers' claims."""
+    """Write the table of a folder's pages and that of the papers' claims."""
     if len(arguments) != 1:
         raise BadInput("experiments: name the folder with the pages: omninav experiments docs/experiments")
-    changed, pages = write_index(Path(arguments[0]))
-    for name in changed:
-        print(f"{name}: judged again")
-    for page in pages:
+    for page in write_index(Path(arguments[0])):
         print(f"table: {page}")
     return 0

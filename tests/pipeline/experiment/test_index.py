@@ -9,7 +9,7 @@ import pytest
 
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.experiment.index import BEGIN, END, index_table, page_of, read_verdicts, verdict_files
-from omninav.pipeline.experiment.verdicts import Case, Verdict, headline, in_words, judged_again
+from omninav.pipeline.experiment.verdicts import Case, Verdict, headline, in_words
 from omninav.pipeline.graph.problems import BadInput
 
 PAGES = Path(__file__).resolve().parents[3] / "docs" / "experiments"
@@ -21,7 +21,9 @@ MADE = re.compile(
 
 
 def verdict(*cases: tuple[bool | None, int]) -> Verdict:
-    plain = (Case("", 1.0, 2.0, "the limit", -1.0, (-1.5, -0.5), holds, many, many) for holds, many in cases)
+    plain = (
+        Case("", 1.0, 2.0, "the limit", -1.0, (-1.5, -0.5), holds, many, many, False, many) for holds, many in cases
+    )
     return Verdict("it holds", "error", "", tuple(plain))
 
 
@@ -40,19 +42,6 @@ def verdict(*cases: tuple[bool | None, int]) -> Verdict:
 )
 def test_a_page_holds_only_where_every_claim_does(verdicts: list[bool | None], said: str) -> None:
     assert headline([verdict((holds, 12)) for holds in verdicts]) == said
-
-
-@pytest.mark.parametrize(
-    ("cases", "holds"),
-    [([(True, 5)], None), ([(False, 5)], None), ([(True, 6)], True), ([(True, 3), (False, 6)], False)],
-)
-def test_fewer_than_six_repetitions_decide_nothing_afterwards_either(
-    cases: list[tuple[bool | None, int]], holds: bool | None
-) -> None:
-    again = judged_again(verdict(*cases))
-    assert again.holds is holds
-    assert judged_again(again) == again
-    assert [case.ours for case in again.cases] == [1.0] * len(cases)
 
 
 def test_the_committed_tables_are_what_the_command_writes(tmp_path: Path) -> None:
@@ -75,30 +64,21 @@ def test_a_page_says_what_its_verdict_file_does_and_which_commit_made_it(path: P
     assert MADE.search(page)
 
 
-def test_a_page_of_few_repetitions_is_judged_again_and_says_so(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_table_says_over_how_many_scenarios_claims_were_judged(tmp_path: Path) -> None:
     (tmp_path / "README.md").write_text(f"# Ours\n\n{BEGIN}\nformer\n{END}\n\nwhat follows\n")
-    row = "| it holds (error): **holds** |  |  | 1.0 | 2.0 (the limit) | -1.0 [-1.5, -0.5] | holds |"
-    page = (
-        f"# One\n\nAbout it.\n\n```\nomninav +experiment=one\n```\n\n## Verdicts\n\n{row}\n\nMade with omninav 0.1.0.\n"
-    )
-    (tmp_path / "one.md").write_text(page)
-    (tmp_path / "one.verdicts.json").write_text(json.dumps([verdict((True, 3)).plain()]))
+    (tmp_path / "one.md").write_text("# One\n\nAbout it.\n\n```\nomninav +experiment=one\n```\n")
+    judged = verdict((None, 3), (True, 6))
+    (tmp_path / "one.verdicts.json").write_text(json.dumps([judged.plain()]))
     assert main(["experiments", str(tmp_path)]) == 0
-    assert "one: judged again" in capsys.readouterr().out
-    again = (tmp_path / "one.md").read_text()
-    assert row.replace("holds**", "undecided**").replace("| holds |", "| undecided |") in again
-    assert "Made with omninav 0.1.0.\n\nJudged again with omninav " in again
-    assert "fewer than six repetitions is undecided" in again
-    assert read_verdicts(tmp_path / "one.verdicts.json")[0].holds is None
-    table = "| [One](one.md) | `omninav +experiment=one` | **undecided** |  | it holds |\n"
+    row = "| [One](one.md) | `omninav +experiment=one` | 6 | **undecided** |  | it holds |\n"
     readme = (tmp_path / "README.md").read_text()
-    assert readme.endswith(f"{table}{END}\n\nwhat follows\n")
+    assert readme.endswith(f"{row}{END}\n\nwhat follows\n")
     assert "former" not in readme
-    assert main(["experiments", str(tmp_path)]) == 0
-    assert "judged again" not in capsys.readouterr().out
-    assert (tmp_path / "one.md").read_text() == again
+    earlier = judged.plain()
+    for case in earlier["cases"]:
+        del case["scenarios"]
+    (tmp_path / "one.verdicts.json").write_text(json.dumps([earlier]))
+    assert "| earlier rule |" in index_table(tmp_path)
 
 
 def test_what_is_no_page_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

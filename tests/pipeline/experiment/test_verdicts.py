@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from omninav.pipeline.experiment.specification import read_experiment
-from omninav.pipeline.experiment.verdicts import Verdict, bootstrap_interval, judge, key_of, pooled
+from omninav.pipeline.experiment.verdicts import Verdict, judge, key_of, pooled
 from omninav.pipeline.graph.problems import ProblemsFound
 
 
-def held(claim: dict[str, object], **errors: list[float]) -> bool | None:
-    """Whether a claim about the method `a` holds, with these errors of the methods by seed."""
-    return judged(claim, **errors).holds
+def held(claim: dict[str, object], seeds: int = 1, **errors: list[float]) -> bool | None:
+    """Whether a claim about the method `a` holds, with these errors of the methods by world, and in each by seed."""
+    return judged(claim, seeds, **errors).holds
 
 
-def judged(claim: dict[str, object], **errors: list[float]) -> Verdict:
+def judged(claim: dict[str, object], seeds: int = 1, over_runs: str = "mean", **errors: list[float]) -> Verdict:
     """The verdict on it. An error of NaN is one that a repetition does not have."""
     file = {
         "name": "test",
@@ -21,15 +21,19 @@ def judged(claim: dict[str, object], **errors: list[float]) -> Verdict:
         "about": "",
         "variant": "none",
         "sweep": {"method": dict.fromkeys(errors, "")},
-        "measures": {"error": {"title": "Error", "path": ["error"]}},
+        "measures": {"error": {"title": "Error", "path": ["error"], "over_runs": over_runs}},
         "page": {"rows": [], "columns": "method"},
         "published": {"error": {"a": 10.0}},
         "claims": [{"statement": "it holds", "measure": "error", "of": {"method": "a"}, **claim}],
     }
     results = {
         key_of({"method": name}): {
-            seed: {"metrics": {"error": None if np.isnan(value) else value}, "timing": {}, "facts": {}}
-            for seed, value in enumerate(values)
+            (f"world {n // seeds}", n % seeds): {
+                "metrics": {"error": None if np.isnan(value) else value},
+                "timing": {},
+                "facts": {},
+            }
+            for n, value in enumerate(values)
         }
         for name, values in errors.items()
     }
@@ -42,50 +46,41 @@ FAR = [11.0, 12.0, 13.0, 14.0, 15.0, 16.0]
 NEAR = [1.01, 2.01, 3.01, 4.01, 5.01, 6.01]
 
 
-def test_a_constant_difference_has_an_interval_of_no_width():
-    assert bootstrap_interval(np.full(5, 2.5)) == (2.5, 2.5)
-
-
-def test_the_interval_of_a_mean_is_the_normal_one_for_many_values():
-    values = np.random.default_rng(1).normal(3.0, 2.0, 400)
-    low, high = bootstrap_interval(values)
-    half = 1.96 * values.std() / np.sqrt(400)
-    assert low == pytest.approx(values.mean() - half, abs=0.03)
-    assert high == pytest.approx(values.mean() + half, abs=0.03)
-
-
 @pytest.mark.parametrize(
     ("claim", "ours", "theirs", "holds"),
     [
-        ({"at_most": 3.5}, CLEAR, FAR, True),
-        ({"at_most": 3.4}, CLEAR, FAR, False),
+        ({"at_most": 6.5}, CLEAR, FAR, True),
+        ({"at_most": 3.5}, CLEAR, FAR, None),
+        ({"at_most": 0.5}, CLEAR, FAR, False),
+        ({"at_most": 3.5}, [3.5] * 6, FAR, True),
         ({"at_most": "published"}, CLEAR, FAR, True),
         ({"at_most": "published"}, FAR, CLEAR, False),
-        ({"at_most": {"method": "b"}, "scale": 5.0}, FAR, CLEAR, True),
-        ({"at_most": {"method": "b"}, "scale": 3.5}, FAR, CLEAR, False),
+        ({"at_most": {"method": "b"}, "scale": 20.0}, FAR, CLEAR, True),
+        ({"at_most": {"method": "b"}, "scale": 3.5}, FAR, CLEAR, None),
+        ({"at_most": {"method": "b"}, "scale": 0.5}, FAR, CLEAR, False),
+        ({"at_least": 0.5}, CLEAR, FAR, True),
+        ({"at_least": 3.5}, CLEAR, FAR, None),
+        ({"at_least": 6.5}, CLEAR, FAR, False),
+        ({"at_least": {"method": "b"}}, CLEAR, CLEAR, True),
         ({"below": {"method": "b"}}, CLEAR, FAR, True),
-        ({"below": {"method": "b"}}, CLEAR, ALIKE, False),
+        ({"below": {"method": "b"}}, CLEAR, ALIKE, None),
+        ({"below": {"method": "b"}}, FAR, CLEAR, False),
+        ({"below": {"method": "b"}}, CLEAR, CLEAR, False),
+        ({"below": 7.0}, CLEAR, FAR, True),
+        ({"below": "published"}, CLEAR, FAR, True),
         ({"above": {"method": "b"}}, FAR, CLEAR, True),
-        ({"above": {"method": "b"}}, CLEAR, ALIKE, False),
+        ({"above": {"method": "b"}}, CLEAR, ALIKE, None),
+        ({"above": {"method": "b"}}, CLEAR, FAR, False),
+        ({"above": 0.5}, CLEAR, FAR, True),
         ({"not_above": {"method": "b"}}, NEAR, CLEAR, True),
         ({"not_above": {"method": "b"}}, CLEAR, ALIKE, None),
         ({"not_above": {"method": "b"}}, FAR, CLEAR, False),
-        ({"at_least": 3.5}, CLEAR, FAR, True),
-        ({"at_least": 3.6}, CLEAR, FAR, False),
-        ({"at_least": {"method": "b"}}, CLEAR, FAR, False),
-        ({"below": 7.0}, CLEAR, FAR, True),
-        ({"below": 3.6}, CLEAR, FAR, False),
-        ({"above": 0.5}, CLEAR, FAR, True),
-        ({"below": "published"}, CLEAR, FAR, True),
         ({"not_above": 3.5}, [3.5, 3.4, 3.6, 3.5, 3.4, 3.6], FAR, True),
-        ({"no_worse": {"method": "b"}}, CLEAR, ALIKE, True),
-        ({"no_worse": {"method": "b"}}, CLEAR, FAR, True),
-        ({"no_worse": {"method": "b"}}, NEAR, CLEAR, False),
-        ({"no_worse": {"method": "b"}}, FAR, CLEAR, False),
-        ({"ratio_to": {"method": "b"}, "at_most": 0.26}, CLEAR, FAR, True),
-        ({"ratio_to": {"method": "b"}, "at_most": 0.25}, CLEAR, FAR, False),
+        ({"ratio_to": {"method": "b"}, "at_most": 0.5}, CLEAR, FAR, True),
+        ({"ratio_to": {"method": "b"}, "at_most": 0.26}, CLEAR, FAR, None),
+        ({"ratio_to": {"method": "b"}, "at_most": 0.05}, CLEAR, FAR, False),
         ({"ratio_to": {"method": "b"}, "below": 0.5}, CLEAR, FAR, True),
-        ({"ratio_to": {"method": "b"}, "below": 1.0}, CLEAR, ALIKE, False),
+        ({"ratio_to": {"method": "b"}, "below": 1.0}, CLEAR, ALIKE, None),
         ({"lowest": True}, CLEAR, FAR, True),
         ({"lowest": True}, NEAR, CLEAR, True),
         ({"lowest": True}, CLEAR, ALIKE, None),
@@ -102,8 +97,37 @@ def test_what_has_not_run_is_not_judged():
     assert held({"below": {"method": "b"}}, a=CLEAR, b=[]) is None
 
 
-def test_a_handful_of_repetitions_decides_nothing():
+def test_a_handful_of_scenarios_decides_nothing():
     assert held({"below": {"method": "b"}}, a=CLEAR[:5], b=FAR[:5]) is None
+
+
+def test_seeds_do_not_stand_for_scenarios():
+    """Sixty seeds in five worlds decide nothing, and twelve in six worlds do."""
+    many = {name: [each for each in figures[:5] for _ in range(12)] for name, figures in (("a", CLEAR), ("b", FAR))}
+    assert held({"below": {"method": "b"}}, seeds=12, **many) is None
+    two = {name: [each for each in figures for _ in range(2)] for name, figures in (("a", CLEAR), ("b", FAR))}
+    (case,) = judged({"below": {"method": "b"}}, seeds=2, **two).cases
+    assert (case.holds, case.judged, case.scenarios) == (True, 12, 6)
+
+
+@pytest.mark.parametrize(
+    ("over_runs", "claim", "ours", "holds"),
+    [
+        ("largest", {"at_most": 6.0}, 6.0, True),
+        ("largest", {"at_most": 5.9}, 6.0, False),
+        ("largest", {"below": 6.0}, 6.0, False),
+        ("smallest", {"at_least": 1.0}, 1.0, True),
+        ("smallest", {"at_least": 1.1}, 1.0, False),
+    ],
+)
+def test_a_largest_figure_is_that_of_the_worst_run(over_runs: str, claim: dict[str, object], ours: float, holds: bool):
+    (case,) = judged(claim, over_runs=over_runs, a=CLEAR).cases
+    assert (case.ours, case.holds, case.interval) == (ours, holds, None)
+
+
+def test_a_largest_figure_is_compared_with_a_number():
+    with pytest.raises(ProblemsFound, match="which is compared with a number"):
+        judged({"below": {"method": "b"}}, over_runs="largest", a=CLEAR, b=FAR)
 
 
 def test_the_best_must_stand_against_every_other():
@@ -119,21 +143,14 @@ def test_a_ratio_is_that_of_the_means_and_its_interval_holds_it():
     assert case.difference == pytest.approx(3.5 / 13.5 - 0.5)
     low, high = (end + 0.5 for end in case.interval)
     assert low < 3.5 / 13.5 < high
-    assert bootstrap_interval(np.full(4, 2.0), np.full(4, 8.0)) == (0.25, 0.25)
-
-
-def test_a_ratio_s_interval_is_paired():
-    """Errors that are always half of the other method's, however much they vary from seed to seed."""
-    theirs = np.array([1.0, 20.0, 3.0, 40.0, 5.0, 60.0])
-    assert bootstrap_interval(theirs / 2, theirs) == pytest.approx((0.5, 0.5))
 
 
 def test_a_claim_about_survivors_does_not_hold_but_it_may_fail():
     survivors = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, np.nan]
-    verdict = judged({"at_most": 4.0}, a=survivors)
+    verdict = judged({"at_most": 7.0}, a=survivors)
     assert verdict.holds is None
     assert (verdict.cases[0].judged, verdict.cases[0].repetitions) == (6, 7)
-    assert held({"at_most": 3.0}, a=survivors) is False
+    assert held({"at_most": 0.5}, a=survivors) is False
     assert held({"below": {"method": "b"}}, a=survivors, b=[*FAR, 17.0]) is None
     assert held({"below": {"method": "b"}}, a=survivors[:6], b=[*FAR, 17.0]) is True  # the seventh has not run yet
 
@@ -170,7 +187,7 @@ def test_a_pooled_deviation_is_over_all_frames_of_all_repetitions_and_nothing_is
     }
     results = {
         key_of({"method": "a"}): {
-            seed: {
+            ("", seed): {
                 "metrics": {"late": {"error": {"mean": run.mean(), "std": run.std()}, "frames": len(run)}},
                 "timing": {},
                 "facts": {},

@@ -1,0 +1,58 @@
+"""Bootstrap intervals of means over a hierarchy: scenarios are drawn first, then repetitions in each of them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+RESAMPLES = 4999
+CONFIDENCE = 0.95
+
+
+def bootstrap_interval(groups: Sequence[Array], over: Sequence[Array] | None = None) -> tuple[float, float]:
+    """95 % interval of the mean over all figures, by resampling groups and then the figures in each (always the same).
+
+    `groups`: the figures (n_g,) of each scenario. With `over`, figures of the same shapes: that of the ratio of the two
+    means, resampled in pairs. Equal figures, or a single one, give an interval of no width.
+
+    The two-stage bootstrap of hierarchical data (Davison & Hinkley, Bootstrap Methods and their Application, 1997). Its
+    percentiles are expanded (Hesterberg, What Teachers Should Know About the Bootstrap, 2015), because those of a plain
+    one are too narrow where there are few groups: by sqrt((n - 1) / n), and by the normal in place of Student's t.
+    """
+    columns = [[group for group in column if len(group)] for column in ((groups,) if over is None else (groups, over))]
+    whole = [np.concatenate(column) for column in columns]
+    if all(np.ptp(values) == 0.0 for values in whole):
+        mean = float(whole[0][0]) if over is None else float(whole[0][0] / whole[1][0])
+        return mean, mean
+    counts = [len(group) for group in columns[0]]
+    drawn, there = _draws(counts)
+    sums = [np.sum(_padded(column)[drawn], axis=(1, 2), where=there) for column in columns]
+    figures = sums[0] / (there.sum(axis=(1, 2)) if over is None else sums[1])
+    independent = len(counts) if len(counts) > 1 else counts[0]
+    low, high = np.quantile(figures, _expanded(independent))
+    return float(low), float(high)
+
+
+def _draws(counts: Sequence[int]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
+    """Places in the padded figures that each resample draws (RESAMPLES, groups, n), and which of them count."""
+    rng, number, longest = np.random.default_rng(0), len(counts), max(counts)
+    of_group = np.asarray(counts)
+    group = rng.integers(number, size=(RESAMPLES, number))
+    place = (rng.random((RESAMPLES, number, longest)) * of_group[group][..., None]).astype(np.intp)
+    return group[..., None] * longest + place, np.arange(longest) < of_group[group][..., None]
+
+
+def _padded(groups: Sequence[Array]) -> Array:
+    longest = max(len(group) for group in groups)
+    return np.concatenate([np.pad(group, (0, longest - len(group))) for group in groups])
+
+
+def _expanded(independent: int) -> tuple[float, float]:
+    """The two percentiles, as shares, for this many independent figures."""
+    from scipy.stats import norm, t  # type: ignore[attr-defined]
+
+    tail = (1.0 - CONFIDENCE) / 2.0
+    share = float(norm.cdf(np.sqrt(independent / (independent - 1)) * t.ppf(tail, independent - 1)))
+    return share, 1.0 - share

@@ -1,0 +1,52 @@
+"""Intervals of means over worlds and seeds, against what is known of them."""
+
+import numpy as np
+import pytest
+from scipy.stats import t
+
+from omninav.pipeline.experiment.intervals import bootstrap_interval
+
+
+def test_a_constant_difference_has_an_interval_of_no_width():
+    assert bootstrap_interval([np.full(5, 2.5)]) == (2.5, 2.5)
+    assert bootstrap_interval([np.full(4, 2.0)], [np.full(4, 8.0)]) == (0.25, 0.25)
+
+
+@pytest.mark.parametrize("groups", [1, 400])
+def test_the_interval_of_a_mean_is_the_normal_one_for_many_values(groups: int):
+    values = np.random.default_rng(1).normal(3.0, 2.0, 400)
+    low, high = bootstrap_interval(np.split(values, groups))
+    half = 1.96 * values.std() / np.sqrt(400)
+    assert low == pytest.approx(values.mean() - half, abs=0.03)
+    assert high == pytest.approx(values.mean() + half, abs=0.03)
+
+
+def test_of_six_values_it_is_as_wide_as_student_s():
+    values = np.array([-1.3, -0.7, -0.2, 0.2, 0.7, 1.3])
+    low, high = bootstrap_interval([values[k : k + 1] for k in range(6)])
+    student = t.ppf(0.975, 5) * values.std(ddof=1) / np.sqrt(6)
+    assert high == pytest.approx(student, rel=0.12)
+    assert low == pytest.approx(-high, rel=0.05)
+
+
+def test_it_misses_the_truth_as_rarely_as_it_says():
+    """Six worlds with three seeds in each: more seeds of a world say little of the next world."""
+    rng, hits = np.random.default_rng(2), 0
+    for _ in range(60):
+        groups = rng.normal(0.0, 1.0, (6, 1)) + rng.normal(0.0, 0.3, (6, 3))
+        low, high = bootstrap_interval(list(groups))
+        hits += low <= 0.0 <= high
+    assert 54 <= hits <= 60
+    naive = bootstrap_interval([np.concatenate(list(groups))])
+    assert high - low > 1.3 * (naive[1] - naive[0])
+
+
+def test_groups_of_different_sizes_count_by_their_figures():
+    low, high = bootstrap_interval([np.array([0.0, 0.0, 0.0]), np.array([1.0])])
+    assert (low, high) == (0.0, 1.0)
+
+
+def test_a_ratio_s_interval_is_paired():
+    """Errors that are always half of the other method's, however much they vary from world to world."""
+    theirs = [np.array([each]) for each in (1.0, 20.0, 3.0, 40.0, 5.0, 60.0)]
+    assert bootstrap_interval([each / 2 for each in theirs], theirs) == pytest.approx((0.5, 0.5))
