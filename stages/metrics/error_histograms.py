@@ -1,0 +1,50 @@
+"""How position errors are distributed, log by log."""
+
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Stage
+from omninav.stages.geometry.plane.pose_errors import position_errors
+from omninav.stages.values.drive import Array, Drive, known
+
+
+class ErrorHistograms(Stage):
+    """Counts how often position errors of each size occur, in every log that has ground truth.
+
+    Gross, Koenig & Müller 2005, Figures 5 and 6. `error_histograms`: a list with an entry for each log: lists over the
+    sizes, `error_m`, the middle of each bin, and `share`, that of the frames; `small` and `large`, the shares of frames
+    with errors of at most `small_m` and of more than `large_m`. The last bin holds everything larger.
+    """
+
+    bin_m: Annotated[float, Bounds(gt=0)] = 0.2
+    """Width (m) of a bin."""
+    bins: Annotated[int, Bounds(ge=2)] = 16
+    """Number of bins."""
+    small_m: Annotated[float, Bounds(gt=0)] = 0.4
+    """Largest error (m) that is small."""
+    large_m: Annotated[float, Bounds(gt=0)] = 2.0
+    """Error (m) above which it is large."""
+    skip: Annotated[float, Bounds(ge=0, lt=1)] = 0.0
+    """Share of each log's frames, from its start, that does not count."""
+
+    class Out(Outputs):
+        """`metrics`: the entry `error_histograms` of metrics.json."""
+
+        metrics: Metrics
+
+    def step(self, ctx: Context, drive: Drive) -> Out:
+        """The whole run at once."""
+        logs = [log.at(slice(int(self.skip * len(log)), None)) for log in drive.by_log]
+        scored = [log.at(known(log.truth) & known(log.estimate)) for log in logs]
+        errors = [position_errors(log.estimate, log.truth) for log in scored if len(log)]
+        return self.Out(metrics=Metrics({"error_histograms": [self._histogram(each) for each in errors]}))
+
+    def _histogram(self, errors: Array) -> dict[str, list[float] | float]:
+        bins = np.minimum((errors / self.bin_m).astype(np.int64), self.bins - 1)
+        return {
+            "error_m": ((np.arange(self.bins) + 0.5) * self.bin_m).tolist(),
+            "share": (np.bincount(bins, minlength=self.bins) / len(errors)).tolist(),
+            "small": float((errors <= self.small_m).mean()),
+            "large": float((errors > self.large_m).mean()),
+        }

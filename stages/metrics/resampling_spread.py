@@ -1,0 +1,65 @@
+"""What resampling does to the spread of the particles."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.stages.geometry.probability.gaussians import density
+from omninav.stages.geometry.probability.particles import weighted_moments
+from omninav.stages.values.belief import GaussianMixture, Particles
+
+QUANTITIES = {"resampling.ratio": Quantity(title="Spread of the particles after resampling, over that before")}
+
+
+class ResamplingSpread(Stage):
+    """Measures the spread of the particles before and after they are resampled, where belief and map agree.
+
+    Porta & Kröse 2004, section 3.1: resampling by pi p(y|x) gives "a concentration of the particles in the
+    prior-likelihood intersection". The spread is the root of the summed variances of x and y (m); belief and map agree
+    where the particles' mean density under the map's hypothesis is above `agree_above` (as `Agreement` decides).
+
+    Under `resampling`: `frames`, where they agree; `before_m` and `after_m`, the mean spreads there; `ratio`, the
+    second over the first. Only `frames` where they never agree.
+    """
+
+    agree_above: Annotated[float, Bounds(ge=0)] = 1e-4
+    """Mean density, 1/(m^2 rad), above which both agree."""
+
+    class Out(Outputs):
+        """`metrics`: the entry `resampling` of metrics.json."""
+
+        metrics: Metrics
+
+    def step(
+        self,
+        ctx: Context,
+        predictions: Sequence[Particles | GaussianMixture],
+        hypotheses: Sequence[GaussianMixture | None],
+        beliefs: Sequence[Particles | GaussianMixture],
+    ) -> Out:
+        """The whole run at once."""
+        spreads = []
+        for before, hypothesis, after in zip(predictions, hypotheses, beliefs, strict=True):
+            if hypothesis is None or not isinstance(before, Particles) or not isinstance(after, Particles):
+                continue  # a mixture is not resampled
+            if agreement(before, hypothesis) > self.agree_above:
+                spreads.append((spread(before), spread(after)))
+        values: dict[str, float | int] = {"frames": len(spreads)}
+        if spreads:
+            before_m, after_m = np.mean(spreads, axis=0)
+            values |= {"before_m": float(before_m), "after_m": float(after_m), "ratio": float(after_m / before_m)}
+        return self.Out(metrics=Metrics({"resampling": values}, QUANTITIES if spreads else {}))
+
+
+def agreement(particles: Particles, hypothesis: GaussianMixture) -> float:
+    """The particles' mean density under a hypothesis whose weights are made to sum to 1: 1/(m^2 rad)."""
+    shares = hypothesis.weights / hypothesis.weights.sum()
+    return float(particles.weights @ density(particles.poses, hypothesis.means, hypothesis.covariances, shares))
+
+
+def spread(particles: Particles) -> float:
+    """The root of the summed variances of x and y (m)."""
+    covariance = weighted_moments(particles.poses, particles.weights)[1]
+    return float(np.sqrt(covariance[0, 0] + covariance[1, 1]))

@@ -1,0 +1,104 @@
+"""How the error at a place follows from the odometry of its first visit, and falls with further visits."""
+
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Stage
+from omninav.stages.geometry.plane.pose_errors import position_errors
+from omninav.stages.values.drive import Array, Drive, known
+
+Ints = npt.NDArray[np.int64]
+
+
+class VisitedPlaces(Stage):
+    """Compares errors at a place's later visits with its first one, over all logs that have ground truth.
+
+    A place is a square cell of the floor, by true positions; a visit ends where the robot has driven `away_m` since it
+    was last in the cell, or where a log ends. Porta & Kröse 2004, section 5, and Gross, Koenig & Müller 2005, section
+    3, say of a map that is learned while it is used that its error at a place is that of the odometry of the first
+    visit.
+
+    `visits`: lists with an entry for each number of visits: `number` (1: the first), `position_error_m`, the mean over
+    all frames of such visits, `frames`. `first_visits`, over the places that were visited again: `places`, how many;
+    `odometry_error_m`, the mean error of odometry alone at their first visits; `position_error_m`, that of the estimate
+    at all later ones; `ratio`, the second over the first; `correlation` of the two over the places (None where one of
+    them does not vary). Odometry alone starts at each log's first true pose and is not aligned.
+    """
+
+    place_m: Annotated[float, Bounds(gt=0)] = 1.0
+    """Side (m) of a place's cell."""
+    away_m: Annotated[float, Bounds(gt=0)] = 5.0
+    """True path length (m) since the robot was last in the cell, beyond which it comes for another visit."""
+
+    class Out(Outputs):
+        """`metrics`: the entries `visits` and `first_visits` of metrics.json."""
+
+        metrics: Metrics
+
+    def step(self, ctx: Context, drive: Drive) -> Out:
+        """The whole run at once."""
+        logs = [log for log in drive.by_log if log.has_truth]
+        scored = [log.at(known(log.truth) & known(log.estimate)) for log in logs]
+        if not sum(map(len, scored)):
+            return self.Out(metrics=Metrics({}))
+        truth = np.concatenate([log.truth for log in scored])
+        errors = np.concatenate([position_errors(log.estimate, log.truth) for log in scored])
+        odometry = np.concatenate([odometry_errors(log) for log in logs])
+        cells = np.unique(np.floor(truth[:, :2] / self.place_m).astype(np.int64), axis=0, return_inverse=True)[1]
+        numbers = visit_numbers(cells.ravel(), driven_between(scored), self.away_m)
+        each = np.arange(1, numbers.max() + 1)
+        values: dict[str, Any] = {
+            "visits": {
+                "number": each.tolist(),
+                "position_error_m": [float(errors[numbers == number].mean()) for number in each],
+                "frames": [int((numbers == number).sum()) for number in each],
+            }
+        }
+        found = first_against_later(cells.ravel(), numbers, errors, odometry)
+        return self.Out(metrics=Metrics(values | ({"first_visits": found} if found else {})))
+
+
+def odometry_errors(log: Drive) -> Array:
+    """Position errors of odometry alone in a log's frames that have truth and estimate: (N,), NaN without odometry."""
+    rows = known(log.truth) & known(log.estimate)
+    path = log.odometry_alone()
+    return np.full(int(rows.sum()), np.nan) if path is None else position_errors(path[rows], log.truth[rows])
+
+
+def driven_between(logs: list[Drive]) -> Array:
+    """True path (m) that led to each frame from the one before, infinite at the first frame of a log: (N,)."""
+    ways = [np.concatenate([[np.inf], np.hypot(*np.diff(log.truth[:, :2], axis=0).T)])[: len(log)] for log in logs]
+    return np.concatenate(ways)
+
+
+def visit_numbers(cells: Ints, ways: Array, away_m: float) -> Ints:
+    """The number of the visit that each frame belongs to, from 1, of its cell (N,): (N,)."""
+    numbers = np.zeros(len(cells), np.int64)
+    last_m: dict[int, float] = {}
+    count: dict[int, int] = {}
+    driven = 0.0
+    for row, (cell, way) in enumerate(zip(cells.tolist(), ways.tolist(), strict=True)):
+        driven += min(way, away_m + 1.0)  # between two logs the robot has been away from everywhere
+        if cell not in last_m or driven - last_m[cell] > away_m:
+            count[cell] = count.get(cell, 0) + 1
+        last_m[cell], numbers[row] = driven, count[cell]
+    return numbers
+
+
+def first_against_later(cells: Ints, numbers: Ints, errors: Array, odometry: Array) -> dict[str, Any]:
+    """What `first_visits` holds; empty where no place was visited again, or without odometry."""
+    again = np.unique(cells[numbers > 1])
+    if not len(again) or not np.isfinite(odometry).all():
+        return {}
+    before = np.array([odometry[(cells == cell) & (numbers == 1)].mean() for cell in again])
+    after = np.array([errors[(cells == cell) & (numbers > 1)].mean() for cell in again])
+    varied = len(again) > 2 and np.ptp(before) > 0.0 and np.ptp(after) > 0.0
+    return {
+        "places": len(again),
+        "odometry_error_m": float(before.mean()),
+        "position_error_m": float(after.mean()),
+        "ratio": float(after.mean() / before.mean()) if before.mean() > 0.0 else None,
+        "correlation": float(np.corrcoef(before, after)[0, 1]) if varied else None,
+    }

@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+from small_run import collected
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.metrics.after_lifts import AfterLifts
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.pose import Motion, Pose
+
+CTX = Context("metric")
+
+
+def lifted_drive(wrong_for: int | None):
+    """Forty frames of half a metre and two seconds. Before frame 12 it is turned by half a radian, which odometry does
+    not see, and its estimate is wrong for so many frames (None: to the end)."""
+    turned = [0.5 * (n >= 12) for n in range(40)]
+    path = np.cumsum([[0.5 * np.cos(turn), 0.5 * np.sin(turn)] for turn in turned], axis=0)
+    truth = [Pose(x, y, turn) for (x, y), turn in zip(path.tolist(), turned, strict=True)]
+    motion = [None, *(Motion(0.5, 0.0, 0.0) for _ in range(39))]
+    until = 40 if wrong_for is None else 12 + wrong_for
+    poses = [Pose(true.x, true.y, 0.0 if n < until else true.heading) for n, true in enumerate(truth)]
+    estimates = [PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in poses]
+    return collected([Tick(n, 2 * n * 10**9, 0, n, n == 0) for n in range(40)], truth, motion, estimates)
+
+
+def test_the_time_until_the_estimate_is_right_counts_from_the_lift():
+    lifts = AfterLifts().step(CTX, lifted_drive(5)).metrics.values["lifts"]
+    assert lifts == {"number": 1, "never": 0, "step": [12], "seconds": [10.0]}
+
+
+def test_an_estimate_that_is_never_right_again_counts_to_the_end():
+    lifts = AfterLifts().step(CTX, lifted_drive(None)).metrics.values["lifts"]
+    assert (lifts["never"], lifts["seconds"]) == (1, [54.0])
+
+
+def test_a_drive_without_lifts_has_none():
+    drive = lifted_drive(0)
+    quiet = drive.at(slice(None, 12))
+    assert AfterLifts().step(CTX, quiet).metrics is None
+    assert AfterLifts(jump_deg=40.0).step(CTX, drive).metrics is None
+
+
+def test_a_robot_that_is_carried_away_was_lifted():
+    drive = lifted_drive(0)
+    drive.motion[30, 0] = 3.0
+    assert AfterLifts().step(CTX, drive).metrics.values["lifts"]["step"] == pytest.approx([12, 30])

@@ -1,0 +1,39 @@
+import numpy as np
+import pytest
+from small_run import collected
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.metrics.error_histograms import ErrorHistograms
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.pose import Pose
+
+CTX = Context("metric")
+
+
+def two_logs(*errors: list[float]):
+    ticks, truth, estimates = [], [], []
+    for log, each in enumerate(errors):
+        for frame, error in enumerate(each):
+            ticks.append(Tick(len(ticks), len(ticks), log, frame, frame == 0))
+            truth.append(Pose(0.0, 0.0, 0.0))
+            pose = Pose(error, 0.0, 0.0)
+            estimates.append(PoseEstimate(pose, np.eye(3), 1.0, pose))
+    return collected(ticks, truth, None, estimates)
+
+
+def test_each_log_has_the_shares_of_its_errors():
+    first, second = (
+        ErrorHistograms(bin_m=1.0, bins=3)
+        .step(CTX, two_logs([0.1, 0.3, 1.5, 9.0], [0.2, 0.2]))
+        .metrics.values["error_histograms"]
+    )
+    assert first["error_m"] == [0.5, 1.5, 2.5]
+    assert first["share"] == [0.5, 0.25, 0.25]
+    assert (first["small"], first["large"]) == (0.5, 0.25)
+    assert second["share"] == [1.0, 0.0, 0.0]
+
+
+def test_what_is_skipped_does_not_count():
+    (late,) = ErrorHistograms(skip=0.5).step(CTX, two_logs([5.0, 5.0, 0.1, 0.1])).metrics.values["error_histograms"]
+    assert late["large"] == 0.0
+    assert sum(late["share"]) == pytest.approx(1.0)

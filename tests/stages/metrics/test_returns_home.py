@@ -1,0 +1,29 @@
+import numpy as np
+import pytest
+from small_run import collected
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.metrics.returns_home import ReturnsHome
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.pose import Motion, Pose
+
+
+def test_the_error_at_home_is_that_of_the_frames_at_the_end_of_each_lap():
+    # Three rounds on a circle of 10 m, 40 frames each. The estimate is 1, 2 and 3 m too high in them.
+    angles = 2 * np.pi * np.arange(121) / 40
+    truth = [Pose(10 * np.cos(a), 10 * np.sin(a), a + np.pi / 2) for a in angles.tolist()]
+    poses = [Pose(true.x, true.y + 1.0 + n // 40, true.heading) for n, true in enumerate(truth)]
+    estimates = [PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in poses]
+    motion = [None, *(Motion(1.0, 0.0, 0.0) for _ in range(120))]
+    drive = collected([Tick(n, n, 0, n, n == 0) for n in range(121)], truth, motion, estimates)
+    returns = ReturnsHome(frames=3).step(Context("metric"), drive).metrics.values["returns"]
+    assert [each["step"] for each in returns] == [40, 80]
+    assert [each["position_error_m"] for each in returns] == pytest.approx([2.0, 3.0])
+    path = drive.odometry_alone()
+    gap = np.hypot(*(path[40:43, :2] - drive.truth[40:43, :2]).T).mean()
+    assert returns[0]["odometry_error_m"] == pytest.approx(gap)
+    assert gap > 30.0  # odometry alone goes straight on
+
+
+def test_nothing_is_measured_without_truth():
+    assert ReturnsHome().step(Context("metric"), collected([Tick(0, 0)], [None])).metrics is None
