@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.mapping.calibrated_threshold import CalibratedThreshold, CalibratedThresholdState
+from omninav.stages.mapping.calibrated_threshold import (
+    CalibratedThreshold,
+    CalibratedThresholdState,
+    distance_to_new_view,
+)
 from omninav.stages.values.pose import Motion
+from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import Coefficients, NoveltyThreshold
 
 
@@ -66,3 +71,40 @@ def test_what_was_measured_is_let_go_of_once_it_is_settled() -> None:
 def test_there_must_be_a_pair_that_far_apart() -> None:
     with pytest.raises(ValueError, match="min_separation: of 20 views none"):
         CalibratedThreshold(views=20, min_separation=20)
+
+
+def test_a_view_counts_after_as_much_driving_as_asked_in_any_direction() -> None:
+    ctx, state, stage = (
+        Context("limit"),
+        CalibratedThresholdState(),
+        CalibratedThreshold(min_separation=1, min_move_m=0.05),
+    )
+    steps = [None, Motion(0.03, 0.0, 1.0), Motion(0.0, 0.04, 0.0), None, Motion(0.03, -0.04, 0.0)]
+    counted = []
+    for place, motion in enumerate(steps):
+        stage.step(ctx, at(float(place)), motion, state)
+        counted.append(len(state.views))
+    assert counted == [1, 1, 2, 2, 3]
+    assert state.gaps_m == pytest.approx([0.0, 0.07, 0.05])
+    assert state.since_m == 0.0
+
+
+def test_a_drive_that_never_gets_beyond_its_threshold_does_not_say_how_far_it_reaches() -> None:
+    # Pairs 0 to 4 and 4 to 0 of three: threshold 2 x 4 = 8, and no view is 8 from another.
+    limit = limits(CalibratedThreshold(views=3, min_separation=1, share=2.0), [0.0, 4.0, 0.0])[0][-1]
+    assert limit is not None
+    assert (limit.distance, limit.metres, limit.settled) == (8.0, 0.0, True)
+
+
+def test_a_view_as_far_as_the_threshold_is_beyond_it() -> None:
+    assert distance_to_new_view(4.0, [np.zeros(0), np.array([4.0]), np.array([3.0, 5.0])], [0.0, 0.5, 0.25]) == 0.375
+    assert distance_to_new_view(9.0, [np.zeros(0), np.array([4.0])], [0.0, 0.5]) == 0.0
+
+
+def test_a_known_threshold_is_taken_as_it_is_and_nothing_measured() -> None:
+    known, ctx, state = ViewMixtures.empty(), Context("limit"), CalibratedThresholdState()
+    known.keep_threshold(NoveltyThreshold(7.12344, True, 0.3))
+    found = [CalibratedThreshold().step(ctx, at(float(n)), None, state, known).threshold for n in range(3)]
+    assert found == [known.threshold] * 3
+    assert ctx.facts["novelty_threshold"] == 7.1234
+    assert not len(state.views)

@@ -71,3 +71,22 @@ def test_corrections_replace_waiting_updates_and_repeat_earlier_ones() -> None:
     assert out.updates.items[0].reconstructed
     assert out.updates.open_from == 1
     assert [update.reconstructed for update in out.waiting.items] == [False, True, False, False]
+
+
+def test_the_oldest_of_too_many_are_given_in_order() -> None:
+    stage, queue = DelayedByDistance(distance_m=1.0, max_waiting=2), DelayedByDistanceState()
+    assert [due(stage, queue, n, 0.0) for n in range(4)] == [[], [], [0], [1]]
+    assert queue.seen_at_m == [0.0, 0.0]
+    assert due(stage, queue, 4, 5.0) == [2, 3]
+
+
+def test_corrections_come_before_what_is_due_and_repeat_nothing_that_waits() -> None:
+    stage, queue, ctx = DelayedByDistance(distance_m=9.0), DelayedByDistanceState(), Context("map_update")
+    for n in range(3):
+        due(stage, queue, n, 1.0 if n else None)
+    ctx.tick = Tick(3, 3, 0, 3, True)
+    corrections = MapUpdates((MapUpdate(VIEW, STATE, 1, reconstructed=True),))
+    out = stage.step(ctx, VIEW, STATE, None, queue, corrections)
+    assert [(update.index, update.reconstructed) for update in out.updates.items] == [(0, False), (1, True), (2, False)]
+    assert out.updates.open_from is None
+    assert [update.index for update in out.waiting.items] == [3]

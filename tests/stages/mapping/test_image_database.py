@@ -78,3 +78,47 @@ def test_the_paper_s_936_images_take_at_most_4_megabytes(kind: str, tmp_path: Pa
     map = learned(ImageDatabase(), [(0.01 * n, 0.0, 0.0) for n in range(936)], features)
     write_artifact(tmp_path / "map.omap", map)
     assert (tmp_path / "map.omap").stat().st_size <= 4e6
+
+
+def test_either_rule_takes_an_image_and_the_limit_itself_counts() -> None:
+    tour: Tour = [(0.0, 0.0, 0.0), (0.3, 0.4, 0.0), (0.3, 0.4, 0.4), (0.3, 0.4, 0.6), (0.6, 0.4, 0.6)]
+    seen = SegmentHistograms(views(4))
+
+    def taken(**options: float) -> list[int]:
+        map = learned(ImageDatabase(**options), tour, seen)
+        return [tour.index(tuple(pose)) for pose in map.poses.tolist()]
+
+    assert taken(min_distance_m=0.5) == [0, 1]
+    assert taken(min_distance_m=0.51) == [0, 4]
+    assert taken(min_turn_deg=30.0) == [0, 3]
+    assert taken(min_distance_m=0.5, min_turn_deg=30.0) == [0, 1, 3]
+    assert taken(min_distance_m=0.3, min_turn_deg=20.0) == [0, 1, 2, 4]
+
+
+def test_a_turn_across_the_seam_is_the_shorter_one() -> None:
+    tour: Tour = [(0.0, 0.0, 3.0), (0.0, 0.0, -3.0), (0.0, 0.0, -2.4)]
+    map = learned(ImageDatabase(min_turn_deg=30.0), tour, SegmentHistograms(views(4)))
+    assert map.poses[:, 2].tolist() == [3.0, -2.4]
+
+
+def test_events_name_the_first_reference_of_each_image_and_tours_are_not_joined() -> None:
+    ctx, map, last, stage = Context("mapping"), None, ImageDatabaseState(), ImageDatabase(min_distance_m=0.5)
+    seen, events = SegmentHistograms(views(4), np.array([0.0, 1.0, 2.0, 3.0])), []
+    for number, (x, first) in enumerate(((0.0, True), (0.1, False), (1.0, False), (1.1, True))):
+        ctx.tick = Tick(number, number, first_of_log=first)
+        out = stage.step(ctx, seen, None, Pose(x, 0.0, 0.0), map, last)
+        map = out.map
+        events.append(None if out.events is None else (out.events.inserted, out.events.reason))
+    assert events == [(0, "first"), None, (4, "far"), (8, "far")]
+    assert map is not None
+    assert map.edges.tolist() == [[n, n + 4] for n in range(4)]
+
+
+def test_an_image_without_a_pose_is_passed_over() -> None:
+    ctx, map, last = Context("mapping"), ReferenceGraph.empty(), ImageDatabaseState()
+    for number, truth in enumerate((Pose(0.0, 0.0, 0.0), None, Pose(2.0, 0.0, 0.0))):
+        ctx.tick = Tick(number, number, first_of_log=number == 0)
+        ImageDatabase().step(ctx, SegmentHistograms(views(4)), None, truth, map, last)
+    assert map.poses[:, 0].tolist() == [0.0, 2.0]
+    assert map.edges.tolist() == [[0, 1]]
+    assert ctx.counts == {"view_without_pose": 1}

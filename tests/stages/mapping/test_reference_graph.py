@@ -117,3 +117,55 @@ def test_two_logs_without_truth_make_no_map() -> None:
     ctx.tick = Tick(1, 1, log=1, first_of_log=True)
     with pytest.raises(BadInput, match="frame of its own"):
         stage.step(ctx, view, Pose(0.0, 0.0, 0.0), None, map, along)
+
+
+def test_a_view_at_the_limits_adds_nothing() -> None:
+    # As far as the distance, and as alike as asked: half of the bins are the same.
+    stage, ctx, along = (
+        LearnReferenceGraph(distance_m=0.25, similarity=0.5),
+        Context("mapping"),
+        LearnReferenceGraphState(),
+    )
+    map, reasons = ReferenceGraph.empty(), []
+    mixed = SegmentHistograms((view(3).values + view(7).values) / 2)
+    unlike = SegmentHistograms((view(3).values + 2 * view(7).values) / 3)
+    for tick, (seen, x) in enumerate(((view(3), 0.0), (mixed, 0.25), (unlike, 0.25), (view(7), 0.51))):
+        ctx.tick = Tick(index=tick, stamp=tick, first_of_log=tick == 0)
+        event = stage.step(ctx, seen, None, Pose(x, 0.0, 0.0), map, along).events
+        reasons.append(None if event is None else (event.inserted, event.reason))
+    assert reasons == [(0, "first"), None, (1, "unlike"), (2, "far")]
+    assert map.edges.tolist() == [[0, 1], [1, 2]]
+
+
+def test_a_view_is_compared_with_all_around_it_at_its_own_heading() -> None:
+    # A half ring looks the same from a robot that is turned by half a turn, seen from the other side.
+    ring = np.zeros((8, 20), np.float32)
+    ring[:4, 3] = ring[4:, 7] = 1.0
+    ctx, along, map = Context("mapping"), LearnReferenceGraphState(), ReferenceGraph.empty()
+    stage = LearnReferenceGraph(distance_m=5.0, vicinity_m=5.0, similarity=0.9)
+    seen = ((ring, 0.0), (np.roll(ring, 4, axis=0), np.pi), (ring, np.pi), (ring, 0.3 * np.pi / 4))
+    for tick, (looks, heading) in enumerate(seen):
+        ctx.tick = Tick(index=tick, stamp=tick, first_of_log=tick == 0)
+        stage.step(ctx, SegmentHistograms(looks), None, Pose(0.01 * tick, 0.0, heading), map, along)
+    assert map.poses[:, 0].tolist() == [0.0, 0.02]
+
+
+def test_references_beyond_the_vicinity_do_not_count() -> None:
+    places = [(0.0, 0.0, 3), (1.0, 0.0, 7), (0.6, 0.0, 3)]
+    assert len(drive(LearnReferenceGraph(distance_m=0.45, vicinity_m=0.5, similarity=0.5), places)) == 3
+    assert len(drive(LearnReferenceGraph(distance_m=0.45, vicinity_m=0.7, similarity=0.5), places)) == 2
+
+
+def test_the_closest_reference_is_where_an_edge_leads_and_none_leads_across_a_gap() -> None:
+    stage, ctx, along = (
+        LearnReferenceGraph(distance_m=0.4, similarity=0.0),
+        Context("mapping"),
+        LearnReferenceGraphState(),
+    )
+    map = ReferenceGraph.empty()
+    for tick, x in enumerate((0.0, 1.0, 2.0, None, 0.9, 0.1)):
+        ctx.tick = Tick(index=tick, stamp=tick, first_of_log=tick == 0)
+        stage.step(ctx, view(3), None, None if x is None else Pose(x, 0.0, 0.0), map, along)
+    assert map.edges.tolist() == [[0, 1], [1, 2]]
+    assert along.reference == 0
+    assert ctx.counts == {"view_without_pose": 1}

@@ -65,3 +65,43 @@ def test_without_a_crossing_or_with_few_views_it_says_so(seen):
     out, ctx = straightened(map)
     assert out.map is map
     assert ctx.facts["map_straightened"].startswith("no: ")
+
+
+def test_it_says_by_how_much_references_were_moved_and_the_first_was_not():
+    map = bent()
+    out, ctx = straightened(map)
+    values = out.metrics.values["straightened"]
+    moved = np.hypot(*(out.map.poses - map.poses)[:, :2].T)
+    assert moved[0] < 1e-6
+    assert values["moved_median_m"] == np.median(moved)
+    assert values["moved_max_m"] == moved.max()
+    assert 0 <= values["rejected"] < values["closures"]
+    assert ctx.facts["map_straightened"] == f"by {values['closures']} closures, {moved.max():.2f} m at most"
+
+
+def test_views_of_one_direction_and_places_that_are_too_near_along_the_drive_close_no_loop():
+    map = bent()
+    window = ReferenceGraph(map.poses, map.features[:][:, :1], "histograms", np.zeros((0, 2), np.int64), "odometry")
+    out, ctx = straightened(window)
+    assert out.map is window
+    assert "all around" in ctx.facts["map_straightened"]
+    ctx = Context("straightened")
+    assert StraightenMap(min_gap=500.0).step(ctx, map, []).map is map
+    assert "came back to no place" in ctx.facts["map_straightened"]
+
+
+def test_the_way_along_the_drive_is_what_keeps_neighbours_apart():
+    # The stadium is 6.4 m round: a reference and the one a round later are 6.4 m of way apart.
+    map, stage = bent(), StraightenMap(min_gap=1e-3)
+    near = stage.step(Context("straightened"), map, []).metrics.values["straightened"]["closures"]
+    assert near > straightened(map)[0].metrics.values["straightened"]["closures"]
+
+
+def test_fewer_references_that_look_for_others_find_fewer():
+    few = StraightenMap(samples=20).step(Context("straightened"), bent(), []).metrics.values["straightened"]
+    assert 0 < few["closures"] <= 20
+
+
+def test_closures_that_are_held_to_be_vague_move_less():
+    vague = StraightenMap(closure_sigma=300.0, closure_sigma_deg=170.0).step(Context("straightened"), bent(), [])
+    assert error(vague.map) > 0.8 * error(bent())

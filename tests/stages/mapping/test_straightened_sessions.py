@@ -11,6 +11,7 @@ from omninav.stages.mapping.kept_sessions import KeepSessions
 from omninav.stages.mapping.session_closures import closures_between
 from omninav.stages.mapping.straightened_sessions import StraightenSessions
 from omninav.stages.values.belief import GaussianMixture
+from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.pose import Motion
 from omninav.stages.values.sessions import Sessions
 from omninav.stages.values.view_mixtures import ViewMixtures
@@ -155,3 +156,114 @@ def test_drives_with_other_views_are_not_gone_on_with():
     assert len(KeepSessions().step(ctx, other, None, state, None, known).sessions) == 1
     assert len(KeepSessions().step(ctx, view(TWICE[0]), None, state, None, known).sessions) == 4
     assert len(known.sessions) == 3
+
+
+def at_log(sessions, updates=None, threshold=THRESHOLD, first=True, ticks=None, **options):
+    ctx = Context("straightened", np.random.default_rng(0))
+    ctx.tick = Tick(index=500, stamp=0.0, first_of_log=first)
+    return StraightenSessions(**options).step(ctx, sessions, updates, threshold, ticks), ctx
+
+
+def test_as_a_log_begins_the_map_is_learned_again_from_the_drives_before_it():
+    sessions = drive(None, TWICE)
+    out, ctx = at_log(sessions)
+    assert out.updates.relearn
+    assert out.updates.sessions is None
+    assert out.updates.open_from is None
+    assert out.metrics is None
+    assert ctx.facts["map_straightened"].startswith("by ")
+    assert [update.index for update in out.updates.items] == sessions.ticks.tolist()
+    assert all(update.reconstructed for update in out.updates.items)
+    np.testing.assert_array_equal(out.updates.items[7].view.values, sessions.view(7).values)
+
+
+def test_views_are_learned_with_the_spread_that_is_asked_for():
+    item = at_log(drive(None, TWICE), sigma_m=0.3, sigma_deg=6.0)[0].updates.items[0]
+    assert item.state.covariances[0] == pytest.approx(np.diag([0.3, 0.3, np.radians(6.0)]) ** 2)
+    assert item.state.weights.tolist() == [1.0]
+
+
+WAITING = MapUpdates((MapUpdate(view(TWICE[0]), GaussianMixture(np.zeros((1, 3)), np.eye(3)[None], np.ones(1)), 3),), 2)
+
+
+@pytest.mark.parametrize(
+    "left",
+    [
+        {"first": False},
+        {"threshold": None},
+        {"threshold": NoveltyThreshold(4.0, False, 0.4)},
+        {"threshold": NoveltyThreshold(4.0, True, 0.0)},
+        {"max_distance": 0.0},
+        {"sessions": None},
+        {"sessions": Sessions.empty(view(TWICE[0]))},
+    ],
+)
+def test_else_the_updates_go_on_as_they_came(left):
+    sessions = left.pop("sessions") if "sessions" in left else drive(None, TWICE)
+    out, ctx = at_log(sessions, WAITING, **left)
+    assert out.updates is WAITING
+    assert out.metrics is None
+    assert not ctx.facts
+
+
+def test_without_a_crossing_the_last_updates_go_on_with_the_drives_to_be_kept():
+    once = drive(None, TWICE[:25])
+    out, _ = at_log(once, WAITING, first=False, ticks=[])
+    assert (out.updates.items, out.updates.open_from, out.updates.relearn) == (WAITING.items, 2, False)
+    assert out.updates.sessions is once
+    assert at_log(once, WAITING)[0].updates is WAITING
+    assert at_log(once, None, ticks=[])[0].updates.items == ()
+
+
+def test_it_says_how_many_drives_and_closures_there_were_and_by_how_much_views_were_moved():
+    sessions = drive(drive(None, TWICE), AWAY)
+    out, ctx = straightened(sessions)
+    values = out.metrics.values["straightened"]
+    moved = np.hypot(*(learned(out) - sessions.believed)[: len(TWICE), :2].T)
+    assert (values["sessions"], values["joined"]) == (2, 1)
+    assert values["moved_rms_m"] == pytest.approx(np.sqrt(np.mean(moved**2)))
+    assert values["moved_max_m"] == pytest.approx(moved.max())
+    assert values["closures"] == len(closures_between(sessions, 2.4, 2.0, 1000).pairs)
+    assert 0 <= values["rejected"] < values["closures"]
+    assert ctx.facts["map_straightened"] == (
+        f"by {values['closures']} closures between 1 of 2 drives, {values['rejected']} of them rejected, "
+        f"{moved.max():.2f} m at most"
+    )
+
+
+def test_of_a_drive_elsewhere_only_what_was_believed_of_one_pose_is_learned():
+    sessions = drive(drive(None, TWICE), AWAY, believed=False)
+    out, _ = straightened(sessions)
+    assert len(learned(out)) == len(TWICE)
+    assert straightened(drive(None, TWICE, believed=False))[0].metrics.values["straightened"]["moved_rms_m"] == 0.0
+
+
+def test_closures_of_which_none_is_left_straighten_nothing():
+    # Two views far apart that look alike by chance are all there is: odometry knows better.
+    poses = TWICE[:25]
+    sessions = drive(None, poses)
+    looks = sessions.views.copy()
+    looks[24] = looks[2]
+    sessions.put(views=looks)
+    out, ctx = at_log(sessions, WAITING)
+    assert len(closures_between(sessions, 2.4, 2.0, 1000).pairs) >= 1
+    assert out.updates is WAITING
+    assert ctx.facts["map_straightened"].startswith("no: ")
+
+
+def test_the_limits_of_closures_are_in_units_of_the_threshold():
+    sessions = drive(None, TWICE)
+    by = {
+        (distance, gap): at_log(sessions, ticks=[], max_distance=distance, min_gap=gap)[0].metrics
+        for distance, gap in ((0.3, 5.0), (0.6, 5.0), (0.6, 2.0))
+    }
+    for (distance, gap), metrics in by.items():
+        found = closures_between(sessions, distance * 4.0, gap * 0.4, 1000)
+        assert metrics.values["straightened"]["closures"] == len(found.pairs)
+    few = at_log(sessions, ticks=[], samples=60)[0].metrics.values["straightened"]["closures"]
+    assert few == len(closures_between(sessions, 2.4, 2.0, 60).pairs)
+
+
+def test_closures_that_are_held_to_be_vague_move_less():
+    vague, _ = at_log(drive(None, TWICE), closure_sigma=300.0, closure_sigma_deg=170.0)
+    assert error(learned(vague), TWICE) > 0.8 * error(compose(TWICE[0], drive(None, TWICE).by_odometry), TWICE)

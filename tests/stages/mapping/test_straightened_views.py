@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_tour import Landmarks, along, mapped, scattered
+from made_views import between_looks, made_views
 
 from omninav.pipeline import Context
 from omninav.stages.geometry.plane.se2 import between, chain, compose
@@ -50,3 +51,44 @@ def test_a_tour_that_comes_back_to_no_place_stays():
     out, ctx = straightened(once)
     assert out.views is once
     assert ctx.facts["map_straightened"].startswith("no: ")
+
+
+def test_it_says_by_how_much_views_were_moved(views):
+    before = bent(views)
+    out, ctx = straightened(before)
+    values = out.metrics.values["straightened"]
+    moved = np.hypot(*(out.views.poses - before.poses)[:, :2].T)
+    assert moved[0] < 1e-6
+    assert values["moved_rms_m"] == pytest.approx(np.sqrt((moved**2).mean()))
+    assert values["moved_max_m"] == moved.max()
+    assert 0 <= values["rejected"] < values["closures"]
+    assert ctx.facts["map_straightened"] == f"by {values['closures']} closures, {moved.max():.2f} m at most"
+
+
+def test_views_of_one_spot_and_a_single_view_stay():
+    still = mapped(WORLD, [along(SQUARE[:2], 1.5)[:1] * 30], truth=False).views
+    assert straightened(still)[0].views is still
+    lone = mapped(WORLD, [along(SQUARE[:2], 1.5)[:1]], truth=False).views
+    out, ctx = straightened(lone)
+    assert out.views is lone
+    assert not ctx.facts
+
+
+def closures(looks, tours=None, **options):
+    """Number of closures of views a metre apart of which two that follow each other are usually 1 apart in looks."""
+    made = made_views(between_looks(looks), tours=tours)
+    ctx = Context("straightened", np.random.default_rng(0))
+    metrics = StraightenViews(**options).step(ctx, made).metrics
+    return 0 if metrics is None else metrics.values["straightened"]["closures"]
+
+
+def test_a_closure_is_as_alike_as_two_that_follow_each_other_and_some_views_apart():
+    # There and back again: the limit is 1. On the way back each view has its place on the way there.
+    looks = [0, 1, 2, 3, 4, 5, 6, 7, 8, 7, 6, 5, 4, 3, 2, 1, 0]
+    assert closures(looks, min_gap=4) == 7  # views 10 to 16; 9 is 2 after 7, and 5 is not alike
+    assert closures(looks, min_gap=12) == 3  # views 14 to 16; 12 before 13 is a look of 1 for one of 3
+
+
+def test_tours_that_look_elsewhere_are_not_moved_by_the_others():
+    first, second = [0, 1, 2, 3, 4, 5], [100, 101, 102, 103]
+    assert closures(first + second, [1] * 6 + [2] * 4, min_gap=2) == 0

@@ -110,3 +110,57 @@ def test_a_single_component_as_wide_as_the_map_is_not_unimodal():
     adrift = np.diag([9.0, 9.0, 0.1])
     assert given(UnimodalQueue(length=0), belief(0, covariance=adrift))
     assert not given(UnimodalQueue(length=0, max_sigma_m=1.0), belief(0, covariance=adrift))
+
+
+def test_a_state_of_which_both_spreads_are_small_enough_is_unimodal():
+    def spread(x: float, y: float, degrees: float) -> GaussianMixture:
+        return belief(0, covariance=np.diag([x, y, np.radians(degrees)]) ** 2)
+
+    stage = UnimodalQueue(length=0, max_sigma_m=1.0, max_sigma_deg=10.0)
+    assert given(stage, spread(0.9, 0.9, 9.0))
+    for wide in (spread(1.1, 0.5, 9.0), spread(0.5, 1.1, 9.0), spread(0.5, 0.5, 11.0)):
+        assert not given(stage, wide)
+    assert given(UnimodalQueue(length=0), spread(30.0, 30.0, 44.0))
+
+
+def test_a_component_without_company_is_taken_as_it_is_and_given_with_its_tick():
+    (update,) = given(UnimodalQueue(length=0, unimodal="single"), belief(0))
+    np.testing.assert_allclose(update.state.means[0], place(0))
+    assert (update.index, update.reconstructed, update.state.weights.tolist()) == (0, False, [1.0])
+    assert not given(UnimodalQueue(length=0), GaussianMixture(np.empty((0, 3)), np.empty((0, 3, 3)), np.empty(0)))
+
+
+def test_what_waits_is_said_and_each_waits_the_same():
+    drive = Drive(split=range(2, 4), length=2)
+    waiting = []
+    for n in range(6):
+        drive.ctx.tick = Tick(n, n, 0, n, n == 0)
+        state = belief(n, (0.5, 0.5) if n in drive.split else (1.0,))
+        view = Coefficients(look(n), look(n)[None])
+        out = drive.stage.step(drive.ctx, view, state, None if n == 0 else way(n), drive.pending)
+        waiting.append([update.index for update in out.waiting.items])
+    assert waiting == [[0], [0, 1], [1], [], [3, 4], [4, 5]]
+
+
+def test_as_many_views_as_may_wait_are_reconstructed():
+    assert Drive(split=range(5, 9), length=0, max_waiting=4).to(12).ctx.counts == {"view_reconstructed": 4}
+    assert Drive(split=range(5, 9), length=0, max_waiting=3).to(12).ctx.counts == {"view_not_learned": 4}
+
+
+def test_a_path_is_reconstructed_from_the_last_certain_state_only():
+    # Uncertain from the very beginning, then certain, uncertain and certain: only the second stretch has two ends.
+    drive = Drive(split=[0, 1, 4, 5], length=0).to(8)
+    assert [index for index, _ in drive.order()] == [2, 3, 4, 5, 6, 7]
+    assert drive.ctx.counts == {"view_not_learned": 2, "view_reconstructed": 2}
+
+
+def test_views_in_a_gap_of_the_odometry_are_dropped():
+    drive = Drive(split=range(2, 6), length=0)
+    for n in range(8):
+        drive.ctx.tick = Tick(n, n, 0, n, n == 0)
+        state = belief(n, (0.5, 0.5) if n in drive.split else (1.0,))
+        view = Coefficients(look(n), look(n)[None])
+        model = None if n in (0, 4) else way(n)
+        drive.came[n] = list(drive.stage.step(drive.ctx, view, state, model, drive.pending).updates.items)
+    assert [index for index, _ in drive.order()] == [0, 1, 6, 7]
+    assert drive.ctx.counts == {"view_not_learned": 4}

@@ -34,3 +34,14 @@ def test_more_than_half_of_the_weight_must_lie_at_the_heaviest(share: float, uni
 
 def test_nothing_has_no_mode():
     assert unimodal_state(GaussianMixture(np.empty((0, 3)), np.empty((0, 3, 3)), np.empty(0))) is None
+
+
+@pytest.mark.parametrize(("apart", "one"), [(3.99, True), (4.0, True), (4.01, False)])
+def test_components_up_to_the_limit_are_near_the_heaviest(apart: float, one: bool):
+    # Squared distance with both covariances: 4^2 / (1 + 1) = 8. Together they hold all, alone the heaviest half.
+    assert (unimodal_state(mixture((0.0, 0.5), (apart, 0.5)), 0.5, 8.0) is not None) == one
+
+
+def test_a_share_is_of_the_whole_weight_and_must_be_exceeded():
+    assert unimodal_state(mixture((0.0, 3.0), (20.0, 1.0)), 0.75) is None
+    assert unimodal_state(mixture((0.0, 3.0), (20.0, 1.0)), 0.74) is not None
