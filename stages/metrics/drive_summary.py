@@ -30,7 +30,8 @@ class DriveSummary(Stage):
         values: dict[str, Any] = {"duration_s": float(drive.seconds[-1]) if len(drive) else 0.0}
         tallied = np.flatnonzero(np.isfinite(drive.distance))
         if len(tallied):
-            values |= {"collisions": int(drive.collisions[-1]), "distance_m": float(drive.distance[tallied[-1]])}
+            last = tallied[-1]
+            values |= {"collisions": int(drive.collisions[last]), "distance_m": float(drive.distance[last])}
         else:
             values["distance_m"] = float(np.nansum(np.hypot(drive.motion[:, 0], drive.motion[:, 1])))
         return self.Out(metrics=Metrics({"frames": len(drive), "drive": values}, QUANTITIES, ("drive.collisions",)))

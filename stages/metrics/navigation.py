@@ -66,7 +66,7 @@ class Navigation(Stage):
         ends = (k for k, route in enumerate(routes) if route is not None and route.state in ("arrived", "gave up"))
         ended = next(ends, len(drive) - 1)
         tallied = np.flatnonzero(np.isfinite(drive.distance))
-        collisions = int(drive.collisions[-1]) if len(tallied) else None
+        collisions = int(drive.collisions[tallied[-1]]) if len(tallied) else None
         by_odometry = float(np.nansum(np.hypot(drive.motion[:, 0], drive.motion[:, 1])))
         driven = float(drive.distance[tallied[-1]]) if len(tallied) else by_odometry
         goal = int(last.places[-1]) if len(last.places) else None

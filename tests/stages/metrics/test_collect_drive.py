@@ -1,9 +1,14 @@
+import numpy as np
 import pytest
 from small_run import collected, small_run
 
 from omninav.pipeline import Tick
 from omninav.pipeline.engine.codec import decode, encode
+from omninav.stages.values.belief import PoseEstimate, SinglePose
+from omninav.stages.values.confidence import PoseConfidence
 from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.pose import Motion, Pose
+from omninav.stages.values.similarity import BestMatch
 
 
 def test_every_tick_has_its_row():
@@ -31,3 +36,38 @@ def test_sequences_of_different_length_are_an_error():
 def test_a_drive_survives_being_written():
     drive = small_run(frames=5).drive
     assert encode(decode(encode(drive))) == encode(drive)
+
+
+def test_every_column_holds_what_the_tick_brought():
+    covariance = np.arange(9.0).reshape(3, 3)
+    estimate = PoseEstimate(Pose(1.0, 2.0, 0.3), covariance, 0.75, Pose(4.0, 5.0, 0.6), place=3)
+    match = BestMatch(7, 0.5, similarity=0.9, distance=1.25)
+    drive = collected(
+        [Tick(5, 10, log=2, frame=4)],
+        [Pose(-1.0, -2.0, -0.3)],
+        [Motion(0.1, 0.2, 0.3)],
+        [estimate],
+        [DriveTally(6, 8.5)],
+        [match],
+        [PoseConfidence(0.25)],
+    )
+    ints = (drive.row, drive.log, drive.frames, drive.stamps, drive.collisions, drive.place, drive.reference)
+    assert [each.tolist() for each in ints] == [[0], [2], [4], [10], [6], [3], [7]]
+    assert drive.estimate.tolist() == [[1.0, 2.0, 0.3]]
+    assert drive.covariance.tolist() == [covariance.tolist()]
+    assert drive.mean.tolist() == [[4.0, 5.0, 0.6]]
+    assert drive.truth.tolist() == [[-1.0, -2.0, -0.3]]
+    assert drive.motion.tolist() == [[0.1, 0.2, 0.3]]
+    floats = (drive.mode_weight, drive.distance, drive.similarity, drive.visual_distance, drive.reference_turn)
+    assert [each.tolist() for each in floats] == [[0.75], [8.5], [0.9], [1.25], [0.5]]
+    assert drive.confidence.tolist() == [0.25]
+
+
+def test_what_a_tick_did_not_bring_is_not_a_number_or_less_than_none():
+    drive = collected([Tick(0, 0)], [None])
+    assert (drive.collisions[0], drive.place[0], drive.reference[0], drive.mode_weight[0]) == (0, -1, -1, 0.0)
+    for each in (drive.estimate, drive.covariance, drive.mean, drive.truth, drive.motion, drive.distance):
+        assert np.isnan(each).all()
+    for each in (drive.similarity, drive.visual_distance, drive.reference_turn, drive.confidence):
+        assert np.isnan(each).all()
+    assert collected([Tick(0, 0)], [None], estimates=[SinglePose(Pose(0.0, 0.0, 0.0)).estimate()]).place.tolist() == [-1]

@@ -15,6 +15,13 @@ def test_a_simulated_robot_is_measured_by_its_tally():
     assert summary(drive) == {"collisions": 2, "distance_m": 0.5, "duration_s": 1.0}
 
 
+def test_the_last_tally_counts_and_the_last_tick_ends_the_drive():
+    ticks = [Tick(k, 10**9 * (2 + 3 * k)) for k in range(3)]
+    drive = collected(ticks, [None] * 3, tallies=[DriveTally(0, 0.5), DriveTally(3, 1.5), None])
+    assert summary(drive) == {"collisions": 3, "distance_m": 1.5, "duration_s": 6.0}
+    assert summary(collected([], [])) == {"duration_s": 0.0, "distance_m": 0.0}
+
+
 def test_a_real_robot_is_measured_by_its_odometry_and_no_contact_is_claimed():
     run = small_run(frames=12)
     found = summary(run.drive)

@@ -1,5 +1,6 @@
 """Right matches before the first wrong one, of made-up pictures whose points are known."""
 
+import dataclasses
 from typing import Literal
 
 import numpy as np
@@ -7,9 +8,18 @@ import pytest
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.metrics.first_matches import FirstMatches, pairs_apart, run_of_right
+from omninav.stages.camera.equirectangular import Equirectangular
+from omninav.stages.geometry.appearance.feature_matching import Pairs
+from omninav.stages.metrics.first_matches import (
+    FirstMatches,
+    half_widths,
+    pairs_apart,
+    run_of_right,
+    shifted,
+    summary,
+)
 from omninav.stages.values.depths import Depths
-from omninav.stages.values.local_features import LocalFeatures
+from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
 from omninav.stages.values.pose import Pose
 
 RNG = np.random.default_rng(5)
@@ -72,3 +82,164 @@ def test_pairs_are_spread_over_the_log_and_as_far_apart_as_said() -> None:
 def test_without_truth_nothing_can_be_said() -> None:
     with pytest.raises(BadInput, match="true pose"):
         FirstMatches().step(Context("m"), [None, None], [None, None])
+
+
+SIDES = np.array([(0.5, y, z) for y in (-40.0, 40.0) for z in np.linspace(-9.0, 9.0, 10)])
+"""Points far to both sides of the way, so that an angle in one view is the same in the other."""
+
+
+LENS = Equirectangular(360, 90, 180.0, elevation_top=np.pi / 4, elevation_bottom=-np.pi / 4)
+"""A degree a pixel."""
+
+
+def turned(bearings: np.ndarray, axis: int, degrees: float) -> np.ndarray:
+    """Bearings turned about an axis of the robot."""
+    angle, (one, other) = np.radians(degrees), [(1, 2), (2, 0), (0, 1)][axis]
+    found = bearings.copy()
+    found[..., one] = np.cos(angle) * bearings[..., one] - np.sin(angle) * bearings[..., other]
+    found[..., other] = np.sin(angle) * bearings[..., one] + np.cos(angle) * bearings[..., other]
+    return found
+
+
+def sides(x: float, axis: int = 2, degrees: float = 0.0, colour: float = 0.0) -> tuple[LocalFeatures, Depths]:
+    away = SIDES - (x, 0.0, 0.0)
+    metres = np.linalg.norm(away, axis=1)
+    bearings = turned(away / metres[:, None], axis, degrees)
+    points, _ = LENS.project(bearings)
+    colours = np.full((20, 3), [colour, 0.0, 0.0], np.float32)
+    patches = LocalFeatures(bearings, points, LOOKS[:20], colours, np.full(20, 8.0, np.float32))
+    return patches, Depths(metres, np.zeros((0, 2)))
+
+
+def of_sides(axis=2, degrees=0.0, colour=0.0, known=True, lens=(), **parameters) -> dict:
+    views = [sides(0.0), sides(1.0, axis, degrees, colour)]
+    depths = [depth for _, depth in views] if known else ()
+    stage = FirstMatches(**{"apart_m": (1.0,)} | parameters)
+    poses = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
+    out = stage.step(Context("m"), poses, [view for view, _ in views], (), depths, lens)
+    return out.metrics.values["matches"]
+
+
+@pytest.mark.parametrize(("degrees", "share"), [(1.9, 1.0), (2.1, 0.0)])
+def test_a_patch_is_right_up_to_two_degrees_from_where_its_partner_is_seen(degrees: float, share: float) -> None:
+    found = of_sides(degrees=degrees)
+    assert (found["depths_known"], found["all"]["pairs"]) == (1, 1)
+    assert found["all"]["right_share"] == share
+
+
+@pytest.mark.parametrize(("degrees", "share"), [(1.35, 1.0), (1.5, 0.0)])
+def test_without_depths_it_is_right_where_both_together_are_a_degree_from_one_plane(degrees: float, share: float) -> None:
+    found = of_sides(axis=0, degrees=degrees, known=False)
+    assert found["depths_known"] == 0
+    assert found["all"]["right_share"] == share
+    assert of_sides(axis=0, degrees=degrees, known=False, epipolar_deg=5.0)["all"]["right_share"] == 1.0
+
+
+@pytest.mark.parametrize("search", ["both_ways", "one_way"])
+@pytest.mark.parametrize(("colour", "matched"), [(0.45, 20.0), (0.55, 0.0)])
+def test_patches_of_other_colours_are_not_matched(search: Search, colour: float, matched: float) -> None:
+    assert of_sides(colour=colour, search=search)["all"]["right"] == matched
+
+
+@pytest.mark.parametrize(("degrees", "share"), [(3.9, 1.0), (4.1, 0.0)])
+def test_a_large_patch_is_right_up_to_half_of_its_diameter(degrees: float, share: float) -> None:
+    assert of_sides(degrees=degrees, lens=(None, LENS))["all"]["right_share"] == share
+
+
+def columns(x: float, higher_deg: float = 0.0) -> tuple[VerticalSegments, Depths]:
+    """Twenty upright edges 40 m to the left, from 1 m below the camera to a metre above, their upper ends moved up."""
+    feet = np.stack([np.linspace(-15.0, 15.0, 20) - x, np.full(20, 40.0)], axis=1)
+    level = np.hypot(*feet.T)
+    elevations = np.arctan2([1.0, -1.0], level[:, None]) + np.radians([higher_deg, 0.0])
+    looks = np.random.default_rng(3).normal(size=(20, 10)).astype(np.float32)
+    azimuths = np.arctan2(feet[:, 1], feet[:, 0])
+    segments = VerticalSegments(azimuths, elevations, looks, np.ones(20, np.float32), np.zeros((20, 2, 2)))
+    return segments, Depths(np.zeros(0), np.hypot(level, 1.0)[:, None].repeat(2, axis=1))
+
+
+def of_columns(higher_deg: float = 0.0, known: bool = True, **parameters) -> dict:
+    views = [columns(0.0), columns(1.0, higher_deg)]
+    depths = [depth for _, depth in views] if known else ()
+    stage = FirstMatches(apart_m=(1.0,), by="columns", **parameters)
+    poses = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
+    out = stage.step(Context("m"), poses, (), [view for view, _ in views], depths)
+    return out.metrics.values["matches"]["all"]
+
+
+@pytest.mark.parametrize("best", ["clearest", "nearest"])
+@pytest.mark.parametrize(("degrees", "right"), [(0.0, 20.0), (2.9, 20.0), (3.1, 0.0)])
+def test_a_column_is_right_where_both_of_its_ends_are(best: Best, degrees: float, right: float) -> None:
+    found = of_columns(degrees, best=best)
+    assert (found["pairs"], found["right"]) == (1, right)
+    assert found["first_right"] == right
+
+
+@pytest.mark.parametrize(("degrees", "right"), [(1.35, 20.0), (1.5, 0.0)])
+def test_without_depths_a_column_is_right_where_both_ends_are_in_a_plane(degrees: float, right: float) -> None:
+    assert of_columns(degrees, known=False)["right"] == right
+
+
+def test_patches_and_columns_are_counted_together_the_best_of_both_first() -> None:
+    patches, segments = [sides(x) for x in (0.0, 1.0)], [columns(0.0), columns(1.0, 9.0)]
+    depths = [Depths(one.patches, other.ends) for (_, one), (_, other) in zip(patches, segments, strict=True)]
+    given = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)], [each for each, _ in patches], [each for each, _ in segments]
+    found = {}
+    for by in ("patches", "columns", "both"):
+        stage = FirstMatches(apart_m=(1.0,), by=by)
+        found[by] = stage.step(Context("m"), *given, depths).metrics.values["matches"]["all"]
+    assert [found[by]["right"] for by in found] == [20.0, 0.0, 20.0]
+    assert [found[by]["right_share"] for by in found] == [1.0, 0.0, 0.5]
+
+
+def test_a_pair_without_features_has_no_match_and_no_chance() -> None:
+    poses = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
+    found = FirstMatches(apart_m=(1.0, 5.0)).step(Context("m"), poses).metrics.values["matches"]
+    none = {"right_share": None, "by_chance": None}
+    assert found["apart"] == [
+        {"m": 1.0, "pairs": 1, "first_right": 0.0, "right": 0.0, **none},
+        {"m": 5.0, "pairs": 0, "first_right": None, "right": None, **none},
+    ]
+    assert found["depths_known"] == 0
+
+
+def test_images_without_a_true_pose_make_no_pair() -> None:
+    poses = [None, Pose(0.0, 0.0, 0.0), Pose(0.9, 0.0, 0.0), Pose(1.0, 0.0, 0.0)]
+    views = [None, sides(0.0)[0], sides(0.9)[0], sides(1.0)[0]]
+    found = FirstMatches(apart_m=(1.0,)).step(Context("m"), poses, views).metrics.values["matches"]["all"]
+    assert (found["pairs"], found["right"]) == (1, 20.0)
+
+
+def test_figures_of_pairs_are_medians_and_shares_of_all_matches() -> None:
+    yes, no = True, False
+    judged = [(np.array([yes, yes, no, yes]), 0.1), (np.array([no]), 0.3), (np.array([yes] * 5), np.nan)]
+    assert summary(judged) == {
+        "pairs": 3,
+        "first_right": 2.0,
+        "right": 3.0,
+        "right_share": 0.8,
+        "by_chance": pytest.approx(0.2),
+    }
+
+
+def test_a_partner_of_another_is_half_of_them_away() -> None:
+    pairs = Pairs(np.arange(5), np.arange(5), np.zeros(5), np.zeros(5))
+    assert shifted(pairs).first.tolist() == [0, 1, 2, 3, 4]
+    assert shifted(pairs).second.tolist() == [3, 4, 0, 1, 2]
+    assert shifted(pairs.chosen(np.array([0]))).second.tolist() == [0]
+
+
+def test_half_a_patch_is_the_less_of_across_and_down_and_nothing_where_the_lens_does_not_see() -> None:
+    lens = Equirectangular(360, 45, 180.0, elevation_top=np.pi / 4, elevation_bottom=-np.pi / 4)  # two degrees a row
+    bearings, _ = lens.unproject(np.array([[100.0, 22.0], [100.0, 22.0]]))
+    patches = sides(0.0)[0].chosen(np.array([0, 1]))
+    patches = dataclasses.replace(patches, bearings=bearings, points=np.array([[100.0, 22.0]] * 2))
+    assert np.degrees(half_widths(patches, lens)) == pytest.approx([4.0, 4.0], abs=0.01)
+
+
+def test_thirty_pairs_are_taken_of_each_distance_evenly() -> None:
+    poses = np.column_stack([np.arange(100) * 0.5, np.zeros(100), np.zeros(100)])
+    truth = [Pose(*map(float, pose)) for pose in poses]
+    found = FirstMatches().step(Context("m"), truth).metrics.values["matches"]
+    assert [(each["m"], each["pairs"]) for each in found["apart"]] == [(0.5, 30), (1.0, 30), (2.0, 30)]
+    assert found["all"]["pairs"] == 90
+    assert pairs_apart(poses, 0.5, 3) == [(0, 1), (49, 50), (98, 99)]

@@ -11,7 +11,7 @@ from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.navigation import Navigation, shortest_metres
 from omninav.stages.values.drive_tally import DriveTally
 from omninav.stages.values.planned_route import PlannedRoute
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.pose import Motion, Pose
 
 # 3 m east, then 4 m north; place 3 lies apart
 CORNER = made_map([(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (9.0, 9.0)], {(0, 1): 0, (1, 2): 0})
@@ -85,3 +85,52 @@ def test_the_shortest_way_begins_at_the_closest_view():
 def test_without_a_way_there_is_nothing_to_say():
     tick = Tick(index=0, stamp=0, log=0, frame=0, first_of_log=True)
     assert Navigation().step(Context("n"), collected([tick], [Pose(0.0, 0.0, 0.0)]), [None], CORNER).metrics is None
+
+
+def test_the_goal_is_reached_up_to_half_a_metre_from_it():
+    reached = [ended([(0.0, 0.0), (3.0, 4.0 - off)], ["under way", "arrived"])["reached"] for off in (0.5, 0.625)]
+    assert reached == [True, False]
+
+
+def test_the_time_of_a_drive_that_has_not_ended_is_all_of_it():
+    assert ended([(0.0, 0.0)] * 4, ["under way"] * 4)["time_s"] == 3.0
+
+
+def test_the_last_route_that_was_planned_counts_and_it_is_the_third():
+    spots = [(0.0, 0.0), (3.0, 0.0), (3.0, 0.0)]
+    ways = [PlannedRoute(PLACES, "under way", 0), PlannedRoute(np.array([0, 1]), "arrived", 2), None]
+    ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(3)]
+    drive = collected(ticks, [Pose(x, y, 0.0) for x, y in spots], [None, Motion(3.0, 4.0, 0.1), Motion(0.5, 0.0, 0.0)])
+    found = Navigation().step(Context("navigation"), drive, ways, CORNER).metrics.values["navigation"]
+    assert (found["goal"], found["routes"], found["reached"], found["time_s"]) == (1, 3, True, 1.0)
+    assert (found["path_length_m"], found["shortest_m"]) == pytest.approx((5.5, 3.0))
+
+
+def test_of_a_tally_that_ends_early_the_last_entry_counts():
+    ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(3)]
+    tallies = [DriveTally(0, 0.5), DriveTally(1, 2.5), None]
+    drive = collected(ticks, [Pose(0.0, 0.0, 0.0)] * 3, tallies=tallies)
+    way = PlannedRoute(PLACES, "under way", 0)
+    found = Navigation().step(Context("navigation"), drive, [way] * 3, CORNER).metrics.values["navigation"]
+    assert (found["path_length_m"], found["collisions"]) == (2.5, 1)
+
+
+def test_who_was_at_the_goal_already_has_no_ratio_and_who_has_no_route_no_goal():
+    there = ended([(3.0, 4.0)] * 2, ["under way", "arrived"])
+    assert (there["reached_rate"], there["shortest_m"], there["reached_error_m"]) == (1.0, 0.0, 0.0)
+    assert not {"path_length_ratio", "time_per_metre_s"} & there.keys()
+    nowhere = PlannedRoute(np.empty(0, np.int64), "gave up", 0, "no way")
+    drive = collected([Tick(0, 0)], [Pose(0.0, 0.0, 0.0)])
+    found = Navigation().step(Context("navigation"), drive, [nowhere], CORNER).metrics.values["navigation"]
+    assert (found["goal"], found["end_error_m"], found["shortest_m"], found["reached"]) == (None, None, None, False)
+    blind = collected([Tick(0, 0)], [None])
+    assert Navigation().step(Context("navigation"), blind, [nowhere], CORNER).metrics is None
+
+
+def test_a_way_along_path_images_is_as_long_as_they_lie_apart():
+    made = made_map([(0.0, 0.0), (4.0, 0.0)], {(0, 1): 1})
+    poses = made.poses.copy()
+    poses[2, :2] = (2.0, 1.5)  # the path image
+    bent = dataclasses.replace(made, poses=poses)
+    assert shortest_metres(bent, (0.0, 0.0), 1) == pytest.approx(5.0)
+    assert shortest_metres(bent, (2.0, 2.5), 1) == pytest.approx(3.5)

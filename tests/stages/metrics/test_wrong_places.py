@@ -110,3 +110,52 @@ def test_the_measure_of_the_order_of_correction_is_0_where_all_are_corrected_ali
     some_stay = corrected(2, laps=7)
     assert figure_at(some_stay, *kept) == 4
     assert figure_at(some_stay, *order) == pytest.approx(40 / 2, rel=0.15)
+
+
+def test_a_place_is_wrong_beyond_two_metres():
+    truth = driven([Pose(0.0, 0.0, 0.0)] * 2)
+    events = [event([0, 1, 2], seen=[0, 0, 0]), event()]
+    parts = [mixture((0, 1.9, 1.0), (1, 2.0, 1.0), (2, 2.1, 1.0)), None]
+    found = WrongPlaces().step(CTX, truth, events, parts).metrics.values["wrong_places"]
+    assert (found["references"], found["kept"]) == (1, 1)
+
+
+def test_what_was_not_seen_on_this_drive_or_where_no_truth_is_does_not_count():
+    truth = driven([None, Pose(0.0, 0.0, 0.0), Pose(0.0, 0.0, 0.0)])
+    events = [event([1], seen=[0]), event([2], seen=[1]), event()]
+    parts = [mixture((0, 50.0, 1.0), (1, 50.0, 1.0)), mixture((0, 50.0, 1.0), (1, 50.0, 1.0), (2, 50.0, 1.0)), None]
+    found = WrongPlaces(points=3).step(CTX, truth, events, parts).metrics.values["wrong_places"]
+    assert found["references"] == 1
+    assert found["weight"] == [None, 1.0, 1.0]
+
+
+def test_a_reference_without_any_weight_holds_no_place(life):
+    events, parts = [event([0]), *[event()] * 5], [mixture((0, 9.0, 1.0)), mixture((0, 9.0, 0.0)), *[None] * 4]
+    found = WrongPlaces(points=6).step(CTX, life[0], events, parts).metrics.values["wrong_places"]
+    assert found["weight"] == [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    assert found["gone_after_steps"] == [1]
+
+
+def test_how_long_a_place_stayed_is_counted_from_where_it_came_and_not_from_where_it_was_seen(life):
+    late = [event(), event(), event([0, 1], seen=[1, 0]), *[event()] * 3]
+    parts = [None, None, mixture((0, 20.0, 1.0), (1, 20.0, 1.0)), None, mixture((0, 1.0, 1.0), (1, 20.0, 1.0)), None]
+    found = WrongPlaces().step(CTX, life[0], late, parts).metrics.values["wrong_places"]
+    assert found["along_m"] == [0.0, 1.0]  # 1 was seen before 0
+    assert found["gone_after_steps"] == [None, 2]
+    assert len(found["step"]) == 6
+    assert found["weight"][:3] == [None, None, 1.0]
+
+
+def test_a_mixture_is_wrong_where_its_heaviest_place_is():
+    truth = driven([Pose(0.0, 0.0, 0.0)] * 2)
+    parts = [mixture((0, 0.0, 0.6), (0, 9.0, 0.4), (1, 0.0, 0.25), (1, 9.0, 0.75)), None]
+    found = WrongPlaces().step(CTX, truth, [event([0, 1], seen=[0, 0]), event()], parts).metrics.values["wrong_places"]
+    assert found["references"] == 1
+    assert found["weight"] == [0.75, 0.75]
+
+
+def test_the_lists_over_the_frames_have_sixty_entries_from_the_first_to_the_last():
+    truth = driven([Pose(0.0, 0.0, 0.0)] * 200)
+    events, parts = [event([0]), *[event()] * 199], [mixture((0, 9.0, 1.0)), *[None] * 199]
+    found = WrongPlaces().step(CTX, truth, events, parts).metrics.values["wrong_places"]
+    assert (len(found["step"]), found["step"][0], found["step"][-1]) == (60, 0, 199)
