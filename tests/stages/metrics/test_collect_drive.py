@@ -70,4 +70,5 @@ def test_what_a_tick_did_not_bring_is_not_a_number_or_less_than_none():
         assert np.isnan(each).all()
     for each in (drive.similarity, drive.visual_distance, drive.reference_turn, drive.confidence):
         assert np.isnan(each).all()
-    assert collected([Tick(0, 0)], [None], estimates=[SinglePose(Pose(0.0, 0.0, 0.0)).estimate()]).place.tolist() == [-1]
+    nowhere = SinglePose(Pose(0.0, 0.0, 0.0)).estimate()
+    assert collected([Tick(0, 0)], [None], estimates=[nowhere]).place.tolist() == [-1]

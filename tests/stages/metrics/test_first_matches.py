@@ -128,7 +128,7 @@ def test_a_patch_is_right_up_to_two_degrees_from_where_its_partner_is_seen(degre
 
 
 @pytest.mark.parametrize(("degrees", "share"), [(1.35, 1.0), (1.5, 0.0)])
-def test_without_depths_it_is_right_where_both_together_are_a_degree_from_one_plane(degrees: float, share: float) -> None:
+def test_without_depths_it_is_right_where_both_are_a_degree_from_one_plane(degrees: float, share: float) -> None:
     found = of_sides(axis=0, degrees=degrees, known=False)
     assert found["depths_known"] == 0
     assert found["all"]["right_share"] == share
