@@ -1,7 +1,7 @@
 """Cameras as rays: for each pixel the direction it looks along, in the robot's frame (x forward, y left, z up)."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -103,6 +103,28 @@ def camera_rays(camera: Camera, vignetting: float = 0.0, robot_radius: float = 0
         wedges=wedges,
         ray_of=ray_of,
         own=own[is_own].astype(np.float32),
+    )
+
+
+def leaning(rays: Rays, rotation: F64) -> Rays:
+    """The rays of a camera that leans: `rotation` (3, 3) brings its frame to that of the level robot.
+
+    The robot's own image stays as it is.
+    """
+    directions = rays.directions @ rotation.T.astype(np.float32)
+    order, wedge_start, wedges = _wedges(directions.astype(np.float64))
+    seen = len(rays.pixels)
+    ray_of = rays.ray_of.copy()
+    ray_of[rays.pixels[order]] = np.arange(seen, dtype=np.int32)
+    return replace(
+        rays,
+        pixels=rays.pixels[order],
+        directions=np.ascontiguousarray(directions[order]),
+        footprint=rays.footprint[order],
+        gain=np.concatenate([rays.gain[:seen][order], rays.gain[seen:]]),
+        wedge_start=wedge_start,
+        wedges=wedges,
+        ray_of=ray_of,
     )
 
 

@@ -276,7 +276,7 @@ class Robot:
     """rad/s²."""
     look_ahead: Positive = 0.45
     """Distance along the route to the point that is steered for (pure pursuit)."""
-    path_jitter_m: Spread = 0.04
+    path_jitter_m: Spread = 0.2
     """Standard deviation of each day's offset from the route, drawn every 2.5 m; its root mean square is 0.78 of it."""
     contact: Literal["slide", "hold"] = "slide"
     """At an obstacle the robot slides along it, or stops."""
@@ -339,6 +339,36 @@ class Sensor:
     """Exposure time (s): whatever moves meanwhile is blurred."""
     sub_exposures: Annotated[int, Bounds(ge=1)] = 6
     """Instants within the exposure time that are rendered and averaged."""
+    exposure_jumps: Spread = 0.0
+    """Standard deviation (stops, factors of two) of an automatic exposure that jumps."""
+    exposure_hold_s: Positive = 4.0
+    """Seconds between two of its jumps."""
+
+
+@dataclass(frozen=True)
+class CameraErrors:
+    """What camera.yaml does not know of the camera. Signs and directions follow from the seed, the same on all days."""
+
+    tilt_deg: Annotated[float, Bounds(ge=0, le=30)] = 0.0
+    """Degrees by which the camera leans; the image of the robot itself stays where it is."""
+    focal: Annotated[float, Bounds(ge=0, le=0.2)] = 0.0
+    """Share by which its focal lengths are longer or shorter."""
+    centre_px: Annotated[float, Bounds(ge=0, le=100)] = 0.0
+    """Pixels by which its centre lies elsewhere."""
+
+
+@dataclass(frozen=True)
+class Ramps:
+    """A floor that rises, is level and falls along x, over and over. Robot and camera lean with it.
+
+    Nothing else does: bodies stay upright on a flat floor, the camera stays at its height, and ranges and odometry are
+    those of the flat floor (which differ by 0.06 % at 2 degrees).
+    """
+
+    slope_deg: Annotated[float, Bounds(ge=0, le=30)] = 0.0
+    """Steepest slope; it holds over two thirds of the way."""
+    period_m: Positive = 16.0
+    """Metres along x from one rise to the next."""
 
 
 @dataclass(frozen=True)
@@ -392,6 +422,9 @@ class WorldConfig:
     name: str = "empty"
     seed: int = 1
     """Of goods, textures, the jitter of each day's path and all noise."""
+    draw: Annotated[int, Bounds(ge=0)] = 0
+    """Which world is drawn: 0 is for development, 1 to 6 are for tests. Each has another seed; in draws 2, 4, 6, …
+    routes that are not `random` are driven the other way round."""
     size: Point = (12.0, 9.0)
     height: Positive = 3.2
     wall: Material = "wall"
@@ -420,6 +453,23 @@ class WorldConfig:
     timing: Timing = Timing()
     ranges: Ranges = Ranges()
     delivery: Delivery = Delivery()
+    camera_errors: CameraErrors = CameraErrors()
+    ramps: Ramps = Ramps()
+
+    @property
+    def draw_seed(self) -> int:
+        """The seed of all that is drawn at random: `seed` + 1000 `draw`."""
+        return self.seed + 1000 * self.draw
+
+    @property
+    def drives_backwards(self) -> bool:
+        """Whether routes are driven the other way round: in even draws, but for the first."""
+        return self.draw > 0 and self.draw % 2 == 0
+
+    @property
+    def label(self) -> str:
+        """Its name, and its draw where that is not the one for development."""
+        return f"{self.name}, draw {self.draw}" if self.draw else self.name
 
     @property
     def eye_height(self) -> float:

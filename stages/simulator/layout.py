@@ -57,7 +57,7 @@ def _curtained(config: WorldConfig, hanging: WallPanel, number: int, day: int) -
     """A window with its curtain closed, where the day has it so."""
     if hanging.material != "window":
         return hanging
-    closed = stream(config.seed, "curtain", number, "day", day).uniform() < config.day(day).curtains
+    closed = stream(config.draw_seed, "curtain", number, "day", day).uniform() < config.day(day).curtains
     return replace(hanging, material="curtain") if closed else hanging
 
 
@@ -70,7 +70,7 @@ def _aisle_block(config: WorldConfig, block: AisleBlock) -> tuple[list[Shelf], l
     gap = pitch - block.depth if rows > 1 else block.aisle
     stretches = block.cross_aisles + 1
     stretch = (length - block.cross_aisles * gap) / stretches
-    rng = stream(config.seed, "aisles", block.name)
+    rng = stream(config.draw_seed, "aisles", block.name)
     shelves, pillars, aisles = [], [], []
 
     def at(along: float, over: float) -> Point:

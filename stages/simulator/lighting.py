@@ -105,7 +105,7 @@ def lamps_on(lamps: Sequence[Lamp], config: WorldConfig, number: int) -> list[bo
     off = config.day(number).lamps_off
     if isinstance(off, tuple):
         return [lamp.name not in off for lamp in lamps]
-    return [stream(config.seed, "lamp", k, "day", number).uniform() >= off for k in range(len(lamps))]
+    return [stream(config.draw_seed, "lamp", k, "day", number).uniform() >= off for k in range(len(lamps))]
 
 
 def light_map(

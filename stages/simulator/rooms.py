@@ -158,7 +158,7 @@ def doors(config: WorldConfig, room: Room, day: Day, number: int) -> list[Block]
         along_x, line, low, _ = _wall(room, door.side)
         at, inward = line + INWARD[door.side] * INNER_WALL_M / 2, INWARD[door.side]
         middle = low + door.at
-        is_open = stream(config.seed, "door", room.name, k, "day", number).uniform() < day.doors
+        is_open = stream(config.draw_seed, "door", room.name, k, "day", number).uniform() < day.doors
         if is_open:
             along, across, turned = middle - door.width / 2, at + inward * (door.width / 2 + INNER_WALL_M / 2), True
         else:
@@ -211,8 +211,8 @@ def furnish(config: WorldConfig, room: Room, cuts: list[Opening], day: Day, numb
     """Furniture of a room, by its kind and the seed; on each day every piece is shifted along its wall a little."""
     if room.furniture in ("trees", "park"):
         return Fittings(_planted(config, room), [])
-    rng = stream(config.seed, "furniture", room.name)
-    moved = stream(config.seed, "furniture", room.name, "day", number)
+    rng = stream(config.draw_seed, "furniture", room.name)
+    moved = stream(config.draw_seed, "furniture", room.name, "day", number)
     blocks: list[Block] = []
     wall_panels: list[WallPanel] = []
     pieces = CATALOGUE[room.furniture]
@@ -313,7 +313,7 @@ def _table(config: WorldConfig, room: Room, shift: float) -> Iterator[Block]:
 
 def _planted(config: WorldConfig, room: Room) -> list[Block]:
     """Trees (and in a park hedges and benches) scattered over a rectangle, apart from each other."""
-    rng = stream(config.seed, "planted", room.name)
+    rng = stream(config.draw_seed, "planted", room.name)
     (x, y), (width, depth) = room.corner, room.size
     blocks: list[Block] = []
     columns, rows = max(1, round(width / 4.0)), max(1, round(depth / 4.0))

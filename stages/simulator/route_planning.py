@@ -37,12 +37,14 @@ class UnreachableRoute(Exception):
 def plan(world: World, route: Route) -> F64:
     """The points (W, 2) of a route around what stands in the world on its day, rounded with smoothed corners.
 
-    All points keep the robot's radius and 0.1 m from obstacles where there is as much room. Points behind closed doors
-    are left out. Raises `UnreachableRoute` if another point cannot be reached, or no point is left.
+    Where the world `drives_backwards`, laps go round the other way from the same first point, a lead-in too; all other
+    routes but random ones begin at their end. All points keep the robot's radius and 0.1 m from obstacles where there
+    is as much room. Points behind closed doors are left out. Raises `UnreachableRoute` if another point cannot be
+    reached, or no point is left.
     """
     radius = world.config.robot.radius
     if route.kind == "waypoints":
-        points = np.asarray(route.waypoints, dtype=np.float64)
+        points = np.asarray(route.waypoints[:: -1 if world.config.drives_backwards else 1], dtype=np.float64)
         if len(points) and _straight(world, points, radius):
             return _cut(points, route.length)
     space = _free_space(world)
@@ -89,17 +91,27 @@ def jittered(world: World, line: F64, spread: float, rng: np.random.Generator) -
 
 
 def _goals(world: World, space: "_FreeSpace", route: Route) -> Iterator[Point]:
-    """The points that a route visits, in order."""
+    """The points that a route visits, in the order in which it is driven."""
+    backwards = world.config.drives_backwards
+    if route.kind == "laps":
+        ring, lead_in = (_other_way_round(part) if backwards else part for part in (route.waypoints, route.lead_in))
+        yield from (*lead_in, *ring * route.laps, *ring[:1])
+    elif route.kind == "random" or not backwards:
+        yield from _listed_goals(world, space, route)
+    else:
+        yield from reversed(list(_listed_goals(world, space, route)))
+
+
+def _other_way_round(ring: tuple[Point, ...]) -> tuple[Point, ...]:
+    return ring[:1] + ring[:0:-1]
+
+
+def _listed_goals(world: World, space: "_FreeSpace", route: Route) -> Iterator[Point]:
+    """The points of a route that is no laps, in the order in which it is described."""
     if route.kind == "waypoints":
         yield from route.waypoints
         return
-    if route.kind == "laps":
-        yield from route.lead_in
-        for _ in range(route.laps):
-            yield from route.waypoints
-        yield from route.waypoints[:1]
-        return
-    rng = stream(world.config.seed, "tour", route.kind, route.seed)
+    rng = stream(world.config.draw_seed, "tour", route.kind, route.seed)
     start = route.waypoints[0] if route.waypoints else space.random_place(rng)
     yield start
     if route.kind == "rooms":

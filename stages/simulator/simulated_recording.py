@@ -20,14 +20,15 @@ from omninav.stages.values.image import Pixels
 from omninav.stages.values.scan import Scan
 
 from . import route_planning
-from .cameras import Rays, camera_of, camera_rays, shutter_times
+from .cameras import shutter_times
 from .config import Day, Kidnapping, WorldConfig
 from .obstacles import Obstacles, gather, nearest
 from .odometry import draw_bias, odometry
 from .people import Person, Track
 from .ranges import azimuths, measure, round_bodies
-from .renderer import Scene, render
-from .robot import NO_PEOPLE, drive, reach
+from .renderer import Scene
+from .robot import NO_PEOPLE, SimulatedDrive, drive, reach
+from .robot_camera import RobotCamera
 from .streams import stream
 from .world import World
 
@@ -38,6 +39,8 @@ DAY_0_NS = 1_767_571_200 * 10**9
 """Midnight before day 0, 2026-01-05 UTC, in nanoseconds."""
 FIRST_IMAGE_S = 0.52
 """Seconds from the start of a drive to its first image, so that odometry begins before it."""
+JITTER_SHARES = (1.0, 0.5, 0.25, 0.0)
+"""Shares of the path's jitter that are tried one after the other, until the robot touches nothing."""
 IMAGE_LATENCY_NS = 42_000_000
 """Nanoseconds from an image's stamp to its arrival."""
 
@@ -57,12 +60,12 @@ class SimulatedRecording:
                 f"world '{world.name}' has no route '{route}'; it has: {', '.join(sorted(world.routes)) or 'none'}"
             )
         self.world, self.route, self.day = world, route, day
-        self.kidnappings = tuple(
-            sorted([*world.routes[route].kidnappings, *kidnappings], key=lambda kidnapping: kidnapping.at)
-        )
+        listed = sorted([*world.routes[route].kidnappings, *kidnappings], key=lambda kidnapping: kidnapping.at)
+        self.kidnappings = tuple(map(_other_way, listed) if world.drives_backwards else listed)
         self._later_world: World | None = None
         self._day_duration_s = world.routes[route].day_duration_s
-        self.camera = camera_of(world)
+        self._camera = RobotCamera(world, route, day)
+        self.camera = self._camera.described
         self.dropped: Counter[str] = Counter()
         self.details: dict[str, str] = {}
         self.unmeasured_s: None = None
@@ -78,7 +81,6 @@ class SimulatedRecording:
             way = route_planning.plan(self._world, world.routes[self.route])
         except route_planning.UnreachableRoute as why:
             raise UnreadableRecording(f"route '{self.route}': {why}") from None
-        line = route_planning.jittered(self._world, way, world.robot.path_jitter_m, self._stream("line"))
         for kidnapping in self.kidnappings:
             if kidnapping.to is not None:
                 refuse_no_room(world, self._room, kidnapping.to, "kidnappings")
@@ -89,9 +91,9 @@ class SimulatedRecording:
                 f"route '{self.route}' lasts several days, and on one of world '{world.name}' furniture or doors move; "
                 "lamps, curtains and goods may change while the robot drives, but what it may run into may not"
             )
-        driven = drive(line, world.robot, world.timing.odometry, room=self._room, kidnappings=self.kidnappings)
+        driven = self._without_contact(way)
         self._seconds, self.driven, self.collisions = driven.times, driven.poses, driven.collisions
-        bias = draw_bias(world.odometry, stream(world.seed, "odometry bias", self.day))
+        bias = draw_bias(world.odometry, stream(world.draw_seed, "odometry bias", self.day))
         self.rolled = odometry(driven.poses, world.odometry, bias, self._stream("odometry"), driven.rolled_to)
         self.times = self._stamps(driven.times)
         self.lifted = [(int(self.times[row]), kidnapping) for row, kidnapping in driven.kidnappings]
@@ -102,6 +104,16 @@ class SimulatedRecording:
         self.true_poses = np.insert(driven.poses, put, driven.rolled_to[put], axis=0)
         self._true_columns = (*self.true_poses[:, :2].T.copy(), np.unwrap(self.true_poses[:, 2]))
         self.true_times: I64 = np.insert(self.times, put, self.times[put] - 1)
+
+    def _without_contact(self, planned: F64) -> SimulatedDrive:
+        """The drive along a planned path (W, 2), off it by the day's jitter, by less where it touches anything."""
+        robot, rate = self.world.robot, self.world.timing.odometry
+        for share in JITTER_SHARES:
+            line = route_planning.jittered(self._world, planned, share * robot.path_jitter_m, self._stream("line"))
+            driven = drive(line, robot, rate, room=self._room, kidnappings=self.kidnappings)
+            if not driven.collisions:
+                break
+        return driven
 
     def _schedule_images(self) -> None:
         timing, delivery = self.world.timing, self.world.delivery
@@ -147,7 +159,7 @@ class SimulatedRecording:
     @property
     def name(self) -> str:
         """World, route and day."""
-        return f"{self.world.name}, route {self.route}, day {self.day}"
+        return f"{self.world.label}, route {self.route}, day {self.day}"
 
     @cached_property
     def _world(self) -> World:
@@ -171,7 +183,7 @@ class SimulatedRecording:
         return int(self._stream("pixels").integers(2**62))
 
     def _stream(self, purpose: str) -> np.random.Generator:
-        return stream(self.world.seed, purpose, self.route, self.day)
+        return stream(self.world.draw_seed, purpose, self.route, self.day)
 
     def image(self, frame: int, following: Sequence[int] = ()) -> Pixels:
         """The image of a frame, (height, width, 3) uint8 blue-green-red, rendered now."""
@@ -179,22 +191,9 @@ class SimulatedRecording:
 
     def image_of_shot(self, shot: int) -> Pixels:
         """An image by its number among all that were taken, lost ones included."""
-        sensor, at = self.world.sensor, self._shots[shot]
-        swing = np.sin(2 * np.pi * at / sensor.exposure_period)
-        return render(
-            self._scene(float(at)),
-            self._rays,
-            self._true(shutter_times(sensor, at)),
-            self.world.eye_height,
-            exposure=sensor.exposure * (1.0 + sensor.exposure_drift * float(swing)),
-            noise=sensor.noise,
-            key=self._key + shot,
-            people=self.people_at(float(at)),
-        )
-
-    @cached_property
-    def _rays(self) -> Rays:
-        return camera_rays(self.camera, self.world.sensor.vignetting, self.world.robot.radius)
+        at = float(self._shots[shot])
+        poses = self._true(shutter_times(self.world.sensor, at))
+        return self._camera.image(self._scene(at), poses, at, self._key + shot, self.people_at(at))
 
     def scan(self, frame: int) -> Scan | None:
         """The last range scan before a frame."""
@@ -215,6 +214,14 @@ class SimulatedRecording:
     def digest(self) -> str:
         """sha256 over the days of the world that the drive sees, route, day, kidnappings and the simulator's code."""
         return drive_digest(self.world, self.route, self.day, self.kidnappings)
+
+
+def _other_way(kidnapping: Kidnapping) -> Kidnapping:
+    """A kidnapping on a route that is driven backwards: the robot is put down facing along it."""
+    if kidnapping.to is None:
+        return kidnapping
+    x, y, heading = kidnapping.to
+    return dataclasses.replace(kidnapping, to=(x, y, float(se2.wrap(heading + np.pi))))
 
 
 def drive_digest(world: WorldConfig, route: str, day: int, kidnappings: Sequence[Kidnapping]) -> str:

@@ -80,7 +80,7 @@ class World:
     def _ground(self, material: str, kinds: int, rooms: Sequence[Room] = ()) -> Tiling:
         """Floor or ceiling in tiles of about a metre; rooms have floors of their own."""
         rows, columns = math.ceil(self.config.size[1]), math.ceil(self.config.size[0])
-        choice = stream(self.config.seed, "ground", material).integers(kinds, size=(rows, columns))
+        choice = stream(self.config.draw_seed, "ground", material).integers(kinds, size=(rows, columns))
         numbers = np.array([self._texture(material, f"{material} {k}") for k in range(kinds)])
         choice = choice if material in VARIED_MATERIALS else 0 * choice
         tiles = numbers[choice]
@@ -128,7 +128,7 @@ class World:
 
     def goods_on(self, shelf: Shelf, number: int) -> list[I64]:
         """Textures (levels, compartments) on each of a shelf's four sides, about one compartment a metre."""
-        rng = stream(self.config.seed, "goods", number)
+        rng = stream(self.config.draw_seed, "goods", number)
         here = self._assortment(shelf.department)
         sides = []
         for extent in (shelf.depth, shelf.depth, shelf.length, shelf.length):
@@ -136,7 +136,7 @@ class World:
             sides.append(here[rng.integers(len(here), size=shape)])
         rearranged = self.config.day(self.day).rearranged
         if rearranged:
-            anew = stream(self.config.seed, "goods", number, "day", self.day)
+            anew = stream(self.config.draw_seed, "goods", number, "day", self.day)
             for side in sides:
                 changed = anew.uniform(size=side.shape) < rearranged
                 side[changed] = here[anew.integers(len(here), size=int(changed.sum()))]
@@ -145,12 +145,12 @@ class World:
     def _assortment(self, department: str) -> I64:
         """Textures of the goods that a department has."""
         count = min(self.config.assortment, self.config.goods)
-        chosen = stream(self.config.seed, "assortment", department).permutation(self.config.goods)[:count]
+        chosen = stream(self.config.draw_seed, "assortment", department).permutation(self.config.goods)[:count]
         return np.array(self._goods)[np.sort(chosen)]
 
     def _stock(self, shelf: Shelf, number: int) -> list[Box]:
         """Cartons on top of a shelf, one here and there."""
-        rng = stream(self.config.seed, "stock", number)
+        rng = stream(self.config.draw_seed, "stock", number)
         boxes: list[Box] = []
         along = -shelf.length / 2 + 0.3
         while along < shelf.length / 2 - 0.4:
@@ -225,7 +225,7 @@ class World:
         day = np.array(self.config.day(self.day).light)
         images, glow = [], [textures.glow(material) for material, _ in self._named]
         for number, (material, name) in enumerate(self._named):
-            image = _drawn(self.config.seed, material, name)
+            image = _drawn(self.config.draw_seed, material, name)
             if glow[number]:  # what shines has the light's colour
                 image = np.clip(image * (day * self._tints.get(number, (1.0, 1.0, 1.0))), 0, 255).astype(np.uint8)
             images.append(image)
@@ -248,7 +248,7 @@ class World:
     def crowd(self) -> people.Crowd:
         """The people of this day."""
         count = self.config.day(self.day).people
-        return people.Crowd(self.config.seed, self.day, count, self.config.size, self.clearance)
+        return people.Crowd(self.config.draw_seed, self.day, count, self.config.size, self.clearance)
 
     def people_at(self, seconds: float, track: people.Track | None = None) -> tuple[people.Person, ...]:
         """The people of this day at a time; some keep the robot company where its `track` up to then is known."""

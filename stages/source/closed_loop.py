@@ -11,15 +11,15 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator import route_planning
-from omninav.stages.simulator.cameras import camera_of, camera_rays, shutter_times
+from omninav.stages.simulator.cameras import shutter_times
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.obstacles import gather
 from omninav.stages.simulator.odometry import draw_bias, measured
 from omninav.stages.simulator.people import Person, Track
 from omninav.stages.simulator.ranges import measure, round_bodies
-from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.robot import COLLISIONS, DISTANCE, around, at_rest, limits, reach, steer, teleport
+from omninav.stages.simulator.robot_camera import RobotCamera
 from omninav.stages.simulator.simulated_recording import DAY_0_NS, refuse_no_room, scan_value, simulation_digest
 from omninav.stages.simulator.streams import stream
 from omninav.stages.simulator.world import World
@@ -99,9 +99,8 @@ class ClosedLoop(Source):
         self._world, self._scene = world, world.scene
         self._room = gather(world.obstacles, self.world.size, reach(self.world.robot))
         self._limits = limits(self.world.robot)
-        self._camera = camera_of(self.world)
-        self._rays = camera_rays(self._camera, self.world.sensor.vignetting, self.world.robot.radius)
-        self._bias = draw_bias(self.world.odometry, stream(self.world.seed, "odometry bias", self.day))
+        self._camera = RobotCamera(self.world, "closed loop", self.day)
+        self._bias = draw_bias(self.world.odometry, stream(self.world.draw_seed, "odometry bias", self.day))
         self._first = self._first_pose(world)
         refuse_no_room(self.world, self._room, self._first.tolist(), "start")
         for kidnapping in self.kidnappings:
@@ -157,7 +156,7 @@ class ClosedLoop(Source):
         return self.Out(
             tick=Tick(index=simulation.ticks, stamp=stamp, frame=simulation.ticks, first_of_log=simulation.ticks == 0),
             image=self._look(ctx, simulation.robot, now, people),
-            camera=self._camera,
+            camera=self._camera.described,
             odometry=_pose(simulation.odometry),
             motion=motion,
             scan=scan_value(self.world, metres),
@@ -171,14 +170,8 @@ class ClosedLoop(Source):
         if fate[0] < delivery.dropped or fate[1] < delivery.late:
             ctx.count("lost_image" if fate[0] < delivery.dropped else "late_image")
             return None
-        swing = float(np.sin(2 * np.pi * now / sensor.exposure_period))
-        exposure = sensor.exposure * (1.0 + sensor.exposure_drift * swing)
-        eye = self.world.eye_height
         poses = around(robot, shutter_times(sensor, 0.0))
-        seen = render(
-            self._scene, self._rays, poses, eye, exposure=exposure, noise=sensor.noise, key=key, people=people
-        )
-        return Image(seen)
+        return Image(self._camera.image(self._scene, poses, now, key, people))
 
     def _meet(self, simulation: ClosedLoopState, now: float) -> tuple[Person, ...]:
         """The robot is where it is now, and people have walked on until then: everybody who is about."""

@@ -12,11 +12,10 @@ from omninav.pipeline.files import digest_text
 from omninav.stages.camera.model import Camera
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, UnreadableRecording
-from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.first_hits import first_hits
-from omninav.stages.simulator.renderer import render
+from omninav.stages.simulator.robot_camera import RobotCamera
 from omninav.stages.simulator.simulated_recording import simulation_digest
 from omninav.stages.simulator.world import World
 from omninav.stages.values.image import Image, Pixels
@@ -138,15 +137,12 @@ class RenderedViews:
         points = points[np.array(seen, np.bool_)]
         headings = rng.uniform(-math.pi, math.pi, len(points))
         self.poses = np.concatenate([[target], np.column_stack([points, headings])])
-        self.camera = camera_of(config)
-        self._config, self._scene = config, world.scene
-        self._rays = camera_rays(self.camera, config.sensor.vignetting, config.robot.radius)
+        self._camera, self._scene = RobotCamera(config, "homing grid", day), world.scene
+        self.camera = self._camera.described
 
     def image(self, row: int) -> Pixels | None:
-        """Rendered now, with the camera's noise."""
-        sensor = self._config.sensor
-        height = self._config.eye_height
-        return render(self._scene, self._rays, self.poses[row], height, sensor.exposure, sensor.noise, key=row)
+        """Rendered now, with the camera's noise; all are of one moment, and of one exposure."""
+        return self._camera.image(self._scene, self.poses[row : row + 1], 0.0, key=row)
 
 
 class RecordedViews:

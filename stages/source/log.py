@@ -172,7 +172,7 @@ class LogSource(Source):
 
     def recording_name(self) -> str:
         """World, route and days of a simulated drive."""
-        return f"{self.world.name} {self.route} day {self.day}{' with kidnappings' if self.kidnappings else ''}"
+        return f"{self.world.label} {self.route} day {self.day}{' with kidnappings' if self.kidnappings else ''}"
 
     def record(self, ctx: Context, folder: Path) -> None:
         """Write a simulated drive as an MCAP log, with camera.yaml, floor plan and grid beside it."""
