@@ -255,3 +255,116 @@ def test_weights_stay_in_0_to_1_and_covariances_positive_definite_over_10000_upd
         assert (np.abs(map.means[:, 2]) <= math.pi).all()
         assert len(map) <= 12
     assert map.steps == 10_000
+
+
+def test_the_length_scale_of_forgetting_is_that_of_a_settled_threshold():
+    # b = 0.2 (1 - d / s) 2 s / (0.1 + 0.1), at most 1; at d = 0.4 m with s = 0.5 m 0.2, with 0.3 m (or unknown) nothing.
+    for threshold, weight in (
+        (NoveltyThreshold(1.0, True, 0.5), 0.4),
+        (NoveltyThreshold(1.0, False, 0.5), 0.5),
+        (NoveltyThreshold(1.0, True, 0.0), 0.5),
+    ):
+        map = ViewMixtures.empty()
+        map.add_view(np.array([10.0, 0.0], np.float32), "Coefficients")
+        map.add_component(0, np.array([0.4, 0.0, 0.0]), np.eye(3) * 0.01, 0.5, 3.0)
+        lessons = MapUpdates((MapUpdate(view(0, 0), state([0, 0, 0]), 0),))
+        AdaptiveViews(**FREE).step(Context("mapping"), lessons, threshold, map, BeforeThreshold())
+        assert map.weights[0] == pytest.approx(weight)
+        assert map.threshold == (threshold if threshold.settled else None)
+
+
+@pytest.mark.parametrize(("radius", "fade", "weight"), [(0.5, 0.4, 0.475), (0.3, 0.4, 0.5), (0.5, 0.3, 0.5)])
+def test_forgetting_ends_at_its_radius_and_where_it_has_faded(radius, fade, weight):
+    # At 0.3 m (0.18, 0.24), a limit itself excluded: b = 0.2 (1 - 0.3 / 0.4) 0.2 / 0.2.
+    map = ViewMixtures.empty()
+    map.add_view(np.array([10.0, 0.0], np.float32), "Coefficients")
+    map.add_component(0, np.array([0.18, 0.24, 0.0]), np.eye(3) * 0.01, 0.5, 3.0)
+    options = {"forget_radius_m": radius, "forget_fade_m": fade, "forget_gain_m": 0.2}
+    learn(map, view(0, 0), state([0, 0, 0]), **options)
+    assert map.weights[0] == pytest.approx(weight)
+
+
+def test_forgetting_goes_by_both_sigmas_of_each_mode_and_its_weight():
+    # b = 0.2 * 0.4 / (0.1 + 0.3) = 0.2 of a mode of half the weight.
+    map = ViewMixtures.empty()
+    map.add_view(np.array([10.0, 0.0], np.float32), "Coefficients")
+    map.add_component(0, np.zeros(3), np.eye(3) * 0.01, 0.5, 3.0)
+    covariances = np.stack([np.diag([0.01, 0.09, 0.01])] * 2)
+    split = GaussianMixture(np.array([[0.0, 0.0, 0.0], [50.0, 0.0, 0.0]]), covariances, np.array([3.0, 3.0]))
+    learn(map, view(0, 0), split, forget_gain_m=0.4)
+    assert map.weights[0] == pytest.approx(0.5 * (1.0 - 0.5 * 0.2))
+    assert map.weights[1:] == pytest.approx([0.05, 0.05])
+
+
+def test_a_component_at_the_limit_still_fits_and_headings_count():
+    # Squared distances with both covariances: 0.4^2 / 0.02 = 8; and 3.0 against -3.0 rad is 0.283 rad apart: 4.01.
+    for where, fits, grows in (([0.4, 0, 3.0], 8.0, True), ([0.4, 0, 3.0], 7.9, False), ([0, 0, -3.0], 4.1, True)):
+        map = ViewMixtures.empty()
+        row = map.add_view(np.zeros(2, np.float32), "Coefficients")
+        map.add_component(row, np.array([0.0, 0.0, 3.0]), np.eye(3) * 0.01, 0.5, 3.0)
+        learn(map, view(0, 0), state(where), fits_below=fits + 1e-9, merge_below=0.0)
+        assert map.weights[0] == pytest.approx(0.1 + 0.9 * 0.5 if grows else 0.9 * 0.5)
+
+
+def test_weights_of_merged_components_are_added_and_capped_at_one():
+    # Erratum 8: 0.7 and 0.6 become 1, which the state then confirms: 0.1 + 0.9 * 1.
+    map = ViewMixtures.empty()
+    row = map.add_view(np.zeros(2, np.float32), "Coefficients")
+    for x, weight in ((0.0, 0.7), (0.1, 0.6)):
+        map.add_component(row, np.array([x, 0.0, 0.0]), np.eye(3) * 0.01, weight, 2.0)
+    learn(map, view(0, 0), state([0.05, 0, 0]))
+    assert map.weights == pytest.approx([1.0])
+    assert map.counts == pytest.approx([5.0])
+    assert map.means[0] == pytest.approx([0.05, 0.0, 0.0])
+
+
+def test_each_mode_confirms_the_component_that_is_nearest_to_it_and_a_far_one_is_new():
+    map = ViewMixtures.empty()
+    row = map.add_view(np.zeros(2, np.float32), "Coefficients")
+    for x in (0.0, 0.5, 5.0):
+        map.add_component(row, np.array([x, 0.0, 0.0]), np.eye(3) * 0.01, 0.5, 3.0)
+    modes = state([0.4, 0, 0], [5.1, 0, 0], [9.0, 0, 0], weights=[0.5, 0.25, 0.25])
+    learn(map, view(0, 0), modes, min_sigma_m=0.1, min_sigma_deg=np.degrees(0.1), merge_below=7.81)
+    order = np.argsort(map.means[:, 0])
+    # Counts 3 and 0.5 or 0.25: (3 * 0.5 + 0.5 * 0.4) / 3.5 and (3 * 5 + 0.25 * 5.1) / 3.25.
+    assert map.means[order, 0] == pytest.approx([0.0, 1.7 / 3.5, 16.275 / 3.25, 9.0])
+    assert map.counts[order] == pytest.approx([3.0, 3.5, 3.25, 0.25])
+    assert map.weights[order] == pytest.approx([0.45, 0.1 * 0.5 + 0.45, 0.1 * 0.25 + 0.45, 0.1 * 0.25])
+    shares = np.array([3.0, 0.5]) / 3.5
+    spread = 0.01 + shares[0] * shares[1] * 0.1**2
+    assert map.covariances[order[1], 0, 0] == pytest.approx(spread)
+
+
+def test_only_modes_that_are_similar_and_heavy_enough_are_learned():
+    # S = 0.5: of modes 0.6 and 0.4 both would be learned from 0.2 on, from 0.3 on only the first.
+    map = ViewMixtures.empty()
+    learn(map, view(0, 0), state([0, 0, 0]))
+    two = state([10, 0, 0], [20, 0, 0], weights=[3.0, 2.0])
+    learn(map, view(0.5, 0), two, min_similarity=0.3)
+    assert map.means[:, 0].tolist() == [0.0, 10.0]
+    learn(map, view(0.5, 0), two, min_similarity=0.2)
+    assert sorted(map.means[:, 0].tolist()) == [0.0, 10.0, 20.0]
+
+
+def test_states_are_as_wide_as_asked_in_position_and_heading():
+    map = ViewMixtures.empty()
+    learn(map, view(0, 0), state([0, 0, 0], sigma=0.01), min_sigma_m=0.3, min_sigma_deg=10.0)
+    assert np.sqrt(np.diag(map.covariances[0])) == pytest.approx([0.3, 0.3, np.radians(10.0)])
+    nothing = GaussianMixture(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1))
+    before = map.weights.copy()
+    assert learn(map, view(5.0, 0), nothing).inserted.tolist() == []
+    assert map.weights.tolist() == before.tolist()
+
+
+def test_an_event_says_why_views_went_and_what_changed():
+    map = ViewMixtures.empty()
+    stage = AdaptiveViews(**FREE, max_views=2)
+    events = []
+    for n in range(3):
+        lessons = MapUpdates((MapUpdate(view(5.0 * n, 0), state([9.0 * n, 0, 0]), 30 + n),))
+        events.append(stage.step(Context("mapping"), lessons, LIMIT, map, BeforeThreshold()).events)
+    assert [event.why for event in events] == ["", "", "full"]
+    assert [event.removed.tolist() for event in events] == [[], [], [0]]
+    assert [event.seen.tolist() for event in events] == [[30], [31], [32]]
+    assert [event.changed.tolist() for event in events] == [[0], [1], [2]]
+    assert map.steps == 3

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from omninav.pipeline import Context
-from omninav.stages.mapping.fused_mixtures import Average, FusedMixtures, FusedMixturesState
+from omninav.stages.mapping.fused_mixtures import Average, FusedMixtures, FusedMixturesState, fuse, parts
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
@@ -229,3 +229,99 @@ def test_weights_stay_in_0_to_1_and_covariances_positive_definite_over_10000_upd
         assert (np.abs(map.means[:, 2]) <= np.pi).all()
         assert len(map) <= 12
     assert map.steps == 10_000
+
+
+def test_a_state_is_kept_as_seen_from_the_view_s_own_heading() -> None:
+    means, covariances, weights, counts = parts(state(1.0, 2.0, weights=(0.75, 0.25), heading=3.0), -0.5, 0.4)
+    assert means.tolist() == [[1.0, 0.0, pytest.approx(3.5 - 2 * np.pi)], [2.0, 0.0, pytest.approx(3.5 - 2 * np.pi)]]
+    assert covariances[1] == pytest.approx(np.eye(3) * SIGMA**2)
+    assert weights.tolist() == [0.75, 0.25]
+    assert counts == pytest.approx([0.3, 0.1])
+
+
+def test_mixtures_side_by_side_are_merged_normalised_and_freed_of_what_is_light() -> None:
+    # 0 and 0.2 merge (squared distance 2), 9 stays; of the sum 2: 0.98, 0.01 and 0.01. What weighs a hundredth stays.
+    one, other = state(0.0, 9.0, weights=(0.98, 0.02)), state(0.2, 20.0, weights=(0.98, 0.02))
+    both = [parts(one, 0.0, 1.0), parts(other, 0.0, 0.5)]
+    for average, place in (("halves", 0.1), ("visits", 0.2 / 3)):
+        means, covariances, weights, counts = fuse(both, 2.5, True, 0.01, average)  # type: ignore[arg-type]
+        assert means[:, 0] == pytest.approx([place, 9.0, 20.0])
+        assert weights == pytest.approx([0.98, 0.01, 0.01])
+        assert counts == pytest.approx([0.98 * 1.5, 0.02, 0.01])
+        apart = SIGMA**2 + place * (0.2 - place)
+        assert covariances[0, 0, 0] == pytest.approx(apart)
+        means, _, weights, counts = fuse(both, 1.5, True, 0.0101, average)  # type: ignore[arg-type]
+        assert means[:, 0] == pytest.approx([0.0, 0.2])
+        assert weights.tolist() == [0.5, 0.5]
+        assert counts == pytest.approx([0.98, 0.49])
+
+
+def step(
+    map: ViewMixtures,
+    stage: FusedMixtures,
+    pending: FusedMixturesState,
+    *updates: tuple[float, float, int],
+    limit: NoveltyThreshold | None = NoveltyThreshold(1.0),
+    **said: int | bool,
+) -> tuple[ViewEvent | None, Context]:
+    """Learn views (look, place, tick)."""
+    ctx = Context("mapping")
+    items = tuple(MapUpdate(view(look), state(place), tick) for look, place, tick in updates)
+    return stage.step(ctx, MapUpdates(items, **said), limit, map, pending).events, ctx  # type: ignore[arg-type]
+
+
+def test_a_correction_of_what_still_waits_for_a_threshold_takes_its_place() -> None:
+    map, stage, pending = ViewMixtures.empty(), FusedMixtures(), FusedMixturesState()
+    step(map, stage, pending, (0.0, 0.0, 0), limit=None, open_from=0)
+    step(map, stage, pending, (3.0, 3.0, 1), (6.0, 6.0, 2), limit=None, open_from=0)
+    step(map, stage, pending, (3.0, 4.0, 1), limit=None, open_from=0)
+    assert [update.index for update in pending.waiting] == [1, 2]
+    event, ctx = step(map, stage, pending, open_from=0)
+    assert map.means[:, 0].tolist() == [0.0, 4.0, 6.0]
+    assert event is not None
+    assert (event.inserted.tolist(), event.seen.tolist()) == ([1, 2], [1, 2])
+    assert not ctx.counts
+
+
+def test_what_is_learned_again_is_counted_and_named() -> None:
+    map, stage, pending = ViewMixtures.empty(), FusedMixtures(), FusedMixturesState()
+    step(map, stage, pending, (0.0, 0.0, 4), (3.0, 3.0, 5), (6.0, 6.0, 6), open_from=4)
+    event, ctx = step(map, stage, pending, (3.0, 4.0, 5), (9.0, 9.0, 7), open_from=5)
+    assert ctx.counts == {"update_undone": 1}
+    assert event is not None
+    assert event.changed.tolist() == [1, 2, 3]
+    assert (event.inserted.tolist(), event.seen.tolist(), event.removed.tolist()) == ([3], [7], [])
+    assert [applied.index for applied in pending.open] == [5, 6, 7]
+    assert map.steps == 4
+    assert sorted(map.means[:, 0].tolist()) == [0.0, 4.0, 6.0, 9.0]
+
+
+def test_updates_without_a_beginning_of_what_may_change_are_learned_once_more() -> None:
+    map, stage, pending = ViewMixtures.empty(), FusedMixtures(), FusedMixturesState()
+    step(map, stage, pending, (0.0, 0.0, 4), open_from=4)
+    step(map, stage, pending, (0.0, 9.0, 4))
+    assert map.means[:, 0].tolist() == [0.0, 9.0]
+    assert pending.open == []
+
+
+def test_a_map_that_is_learned_again_forgets_all_before() -> None:
+    map, stage, pending = ViewMixtures.empty(), FusedMixtures(), FusedMixturesState()
+    step(map, stage, pending, (0.0, 0.0, 4), (3.0, 3.0, 5), open_from=4)
+    event, _ = step(map, stage, pending, (0.0, 7.0, 4), open_from=4, relearn=True)
+    assert map.means[:, 0].tolist() == [7.0]
+    assert map.ids.tolist() == [2]
+    assert event is not None
+    assert (event.inserted.tolist(), event.removed.tolist(), event.why) == ([2], [0, 1], "")
+    assert [applied.index for applied in pending.open] == [4]
+
+
+def test_a_full_map_names_what_it_drops_and_keeps_what_can_be_undone_of_the_rest() -> None:
+    map, stage, pending = ViewMixtures.empty(), FusedMixtures(max_views=2), FusedMixturesState()
+    event, _ = step(map, stage, pending, (0.0, 0.0, 0), (3.0, 3.0, 1), (3.5, 3.0, 2), (6.0, 6.0, 3), open_from=0)
+    assert event is not None
+    assert (event.inserted.tolist(), event.removed.tolist(), event.changed.tolist()) == ([1, 2], [], [1, 2])
+    assert map.ids.tolist() == [1, 2]
+    assert [applied.ids.tolist() for applied in pending.open] == [[], [1], [1], [2]]
+    step(map, stage, pending, (3.0, 5.0, 1), open_from=0)
+    assert sorted(map.means[:, 0].round(3).tolist()) == [3.0, 5.0, 6.0]
+    assert map.counts[map.means[:, 0] == 3.0] == pytest.approx([0.5])
