@@ -74,6 +74,7 @@ def main() -> int:
             tried = counted
             if not asked.all and len(counted) > asked.sample:
                 tried = random.Random(asked.seed).sample(counted, asked.sample)
+            tried = sorted(tried, key=lambda each: (each.file, each.line))
             began = time.monotonic()
             ends = in_session(tried, asked.tests or tests, places[0], asked.jobs)
             ends |= imported_anew({each: tests for each, (end, tests) in ends.items() if end == "import"}, places)
@@ -115,14 +116,16 @@ def without_equivalent(found: list[Mutant], files: list[str]) -> list[Mutant]:
 def in_session(tried: list[Mutant], tests: str, place: Path, jobs: int) -> Ends:
     """Try mutants in one session of pytest; "import" is the end of those that only a new import shows."""
     kept, log = place / "ends.pickle", place / "session.log"
+    terminal = os.dup(1)
     child = os.fork()
     if child == 0:
         enter(place)
         printed_to(log)
-        session = MutantSession(place, tried, jobs)
+        session = MutantSession(place, tried, jobs, lambda each, tests: os.write(terminal, survives(each, tests)))
         status = pytest.main([*PYTEST, tests], plugins=[session])
         kept.write_bytes(pickle.dumps({each: (session.ends[each], session.asked[each]) for each in tried}))
         os._exit(int(status))
+    os.close(terminal)
     if os.waitpid(child, 0)[1]:
         raise SystemExit(f"{tests}: without any change, pytest ends with\n{log.read_text()}")
     ends: Ends = pickle.loads(kept.read_bytes())
@@ -145,6 +148,8 @@ def imported_anew(asked: dict[Mutant, list[str]], places: list[Path]) -> Ends:
         (place / mutant.file).write_text((REPOSITORY / mutant.file).read_text())
         free.append(place)
         ends[mutant] = ("survived" if status == 0 else "killed", asked[mutant])
+        if status == 0:
+            os.write(1, survives(mutant, asked[mutant]))
     return ends
 
 
@@ -170,13 +175,14 @@ def enter(place: Path) -> None:
     os.environ |= {"PYTHONPATH": str(place), "MPLBACKEND": "agg"}
 
 
+def survives(mutant: Mutant, tests: list[str]) -> bytes:
+    """A survivor, as it is printed."""
+    return f"{mutant}\n    {f'survives {len(tests)} tests' if tests else 'is reached by no test'}\n".encode()
+
+
 def told(folder: str, counted: int, ends: Ends, seconds: float) -> float:
-    """Print the survivors and the share that was killed; the share."""
+    """Print the share that was killed; the share."""
     killed = sum(end == "killed" for end, _ in ends.values())
-    for mutant, (end, tests) in sorted(ends.items(), key=lambda pair: (pair[0].file, pair[0].line)):
-        if end != "killed":
-            asked = f"survives {len(tests)} tests" if tests else "is reached by no test"
-            print(f"{mutant}\n    {asked}")
     low, high = binomtest(killed, len(ends)).proportion_ci(method="wilson")
     of = "all" if len(ends) == counted else f"{len(ends)} of {counted}"
     print(

@@ -13,7 +13,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import CodeType, FunctionType
 
@@ -32,8 +32,10 @@ Reached = dict[str, dict[int, set[int]]]
 class MutantSession:
     """Plugin of pytest: in place of the tests it runs the mutants, and keeps what became of each."""
 
-    def __init__(self, root: Path, mutants: list[Mutant], jobs: int) -> None:
-        self.root, self.mutants, self.jobs = root, mutants, jobs
+    def __init__(
+        self, root: Path, mutants: list[Mutant], jobs: int, survived: Callable[[Mutant, list[str]], object]
+    ) -> None:
+        self.root, self.mutants, self.jobs, self.survived = root, mutants, jobs, survived
         self.coverage: coverage.Coverage | None = None
         self.ends: dict[Mutant, str] = {}
         self.asked: dict[Mutant, list[str]] = {}
@@ -55,6 +57,7 @@ class MutantSession:
             targets = functions.get((mutant.file, mutant.function), []) if mutant.function else []
             if not chosen:
                 self.ends[mutant] = "no test"
+                self.survived(mutant, [])
                 continue
             if code is None or not targets or any(each.__code__.co_freevars != code.co_freevars for each in targets):
                 self.ends[mutant] = "import"
@@ -160,7 +163,10 @@ class MutantSession:
     def _ended(self, running: dict[int, Mutant]) -> None:
         child, status = os.wait()
         if child in running:
-            self.ends[running.pop(child)] = "survived" if status == 0 else "killed"
+            mutant = running.pop(child)
+            self.ends[mutant] = "survived" if status == 0 else "killed"
+            if status == 0:
+                self.survived(mutant, self.asked[mutant])
 
 
 def ends_after(seconds: int) -> None:

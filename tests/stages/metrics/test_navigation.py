@@ -107,11 +107,11 @@ def test_the_last_route_that_was_planned_counts_and_it_is_the_third():
 
 
 def test_of_a_tally_that_ends_early_the_last_entry_counts():
-    ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(3)]
-    tallies = [DriveTally(0, 0.5), DriveTally(1, 2.5), None]
-    drive = collected(ticks, [Pose(0.0, 0.0, 0.0)] * 3, tallies=tallies)
+    ticks = [Tick(index=k, stamp=k * 10**9, log=0, frame=k, first_of_log=k == 0) for k in range(4)]
+    tallies = [DriveTally(0, 0.5), DriveTally(0, 1.5), DriveTally(1, 2.5), None]
+    drive = collected(ticks, [Pose(0.0, 0.0, 0.0)] * 4, tallies=tallies)
     way = PlannedRoute(PLACES, "under way", 0)
-    found = Navigation().step(Context("navigation"), drive, [way] * 3, CORNER).metrics.values["navigation"]
+    found = Navigation().step(Context("navigation"), drive, [way] * 4, CORNER).metrics.values["navigation"]
     assert (found["path_length_m"], found["collisions"]) == (2.5, 1)
 
 
