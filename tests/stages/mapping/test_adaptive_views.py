@@ -258,7 +258,7 @@ def test_weights_stay_in_0_to_1_and_covariances_positive_definite_over_10000_upd
 
 
 def test_the_length_scale_of_forgetting_is_that_of_a_settled_threshold():
-    # b = 0.2 (1 - d / s) 2 s / (0.1 + 0.1), at most 1; at d = 0.4 m with s = 0.5 m 0.2, with 0.3 m (or unknown) nothing.
+    # b = 0.2 (1 - d / s) 2 s / (0.1 + 0.1), at most 1: at d = 0.4 m with s = 0.5 m 0.2, with 0.3 m (unknown) nothing.
     for threshold, weight in (
         (NoveltyThreshold(1.0, True, 0.5), 0.4),
         (NoveltyThreshold(1.0, False, 0.5), 0.5),

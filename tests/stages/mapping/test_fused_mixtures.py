@@ -10,7 +10,7 @@ from omninav.stages.values.map_update import MapUpdate, MapUpdates
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 from omninav.stages.values.views import Coefficients, NoveltyThreshold
 
-SIGMA = 0.1
+SIGMA, LIMIT = 0.1, NoveltyThreshold(1.0)
 HELD = ("means", "covariances", "weights", "counts")
 
 
@@ -261,7 +261,7 @@ def step(
     stage: FusedMixtures,
     pending: FusedMixturesState,
     *updates: tuple[float, float, int],
-    limit: NoveltyThreshold | None = NoveltyThreshold(1.0),
+    limit: NoveltyThreshold | None = LIMIT,
     **said: int | bool,
 ) -> tuple[ViewEvent | None, Context]:
     """Learn views (look, place, tick)."""
