@@ -36,7 +36,7 @@ from session import MutantSession, ends_after, printed_to  # noqa: E402
 REPOSITORY = HERE.parents[1]
 FOLDERS = {
     "stages/metrics": ("*", "tests/stages/metrics"),
-    "pipeline/experiment": ("verdicts series claims specification", "tests/pipeline/experiment"),
+    "pipeline/experiment": ("verdicts intervals series claims specification", "tests/pipeline/experiment"),
     "stages/fusion": ("*", "tests/stages/fusion"),
     "stages/mapping": ("*", "tests/stages/mapping"),
 }

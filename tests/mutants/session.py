@@ -50,6 +50,7 @@ class MutantSession:
         reached, seconds = self._observed()
         functions = _functions(self.root)
         running: dict[int, Mutant] = {}
+        gc.freeze()  # a fork that collects garbage would copy all of the memory
         for mutant in self.mutants:
             chosen = self._chosen(mutant, reached, seconds)
             self.asked[mutant] = [self.items[k].nodeid for k in chosen]

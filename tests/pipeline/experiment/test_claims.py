@@ -62,6 +62,22 @@ def test_each_claim_stands_with_its_verdict_and_figure(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("ours", "shown"), [(0.125, "0.12"), (9.96, "9.96"), (10.06, "10.1"), (99.46, "99.5"), (100.4, "100"), (-12.5, "-12.5")]
+)
+def test_figures_have_three_digits_or_four(folder: Path, ours: float, shown: str) -> None:
+    (folder / "one.verdicts.json").write_text(json.dumps([verdict("it holds", ("first", True, ours)).plain()]))
+    assert written(folder, GOOD) == 0
+    assert f"| holds | Error (cm): {shown}, beside 9 (the limit)" in (folder.parent / "papers.md").read_text()
+
+
+def test_every_fault_of_a_paper_is_named(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert written(folder, "experiment: one", GOOD, "experiment: two, statement: it holds") == 2
+    message = capsys.readouterr().err
+    assert "A paper 2004[0]" in message
+    assert "A paper 2004[2]" in message
+
+
+@pytest.mark.parametrize(
     ("wrong", "said"),
     [
         (

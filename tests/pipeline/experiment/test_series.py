@@ -16,7 +16,8 @@ RESULT = {
 def test_a_path_leads_through_names_numbers_and_stars():
     assert at(RESULT, "error_m.mean") == 2.0
     assert at(RESULT, "logs.-1.error_m.mean") == 1.0
-    assert at(RESULT, "logs.2.error_m.mean") is None
+    assert at(RESULT, "logs.-2.error_m.mean") == 3.0
+    assert at(RESULT, "logs.2.error_m.mean") is at(RESULT, "logs.-3.error_m.mean") is None
     assert at(RESULT, "logs.first") is None
     assert series_at(RESULT, "laps.*.error_m.mean") == [0.4, None, 0.1]
     assert series_at(RESULT, "growth.references") == [10.0, 20.0, 30.0, 31.0]
@@ -45,6 +46,25 @@ def test_what_is_taken_of_a_series(take, figure):
 def test_a_part_of_a_series_counts_from_its_start():
     assert figure_at(RESULT, "growth.references", "change", (0.5, 1.0)) == 1.0
     assert figure_at(RESULT, "growth.references", "mean", (0.0, 0.5)) == 15.0
+
+
+def test_an_entry_that_lies_partly_in_the_window_counts():
+    series = [1.0, 2.0, 4.0, 8.0, 16.0]
+    assert aggregated(series, "first", (0.3, 0.7)) == 2.0
+    assert aggregated(series, "last", (0.3, 0.7)) == 8.0
+    assert aggregated(series, "mean") == pytest.approx(6.2)
+
+
+def test_one_entry_is_enough_where_nothing_is_compared():
+    assert [aggregated([None, 7.0], take) for take in ("mean", "max", "first", "last")] == [7.0] * 4
+    assert aggregated([3.0, None, 7.0], "change") == 4.0
+
+
+def test_what_is_no_number_is_not_there():
+    series = [True, "3", float("nan"), float("inf"), 2, None]
+    assert series_at({"a": series}, "a") == [None, None, None, None, 2.0, None]
+    assert figure_at({"a": True}, "a") is None
+    assert figure_at({"a": series}, "a") == 2.0
 
 
 def test_entries_that_are_not_there_are_left_out_and_too_few_give_nothing():
