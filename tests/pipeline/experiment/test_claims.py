@@ -62,7 +62,8 @@ def test_each_claim_stands_with_its_verdict_and_figure(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("ours", "shown"), [(0.125, "0.12"), (9.96, "9.96"), (10.06, "10.1"), (99.46, "99.5"), (100.4, "100"), (-12.5, "-12.5")]
+    ("ours", "shown"),
+    [(0.125, "0.12"), (9.96, "9.96"), (10.06, "10.1"), (99.46, "99.5"), (100.4, "100"), (-12.5, "-12.5")],
 )
 def test_figures_have_three_digits_or_four(folder: Path, ours: float, shown: str) -> None:
     (folder / "one.verdicts.json").write_text(json.dumps([verdict("it holds", ("first", True, ours)).plain()]))
