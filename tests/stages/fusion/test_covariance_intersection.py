@@ -22,7 +22,7 @@ from omninav.stages.fusion.covariance_intersection import (
     fuse,
 )
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.geometry.probability.gaussians import squared_distances
+from omninav.stages.geometry.probability.gaussians import intersected, squared_distances
 from omninav.stages.motion.gaussian import GaussianMotion
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.pose import Motion
@@ -209,6 +209,60 @@ def test_the_paper_weighs_by_weight_and_porta_and_kroese_do_not() -> None:
     assert plain.means[0, 0] == pytest.approx(0.05)
 
 
+def test_each_pair_has_an_alpha_of_its_own() -> None:
+    a = np.zeros((1, 3)), np.diag([0.01, 1.0, 0.1])[None], np.array([0.9])
+    b = (
+        np.array([[0.01, 0.0, 0.0], [0.02, 0.1, 0.0]]),
+        np.stack([np.diag([1.0, 0.01, 0.1]), UNIT]),
+        np.array([0.3, 0.1]),
+    )
+    for rule in ("det_min", "det_ratio"):
+        means, covariance, _ = fuse(a, b, 7.81, rule)  # type: ignore[arg-type]
+        for j in range(2):
+            by_ratio = alpha_by_ratio(a[1][0], b[1][j], 0.9, float(b[2][j]))
+            alpha = alpha_of_min_determinant(a[1][0], b[1][j]) if rule == "det_min" else by_ratio
+            mean, expected = intersected(a[0][0], a[1][0], b[0][j], b[1][j], alpha)
+            assert means[j] == pytest.approx(mean)
+            assert covariance[j] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("variances", "alpha"), [((1.0, 4.0), 0.0), ((4.0, 1.0), 1.0)])
+def test_where_one_is_more_certain_in_every_direction_it_has_all_the_weight(
+    variances: tuple[float, float], alpha: float
+) -> None:
+    assert alpha_of_min_determinant(variances[0] * UNIT, variances[1] * UNIT) == pytest.approx(alpha, abs=1e-12)
+
+
+def test_the_least_determinant_where_covariances_differ_in_one_direction_only() -> None:
+    # det of the inverse: (1 - a / 2) along x where C_b has twice the variance, (1 + a) along y where it has half of it:
+    # (1 - a / 2)(1 + a) is largest at a = 1 / 2.
+    assert alpha_of_min_determinant(UNIT, np.diag([2.0, 0.5, 1.0])) == pytest.approx(0.5)
+    # (1 - a / 2)(1 + 3 a): slope 2.5 - 3 a is 0 at 5 / 6.
+    assert alpha_of_min_determinant(UNIT, np.diag([2.0, 0.25, 1.0])) == pytest.approx(5 / 6)
+    # The same pair in other units and turned in the plane: alpha is that of the pair, not of the axes.
+    turn = np.array([[0.6, -0.8, 0.3], [0.8, 0.6, -0.2], [0.1, 0.5, 1.0]])
+    assert alpha_of_min_determinant(turn @ turn.T, turn @ np.diag([2.0, 0.25, 1.0]) @ turn.T) == pytest.approx(5 / 6)
+    turned = turn[[2, 0, 1]]
+    assert alpha_of_min_determinant(turned @ turned.T, turned @ np.diag([1.0, 2.0, 0.25]) @ turned.T) == pytest.approx(
+        5 / 6
+    )
+
+
+def test_components_at_the_limit_do_not_correspond() -> None:
+    # 1 m apart along x and along y with a summed variance of 1: a squared distance of 2, in exact numbers.
+    a = np.zeros((1, 3)), 0.5 * UNIT[None], np.ones(1)
+    b = np.array([[1.0, 1.0, 0.0]]), 0.5 * UNIT[None], np.ones(1)
+    assert len(fuse(a, b, 2.0)[2]) == 2
+    assert len(fuse(a, b, 2.0 + 1e-9)[2]) == 1
+
+
+def test_alpha_has_the_weights_unless_they_are_switched_off() -> None:
+    a, b = parts(mixture((0.0, 0.9))), parts(mixture((0.1, 0.1)))
+    assert fuse(a, b, 7.81)[0][0, 0] == pytest.approx(0.01)
+    assert fuse(a, b, 7.81, weighted=False)[0][0, 0] == pytest.approx(0.05)
+    assert fuse(a, (b[0], 4.0 * b[1], b[2]), 7.81)[0][0, 0] < 0.1 * 0.1 / (0.1 + 0.9 * 64)
+
+
 # the stage
 
 
@@ -219,6 +273,19 @@ def test_near_components_become_one_and_light_ones_go() -> None:
     assert out.means[0, 0] == pytest.approx(0.12 * 0.48 / 0.98)
     kept = CovarianceIntersection(drop_below=0.0, merge_below=0.0)
     assert len(kept.step(CTX, mixture((0.0, 0.5), (0.12, 0.48), (5.0, 0.02)), None).belief) == 3
+
+
+def test_a_component_at_the_share_below_which_they_are_dropped_stays() -> None:
+    two = mixture((0.0, 1.0), (9.0, 0.25))
+    assert CovarianceIntersection(drop_below=0.25).step(CTX, two, None).belief.weights == pytest.approx([0.8, 0.2])
+    assert CovarianceIntersection(drop_below=0.26).step(CTX, two, None).belief.weights.tolist() == [1.0]
+
+
+def test_as_many_components_as_may_stay_do() -> None:
+    three = mixture((0.0, 0.3), (9.0, 0.4), (20.0, 0.3))
+    kept = [len(CovarianceIntersection(max_components=most).step(CTX, three, None).belief) for most in (1, 2, 3, 4)]
+    assert kept == [1, 2, 3, 3]
+    assert CovarianceIntersection(max_components=1).step(CTX, three, None).belief.means[0, 0] == 9.0
 
 
 def test_two_equal_gaussians_merge_where_they_have_one_peak() -> None:

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from made_tour import Landmarks, Mapped, along, mapped, scattered
+from made_views import between_looks, made_views
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
@@ -102,3 +103,69 @@ def test_words_of_another_map_are_refused_and_a_map_without_words_says_nothing(t
     assert stage.step(Context("match"), seen, twice.map).similarities is None
     with pytest.raises(BadInput, match="give those that were saved with it"):
         stage.step(Context("match"), seen, map_of(twice, merged(twice, min_spacing=0.5)), words)
+
+
+def merged_by_hand(
+    looks: list[float],
+    place: list[int],
+    accepted: list[tuple[int, int]],
+    orders: list[int] | None = None,
+    **parameters: object,
+) -> list[int]:
+    """Places after merging: views match where they look less than 0.1 apart."""
+    number, at = len(looks), between_looks(looks)
+    known = {name: parameters.pop(name, None) for name in ("tours", "owners")}
+    views = made_views(at, (at < 0.1).astype(float), orders=orders, **known)  # type: ignore[arg-type]
+    nothing = np.zeros((len(accepted) + 1, 3))
+    pairs = np.array([*accepted, (0, number - 1)], np.int64)  # the last one was refused
+    found = LoopHypotheses(
+        views.poses, np.zeros(number, np.int64), np.zeros(number, np.int64), np.array(place), views.tours, pairs,
+        np.zeros(len(pairs)), nothing, nothing, np.arange(len(pairs)) < len(accepted), "odometry",
+    )  # fmt: skip
+    stage = MergePlaces(**parameters)  # type: ignore[arg-type]
+    return stage.step(Context("places"), views, found).hypotheses.place.tolist()
+
+
+ROUNDS = [0.0, 0.3, 5.0, 5.3, 9.0, 9.3, 0.01, 0.31, 5.01, 5.31, 9.01, 9.31]
+SIDE_BY_SIDE = [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]
+FAR_ALONG = [*range(6), *range(20, 26)]
+
+
+def test_near_an_accepted_hypothesis_views_that_match_join_the_places_of_two_passes() -> None:
+    one = [0, 0, 1, 1, 2, 2] * 2
+    assert merged_by_hand(ROUNDS, SIDE_BY_SIDE, [(0, 6)], FAR_ALONG) == one
+    assert merged_by_hand(ROUNDS, SIDE_BY_SIDE, [], FAR_ALONG) == SIDE_BY_SIDE
+    # Views 2 and 8 are two along on both passes, 4 together; the pairs further on are not within 5.
+    assert merged_by_hand(ROUNDS, SIDE_BY_SIDE, [(0, 6)], FAR_ALONG, neighbour_distance=5.0) == [
+        0,
+        0,
+        1,
+        1,
+        2,
+        2,
+        0,
+        0,
+        1,
+        1,
+        3,
+        3,
+    ]
+    assert merged_by_hand(ROUNDS, SIDE_BY_SIDE, [(0, 6)], FAR_ALONG, min_spacing=0.005) == SIDE_BY_SIDE
+
+
+def test_a_view_belongs_to_the_medoid_that_is_nearest_along_the_drive() -> None:
+    # Medoids are 0.2 and 1.0; 0.55 was taken for the second and is 0.35 from the first.
+    assert merged_by_hand([0.1, 0.2, 0.3, 0.55, 1.0, 1.1], [0, 0, 0, 1, 1, 1], []) == [0, 0, 0, 0, 1, 1]
+    # Where another tour begins nothing leads from one to the other.
+    apart = merged_by_hand([0.1, 0.2, 0.3, 0.55, 1.0, 1.1], [0, 0, 0, 1, 1, 1], [], tours=[1, 1, 1, 2, 2, 2])
+    assert apart == [0, 0, 0, 1, 1, 1]
+
+
+def test_a_known_place_holds_together_and_takes_new_views_in_by_any_of_its_own() -> None:
+    # Known places of 0 and 0.2, and of 5 and 5.2; a new view looks as 0 does, 0.25 from the medoid 0.2 by way of it.
+    looks, known = [0.0, 0.2, 5.0, 5.2, 0.05, 7.0], {"tours": [0, 0, 0, 0, 1, 1], "owners": [0, 0, 1, 1, -1, -1]}
+    place, accepted = [0, 0, 1, 1, 2, 3], [(0, 4)]
+    assert merged_by_hand(looks, place, accepted, **known, min_spacing=0.3) == [0, 0, 1, 1, 0, 2]
+    assert merged_by_hand(looks, place, accepted, **known, min_spacing=0.01) == [0, 0, 1, 1, 2, 3]
+    # The known places stay two, however near the tour shows them to be.
+    assert merged_by_hand(looks, place, [(0, 4), (2, 4)], **known, min_spacing=99.0)[:4] == [0, 0, 1, 1]
