@@ -1,0 +1,61 @@
+"""How many of the most similar images were taken near by."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.values.drive import Drive, known
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.similarity import Answers
+
+QUANTITIES = {
+    "answers.near_rate": Quantity(title="Answers taken near by", better="higher"),
+    "answers.first_near_rate": Quantity(title="First answers taken near by", better="higher"),
+    "answers.chance_rate": Quantity(title="Images of the map taken near by"),
+    "answers.first_similarity": Quantity(title="Similarity of the first answer"),
+    "answers.last_similarity": Quantity(title="Similarity of the last answer"),
+}
+
+
+class AnswersNearBy(Stage):
+    """Measures what share of a query's most similar images show the same scene.
+
+    Wolf, Burgard & Burkhardt 2005, Figure 5: nine answers to a query. Of the last log, under `answers`, on average over
+    the images: `near_rate`, the share of the answers that were taken within `within_m` of the robot and look the same
+    way; `first_near_rate`, that of the first ones; `chance_rate`, that share of the whole map; the similarities of the
+    first and the last answer. Images that nothing near by was taken of count too.
+    """
+
+    within_m: Annotated[float, Bounds(gt=0)] = 5.0
+    """Distance (m) up to which an image was taken near by."""
+    within_deg: Annotated[float, Bounds(gt=0, le=180)] = 30.0
+    """Largest difference of the directions in which both look, by half of a window's field."""
+
+    class Out(Outputs):
+        """`metrics`: the entry `answers` of metrics.json; absent without truth."""
+
+        metrics: Metrics | None = None
+
+    def step(self, ctx: Context, drive: Drive, answers: Sequence[Answers | None], map: ReferenceGraph) -> Out:
+        """The whole run at once."""
+        last = drive.last_log
+        last = last.at(known(last.truth))
+        rows = []
+        for pose, row in zip(last.truth, last.row, strict=True):
+            given = answers[row]
+            if given is None or not len(given.references):
+                continue
+            near = np.hypot(*(map.poses[:, :2] - pose[:2]).T) <= self.within_m
+            turned = np.abs(np.degrees(wrap(map.poses[given.references, 2] + given.turns - pose[2])))
+            right = near[given.references] & (turned <= self.within_deg)
+            same_way = np.abs(np.degrees(wrap(map.poses[:, 2] - pose[2]))) <= self.within_deg
+            by_chance = (near & same_way).mean()
+            rows.append((right.mean(), right[0], by_chance, given.similarities[0], given.similarities[-1]))
+        if not rows:
+            return self.Out()
+        names = ("near_rate", "first_near_rate", "chance_rate", "first_similarity", "last_similarity")
+        means = np.array(rows, np.float64).mean(axis=0).tolist()
+        return self.Out(metrics=Metrics({"answers": dict(zip(names, means, strict=True))}, QUANTITIES))

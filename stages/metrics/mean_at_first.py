@@ -1,0 +1,31 @@
+"""How far the belief's mean lies from the middle of the free space at first."""
+
+import numpy as np
+
+from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
+from omninav.stages.values.drive import Drive, known
+from omninav.stages.values.grid import FreeSpace
+
+QUANTITIES = {"mean_at_first.from_middle_m": Quantity(title="Mean of the first belief, from the middle of the place")}
+
+
+class MeanAtFirst(Stage):
+    """Measures the distance (m) between the mean of the first image's belief and the middle of the free space.
+
+    Wolf, Burgard & Burkhardt 2005, section VI-B: with the mean of the samples as the estimate "in the beginning, the
+    estimated position is always close to the center of the map". The middle is the mean of all free cells.
+    """
+
+    class Out(Outputs):
+        """`metrics`: the entry `mean_at_first` of metrics.json; absent without a belief."""
+
+        metrics: Metrics | None = None
+
+    def step(self, ctx: Context, drive: Drive, free: FreeSpace) -> Out:
+        """The whole run at once."""
+        means = drive.last_log.mean
+        means = means[known(means)]
+        if not len(means):
+            return self.Out()
+        away = float(np.hypot(*(means[0, :2] - free.centres.mean(axis=0))))
+        return self.Out(metrics=Metrics({"mean_at_first": {"from_middle_m": away}}, QUANTITIES))

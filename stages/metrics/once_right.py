@@ -1,0 +1,49 @@
+"""How often the estimate is right from the first time on that it was."""
+
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
+from omninav.stages.values.drive import Drive, known
+
+QUANTITIES = {
+    "once_right.after_frames": Quantity(title="Frames until right for the first time", better="lower", absent="never"),
+    "once_right.right_rate": Quantity(title="Right from then on", better="higher"),
+}
+
+
+class OnceRight(Stage):
+    """Measures how reliably a robot is tracked once it has been found.
+
+    Wolf, Burgard & Burkhardt 2005, section VI-D: success is below 100 % "because the system always had to perform a
+    global localization in the beginning". Of the last log, under `once_right`: `after_frames`, how many frames went by
+    before the estimate was right for the first time; `right_rate`, the share of frames from that one on in which it is.
+    """
+
+    within_m: Annotated[float, Bounds(gt=0)] = 2.0
+    """Largest position error (m) of a right estimate."""
+    within_deg: Annotated[float, Bounds(gt=0, le=180)] = 35.0
+    """Largest heading error (degrees) of a right estimate."""
+
+    class Out(Outputs):
+        """`metrics`: the entry `once_right` of metrics.json; absent without ground truth."""
+
+        metrics: Metrics | None = None
+
+    def step(self, ctx: Context, drive: Drive) -> Out:
+        """The whole run at once."""
+        last = drive.last_log
+        scored = known(last.truth)
+        if not scored.any():
+            return self.Out()
+        truth, estimate = last.truth[scored], last.estimate[scored]
+        near = position_errors(estimate, truth) <= self.within_m
+        right = near & (heading_errors_deg(estimate, truth) <= self.within_deg)  # a frame without estimate is not
+        first = int(np.argmax(right)) if right.any() else None
+        found = {
+            "after_frames": None if first is None else int(np.flatnonzero(scored)[first]),
+            "right_rate": None if first is None else float(right[first:].mean()),
+        }
+        return self.Out(metrics=Metrics({"once_right": found}, QUANTITIES))

@@ -1,0 +1,63 @@
+"""A view against its own place, places aside and others; and answers against where they were taken."""
+
+import numpy as np
+import pytest
+from small_run import collected
+
+from omninav.pipeline import BadInput, Context, Tick
+from omninav.stages.metrics.answers_near_by import AnswersNearBy
+from omninav.stages.metrics.own_place import Likeness, OwnPlace, OwnPlaceRecognition
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
+from omninav.stages.values.similarity import Answers, Similarities
+
+# At the robot, 1 m aside, 3 m off (neither), 6 and 9 m off; the last one where the robot is, looking the other way.
+POSES = np.array([[0.0, 0, 0], [1, 0, 0], [3, 0, 0], [6, 0, 0], [9, 0, 0], [0, 0, np.pi]])
+MAP = ReferenceGraph(POSES, np.ones((6, 1, 2), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth")
+
+
+def test_each_reference_counts_by_where_it_was_taken() -> None:
+    values = np.array([[0.9], [0.7], [0.99], [0.5], [0.3], [1.0]], np.float32)
+    found = OwnPlace().step(Context("own"), Similarities(values), Pose(0.0, 0.0, 0.0), MAP).likeness
+    assert found is not None
+    assert (found.own, found.aside, found.average, found.most) == pytest.approx((0.9, 0.7, 0.4, 0.5))
+
+
+def test_a_panorama_is_compared_at_the_robots_heading_and_elsewhere_at_the_best() -> None:
+    values = np.full((6, 4), 0.1, np.float32)
+    values[0, 1], values[0, 2], values[3, 3] = 0.8, 0.95, 0.6  # the robot stands turned left by a quarter: column 1
+    found = OwnPlace().step(Context("own"), Similarities(values), Pose(0.0, 0.0, np.pi / 2), MAP).likeness
+    assert found is not None
+    assert (found.own, found.average, found.most) == pytest.approx((0.8, 0.35, 0.6))
+
+
+def test_without_the_place_in_the_map_nothing_is_compared() -> None:
+    values = np.ones((6, 1), np.float32)
+    assert OwnPlace().step(Context("own"), Similarities(values), Pose(0.0, 3.0, 0.0), MAP).likeness is None
+    with pytest.raises(BadInput, match="candidates=all"):
+        OwnPlace().step(Context("own"), Similarities(values[:1], np.zeros(1, np.int64)), Pose(0.0, 0.0, 0.0), MAP)
+
+
+def test_what_is_lost_is_a_share_of_what_there_is_to_lose() -> None:
+    views = [Likeness(0.9, 0.7, 0.5, 0.8), None, Likeness(0.6, float("nan"), 0.2, 0.7)]
+    out = OwnPlaceRecognition().step(Context("own"), views)
+    assert out.metrics is not None
+    found = out.metrics.values["own_place"]
+    assert (found["images"], found["similarity"], found["told_rate"]) == (2, pytest.approx(0.75), 0.5)
+    assert found["lost"] == pytest.approx((0.1 / 0.5 + 0.4 / 0.8) / 2)
+    assert (found["lost_aside"], found["similarity_aside"]) == (pytest.approx(0.3 / 0.5), pytest.approx(0.7))
+
+
+def test_an_answer_is_right_where_it_was_taken_near_by_and_looks_the_same_way() -> None:
+    drive = collected([Tick(n, n, 0, n, n == 0) for n in range(2)], [Pose(0.0, 0.0, 0.0)] * 2)
+    answers = [
+        Answers(np.array([1, 5, 3]), np.array([0.9, 0.8, 0.7], np.float32), np.zeros(3)),  # near, turned round, far
+        Answers(np.array([4, 2, 0]), np.array([0.7, 0.6, 0.5], np.float32), np.zeros(3)),
+    ]
+    out = AnswersNearBy().step(Context("answers"), drive, answers, MAP)
+    assert out.metrics is not None
+    found = out.metrics.values["answers"]
+    assert found["near_rate"] == pytest.approx((1 / 3 + 2 / 3) / 2)
+    assert found["first_near_rate"] == pytest.approx(0.5)
+    assert found["chance_rate"] == pytest.approx(3 / 6)
+    assert (found["first_similarity"], found["last_similarity"]) == pytest.approx((0.8, 0.6))
