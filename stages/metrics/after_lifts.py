@@ -65,8 +65,6 @@ class AfterLifts(Stage):
 
 def lifted(log: Drive, jump_m: float, jump_deg: float) -> Ints:
     """Rows of a log, all with truth, before which the robot was lifted."""
-    if len(log) < 2:
-        return np.empty(0, np.int64)
     true: Array = between(log.truth[:-1], log.truth[1:])
     gap = true - log.motion[1:]
     jumped = (np.hypot(gap[:, 0], gap[:, 1]) > jump_m) | (np.abs(wrap(gap[:, 2])) > math.radians(jump_deg))

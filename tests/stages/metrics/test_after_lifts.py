@@ -44,3 +44,26 @@ def test_a_robot_that_is_carried_away_was_lifted():
     drive = lifted_drive(0)
     drive.motion[30, 0] = 3.0
     assert AfterLifts().step(CTX, drive).metrics.values["lifts"]["step"] == pytest.approx([12, 30])
+
+
+@pytest.mark.parametrize(("sideways", "steps"), [(0.45, [12]), (0.55, [12, 30]), (-0.55, [12, 30])])
+def test_half_a_metre_to_any_side_is_a_lift(sideways, steps):
+    drive = lifted_drive(0)
+    drive.motion[30, 1] = sideways
+    assert AfterLifts().step(CTX, drive).metrics.values["lifts"]["step"] == steps
+
+
+@pytest.mark.parametrize(("degrees", "steps"), [(14.0, [12]), (16.0, [12, 30]), (-16.0, [12, 30])])
+def test_fifteen_degrees_to_either_side_are_a_lift(degrees, steps):
+    drive = lifted_drive(0)
+    drive.motion[30, 2] = np.radians(degrees)
+    assert AfterLifts().step(CTX, drive).metrics.values["lifts"]["step"] == steps
+
+
+def test_frames_without_truth_or_estimate_do_not_count_and_one_frame_alone_has_no_lift():
+    drive = lifted_drive(5)
+    drive.estimate[38] = np.nan
+    drive.truth[39] = np.nan
+    assert AfterLifts().step(CTX, drive).metrics.values["lifts"]["seconds"] == [10.0]
+    assert AfterLifts().step(CTX, drive.at(slice(1))).metrics is None
+    assert AfterLifts().step(CTX, drive.at(slice(38, None))).metrics is None

@@ -29,6 +29,11 @@ def test_the_nearest_view_keeps_its_number_when_others_are_forgotten():
     assert best(neighbours).reference == row[0] < 9
 
 
+def test_of_several_views_the_first_is_the_nearest():
+    found = best(Neighbours(np.array([3, 1]), np.array([0.2, 0.5]), np.array([0.6, 0.3]), np.array([0.1, 0.9]), 0.2))
+    assert (found.reference, found.distance, found.similarity, found.turn) == (3, 0.2, 0.6, 0.1)
+
+
 def test_the_nearest_place_has_a_distance_and_no_similarity():
     found = best(VisualDistances(np.array([np.inf, 3.0, 2.0]), np.array([0.0, 0.1, 0.2]), np.array([0, 9, 9])))
     assert (found.reference, found.distance, found.turn, found.similarity) == (2, 2.0, 0.2, None)

@@ -111,3 +111,31 @@ def test_confidence_is_plotted_where_there_is_one():
     assert figure is not None
     assert "75 %" in figure.caption
     assert ConfidenceOverTime().step(Context("plot"), made([None] * 4)).figure is None
+
+
+TRUE = Pose(3.0, -2.0, 1.0)
+
+
+def beside(offsets: list[tuple[float, float, float]], confidences: list[float], truth: list[Pose | None]) -> Drive:
+    """Estimates that lie so far (m, m, degrees) from the true pose."""
+    poses = [Pose(TRUE.x + x, TRUE.y + y, TRUE.heading + np.radians(turn)) for x, y, turn in offsets]
+    estimates = [PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in poses]
+    told = [PoseConfidence(each) for each in confidences]
+    return collected([Tick(n, n) for n in range(len(poses))], truth, estimates=estimates, confidences=told)
+
+
+def test_a_frame_is_right_within_both_tolerances_and_lost_beyond_its_own():
+    offsets = [(0.5, 0, 0), (0.6, 0, 0), (0, 0, 10.1), (0, 2.5, 0), (0, 3.0, 0), (0, 0, -9.9), (9.0, 9.0, 0)]
+    drive = beside(offsets, [0.9, 0.4, 0.6, 0.5, 0.2, 0.55, 0.3], [TRUE] * 6 + [None])
+    found = Calibration().step(Context("calibration"), drive).metrics.values["calibration"]
+    assert found["right_share"] == pytest.approx(2 / 6)
+    assert found["wrong_auroc"] == pytest.approx(7 / 8)  # 0.6 of a wrong frame is above 0.55 of a right one
+    assert found["lost_auroc"] == 1.0
+
+
+def test_an_ellipse_ends_where_chi_squared_of_two_degrees_says():
+    offsets = [(1.17, 0, 0), (0, 1.185, 0), (2.44, 0, 0), (0, -2.455, 0)]
+    drive = beside(offsets, [0.5] * 4, [TRUE] * 4)
+    found = Calibration().step(Context("calibration"), drive).metrics.values["calibration"]
+    assert (found["ellipse_50"], found["ellipse_95"]) == (0.25, 0.75)
+    assert found["nees"] == pytest.approx(np.mean([1.17**2, 1.185**2, 2.44**2, 2.455**2]))
