@@ -6,6 +6,7 @@ import pytest
 
 from omninav.pipeline import Context
 from omninav.stages.fusion.agreement import Agreement
+from omninav.stages.geometry.probability.gaussians import density
 from omninav.stages.values.belief import GaussianMixture, Particles
 
 
@@ -155,3 +156,11 @@ def test_a_lone_new_particle_has_all_the_weight_that_is_not_kept() -> None:
     out = fuse(particles, at(900.0))
     assert out.weights == pytest.approx([0.2] * 5)
     assert (out.poses[:, 0] > 800.0).tolist() == [False] * 4 + [True]
+
+
+def test_agreement_at_the_border_itself_is_none() -> None:
+    particles, hypothesis = around(0.0, 10), at(0.1)
+    likely = density(particles.poses, hypothesis.means, hypothesis.covariances, hypothesis.weights)
+    ctx = Context("fusion", np.random.default_rng(1))
+    Agreement(agree_above=float(particles.weights @ likely)).step(ctx, particles, hypothesis)
+    assert ctx.counts == {"disagreed": 1}

@@ -86,22 +86,42 @@ def test_weights_are_the_view_at_the_pose_over_the_view_at_the_prediction(sigma:
 
 
 def test_the_scale_of_the_hypothesis_does_not_matter_beside_the_floor() -> None:
-    # A hypothesis's weights need not sum to 1, p(y|x) is that of their shares: a floor as high as its peak counts 1.
-    one, third = at(1.0, 0.3), at(1.0, 0.3)
-    third.weights[:] = 1 / 3
-    peak = (2 * np.pi) ** -1.5 / 0.3
+    # A hypothesis's weights need not sum to 1, p(y|x) is that of their shares: of two components half of their density,
+    # beside which a floor as high as that counts 1.
+    half = (2 * np.pi) ** -1.5 / 0.3 / 2
     wide = UncertainMotion((0.0, 1.0, 0.0), (0.0, 0.5, 0.0))
-    beliefs = [auxiliary_filter(few(0.0, 0.5), wide, view, peak, np.random.default_rng(1)) for view in (one, third)]
-    for belief in beliefs:
+    for weight in (0.5, 1.0, 0.2):
+        means = np.array([[1.0, 0.0, 0.0], [99.0, 0.0, 0.0]])
+        view = GaussianMixture(means, np.stack([np.diag([0.09, 1.0, 1.0])] * 2), np.full(2, weight))
+        belief = auxiliary_filter(few(0.0, 0.5), wide, view, half, np.random.default_rng(1))
         assert belief is not None
         likely = 1.0 + np.exp(-0.5 * ((belief.poses[:, 0] - 1.0) / 0.3) ** 2)
         first = 1.0 + np.exp(-0.5 * ((np.array([1.0, 1.5]) - 1.0) / 0.3) ** 2)
         assert belief.weights == pytest.approx(likely / first / (likely / first).sum())
 
 
+def test_the_selected_particles_move_with_noise_in_all_three_steps() -> None:
+    turning = UncertainMotion((0.5, 1.0, -0.5), (0.1, 0.2, 0.3))
+    anywhere = GaussianMixture(np.zeros((1, 3)), np.diag([1e6, 1e6, 1e6])[None], np.ones(1))
+    out = auxiliary_filter(few(*([0.0] * 20_000)), turning, anywhere, 0.0, np.random.default_rng(1))
+    assert out is not None
+    along = np.hypot(out.poses[:, 0], out.poses[:, 1])
+    assert along.std() == pytest.approx(0.2, rel=0.03)
+    assert np.arctan2(out.poses[:, 1], out.poses[:, 0]).std() == pytest.approx(0.1, rel=0.03)
+    assert out.poses[:, 2].std() == pytest.approx(0.1 * 10**0.5, rel=0.03)
+
+
+def test_a_particle_by_itself_keeps_all_the_weight_however_badly_it_fits() -> None:
+    out = auxiliary_filter(few(0.0), AHEAD, at(1.0, 0.3), 0.0, np.random.default_rng(1))
+    assert out is not None
+    assert out.poses[0, 0] != 1.0
+    assert out.weights.tolist() == [1.0]
+
+
 def test_a_view_that_fits_no_prediction_gives_no_belief_unless_there_is_a_floor() -> None:
     rng, far = np.random.default_rng(1), at(99.0, 0.3)
-    assert auxiliary_filter(few(0.0, 4.0), AHEAD, far, 0.0, rng) is None
+    with np.errstate(all="raise"):
+        assert auxiliary_filter(few(0.0, 4.0), AHEAD, far, 0.0, rng) is None
     out = auxiliary_filter(few(0.0, 4.0, weights=(0.75, 0.25)), AHEAD, far, 1e-3, rng)
     assert out is not None
     assert out.weights == pytest.approx([0.5, 0.5])

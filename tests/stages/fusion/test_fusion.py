@@ -153,6 +153,17 @@ def test_recovery_particles_that_outweigh_their_share_are_resampled_with_the_oth
     assert (5.0 in out.poses[:8, 0]) == joined
 
 
+def test_recovery_particles_that_weigh_just_their_share_stay_apart() -> None:
+    # A quarter of eight particles is two, and half of a half of the weight is two of eight, in exact numbers.
+    poses = np.array([[0.0, 0.0, 0.0]] * 4 + [[5.0, 0.0, 0.0]] * 4)
+    stage = ImportanceResampling(number=8, recovery_share=0.25, kidnapping_probability=0.5)
+    proposals = Particles(np.array([[9.0, 0.0, 0.0]]), np.ones(1))
+    believed = Particles(poses, np.full(8, 0.125), 4)
+    out = stage.step(Context("fusion"), believed, Likelihood(np.ones(8), 1.0), proposals).belief
+    assert out.poses[:6, 0].tolist() == [0.0] * 6
+    assert 5.0 in out.poses[6:, 0]
+
+
 def test_particles_are_resampled_where_their_effective_size_is_below_its_share() -> None:
     # Weights 0.4, 0.4, 0.1, 0.1: 1 / 0.34 = 2.94 of 4.
     poses, weights = np.arange(12.0).reshape(4, 3), np.array([0.4, 0.4, 0.1, 0.1])
@@ -160,6 +171,15 @@ def test_particles_are_resampled_where_their_effective_size_is_below_its_share()
         out = fuse(ImportanceResampling(number=4, resample_below=below), Particles(poses, np.full(4, 0.25)), weights)
         assert (out.weights == pytest.approx(weights)) == kept
         assert (out.weights == pytest.approx(np.full(4, 0.25))) != kept
+
+
+@pytest.mark.parametrize("told", ["proposals", "anywhere"])
+def test_without_proposals_or_what_is_likely_anywhere_there_is_no_recovery(told: str) -> None:
+    more = {"proposals": Particles(np.full((5, 3), 77.0), np.full(5, 0.2)), "anywhere": 1.0}
+    stage = ImportanceResampling(number=20, kidnapping_probability=0.5)
+    out = fuse(stage, belief(20), np.ones(20), **{told: more[told]})
+    assert (len(out.poses), out.recovery_particles) == (20, 0)
+    assert out.weights == pytest.approx(np.full(20, 0.05))
 
 
 def test_without_recovery_particles_nothing_is_proposed() -> None:
