@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, VerticalSegments
+from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.topological_map import DRIVEN, LOOP, TopologicalMap, stored
 
 
@@ -31,13 +31,10 @@ def made_map(
         )
         for _ in owner
     ]
-    empty = VerticalSegments(
-        np.zeros(0), np.zeros((0, 2)), np.zeros((0, 10), np.float32), np.zeros(0, np.float32), np.zeros((0, 2, 2))
-    )
     poses = np.zeros((len(owner), 3))
     poses[:, :2] = np.array(spots)[owner]
     return TopologicalMap(
-        views=stored(features, [empty] * len(owner), [GlobalDescriptor(np.zeros(3, np.float32))] * len(owner)),
+        views=stored(features, [GlobalDescriptor(np.zeros(3, np.float32))] * len(owner)),
         places=np.arange(len(spots)),
         owner=np.array(owner),
         names=tuple(names) or ("",) * len(spots),

@@ -95,7 +95,7 @@ def complete(config: Any, variants: Variants | None = None) -> dict[str, Any]:
     variants = variants or configured_variants()
     try:
         _name_past_links(config)
-        plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
+        plain: dict[str, Any] = _without_taken_out(OmegaConf.to_container(config, resolve=True))  # type: ignore[arg-type]
         specs = read_specifications(plain)
         problems = [*not_taken(plain, settings_left_open()), *_unfit_settings(plain)]
         for name, spec in specs.items():
@@ -165,7 +165,7 @@ def _graph_of(config: Any, name: str, spec: ArtifactSpecification, variants: Var
         other.nodes[node] = OmegaConf.to_container(config.nodes[node], resolve=False)
     for node, changes in spec.nodes.items():
         other.nodes[node] = OmegaConf.merge(other.nodes.get(node) or {}, changes)
-    made: dict[str, Any] = OmegaConf.to_container(other, resolve=True)  # type: ignore[assignment]
+    made = _without_taken_out(OmegaConf.to_container(other, resolve=True))  # type: ignore[arg-type]
     made = dict(without_absent(_without_unset(made)))  # what makes an artifact begins without those it can do without
     return {key: made.get(key) for key in ("nodes", "wires", "saves")}
 
@@ -226,6 +226,16 @@ def settings_read(config: Any) -> set[str]:
                     read.add(each)
                     waiting.append(each)
     return read - set(OF_THE_VARIANT)
+
+
+def _without_taken_out(config: dict[str, Any]) -> dict[str, Any]:
+    """A configuration without the artifacts, and without what is saved, that a variant upon another sets to null."""
+    blocks = {
+        block: {name: value for name, value in config[block].items() if value is not None}
+        for block in ("artifacts", "saves")
+        if isinstance(config.get(block), Mapping)
+    }
+    return {**config, **blocks}
 
 
 def _without_unset(config: dict[str, Any]) -> dict[str, Any]:

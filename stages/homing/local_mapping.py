@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,9 @@ class Matches(NamedTuple):
     rows: Ints
 
 
+NO_MATCHES = Matches(np.zeros((0, 3)), np.zeros((0, 2)), np.zeros((0, 3)), np.zeros(0, np.int64))
+
+
 class LocalMappingState(State):
     """The local map of the tick before, and how many were made."""
 
@@ -52,11 +55,17 @@ class LocalMapping(Stage):
     says the target is reached, where the two views still differ, is discarded.
 
     Without `tracks` only matches count; without `motion` (odometry) the robot's pose is not predicted, and the unit in
-    metres is not known. Raises BadInput for correspondences of other features.
+    metres is not known: the camera is the only sensor. Raises BadInput for correspondences of other features.
     """
+
+    matching: Literal["every_image", "at_start"] = "every_image"
+    """Whether features are matched with the target's anew in every image, or, as in the paper, once, and then only
+    tracked: until the target is lost, which is a new start."""
 
     solver: Solver = "planar"
     """Of the first relative pose; `eight_point` is the paper's. `planar` keeps the robot on the floor later too."""
+    refine: bool = True
+    """Whether poses that samples agree on are brought to their local optimum; the paper keeps the best sample's."""
     max_epipolar_error_deg: Annotated[float, Bounds(gt=0)] = 1.0
     """By which the two bearings of a feature may together miss the relative pose."""
     max_resection_error_deg: Annotated[float, Bounds(gt=0)] = 2.0
@@ -115,14 +124,15 @@ class LocalMapping(Stage):
         """The map with the robot in it, or a new one."""
         why = ""
         if len(local_map):
-            local_map = self._resection(ctx, local_map, tracks, matches)
+            anew = matches if self.matching == "every_image" else NO_MATCHES
+            local_map = self._resection(ctx, local_map, tracks, anew)
             if local_map.state == "tracking":
-                if self._could_be_better(local_map, len(matches.rows)):
+                if self._could_be_better(local_map, len(anew.rows)):
                     more = round(self.rebuild_ratio * local_map.first_inliers)
-                    new, _ = self._made(ctx, state, local_map, matches, more)
+                    new, _ = self._made(ctx, state, local_map, anew, more)
                     if new is not None:
                         return new
-                if not self._contradicted(local_map, matches):
+                if not self._contradicted(local_map, anew):
                     return local_map
                 ctx.count("false_map")
                 local_map = LocalMap(-1, local_map.target, "lost")
@@ -152,7 +162,9 @@ class LocalMapping(Stage):
         places = np.concatenate([places, local_map.places[owners]])
         usable = np.isfinite(bearings).all(axis=1)
         threshold = math.radians(self.max_resection_error_deg)
-        found = three_point_pose(bearings[usable], places[usable], ctx.rng, threshold, planar=self.solver == "planar")
+        found = three_point_pose(
+            bearings[usable], places[usable], ctx.rng, threshold, refine=self.refine, planar=self.solver == "planar"
+        )
         agrees = np.zeros(len(bearings), np.bool_)
         if found is not None:
             agrees[usable] = found.inliers
@@ -199,7 +211,7 @@ class LocalMapping(Stage):
         good = np.isfinite(matches.first).all(axis=1) & np.isfinite(matches.second).all(axis=1)
         first, points, second = matches.first[good], matches.points[good], matches.second[good]
         threshold = math.radians(self.max_epipolar_error_deg)
-        found = relative_pose(first, second, ctx.rng, self.solver, threshold)
+        found = relative_pose(first, second, ctx.rng, self.solver, threshold, refine=self.refine)
         inliers = 0 if found is None else int(np.count_nonzero(found.inliers))
         agree = f"{inliers} of {len(first)} matches with the target view agree"
         if found is None or inliers < max(self.min_inliers, min_inliers):
@@ -238,18 +250,14 @@ class LocalMapping(Stage):
 def matches_with(target: HomingTarget, features: LocalFeatures, pairs: Correspondences | None) -> Matches:
     """What of the present view is in the target view. Raises BadInput where the pairs are of other features."""
     if pairs is None or not len(pairs):
-        return Matches(np.zeros((0, 3)), np.zeros((0, 2)), np.zeros((0, 3)), np.zeros(0, np.int64))
-    if pairs.first.max() >= len(features) or pairs.second.max() >= len(target.features):
+        return NO_MATCHES
+    here, there = features.point_bearings(), target.features.point_bearings()
+    if pairs.first.max() >= len(here) or pairs.second.max() >= len(there):
         raise BadInput(
             "local_map: correspondences that are not those of the present features with the target's; match "
             "local_map's own features with those of its target"
         )
-    return Matches(
-        features.bearings[pairs.first],
-        features.points[pairs.first],
-        target.features.bearings[pairs.second],
-        pairs.second,
-    )
+    return Matches(here[pairs.first], features.point_pixels()[pairs.first], there[pairs.second], pairs.second)
 
 
 def _labelled(local_map: LocalMap, tracks: TrackedFeatures | None) -> TrackedFeatures:

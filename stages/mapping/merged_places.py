@@ -22,7 +22,7 @@ class MergePlaces(Stage):
     """
 
     min_spacing: Annotated[float, Bounds(ge=0)] = 0.1
-    """Visual distance along the drive, of the medoids of two places that are not merged."""
+    """Visual distance along the drive, of the medoids of two places that are not merged; 0: all stay as they are."""
     min_share: Annotated[float, Bounds(ge=0, le=1)] = 0.4
     """Of the features that match, for views of two passes to show one spot."""
     neighbour_distance: Annotated[float, Bounds(gt=0)] = 20.0
@@ -35,6 +35,8 @@ class MergePlaces(Stage):
 
     def step(self, ctx: Context, views: ComparedViews, hypotheses: LoopHypotheses) -> Out:
         """The whole tour at once."""
+        if not self.min_spacing:
+            return self.Out(hypotheses=hypotheses)
         accepted = hypotheses.pairs[hypotheses.accepted]
         spots = same_spots(views.shares, views.orders, accepted, self.min_share, self.neighbour_distance)
         row = np.arange(len(views) - 1)

@@ -11,7 +11,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.stages.geometry.appearance import place_clusters
 from omninav.stages.geometry.appearance.visual_distance import Patches, compare, match_patches
 from omninav.stages.values.compared_views import ComparedViews
-from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
+from omninav.stages.values.local_features import LocalFeatures, view_features
 from omninav.stages.values.rooms import Rooms
 from omninav.stages.values.topological_map import DRIVEN, LOOP, LoopHypotheses, TopologicalMap, stored
 
@@ -29,8 +29,9 @@ class TopologicalMapping(Stage):
     where poses are truth: what an owner would tell the robot.
     """
 
-    min_path_matches: Annotated[int, Bounds(ge=1)] = 20
-    """Features that a path image shares with the one before."""
+    min_path_matches: Annotated[int, Bounds(ge=0)] = 20
+    """Features that a path image shares with the one before; 0: no path images, as in the paper, whose paths lead from
+    medoid to medoid."""
     max_path_step: Annotated[int, Bounds(ge=1)] = 5
     """Views of the drive from one path image to the next, the paper's 1 to 5 m."""
     max_patches: Annotated[int, Bounds(ge=1)] = 80
@@ -76,7 +77,9 @@ class TopologicalMapping(Stage):
         ways = {} if known is None else known_ways(known, place)
         for pair, way in driven_ways(views.distances, place, views.tours, medoids).items():
             if pair not in ways and pair[::-1] not in ways:
-                between = place_clusters.waypoint_views(matches, way, self.min_path_matches, self.max_path_step)
+                between = np.empty(0, np.int64)
+                if self.min_path_matches:
+                    between = place_clusters.waypoint_views(matches, way, self.min_path_matches, self.max_path_step)
                 ways[pair] = between, DRIVEN
         pairs = sorted(ways)
         images = [ways[pair][0] for pair in pairs]
@@ -90,7 +93,6 @@ class TopologicalMapping(Stage):
         return TopologicalMap(
             views=stored(
                 [kept[view] for view in used],
-                [self._segments(views.segments[view]) for view in used],
                 [views.descriptors[view] for view in used],
             ),
             places=row[medoids],
@@ -108,8 +110,10 @@ class TopologicalMapping(Stage):
         )
 
     def _kept(self, views: ComparedViews, patches: list[Patches], view: int) -> LocalFeatures:
-        """The patches that were found again in most of the views around; of equals the strongest."""
+        """The patches that were found again in most of the views around, of equals the strongest; the heavy columns."""
         whole = views.features[view]
+        if whole.columns is not None:
+            whole = dataclasses.replace(whole, columns=whole.columns.chosen(slice(0, self.max_segments)))
         if len(whole) <= self.max_patches:
             return whole
         seen, options = np.zeros(len(whole)), views.comparison_options()
@@ -117,15 +121,6 @@ class TopologicalMapping(Stage):
             if other != view and views.tours[other] == views.tours[view]:
                 seen[match_patches(patches[view], patches[other], options).first] += 1.0
         return whole.chosen(np.sort(np.argsort(-seen, kind="stable")[: self.max_patches]))
-
-    def _segments(self, segments: VerticalSegments | None) -> VerticalSegments:
-        return no_segments() if segments is None else segments.chosen(slice(0, self.max_segments))
-
-
-def no_segments() -> VerticalSegments:
-    """No vertical segments."""
-    nothing = np.empty(0, np.float32)
-    return VerticalSegments(np.empty(0), np.empty((0, 2)), np.empty((0, 10), np.float32), nothing, np.empty((0, 2, 2)))
 
 
 def spread_to_medoids(map: TopologicalMap, views: ComparedViews, place: Ints) -> float:
@@ -135,7 +130,7 @@ def spread_to_medoids(map: TopologicalMap, views: ComparedViews, place: Ints) ->
     """
     options, distances = views.comparison_options(), []
     for number, view in enumerate(map.places):
-        kept = map.views.view_features(int(view))
+        kept = view_features(map.views.features(int(view)))
         for row in np.flatnonzero(place == number).tolist():
             if views.frames[row] != map.frames[view]:
                 distances.append(compare(kept, views.view_features(row), options).distance)

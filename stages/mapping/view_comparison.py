@@ -17,7 +17,7 @@ from omninav.stages.geometry.appearance.visual_distance import (
 )
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.drive import pose_row
-from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, VerticalSegments, view_features
+from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, view_features
 from omninav.stages.values.pose import Pose, PoseSource, frame_of
 from omninav.stages.values.topological_map import TopologicalMap
 
@@ -32,7 +32,6 @@ class View(NamedTuple):
     """One view, with the fields of `ComparedViews`."""
 
     features: LocalFeatures
-    segments: VerticalSegments | None
     descriptor: GlobalDescriptor
     pose: tuple[float, float, float]
     frame: int
@@ -76,7 +75,6 @@ class ViewComparison(Stage):
         ticks: Sequence[Tick],
         features: Sequence[LocalFeatures | None],
         descriptor: Sequence[GlobalDescriptor | None],
-        vertical_segments: Sequence[VerticalSegments | None] = (),
         odometry: Sequence[Pose | None] = (),
         truth: Sequence[Pose | None] = (),
         known: TopologicalMap | None = None,
@@ -94,9 +92,8 @@ class ViewComparison(Stage):
             seen, whole = features[row], descriptor[row]
             assert seen is not None
             assert whole is not None
-            segments = vertical_segments[row] if row < len(vertical_segments) else None
             pose = pose_row(poses[row] if row < len(poses) else None)
-            views.append(View(seen, segments, whole, pose, frame + row, order, 1 + log))
+            views.append(View(seen, whole, pose, frame + row, order, 1 + log))
         if not views:
             raise BadInput("mapping: no image of the tour shows anything; use another tour")
         ctx.doing(f"comparing {len(views)} views")
@@ -109,13 +106,12 @@ class ViewComparison(Stage):
         )
         colours = np.stack([view.descriptor.values for view in views]).astype(np.float64)
         close = colour_distances(colours[:, None], colours[None]) <= self.max_global_distance
-        prepared = [view_features(view.features, view.segments) for view in views]
+        prepared = [view_features(view.features) for view in views]
         known_number = sum(view.owner >= 0 for view in views)
         distances, shares = compare_all(ctx, prepared, close, known_number, options)
         return self.Out(
             views=ComparedViews(
                 features=tuple(view.features for view in views),
-                segments=tuple(view.segments for view in views),
                 descriptors=tuple(view.descriptor for view in views),
                 poses=np.array([view.pose for view in views]),
                 pose_source=source,
@@ -179,12 +175,10 @@ def known_views(known: TopologicalMap) -> list[View]:
     """The views that a map keeps, of tour 0."""
     views = []
     for view in range(len(known.views)):
-        segments = known.views.columns(view)
         x, y, heading = (float(number) for number in known.poses[view])
         views.append(
             View(
                 known.views.features(view),
-                segments if len(segments) else None,
                 known.views.global_moments(view),
                 (x, y, heading),
                 int(known.frames[view]),

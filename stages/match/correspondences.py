@@ -2,20 +2,30 @@
 
 from typing import Annotated, Literal
 
+import numpy as np
+import numpy.typing as npt
+
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.appearance.feature_matching import mahalanobis_matches
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.local_features import LocalFeatures
 
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
 
 class MatchFeatures(Stage):
-    """Pairs of patches of two views: each other's nearest, clearly nearer than the second, with similar colours.
+    """Pairs of features of two views: each other's nearest, clearly nearer than the second, patches of similar colours.
 
-    Goedemé et al. 2007, sections 3.2 and 3.4. The first view is the present one.
+    Goedemé et al. 2007, sections 3.2 to 3.4. The first view is the present one. Where both have columns, the upper ends
+    of two that match are a pair, and so are the lower ones.
     """
 
     ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
     """Of a match's distance to that of the second nearest of either patch."""
+    segment_ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
+    """The same of columns."""
     max_colour_distance: Annotated[float, Bounds(gt=0)] = 0.5
     """Between the colours of two patches (Euclidean, of three correlations)."""
     search: Literal["all", "kd_tree"] = "all"
@@ -30,4 +40,22 @@ class MatchFeatures(Stage):
         """Match two views."""
         options = ComparisonOptions(self.ratio, max_colour_distance=self.max_colour_distance, search=self.search)
         pairs = match_patches(features.patches(), target.patches(), options)
-        return self.Out(correspondences=Correspondences(pairs.first, pairs.second, pairs.distance))
+        first, second, distance = column_ends(features, target, self.segment_ratio)
+        return self.Out(
+            correspondences=Correspondences(
+                np.concatenate([pairs.first, first]),
+                np.concatenate([pairs.second, second]),
+                np.concatenate([pairs.distance, distance]),
+            )
+        )
+
+
+def column_ends(one: LocalFeatures, other: LocalFeatures, ratio: float) -> tuple[Ints, Ints, Array]:
+    """Pairs of ends of matching columns: rows in both views' points, and distances."""
+    if one.columns is None or other.columns is None:
+        return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
+    pairs = mahalanobis_matches(one.columns.descriptors, other.columns.descriptors, ratio)
+    upper_and_lower = np.arange(2)
+    first = len(one) + 2 * pairs.first[:, None] + upper_and_lower
+    second = len(other) + 2 * pairs.second[:, None] + upper_and_lower
+    return first.ravel(), second.ravel(), np.repeat(pairs.distance, 2)

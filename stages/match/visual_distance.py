@@ -9,7 +9,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.many_views import ManyViews
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, colour_distances
-from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, VerticalSegments, view_features
+from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures, view_features
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
 
@@ -51,18 +51,17 @@ class MatchPlaces(Stage):
         features: LocalFeatures,
         descriptor: GlobalDescriptor,
         map: TopologicalMap,
-        vertical_segments: VerticalSegments | None = None,
     ) -> Out:
         """Compare one view with all places."""
         if self._map is not map:
-            self._places = ManyViews([map.views.view_features(int(view)) for view in map.places])
+            self._places = ManyViews([view_features(map.views.features(int(view))) for view in map.places])
             self._map = map
         if len(features) and features.descriptors.shape[1] != map.views.descriptors.shape[1]:
             raise BadInput(
                 f"match: descriptors of {features.descriptors.shape[1]} numbers against a map of "
                 f"{map.views.descriptors.shape[1]}; use the features it was made with, or make a new map"
             )
-        here = view_features(features, vertical_segments)
+        here = view_features(features)
         options = ComparisonOptions(
             self.ratio,
             self.segment_ratio,

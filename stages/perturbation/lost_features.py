@@ -1,5 +1,6 @@
 """Drops features at random."""
 
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -9,7 +10,10 @@ from omninav.stages.values.local_features import LocalFeatures
 
 
 class LostFeatures(Stage):
-    """Drops a random share of the features, different ones at every tick, as occlusion and light do."""
+    """Drops a random share of the features, different ones at every tick, as occlusion and light do.
+
+    Where a view has columns, the same share of them.
+    """
 
     share: Annotated[float, Bounds(ge=0, lt=1)] = 0.0
     """Probability that a feature is dropped; 0: nothing is drawn."""
@@ -22,4 +26,8 @@ class LostFeatures(Stage):
         if self.share == 0.0:
             return self.Out(features=features)
         kept = ctx.rng.random(len(features)) >= self.share
-        return self.Out(features=features.chosen(np.flatnonzero(kept)))
+        thinned = features.chosen(np.flatnonzero(kept))
+        if features.columns is not None:
+            kept = ctx.rng.random(len(features.columns)) >= self.share
+            thinned = replace(thinned, columns=features.columns.chosen(np.flatnonzero(kept)))
+        return self.Out(features=thinned)

@@ -86,7 +86,7 @@ class HomingSnapshot(Stage):
         if vector is not None and seen_by is not None:
             floor_line = seen_at(seen_by, floor_ahead(vector, None if camera is None else camera.height))
         if target is not None:
-            rays = target.features.bearings
+            rays = target.features.point_bearings()
             there = np.full((len(rays), 2), np.nan) if seen_by is None else seen_at(seen_by, rays)
             of_target = np.full(len(there), -1, np.int8)
             if tracks is not None:

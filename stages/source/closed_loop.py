@@ -1,7 +1,7 @@
 """A simulated robot that goes where it is told: the source of a closed loop."""
 
 from dataclasses import field
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from omninav.stages.simulator import route_planning
 from omninav.stages.simulator.cameras import shutter_times
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
 from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.drawn_starts import drawn_way_back
 from omninav.stages.simulator.obstacles import gather
 from omninav.stages.simulator.odometry import draw_bias, measured
 from omninav.stages.simulator.people import Person, Track
@@ -35,6 +36,8 @@ F64 = npt.NDArray[np.float64]
 
 TRACK_TICKS = 2500
 """Ticks of its path that people who keep the robot company know of."""
+CARRIED_AT_S = 0.5
+"""Seconds after which a robot with a drawn start is carried away."""
 
 
 def _nowhere() -> F64:
@@ -72,8 +75,12 @@ class ClosedLoop(Source):
     """As the world is on this day."""
     route: str = "drive"
     """The robot starts where this route of the world does, and faces along it."""
-    start: tuple[float, float, float] | None = None
-    """Where it starts instead: x, y (m), heading (rad)."""
+    start: tuple[float, float, float] | Literal["drawn"] | None = None
+    """Where it starts instead: x, y (m), heading (rad); `drawn`: anywhere on the free floor, another place for every
+    seed."""
+    carried_m: Annotated[float, Bounds(ge=0)] = 0.0
+    """With a drawn start: how far away (m) somebody puts it down after half a second, where the straight way back is
+    free."""
     seconds: Annotated[float, Bounds(gt=0)] = 60.0
     """How long it drives at most."""
     rate_hz: Annotated[float, Bounds(ge=1)] = 5.0
@@ -101,9 +108,10 @@ class ClosedLoop(Source):
         self._limits = limits(self.world.robot)
         self._camera = RobotCamera(self.world, "closed loop", self.day)
         self._bias = draw_bias(self.world.odometry, stream(self.world.draw_seed, "odometry bias", self.day))
-        self._first = self._first_pose(world)
+        self._kidnappings = self.kidnappings
+        self._first = self._first_pose(world, ctx.rng)
         refuse_no_room(self.world, self._room, self._first.tolist(), "start")
-        for kidnapping in self.kidnappings:
+        for kidnapping in self._kidnappings:
             if kidnapping.to is not None:
                 refuse_no_room(self.world, self._room, kidnapping.to, "kidnappings")
 
@@ -143,7 +151,7 @@ class ClosedLoop(Source):
         steer(robot, command.speed, command.turning, self._limits, 1.0 / self.rate_hz, self._room, people)
         rolled = measured(between(before, robot[:3])[None], self.world.odometry, self._bias, ctx.rng)[0]
         simulation.odometry = compose(simulation.odometry, rolled)
-        for kidnapping in self.kidnappings:
+        for kidnapping in self._kidnappings:
             if now - 1.0 / self.rate_hz < kidnapping.at <= now:
                 teleport(robot, kidnapping)
         return Motion(*(float(value) for value in rolled))
@@ -188,8 +196,13 @@ class ClosedLoop(Source):
         """Who is about at the last tick that was made."""
         return self._world.crowd.visible(simulation.crowd, float(simulation.track[-1, 0]))
 
-    def _first_pose(self, world: World) -> F64:
-        if self.start is not None:
+    def _first_pose(self, world: World, rng: np.random.Generator) -> F64:
+        if self.start == "drawn":
+            pose, put = drawn_way_back(world, rng, self.carried_m)
+            if self.carried_m:
+                x, y, heading = put.tolist()
+                self._kidnappings = (Kidnapping(at=CARRIED_AT_S, to=(x, y, heading)),)
+        elif self.start is not None:
             pose = np.array(self.start)
         elif self.route in self.world.routes:
             way = route_planning.plan(world, self.world.routes[self.route])

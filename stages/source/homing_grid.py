@@ -2,7 +2,7 @@
 
 import math
 from functools import cached_property
-from typing import Annotated, Protocol
+from typing import Annotated, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, UnreadableRecording
 from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.demo import DEMO
+from omninav.stages.simulator.drawn_starts import drawn_pose
 from omninav.stages.simulator.first_hits import first_hits
 from omninav.stages.simulator.robot_camera import RobotCamera
 from omninav.stages.simulator.simulated_recording import simulation_digest
@@ -57,8 +58,9 @@ class HomingGrid(Source):
     """The world that they are rendered of."""
     day: Annotated[int, Bounds(ge=0)] = 0
     """As the world is on this day."""
-    target: tuple[float, float, float] = (10.0, 8.0, 0.5)
-    """x, y (m), heading (rad); of a log only x and y matter."""
+    target: tuple[float, float, float] | Literal["drawn"] = (10.0, 8.0, 0.5)
+    """x, y (m), heading (rad), of which only x and y matter in a log; `drawn`: anywhere on the free floor, another
+    place for every seed."""
     spacing_m: Annotated[float, Bounds(gt=0)] = 1.0
     """Distance of neighbouring points of the grid, in x and in y."""
     radius_m: Annotated[float, Bounds(gt=0)] = 8.0
@@ -79,6 +81,8 @@ class HomingGrid(Source):
             self._views: Views = RenderedViews(
                 self.world, self.day, self.target, self.spacing_m, self.radius_m, ctx.rng
             )
+        elif self.target == "drawn":
+            raise UnreadableRecording("target: of a log none is drawn; type nodes.source.target=[x,y,0]")
         else:
             self._views = RecordedViews(recording, self.target, self.radius_m)
 
@@ -120,12 +124,15 @@ class RenderedViews:
         self,
         config: WorldConfig,
         day: int,
-        target: tuple[float, float, float],
+        target: tuple[float, float, float] | Literal["drawn"],
         spacing: float,
         radius: float,
         rng: np.random.Generator,
     ) -> None:
         world = World(config, day)
+        if target == "drawn":
+            x, y, heading = drawn_pose(world, rng).tolist()
+            target = x, y, heading
         if not world.is_free([target[:2]], config.robot.radius)[0]:
             raise UnreadableRecording(
                 f"target: no room for the robot at {target[0]:g}, {target[1]:g} of world '{config.name}'; choose "

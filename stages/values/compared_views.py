@@ -9,7 +9,7 @@ from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, ViewFeatures
 
-from .local_features import GlobalDescriptor, LocalFeatures, VerticalSegments, view_features
+from .local_features import GlobalDescriptor, LocalFeatures, view_features
 from .pose import PoseSource
 
 Array = npt.NDArray[np.float64]
@@ -19,7 +19,7 @@ Ints = npt.NDArray[np.int64]
 class ComparedViews(Value):
     """N views in the order of the drive, first those of a known map, with their visual distances.
 
-    `features`, `segments` (None: not looked for) and `descriptors`: one entry for each view. `poses` (N, 3): x, y (m),
+    `features` and `descriptors`: one entry for each view. `poses` (N, 3): x, y (m),
     heading (rad), from `pose_source`: for scoring and drawing only. `frames` (N,): their numbers among all images;
     `orders` (N,): among the views, with a gap from tour to tour. `tours` (N,): which tour each is from, 0 for a known
     map. `owners` (N,): their place in the known map, -1 for new ones.
@@ -30,7 +30,6 @@ class ComparedViews(Value):
     """
 
     features: Annotated[tuple[LocalFeatures, ...], Shape("N")]
-    segments: Annotated[tuple[VerticalSegments | None, ...], Shape("N")]
     descriptors: Annotated[tuple[GlobalDescriptor, ...], Shape("N")]
     poses: Annotated[Array, Shape("N", 3)]
     pose_source: PoseSource
@@ -47,7 +46,7 @@ class ComparedViews(Value):
 
     def view_features(self, view: int) -> ViewFeatures:
         """A view prepared for comparison with others."""
-        return view_features(self.features[view], self.segments[view])
+        return view_features(self.features[view])
 
     def comparison_options(self) -> ComparisonOptions:
         """How the views were compared."""

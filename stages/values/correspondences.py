@@ -14,9 +14,9 @@ Ints = npt.NDArray[np.int64]
 class Correspondences(Value):
     """Pairs of features, one of each of two views, that look similar; the clearest first.
 
-    `first` (M,) and `second` (M,): their rows in the features of the first and of the second view. Nothing is in two
-    pairs. `distance` (M,): how different they look, in the units of whoever matched them. In homing the first view is
-    the current one and the second the target.
+    `first` (M,) and `second` (M,): their rows among the points of the first and of the second view, patches and then
+    ends of columns (`LocalFeatures.point_bearings`). Nothing is in two pairs. `distance` (M,): how different they look,
+    in the units of whoever matched them. In homing the first view is the current one and the second the target.
     """
 
     first: Annotated[Ints, Shape("M"), Bounds(ge=0)]

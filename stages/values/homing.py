@@ -72,7 +72,7 @@ LOST, TRACKED, FOUND_AGAIN, MATCHED = range(4)
 class TrackedFeatures(Value):
     """Features of the local map with this `number` in the present image, N of them.
 
-    `rows` (N,): which of the target's features they are. `kinds` (N,): LOST, TRACKED, FOUND_AGAIN (tracked from where
+    `rows` (N,): which of the target's points they are. `kinds` (N,): LOST, TRACKED, FOUND_AGAIN (tracked from where
     it was found again in the image before), MATCHED (not tracked, but matched with the target view). `points` (N, 2):
     columns and rows, pixels of the image; of lost ones where they should be, NaN where that is outside of it.
     `bearings` (N, 3): unit vectors in the robot's frame, and `places` (N, 3): positions in the local map of what is
@@ -94,7 +94,7 @@ class LocalMap(Value):
     map has another; `target`: the number of the target it leads to. `state`: `new` (made of two views in this tick),
     `tracking`, or `lost`, and then `why`; a lost map without features is no map.
 
-    `rows` (N,): the target's features; `places` (N, 3): where they are; `kinds` (N,): as in `TrackedFeatures`, LOST
+    `rows` (N,): the target's points; `places` (N, 3): where they are; `kinds` (N,): as in `TrackedFeatures`, LOST
     where a track contradicts the robot's pose; `points` (N, 2): pixels of MATCHED ones in the image.
     `rotation` (3, 3), `translation` (3,): the robot's pose; `goal_rotation`, `goal_translation`: the target's.
     `inliers`: features that agree with the robot's pose; `first_inliers`: those that agreed when the map was made.

@@ -1,9 +1,6 @@
-"""What is kept of a view to find it again from elsewhere: local features, vertical segments, and a global descriptor.
+"""What is kept of a view to find it again from elsewhere: patches, vertical segments, and a global descriptor."""
 
-They are three values: homing needs the local features alone, each can be replaced by one wire, and one that is not
-wired is absent.
-"""
-
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -16,36 +13,6 @@ from omninav.stages.geometry.appearance.visual_distance import Patches, Segments
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 Bytes = npt.NDArray[np.uint8]
-
-
-class LocalFeatures(Value):
-    """Patches of a view with what they look like, the strongest first.
-
-    `bearings` (N, 3): unit vectors in the robot's frame, from the camera's projection centre. `points` (N, 2): columns
-    and rows (pixels, integers are centres) in the image they were found in. `descriptors` (N, D) uint8, compared by
-    Euclidean distance. `colours` (N, 3) float32: correlations of red with green, red with blue, green with blue over
-    the patch, in [-1, 1] (Goedeme et al. 2007, equation 1; erratum 25 in docs/papers.md). `sizes` (N,): diameters
-    (pixels).
-    """
-
-    bearings: Annotated[Array, Shape("N", 3), Bounds(ge=-1.001, le=1.001)]
-    points: Annotated[Array, Shape("N", 2, finite=False)]
-    descriptors: Annotated[Bytes, Shape("N", "D")]
-    colours: Annotated[Floats, Shape("N", 3), Bounds(ge=-1.001, le=1.001)]
-    sizes: Annotated[Floats, Shape("N"), Bounds(ge=0)]
-
-    def __len__(self) -> int:
-        return len(self.bearings)
-
-    def chosen(self, rows: npt.NDArray[np.int64] | slice) -> "LocalFeatures":
-        """Some of them."""
-        return LocalFeatures(
-            self.bearings[rows], self.points[rows], self.descriptors[rows], self.colours[rows], self.sizes[rows]
-        )
-
-    def patches(self) -> Patches:
-        """What they are matched by."""
-        return patches(self.descriptors, self.colours, self.bearings)
 
 
 class VerticalSegments(Value):
@@ -79,15 +46,67 @@ class VerticalSegments(Value):
         return np.stack([level * np.cos(around), level * np.sin(around), np.sin(self.elevations)], axis=-1)
 
 
+NO_SEGMENTS = VerticalSegments(
+    np.empty(0), np.empty((0, 2)), np.empty((0, 10), np.float32), np.empty(0, np.float32), np.empty((0, 2, 2))
+)
+
+
+class LocalFeatures(Value):
+    """Patches of a view with what they look like, the strongest first, and its columns where they were looked for.
+
+    `bearings` (N, 3): unit vectors in the robot's frame, from the camera's projection centre. `points` (N, 2): columns
+    and rows (pixels, integers are centres) in the image they were found in. `descriptors` (N, D) uint8, compared by
+    Euclidean distance. `colours` (N, 3) float32: correlations of red with green, red with blue, green with blue over
+    the patch, in [-1, 1] (Goedeme et al. 2007, equation 1; erratum 25 in docs/papers.md). `sizes` (N,): diameters
+    (pixels). `columns`: the second kind of features (section 3.3); None: not looked for.
+    """
+
+    bearings: Annotated[Array, Shape("N", 3), Bounds(ge=-1.001, le=1.001)]
+    points: Annotated[Array, Shape("N", 2, finite=False)]
+    descriptors: Annotated[Bytes, Shape("N", "D")]
+    colours: Annotated[Floats, Shape("N", 3), Bounds(ge=-1.001, le=1.001)]
+    sizes: Annotated[Floats, Shape("N"), Bounds(ge=0)]
+    columns: VerticalSegments | None = None
+
+    def __len__(self) -> int:
+        return len(self.bearings)
+
+    def chosen(self, rows: npt.NDArray[np.int64] | slice) -> "LocalFeatures":
+        """Some of the patches, and all columns."""
+        return replace(
+            self,
+            bearings=self.bearings[rows],
+            points=self.points[rows],
+            descriptors=self.descriptors[rows],
+            colours=self.colours[rows],
+            sizes=self.sizes[rows],
+        )
+
+    def patches(self) -> Patches:
+        """What they are matched by."""
+        return patches(self.descriptors, self.colours, self.bearings)
+
+    def point_bearings(self) -> Array:
+        """Bearings (N + 2C, 3) of the patches, then of the upper and the lower end of each of C columns."""
+        if self.columns is None:
+            return self.bearings
+        return np.concatenate([self.bearings, self.columns.bearings().reshape(-1, 3)])
+
+    def point_pixels(self) -> Array:
+        """Pixels (N + 2C, 2) of the same."""
+        if self.columns is None:
+            return self.points
+        return np.concatenate([self.points, self.columns.points.reshape(-1, 2)])
+
+
 class GlobalDescriptor(Value):
     """The colours of a whole view. `values` (3,) float32: correlations as in `LocalFeatures`, over all of it."""
 
     values: Annotated[Floats, Shape(3)]
 
 
-def view_features(features: LocalFeatures | None, segments: VerticalSegments | None) -> ViewFeatures:
+def view_features(features: LocalFeatures) -> ViewFeatures:
     """A view prepared for comparison with others."""
-    return ViewFeatures(
-        None if features is None else features.patches(),
-        None if segments is None else Segments(segments.descriptors, segments.azimuths),
-    )
+    columns = features.columns
+    segments = None if columns is None else Segments(columns.descriptors, columns.azimuths)
+    return ViewFeatures(features.patches(), segments)

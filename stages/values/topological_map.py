@@ -10,9 +10,8 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import RowsOf, Shape, Starts
-from omninav.stages.geometry.appearance.visual_distance import ViewFeatures
 
-from .local_features import GlobalDescriptor, LocalFeatures, VerticalSegments, view_features
+from .local_features import NO_SEGMENTS, GlobalDescriptor, LocalFeatures, VerticalSegments
 from .pose import PoseSource
 
 Array = npt.NDArray[np.float64]
@@ -51,7 +50,7 @@ class StoredViews(Value):
         return len(self.starts) - 1
 
     def features(self, view: int) -> LocalFeatures:
-        """The patches of a view; their points in a picture are not known any more (NaN)."""
+        """The patches and columns of a view; their points in a picture are not known any more (NaN)."""
         rows = slice(int(self.starts[view]), int(self.starts[view + 1]))
         azimuth, elevation = (self.directions[rows].astype(np.float64) * ANGLE).T
         level = np.cos(elevation)
@@ -62,12 +61,15 @@ class StoredViews(Value):
             self.descriptors[rows],
             self.colours[rows].astype(np.float32) / np.float32(127.0),
             self.sizes[rows].astype(np.float32),
+            self._columns(view),
         )
 
-    def columns(self, view: int) -> VerticalSegments:
-        """The columns of a view; their points in a picture are not known any more (NaN)."""
+    def _columns(self, view: int) -> VerticalSegments | None:
+        """The columns of a view; None where it has none, as in a map that was made without."""
         rows = slice(int(self.column_starts[view]), int(self.column_starts[view + 1]))
         angles = self.column_directions[rows].astype(np.float64) * ANGLE
+        if not len(angles):
+            return None
         return VerticalSegments(
             angles[:, 0],
             angles[:, 1:],
@@ -76,20 +78,14 @@ class StoredViews(Value):
             np.full((len(angles), 2, 2), np.nan),
         )
 
-    def view_features(self, view: int) -> ViewFeatures:
-        """A view prepared for comparison with others."""
-        segments = self.columns(view)
-        return view_features(self.features(view), segments if len(segments) else None)
-
     def global_moments(self, view: int) -> GlobalDescriptor:
         """The colours of a view as a whole."""
         return GlobalDescriptor(self.moments[view])
 
 
-def stored(
-    features: list[LocalFeatures], columns: list[VerticalSegments], moments: list[GlobalDescriptor]
-) -> StoredViews:
+def stored(features: list[LocalFeatures], moments: list[GlobalDescriptor]) -> StoredViews:
     """Views made small; one entry of each list per view."""
+    columns = [NO_SEGMENTS if each.columns is None else each.columns for each in features]
     bearings = np.concatenate([np.empty((0, 3)), *(f.bearings for f in features)])
     azimuths = np.arctan2(bearings[:, 1], bearings[:, 0])
     elevations = np.arcsin(np.clip(bearings[:, 2], -1.0, 1.0))

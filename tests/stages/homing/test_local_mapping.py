@@ -113,6 +113,26 @@ def test_on_the_way_the_vector_follows_the_local_map_without_any_match(kind: str
         assert astray(vector, pose, start) < 0.1
 
 
+def test_matched_at_the_start_alone_it_goes_on_by_tracks() -> None:
+    once, never = Homing(matching="at_start"), Homing()
+    poses = drive(16)
+    for step, pose in enumerate(poses):
+        told = once.at(pose)
+        assert told.state == ("new" if step == 0 else "tracking")
+        other = never.at(pose, matches=step == 0)
+        assert (told.direction, told.distance, told.inliers) == (other.direction, other.distance, other.inliers)
+        assert astray(told, pose, math.dist(poses[0][:2], TARGET[:2])) < 0.1
+
+
+def test_poses_of_samples_are_worse_than_refined_ones() -> None:
+    off = {refine: [] for refine in (True, False)}
+    for refine, found in off.items():
+        for seed in range(5):
+            pose = (4.2, 4.6, 0.4)
+            found.append(off_deg(Homing(seed=seed, refine=refine).at(pose), pose)[0])
+    assert np.mean(off[False]) > np.mean(off[True])
+
+
 def test_odometry_tells_metres() -> None:
     poses, homing = drive(9), Homing()
     for before, pose in zip([None, *poses], poses, strict=False):

@@ -49,6 +49,11 @@ def test_places_of_two_passes_do_not_stand_side_by_side(twice: Mapped) -> None:
     assert own_is_closest(map, found) > max(0.7, own_is_closest(twice.map, twice.hypotheses))
 
 
+def test_without_a_spacing_every_view_stays_where_it_was(twice: Mapped) -> None:
+    assert merged(twice, min_spacing=0.0).place.tolist() == twice.hypotheses.place.tolist()
+    assert merged(twice).place.tolist() != twice.hypotheses.place.tolist()
+
+
 def test_only_places_at_the_same_spot_are_merged(twice: Mapped) -> None:
     found = merged(twice)
     map = map_of(twice, found)

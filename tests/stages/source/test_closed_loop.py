@@ -242,3 +242,22 @@ def test_a_place_without_room_is_refused():
         Loop(start=(3.7, 2.9, 0.0))
     with pytest.raises(UnreadableRecording, match=r"kidnappings: 0\.1, 0\.1 of world"):
         Loop(kidnappings=(Kidnapping(at=1.0, to=(0.1, 0.1, 0.0)),))
+
+
+def test_a_drawn_start_has_a_free_straight_way_back_and_another_for_each_seed():
+    begun = []
+    for seed in (0, 0, 1):
+        loop = Loop(seed, start="drawn", carried_m=1.5)
+        for _ in range(5):
+            loop.step(Command(0.0, 0.0))
+        begun.append(loop)
+    ends = []
+    for loop in begun:
+        first, put = np.array(loop.source._first), np.array(loop.source._kidnappings[0].to)
+        assert math.dist(first[:2], put[:2]) == pytest.approx(1.5)
+        way = first[:2] + np.linspace(0.0, 1.0, 30)[:, None] * (put[:2] - first[:2])
+        assert World(WORLD, 1).is_free(way, WORLD.robot.radius).all()
+        assert loop.state.robot[:3] == pytest.approx(put)
+        ends.append(put)
+    assert np.array_equal(ends[0], ends[1])
+    assert not np.array_equal(ends[0], ends[2])

@@ -114,7 +114,7 @@ def ready(azimuths: np.ndarray, seed: int = 0) -> ViewFeatures:
     looks = np.random.default_rng(seed).integers(0, 120, (number, 128), dtype=np.uint8)
     grey = np.zeros((number, 3), np.float32)
     patches = LocalFeatures(bearings, np.zeros((number, 2)), looks, grey, np.ones(number, np.float32))
-    return view_features(patches, None)
+    return view_features(patches)
 
 
 @given(st.floats(-3.1, 3.1))
@@ -133,5 +133,5 @@ def test_colours_part_what_looks_alike_in_grey() -> None:
     assert compare(one, other, ComparisonOptions()).matches == 10
     assert compare(one, other, ComparisonOptions(max_colour_distance=9.0)).matches == 20
     assert compare(one, other, ComparisonOptions(search="kd_tree")).matches == 10
-    assert compare(one, view_features(None, None), ComparisonOptions()).distance == math.inf
+    assert compare(one, ViewFeatures(None, None), ComparisonOptions()).distance == math.inf
     assert matching.NO_PAIRS.first.size == 0
