@@ -111,6 +111,13 @@ def test_the_number_follows_the_cells_the_belief_fills() -> None:
     assert len(wide.poses) == 5000
 
 
+@pytest.mark.parametrize(("width", "number"), [(1.0, kld_number(4, 0.05, 0.99)), (90.0, kld_number(2, 0.05, 0.99))])
+def test_cells_are_as_high_in_heading_as_asked(width: float, number: int) -> None:
+    poses = np.array([[0.1, 0.1, np.radians(turn)] for turn in (1.5, 3.5, 91.5, 93.5)])
+    stage = ImportanceResampling(number=900, min_particles=1, adapt="kld", cell_deg=width)
+    assert len(fuse(stage, Particles(poses, np.full(4, 0.25)), np.ones(4)).poses) == number
+
+
 def test_without_adaptation_the_number_stays_however_narrow_the_belief_is() -> None:
     assert (
         len(fuse(ImportanceResampling(number=800, min_particles=50), belief(800, spread=0.01), np.ones(800)).poses)

@@ -76,3 +76,10 @@ def test_clusters_are_what_touching_cells_make_of_them_one_by_one(seed: int, num
             )
     found = clusters(poses, 0.5, np.radians(30.0))
     assert np.array_equal(found[:, None] == found, np.array(group)[:, None] == np.array(group))
+
+
+def test_clusters_at_the_least_weight_stay_and_weights_are_shares_of_all() -> None:
+    poses = np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0], [18.0, 0.0, 0.0]])
+    state = gather(poses, np.array([4.0, 3.0, 1.0]), min_weight=0.375)
+    assert state.means[:, 0].tolist() == [0.0, 9.0]
+    assert state.weights == pytest.approx([4 / 7, 3 / 7])

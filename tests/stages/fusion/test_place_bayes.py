@@ -1,6 +1,7 @@
 """Bayes' rule over places."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -40,3 +41,12 @@ def test_a_view_that_no_place_explains_leaves_the_prediction_and_is_counted():
     ctx = Context("fusion")
     np.testing.assert_allclose(fused([0.5, 0.3, 0.2], [0.0, 0.0, 0.0], ctx=ctx).probabilities, [0.5, 0.3, 0.2])
     assert ctx.counts["belief_without_support"] == 1
+
+
+def test_headings_are_those_of_the_medoids_turned_as_the_view_is():
+    map = replace(made_map([(5.0, 6.0), (7.0, 8.0)], {}), poses=np.array([[5.0, 6.0, 0.25], [7.0, 8.0, -1.0]]))
+    distances = VisualDistances(np.ones(2), np.array([0.5, 0.75]), np.ones(2, np.int64))
+    prediction = PlaceBelief(np.array([0.5, 0.5]), map.poses)
+    out = PlaceBayes().step(Context("fusion"), prediction, Likelihood(np.array([0.2, 0.6])), distances, map).belief
+    assert out.poses.tolist() == [[5.0, 6.0, 0.75], [7.0, 8.0, -0.25]]
+    assert out.probabilities == pytest.approx([0.25, 0.75])

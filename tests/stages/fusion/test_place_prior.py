@@ -59,3 +59,14 @@ def test_what_is_missing_is_said_in_one_line() -> None:
         begun(PlacePrior(at="truth"))
     with pytest.raises(BadInput, match="no place"):
         PlacePrior().step(Context("start"), Tick(0, 0, first_of_log=True), replace(MAP, places=np.empty(0, np.int64)))
+
+
+@pytest.mark.parametrize("place", [0, 1, 2, 3])
+def test_the_origin_is_where_x_and_y_are_zero(place: int) -> None:
+    # Four medoids around it, one of them a little nearer than the others.
+    spots = [(0.6, 0.0), (-0.6, 0.0), (0.0, 0.6), (0.0, -0.6)]
+    spots[place] = (0.9 * spots[place][0], 0.9 * spots[place][1])
+    tick = Tick(0, 0, first_of_log=True)
+    belief = PlacePrior(at="origin").step(Context("start"), tick, made_map(spots, {})).belief
+    assert belief is not None
+    assert belief.probabilities.argmax() == place
