@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Stage
-from omninav.stages.geometry.appearance.segments import euclidean_similarities, largest_distance
+from omninav.stages.geometry.appearance.segments import euclidean_similarities, max_distance_of
 from omninav.stages.values.features import SegmentFeatures
 from omninav.stages.values.maps import ReferenceGraph
 
@@ -23,4 +23,4 @@ class L2Match(ReferenceMatch, Stage):
         return euclidean_similarities(map.features, features.values, self.headings, features.kind, chosen)
 
     def how_compared(self, features: SegmentFeatures) -> tuple[None, float]:
-        return None, largest_distance(len(features.values), features.kind)
+        return None, max_distance_of(len(features.values), features.kind)

@@ -12,9 +12,9 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Answers
 
 QUANTITIES = {
-    "answers.near_rate": Quantity(title="Answers taken near by", better="higher"),
-    "answers.first_near_rate": Quantity(title="First answers taken near by", better="higher"),
-    "answers.chance_rate": Quantity(title="Images of the map taken near by"),
+    "answers.nearby_rate": Quantity(title="Answers taken near by", better="higher"),
+    "answers.first_nearby_rate": Quantity(title="First answers taken near by", better="higher"),
+    "answers.background_rate": Quantity(title="Images of the map taken near by"),
     "answers.first_similarity": Quantity(title="Similarity of the first answer"),
     "answers.last_similarity": Quantity(title="Similarity of the last answer"),
 }
@@ -24,9 +24,9 @@ class AnswersNearBy(Stage):
     """Measures what share of a query's most similar images show the same scene.
 
     Wolf, Burgard & Burkhardt 2005, Figure 5: nine answers to a query. Of the last log, under `answers`, on average over
-    the images: `near_rate`, the share of the answers that were taken within `within_m` of the robot and look the same
-    way; `first_near_rate`, that of the first ones; `chance_rate`, that share of the whole map; the similarities of the
-    first and the last answer. Images that nothing near by was taken of count too.
+    the images: `nearby_rate`, the share of the answers that were taken within `within_m` of the robot and look the same
+    way; `first_nearby_rate`, that of the first ones; `background_rate`, that share of the whole map; the similarities
+    of the first and the last answer. Images that nothing near by was taken of count too.
     """
 
     within_m: Annotated[float, Bounds(gt=0)] = 5.0
@@ -56,6 +56,6 @@ class AnswersNearBy(Stage):
             rows.append((right.mean(), right[0], by_chance, given.similarities[0], given.similarities[-1]))
         if not rows:
             return self.Out()
-        names = ("near_rate", "first_near_rate", "chance_rate", "first_similarity", "last_similarity")
+        names = ("nearby_rate", "first_nearby_rate", "background_rate", "first_similarity", "last_similarity")
         means = np.array(rows, np.float64).mean(axis=0).tolist()
         return self.Out(metrics=Metrics({"answers": dict(zip(names, means, strict=True))}, QUANTITIES))

@@ -13,26 +13,26 @@ from omninav.stages.values.similarity import Similarities
 
 QUANTITIES = {
     "own_place.similarity": Quantity(title="Similarity to the view of the same place", better="higher"),
-    "own_place.similarity_aside": Quantity(title="Similarity to views taken a little aside", better="higher"),
+    "own_place.similarity_nearby": Quantity(title="Similarity to views taken nearby", better="higher"),
     "own_place.similarity_elsewhere": Quantity(title="Similarity to views of other places"),
     "own_place.lost": Quantity(title="Similarity lost, of what there is to lose", better="lower"),
-    "own_place.lost_aside": Quantity(title="Similarity lost a little aside", better="lower"),
+    "own_place.lost_nearby": Quantity(title="Similarity lost nearby", better="lower"),
     "own_place.told_rate": Quantity(title="Told from all other places", better="higher"),
 }
 
 
 class Likeness(Value):
-    """Similarities of a view: to the map's view of its own place (`own`), to those a little `aside` (mean; NaN where
-    there are none), and to those of other places at their best headings, on `average` and at `most`."""
+    """Similarities of a view: to the map's view of its own place (`own`), to those `nearby` (mean; NaN where there
+    are none), and to those of other places at their best headings, on `average` and at `most`."""
 
     own: float
-    aside: float
+    nearby: float
     average: float
     most: float
 
 
 class OwnPlace(Stage):
-    """Compares a view with the map's view of the same place, of places a little aside, and of all others.
+    """Compares a view with the map's view of the same place, of places nearby, and of all others.
 
     For one tour as map and log, so that each view's own place is in the map; what was done to the view in between is
     what costs similarity. The headings of the robot and of the map's views are known. Absent where truth is, or where
@@ -41,8 +41,8 @@ class OwnPlace(Stage):
 
     own_m: Annotated[float, Bounds(gt=0)] = 0.1
     """Distance (m) up to which a reference is of the same place."""
-    aside_m: tuple[float, float] = (0.5, 1.5)
-    """Distances (m) between which it is a little aside."""
+    nearby_m: tuple[float, float] = (0.5, 1.5)
+    """Distances (m) between which it is nearby."""
     elsewhere_m: Annotated[float, Bounds(gt=0)] = 5.0
     """Distance (m) from which it is of another place."""
     within_deg: Annotated[float, Bounds(gt=0, le=180)] = 5.0
@@ -65,20 +65,20 @@ class OwnPlace(Stage):
         turned = wrap(map.poses[:, 2] + 2 * np.pi * column / headings - truth.heading)
         alike, same_way = values[np.arange(len(values)), column], np.abs(np.degrees(turned)) <= self.within_deg
         own, elsewhere = (away <= self.own_m) & same_way, away >= self.elsewhere_m
-        aside = (away >= self.aside_m[0]) & (away <= self.aside_m[1]) & same_way
+        nearby = (away >= self.nearby_m[0]) & (away <= self.nearby_m[1]) & same_way
         if not own.any() or not elsewhere.any():
             return self.Out()
         best = values[elsewhere].max(axis=1)
-        beside = float(alike[aside].mean()) if aside.any() else float("nan")
+        beside = float(alike[nearby].mean()) if nearby.any() else float("nan")
         return self.Out(likeness=Likeness(float(alike[own].max()), beside, float(best.mean()), float(best.max())))
 
 
 class OwnPlaceRecognition(Stage):
     """Measures how much similarity views keep to those of their own places.
 
-    Under `own_place`, means over the images: `similarity` to the view of the same place, `similarity_aside` and
-    `similarity_elsewhere`; `lost` and `lost_aside`, the shares (1 - own) / (1 - elsewhere) of the similarity that there
-    is to lose; `told_rate`, the share of images that are more like their own place than any other place; `images`.
+    Under `own_place`, means over the images: `similarity` to the view of the same place, `similarity_nearby` and
+    `similarity_elsewhere`; `lost` and `lost_nearby`, the shares (1 - own) / (1 - elsewhere) of the similarity that
+    there is to lose; `told_rate`, the share of images that are more like their own place than any other place; `images`.
     """
 
     class Out(Outputs):
@@ -88,18 +88,18 @@ class OwnPlaceRecognition(Stage):
 
     def step(self, ctx: Context, likenesses: Sequence[Likeness | None]) -> Out:
         """The whole run at once."""
-        rows = np.array([(each.own, each.aside, each.average, each.most) for each in likenesses if each is not None])
+        rows = np.array([(each.own, each.nearby, each.average, each.most) for each in likenesses if each is not None])
         if not len(rows):
             return self.Out()
-        own, aside, average, most = rows.T
-        room, beside = 1.0 - average, np.isfinite(aside)
+        own, nearby, average, most = rows.T
+        room, beside = 1.0 - average, np.isfinite(nearby)
         found = {
             "images": len(rows),
             "similarity": float(own.mean()),
-            "similarity_aside": float(aside[beside].mean()) if beside.any() else None,
+            "similarity_nearby": float(nearby[beside].mean()) if beside.any() else None,
             "similarity_elsewhere": float(average.mean()),
             "lost": float(((1.0 - own) / room).mean()),
-            "lost_aside": float(((1.0 - aside) / room)[beside].mean()) if beside.any() else None,
+            "lost_nearby": float(((1.0 - nearby) / room)[beside].mean()) if beside.any() else None,
             "told_rate": float((own > most).mean()),
         }
         return self.Out(metrics=Metrics({"own_place": found}, QUANTITIES))

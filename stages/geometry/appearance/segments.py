@@ -200,7 +200,7 @@ def _compare_many(expected: Floats, observed: Floats, network: Ints, factors: Fl
         out[n] = best
 
 
-def largest_distance(segments: int, kind: FeatureKind) -> float:
+def max_distance_of(segments: int, kind: FeatureKind) -> float:
     """The largest distance of two views: sqrt(2 n) for n histograms, sqrt(3 n) 255 for n colours, 2 sqrt(n) for n unit
     vectors."""
     return float(np.sqrt(segments) * MAX_DISTANCES[kind])
@@ -218,7 +218,7 @@ def euclidean_similarities(
     flat = np.ascontiguousarray(some, np.float32).reshape(len(some), -1)
     # |a - b|^2 = a.a + b.b - 2 a.b
     squared = (flat * flat).sum(axis=1)[:, None] + (query * query).sum(axis=1) - 2 * (flat @ query.T)
-    largest = largest_distance(len(view), kind)
+    largest = max_distance_of(len(view), kind)
     alike: Floats = (1.0 - np.sqrt(np.maximum(squared, 0.0)) / largest).astype(np.float32)
     return np.clip(alike, 0.0, 1.0)
 

@@ -20,7 +20,7 @@ def test_each_reference_counts_by_where_it_was_taken() -> None:
     values = np.array([[0.9], [0.7], [0.99], [0.5], [0.3], [1.0]], np.float32)
     found = OwnPlace().step(Context("own"), Similarities(values), Pose(0.0, 0.0, 0.0), MAP).likeness
     assert found is not None
-    assert (found.own, found.aside, found.average, found.most) == pytest.approx((0.9, 0.7, 0.4, 0.5))
+    assert (found.own, found.nearby, found.average, found.most) == pytest.approx((0.9, 0.7, 0.4, 0.5))
 
 
 def test_a_panorama_is_compared_at_the_robots_heading_and_elsewhere_at_the_best() -> None:
@@ -45,7 +45,7 @@ def test_what_is_lost_is_a_share_of_what_there_is_to_lose() -> None:
     found = out.metrics.values["own_place"]
     assert (found["images"], found["similarity"], found["told_rate"]) == (2, pytest.approx(0.75), 0.5)
     assert found["lost"] == pytest.approx((0.1 / 0.5 + 0.4 / 0.8) / 2)
-    assert (found["lost_aside"], found["similarity_aside"]) == (pytest.approx(0.3 / 0.5), pytest.approx(0.7))
+    assert (found["lost_nearby"], found["similarity_nearby"]) == (pytest.approx(0.3 / 0.5), pytest.approx(0.7))
 
 
 def test_an_answer_is_right_where_it_was_taken_near_by_and_looks_the_same_way() -> None:
@@ -57,7 +57,7 @@ def test_an_answer_is_right_where_it_was_taken_near_by_and_looks_the_same_way() 
     out = AnswersNearBy().step(Context("answers"), drive, answers, MAP)
     assert out.metrics is not None
     found = out.metrics.values["answers"]
-    assert found["near_rate"] == pytest.approx((1 / 3 + 2 / 3) / 2)
-    assert found["first_near_rate"] == pytest.approx(0.5)
-    assert found["chance_rate"] == pytest.approx(3 / 6)
+    assert found["nearby_rate"] == pytest.approx((1 / 3 + 2 / 3) / 2)
+    assert found["first_nearby_rate"] == pytest.approx(0.5)
+    assert found["background_rate"] == pytest.approx(3 / 6)
     assert (found["first_similarity"], found["last_similarity"]) == pytest.approx((0.8, 0.6))
