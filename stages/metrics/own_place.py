@@ -78,7 +78,8 @@ class OwnPlaceRecognition(Stage):
 
     Under `own_place`, means over the images: `similarity` to the view of the same place, `similarity_nearby` and
     `similarity_elsewhere`; `lost` and `lost_nearby`, the shares (1 - own) / (1 - elsewhere) of the similarity that
-    there is to lose; `told_rate`, the share of images that are more like their own place than any other place; `images`.
+    there is to lose; `told_rate`, the share of images that are more like their own place than any other place;
+    `images`.
     """
 
     class Out(Outputs):
