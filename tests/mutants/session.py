@@ -125,7 +125,7 @@ class MutantSession:
         return reached, seconds, failed
 
     def _chosen(self, mutant: Mutant, reached: Reached, seconds: list[float]) -> list[int]:
-        """The tests that reach a mutant's line, or where that is none any of the file's, quick ones first.
+        """The tests that reach a mutant's line, those of its file's own test first, then quick ones.
 
         Whatever is compiled or runs at import is reached by all tests of the file; a line that no test reaches by none.
         """
@@ -133,7 +133,8 @@ class MutantSession:
         everywhere = set().union(*lines.values()) or set(range(len(self.items)))
         chosen = lines.get(mutant.line, set()) if mutant.function else everywhere
         quick = {k for k in chosen if seconds[k] <= QUICK_S}
-        return sorted(quick or chosen, key=lambda k: (seconds[k], k))
+        own = f"test_{Path(mutant.file).name}"
+        return sorted(quick or chosen, key=lambda k: (self.items[k].path.name != own, seconds[k], k))
 
     def _changed(self, mutant: Mutant) -> CodeType | None:
         """The code of the changed function."""

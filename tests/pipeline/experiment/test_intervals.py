@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.stats import t
+from scipy.stats import binom, norm, t
 
 from omninav.pipeline.experiment.intervals import bootstrap_interval
 
@@ -17,8 +17,8 @@ def test_the_interval_of_a_mean_is_the_normal_one_for_many_values(groups: int):
     values = np.random.default_rng(1).normal(3.0, 2.0, 400)
     low, high = bootstrap_interval(np.split(values, groups))
     half = 1.96 * values.std() / np.sqrt(400)
-    assert low == pytest.approx(values.mean() - half, abs=0.03)
-    assert high == pytest.approx(values.mean() + half, abs=0.03)
+    assert low == pytest.approx(values.mean() - half, abs=0.012)
+    assert high == pytest.approx(values.mean() + half, abs=0.012)
 
 
 def test_of_six_values_it_is_as_wide_as_student_s():
@@ -50,3 +50,48 @@ def test_a_ratio_s_interval_is_paired():
     """Errors that are always half of the other method's, however much they vary from world to world."""
     theirs = [np.array([each]) for each in (1.0, 20.0, 3.0, 40.0, 5.0, 60.0)]
     assert bootstrap_interval([each / 2 for each in theirs], theirs) == pytest.approx((0.5, 0.5))
+
+
+def test_a_single_figure_has_an_interval_of_no_width():
+    assert bootstrap_interval([np.array([3.0])]) == (3.0, 3.0)
+    assert bootstrap_interval([np.array([]), np.array([3.0])], [np.array([]), np.array([6.0])]) == (0.5, 0.5)
+
+
+def test_a_ratio_to_what_never_varies_varies_as_its_figures_do():
+    ours = [np.array([each]) for each in (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)]
+    low, high = bootstrap_interval(ours, [np.array([2.0])] * 6)
+    assert (2 * low, 2 * high) == pytest.approx(bootstrap_interval(ours))
+    assert high - low > 0.5
+
+
+def test_two_worlds_are_two_independent_figures_however_many_seeds_they_have():
+    values = np.random.default_rng(5).normal(0.0, 1.0, 100)
+    two, one = bootstrap_interval(np.split(values, 2)), bootstrap_interval([values])
+    assert two[1] - two[0] > 1.5 * (one[1] - one[0])
+
+
+def test_the_interval_of_the_same_figures_is_the_same():
+    groups = [np.array([1.0, 5.0]), np.array([2.0]), np.array([4.0, 3.0, 9.0])]
+    assert bootstrap_interval(groups) == bootstrap_interval(groups)
+
+
+def test_seeds_that_say_the_same_add_nothing_to_their_world():
+    worlds = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0]
+    alone = bootstrap_interval([np.array([each]) for each in worlds])
+    assert bootstrap_interval([np.full(3, each) for each in worlds]) == pytest.approx(alone)
+
+
+def test_a_world_with_more_figures_weighs_more():
+    """Ten worlds with a 0, ten with two 1: a resample that draws k of these has the mean 2 k / (20 + k)."""
+    low, high = bootstrap_interval([np.array([0.0])] * 10 + [np.array([1.0, 1.0])] * 10)
+    share = norm.cdf(np.sqrt(20 / 19) * t.ppf(0.025, 19))
+    few, many = binom.ppf([share, 1.0 - share], 20, 0.5)
+    assert (low, high) == pytest.approx((2 * few / (20 + few), 2 * many / (20 + many)))
+
+
+def test_its_percentiles_are_student_s_expanded():
+    rng = np.random.default_rng(3)
+    groups = [rng.normal(0.0, 1.0, 50) for _ in range(6)]
+    spread = np.sqrt(np.var([group.mean() for group in groups]) / 6 + np.mean([group.var() for group in groups]) / 300)
+    low, high = bootstrap_interval(groups)
+    assert (high - low) / 2 == pytest.approx(np.sqrt(6 / 5) * t.ppf(0.975, 5) * spread, rel=0.02)

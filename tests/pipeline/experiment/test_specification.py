@@ -2,7 +2,7 @@
 
 import pytest
 
-from omninav.pipeline.experiment.specification import read_experiment
+from omninav.pipeline.experiment.specification import figure_of, read_experiment
 from omninav.pipeline.graph.problems import ProblemsFound
 
 FILE = {
@@ -41,3 +41,161 @@ def test_a_profile_changes_mappings_key_by_key_and_null_takes_a_label_out():
 def test_a_file_that_contradicts_itself_is_refused(change: dict[str, object], problem: str):
     with pytest.raises(ProblemsFound, match=problem):
         read_experiment(FILE | change, "paper")
+
+
+def faults(change: dict[str, object], profile: str = "paper") -> list[str]:
+    """What is said of a file with these entries: where, and what is wrong."""
+    try:
+        read_experiment(FILE | change, profile)
+    except ProblemsFound as error:
+        return [f"{problem.where}: {problem.what}" for problem in error.problems]
+    return []
+
+
+CURVE = {"title": "t", "x_label": "x", "path": "p"}
+RUN = {"text": "{}", "variant": "v", "measure": "m"}
+CLAIM = {"statement": "s", "measure": "error", "at_most": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ({"page": FILE["page"] | {"along": "x"}}, "experiment.page.along: there is no 'x'"),
+        ({"page": FILE["page"] | {"panels": "x"}}, "experiment.page.panels: there is no 'x'"),
+        ({"page": FILE["page"] | {"drawn": ["error", "x"]}}, "experiment.page.drawn[1]: there is no 'x'"),
+        ({"page": {"rows": ["data", "x"], "columns": "method"}}, "experiment.page.rows: there is no 'x'"),
+        ({"curves": [CURVE, CURVE | {"only": {"x": "a"}}]}, "experiment.curves[1].only: there is no 'x'"),
+        ({"curves": [CURVE | {"only": {"data": "x"}}]}, "experiment.curves[0].only.data: there is no 'x'"),
+        ({"curves": [CURVE, CURVE | {"panels": "x"}]}, "experiment.curves[1].panels: there is no 'x'"),
+        ({"reference_runs": [RUN | {"over": "x"}]}, "experiment.reference_runs[0].over: there is no 'x'"),
+        ({"without": [{"data": "x"}]}, "experiment.without[0].data: there is no 'x'"),
+        ({"claims": [CLAIM | {"measure": "x"}]}, "experiment.claims[0].measure: there is no 'x'"),
+        ({"claims": [CLAIM, CLAIM | {"of": {"data": "x"}}]}, "experiment.claims[1].data: there is no 'x'"),
+        ({"claims": [CLAIM | {"of": {"x": "a"}}]}, "experiment.claims[0]: there is no 'x'"),
+        ({"claims": [CLAIM | {"ratio_to": {"x": "a"}}]}, "experiment.claims[0]: there is no 'x'"),
+        ({"claims": [CLAIM | {"at_most": {"data": "x"}}]}, "experiment.claims[0].data: there is no 'x'"),
+        ({"repetitions": 100_001}, "experiment.repetitions: expected at least 1, and at most 100,000"),
+        (
+            {"sweep": {"method": dict.fromkeys(range(401), ""), "data": dict.fromkeys(range(250), "")}},
+            "experiment.sweep: 100,250 conditions, expected at most 100,000",
+        ),
+        (
+            {"scenarios": {"development": "z=1"}},
+            "experiment.scenarios: development is an entry of its own, which is not judged",
+        ),
+    ],
+)
+def test_each_fault_is_named_with_its_place(change: dict[str, object], problem: str):
+    assert faults(change) == [problem]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {},
+        {"repetitions": 1},
+        {"repetitions": 100_000},
+        {"sweep": {"method": dict.fromkeys(range(400), ""), "data": dict.fromkeys(range(250), "")}},
+        {"claims": [CLAIM | {"of": {"data": "first"}, "ratio_to": {"method": "b"}}]},
+        {"claims": [CLAIM | {"at_most": "published", "of": {"method": "a"}}]},
+        {"page": FILE["page"] | {"along": "data", "panels": "method", "drawn": ["error"]}},
+        {"curves": [CURVE | {"panels": "data", "only": {"method": "b"}}], "reference_runs": [RUN | {"over": "data"}]},
+    ],
+)
+def test_a_file_at_its_limits_is_read(change: dict[str, object]):
+    assert faults(change) == []
+
+
+def claim_faults(change: dict[str, object], **measure: object) -> list[str]:
+    error = {"title": "Error", "path": ["error"], **measure}
+    return faults({"measures": {"error": error}, "claims": [{"statement": "s", "measure": "error", **change}]})
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({}, "a claim makes one comparison"),
+        ({"lowest": True, "at_most": 1.0}, "a claim makes one comparison"),
+        ({"at_most": 1.0, "at_least": 2.0}, "a claim makes one comparison"),
+        ({"at_least": "printed"}, "at_least: 'printed', expected a number"),
+        ({"ratio_to": {"method": "b"}, "below": "published"}, "below: a ratio is compared with a number"),
+        ({"ratio_to": {"method": "b"}, "lowest": True}, "lowest: a ratio is compared with a number"),
+    ],
+)
+def test_a_claim_makes_one_comparison_that_can_be_made(change: dict[str, object], fault: str):
+    (found,) = claim_faults(change)
+    assert found.startswith(f"experiment.claims[0]: {fault}")
+
+
+def test_what_is_not_a_mean_is_not_compared_with_conditions():
+    other = {"method": "b"}
+    assert claim_faults({"below": 1.0}, over_runs="largest") == []
+    for change in ({"below": other}, {"lowest": True}, {"ratio_to": other, "below": 1.0}):
+        assert len(claim_faults(change)) == 0
+        assert len(claim_faults(change, over_runs="largest")) == 1
+        assert len(claim_faults(change, pooled=True)) == 1
+
+
+def test_every_seed_runs_in_every_scenario_and_that_of_development_stands_beside():
+    alone = read_experiment(FILE | {"repetitions": 3}, "paper")
+    assert (alone.runs_of_a_condition, alone.all_scenarios) == (3, {"": ""})
+    two = read_experiment(
+        FILE | {"repetitions": 3, "scenarios": {"i": "z=1", "ii": "z=2"}, "development": "z=0"}, "paper"
+    )
+    assert two.runs_of_a_condition == 6
+    assert list(two.all_scenarios.items()) == [("i", "z=1"), ("ii", "z=2"), ("development", "z=0")]
+
+
+def test_null_takes_a_measure_or_a_scenario_out():
+    more = FILE["measures"] | {"time": {"title": "Time", "path": ["time"]}}
+    file = FILE | {
+        "measures": more,
+        "scenarios": {"i": "z=1", "ii": None},
+        "profiles": {"quick": {"measures": {"time": None}, "development": "z=0", "notes": ["few"]}},
+    }
+    found = read_experiment(file, "quick")
+    assert (list(found.measures), list(found.scenarios)) == (["error"], ["i"])
+    assert (found.development, found.notes) == ("z=0", ("few",))
+    assert list(read_experiment(file, "paper").measures) == ["error", "time"]
+
+
+def test_a_profile_may_bring_a_mapping_that_the_file_does_not_have():
+    file = FILE | {"profiles": {"quick": {"scenarios": {"i": "z=1"}}}}
+    assert read_experiment(file, "quick").scenarios == {"i": "z=1"}
+    assert faults(file, "quikc") == ["profile: this experiment has no profile 'quikc'"]
+    assert faults(file | {"scenarios": ["i"]}, "paper")
+
+
+def test_the_paper_s_figure_of_a_condition_lies_under_its_row_and_column():
+    file = FILE | {"published": {"error": {"first": {"a": 3, "b": 1.5}, "second": {"a": "none"}}}}
+    found = read_experiment(file, "paper")
+    figures = [found.published_figure("error", condition.labels) for condition in found.conditions()]
+    assert figures == [3.0, None, 1.5, None]
+    assert found.published_figure("time", found.conditions()[0].labels) is None
+
+
+RESULT = {
+    "metrics": {"near": {"error": {"mean": 3.0, "std": 0.5}}, "laps": [4.0, 2.0, 9.0]},
+    "timing": {"together": {"match+fuse": {"p50_ms": 7.0}}, "drive": {"seconds": 12.0}},
+    "facts": {"images": 30},
+}
+
+
+@pytest.mark.parametrize(
+    ("measure", "figure"),
+    [
+        ({"path": ["near.error.mean"], "scale": 100.0}, 300.0),
+        ({"path": ["far.error.mean", "near.error.mean", "facts.images"]}, 3.0),
+        ({"path": ["far.error.mean"]}, None),
+        ({"path": ["near.error"], "pooled": True, "scale": 2.0}, 1.0),
+        ({"path": ["laps"], "aggregate": "max"}, 9.0),
+        ({"path": ["laps"], "window": [0.0, 0.6]}, 3.0),
+        ({"path": ["timing.drive.seconds"]}, 12.0),
+        ({"path": ["facts.images"]}, 30.0),
+        ({"path": ["p50_ms"], "stages": ["match", "fuse"]}, 7.0),
+        ({"path": ["p50_ms"], "stages": ["fuse"]}, None),
+    ],
+)
+def test_a_measure_is_read_from_metrics_timing_or_facts(measure: dict[str, object], figure: float | None):
+    measures = {"error": {"title": "Error", **measure}}
+    assert figure_of(read_experiment(FILE | {"measures": measures}, "paper").measures["error"], RESULT) == figure

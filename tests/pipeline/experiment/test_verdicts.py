@@ -1,10 +1,23 @@
 """Verdicts on claims, from differences that can be worked out by hand."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from omninav.pipeline.experiment.specification import read_experiment
-from omninav.pipeline.experiment.verdicts import Verdict, judge, key_of, pooled
+from omninav.pipeline.experiment.intervals import bootstrap_interval
+from omninav.pipeline.experiment.specification import Measure, read_experiment
+from omninav.pipeline.experiment.verdicts import (
+    Case,
+    Verdict,
+    headline,
+    judge,
+    key_of,
+    over_runs,
+    pooled,
+    verdict_of,
+)
 from omninav.pipeline.graph.problems import ProblemsFound
 
 
@@ -199,3 +212,211 @@ def test_a_pooled_deviation_is_over_all_frames_of_all_repetitions_and_nothing_is
     assert found == pytest.approx(100 * np.concatenate(runs).std())
     with pytest.raises(ProblemsFound, match="pooled"):
         read_experiment(file | {"claims": [{"statement": "small", "measure": "sigma", "at_most": 1.0}]}, "paper")
+
+
+def test_a_case_says_what_was_compared():
+    (case,) = judged({"below": {"method": "b"}, "scale": 0.5}, a=[4.0] * 6, b=[6.0] * 6).cases
+    assert case == Case("a", 4.0, 3.0, "0.5 x method b", 1.0, (1.0, 1.0), False, 6, 6, False, 6)
+    (case,) = judged({"at_most": {"method": "b"}}, a=[4.0] * 6, b=[6.0] * 6).cases
+    assert case == Case("a", 4.0, 6.0, "method b", -2.0, (-2.0, -2.0), True, 6, 6, False, 6)
+    (case,) = judged({"at_most": 3.0, "scale": 2.0}, a=[4.0] * 6).cases
+    assert case == Case("a", 4.0, 6.0, "the limit", -2.0, (-2.0, -2.0), True, 6, 6, False, 6)
+    (case,) = judged({"at_most": "published"}, a=[4.0] * 6).cases
+    assert case == Case("a", 4.0, 10.0, "the paper's figure", -6.0, (-6.0, -6.0), True, 6, 6, False, 6)
+    (case,) = judged({"ratio_to": {"method": "b"}, "at_least": 0.25}, a=[4.0] * 6, b=[8.0] * 7).cases
+    assert case == Case("a / method b", 0.5, 0.25, "the limit", 0.25, (0.25, 0.25), True, 6, 6, True, 6)
+    (case,) = judged({"lowest": True}, a=[4.0] * 6, b=[8.0] * 6, c=[5.0] * 6).cases
+    assert case == Case("a", 4.0, 5.0, "c", -1.0, (-1.0, -1.0), True, 6, 6, False, 6)
+
+
+def test_the_interval_of_a_case_is_that_of_its_differences():
+    (case,) = judged({"below": {"method": "b"}}, seeds=2, a=[*CLEAR, *FAR], b=[*ALIKE, *FAR]).cases
+    differences = np.subtract([*CLEAR, *FAR], [*ALIKE, *FAR])
+    assert case.interval == pytest.approx(bootstrap_interval(np.split(differences, 6)))
+    assert (case.ours, case.other, case.difference) == (8.5, 8.5, 0.0)
+    (case,) = judged({"below": 2.0}, a=CLEAR).cases
+    assert case.interval == pytest.approx(np.subtract(bootstrap_interval(np.split(np.array(CLEAR), 6)), 2.0))
+
+
+def test_what_cannot_be_compared_is_told_as_far_as_it_is_known():
+    (case,) = judged({"below": {"method": "b"}}, a=CLEAR, b=[]).cases
+    assert case == Case("a", 3.5, None, "method b", None, None, None)
+    (case,) = judged({"below": {"method": "b"}}, a=[], b=CLEAR).cases
+    assert case == Case("a", None, 3.5, "method b", None, None, None)
+    (case,) = judged({"at_most": "published", "of": {"method": "b"}}, a=CLEAR, b=CLEAR).cases
+    assert case == Case("b", 3.5, None, "the paper's figure", None, None, None)
+    (case,) = judged({"ratio_to": {"method": "b"}, "below": 1.0}, a=CLEAR, b=[0.0] * 6).cases
+    assert case == Case("a / method b", None, 1.0, "the limit", None, None, None)
+    (case,) = judged({"lowest": True}, a=CLEAR).cases
+    assert case == Case("a", 3.5, None, "no other", None, None, None)
+    (case,) = judged({"lowest": True}, a=[]).cases
+    assert case.ours is None
+
+
+@pytest.mark.parametrize(
+    ("comparison", "by", "holds"),
+    [
+        ("at_most", 0.0, True),
+        ("at_most", 5e-10, True),
+        ("at_most", 1e-8, False),
+        ("at_least", -5e-10, True),
+        ("at_least", -1e-8, False),
+        ("below", 0.0, False),
+        ("below", -1e-8, True),
+        ("above", 0.0, False),
+        ("above", 1e-8, True),
+        ("not_above", 0.49, True),
+        ("not_above", 0.51, False),
+    ],
+)
+def test_a_difference_that_is_rounding_is_none_and_five_percent_are_not_above(comparison: str, by: float, holds: bool):
+    assert held({comparison: 10.0}, a=[10.0 + by] * 6) is holds
+
+
+def test_not_above_is_open_where_the_interval_reaches_from_below_to_beyond_the_margin():
+    figures = [9.0, 9.5, 10.0, 10.5, 11.0, 11.0]
+    assert held({"not_above": 10.0}, a=figures) is None
+    assert held({"not_above": 12.0}, a=figures) is True
+    assert held({"not_above": 9.0}, a=figures) is False
+
+
+def swept(claim: dict[str, object], figures: dict[tuple[str, str], float]) -> list[Case]:
+    """The cases of a claim about figures by method and day, each of six worlds."""
+    methods, days = (list(dict.fromkeys(labels)) for labels in zip(*figures, strict=True))
+    file = {
+        "name": "test",
+        "title": "A test",
+        "about": "",
+        "variant": "none",
+        "sweep": {"method": dict.fromkeys(methods, ""), "day": dict.fromkeys(days, "")},
+        "measures": {"error": {"title": "Error", "path": ["error"]}},
+        "page": {"rows": ["day"], "columns": "method"},
+        "claims": [{"statement": "s", "measure": "error", "paper": "Table 1", **claim}],
+    }
+    results = {
+        key_of({"method": method, "day": day}): {
+            (f"world {n}", 0): {"metrics": {"error": figure}, "timing": {}, "facts": {}} for n in range(6)
+        }
+        for (method, day), figure in figures.items()
+    }
+    (verdict,) = judge(read_experiment(file, "paper"), results)
+    assert (verdict.claim, verdict.measure, verdict.paper) == ("s", "Error", "Table 1")
+    assert verdict_of(verdict.plain()) == verdict
+    return list(verdict.cases)
+
+
+GRID = {("a", "1"): 1.0, ("a", "2"): 2.0, ("b", "1"): 3.0, ("b", "2"): 1.0, ("c", "1"): 9.0, ("c", "2"): 9.0}
+
+
+def test_a_claim_has_a_case_for_each_condition_that_it_leaves_open():
+    cases = swept({"of": {"method": "a"}, "below": {"method": "b"}}, GRID)
+    assert [(case.where, case.ours, case.other, case.holds) for case in cases] == [
+        ("a, 1", 1.0, 3.0, True),
+        ("a, 2", 2.0, 1.0, False),
+    ]
+    others = swept({"of": {"day": "1"}, "below": {"method": "b"}}, GRID)
+    assert [(case.where, case.against) for case in others] == [("a, 1", "method b"), ("c, 1", "method b")]
+    ratios = swept({"of": {"day": "1"}, "ratio_to": {"method": "b", "day": "2"}, "below": 2.0}, GRID)
+    assert [case.where for case in ratios] == [
+        "a, 1 / method b, day 2",
+        "b, 1 / day 2",
+        "c, 1 / method b, day 2",
+    ]
+
+
+def test_the_lowest_is_so_among_conditions_that_differ_in_the_claim_s_factors_or_in_those_it_names():
+    cases = swept({"of": {"method": "a"}, "lowest": True}, GRID)
+    assert [(case.where, case.against, case.holds) for case in cases] == [("a, 1", "b", True), ("a, 2", "b", False)]
+    (case,) = swept({"of": {"method": "a", "day": "1"}, "lowest": True, "among": ["day"]}, GRID)
+    assert (case.where, case.against, case.difference) == ("a, 1", "2", -1.0)
+    (case,) = swept({"of": {"method": "b", "day": "1"}, "lowest": True}, GRID)
+    assert (case.against, case.holds) == ("a, 1", False)
+
+
+def test_a_verdict_holds_where_all_of_its_cases_do_and_is_written_as_one_figure_or_one_for_each():
+    yes, no, open_ = (Case("x", 1.0, 2.0, "the limit", -1.0, (-1.5, -0.5), holds) for holds in (True, False, None))
+    lone, several = Verdict("c", "m", "p", (yes,)), Verdict("c", "m", "p", (yes, replace(no, where="y", ours=3.0)))
+    assert [Verdict("c", "m", "p", cases).holds for cases in ((yes, yes), (yes, open_), (open_, no), ())] == [
+        True,
+        None,
+        False,
+        None,
+    ]
+    assert (lone.plain()["ours"], lone.plain()["interval"], lone.plain()["holds"]) == (1.0, (-1.5, -0.5), True)
+    assert several.plain()["ours"] == {"x": 1.0, "y": 3.0}
+    assert several.plain()["interval"] == {"x": (-1.5, -0.5), "y": (-1.5, -0.5)}
+    assert verdict_of(json.loads(json.dumps(several.plain()))) == several
+    none = Verdict("c", "m", "p", (replace(yes, interval=None),))
+    assert verdict_of(none.plain()) == none
+
+
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        ([True], "holds"),
+        ([False], "does not hold"),
+        ([None], "undecided"),
+        ([True, True], "holds"),
+        ([None, None], "undecided"),
+        ([False, False], "0 of 2 hold"),
+        ([True, False], "1 of 2 hold"),
+        ([None, True, False, None], "1 of 4 hold, 2 undecided"),
+    ],
+)
+def test_the_headline_of_a_page_follows_from_its_claims(found: list[bool | None], words: str):
+    verdicts = [Verdict("c", "m", "", (Case("x", 1.0, 2.0, "", -1.0, None, holds),)) for holds in found]
+    assert headline(verdicts) == words
+
+
+def test_of_the_runs_the_mean_counts_or_the_largest_or_the_smallest():
+    for name, figure in (("mean", 3.0), ("largest", 5.0), ("smallest", 1.0)):
+        assert over_runs(Measure("Error", ("error",), over_runs=name), iter([5.0, 1.0, 3.0])) == figure
+
+
+def test_frames_are_pooled_of_runs_that_have_all_three_figures():
+    whole = {"error": {"mean": 1.0, "std": 2.0}, "frames": 4}
+    measures = {"sigma": {"title": "Sigma", "path": ["late", "error"], "pooled": True}}
+    file = {"name": "t", "title": "T", "about": "", "variant": "v", "sweep": {"method": {"a": ""}}}
+    experiment = read_experiment(file | {"measures": measures, "page": {"rows": [], "columns": "method"}}, "paper")
+    runs = [whole, {"error": {"mean": 9.0, "std": None}, "frames": 4}, {"frames": 4}]
+    results = {
+        key_of({"method": "a"}): {("", n): {"metrics": run, "timing": {}, "facts": {}} for n, run in enumerate(runs)}
+    }
+    assert pooled(experiment, results, "sigma", {"method": "a"}) == pytest.approx(2.0)
+    assert pooled(experiment, {}, "sigma", {"method": "a"}) is None
+
+
+def test_means_are_compared_and_not_medians():
+    (case,) = judged({"below": {"method": "b"}}, a=[1.0, 1.0, 1.0, 1.0, 1.0, 13.0], b=[2.0] * 5 + [32.0]).cases
+    assert (case.ours, case.other, case.difference) == pytest.approx((3.0, 7.0, -4.0))
+    (case,) = judged({"below": {"method": "b"}}, a=[1.0, 1.0, 4.0], b=[]).cases
+    assert case.ours == 2.0
+
+
+def test_five_percent_of_a_negative_figure_are_as_much_as_of_a_positive_one():
+    assert held({"not_above": -10.0}, a=[-9.6] * 6) is True
+    assert held({"not_above": -10.0}, a=[-9.4] * 6) is False
+    assert held({"not_above": {"method": "b"}}, a=[-9.6] * 6, b=[-10.0] * 6) is True
+    assert held({"not_above": {"method": "b"}}, a=[-9.4] * 6, b=[-10.0] * 6) is False
+    assert held({"not_above": {"method": "b"}}, a=[10.4] * 6, b=[10.0] * 6) is True
+
+
+def test_a_ratio_is_of_repetitions_that_have_both_figures():
+    (case,) = judged(
+        {"ratio_to": {"method": "b"}, "below": 1.0}, a=[1.0] * 7, b=[2.0, 2.0, 2.0, 2.0, 2.0, 2.0, np.nan]
+    ).cases
+    assert (case.ours, case.judged, case.repetitions, case.holds) == (0.5, 6, 7, None)
+
+
+def test_of_the_rivals_of_the_best_the_closest_call_is_shown_and_what_fails_or_is_open_first():
+    best, wide = [10.0] * 6, [-50.0, 70.0, -40.0, 60.0, -30.0, 68.0]
+
+    def shown(**rivals: list[float]) -> tuple[str, bool | None]:
+        (case,) = judged({"lowest": True}, a=best, **rivals).cases
+        return case.against, case.holds
+
+    assert shown(b=[15.0] * 6, c=[11.0] * 6, d=[12.0] * 6) == ("c", True)
+    assert shown(b=[11.0] * 6, c=wide) == ("c", None)  # 13 on average, and it may be anything
+    assert shown(b=wide, c=[9.0] * 6, d=[8.0] * 6) == ("d", False)
+    assert shown(b=[each - 3.5 for each in wide], c=[]) == ("b", None)  # 0.5 below
+    assert shown(b=[each - 2.5 for each in wide], c=[]) == ("c", None)  # 0.5 above, where c is not known

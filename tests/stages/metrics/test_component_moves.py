@@ -35,3 +35,19 @@ def test_a_running_mean_moves_less_with_every_update():
 def test_numbers_with_few_moves_end_the_list():
     found = ComponentMoves(min_moves=2).step(Context("metric"), [now((1, 0.0)), now((1, 0.5))])
     assert found.metrics.values["component_moves"]["updates"] == []
+
+
+def test_a_component_is_the_nearest_of_its_view_and_beyond_a_metre_another():
+    ticks = [now((1, 0.0), (1, 0.75)), now((1, 0.125), (1, 1.75))]
+    assert moves(ticks, 1.0) == [(0, 0.125), (0, 1.0)]
+    assert moves(ticks, 0.99) == [(0, 0.125)]
+
+
+def test_an_entry_is_the_mean_of_as_many_moves_as_it_needs():
+    ticks = [now((1, 0.0), (2, 0.0), (3, 0.0)), now((1, 0.25), (2, 0.25), (3, 1.0))]
+    found = ComponentMoves(min_moves=3).step(Context("metric"), ticks).metrics.values["component_moves"]
+    assert found == {"updates": [0], "moved_m": [0.5], "moves": [3]}
+    ten = [now(*((view, 0.0) for view in range(10))), now(*((view, 0.5) for view in range(10)))]
+    assert ComponentMoves().step(Context("m"), ten).metrics.values["component_moves"]["moves"] == [10]
+    nine = [now(*((view, 0.0) for view in range(9))), now(*((view, 0.5) for view in range(9)))]
+    assert ComponentMoves().step(Context("m"), nine).metrics.values["component_moves"]["moves"] == []

@@ -68,3 +68,55 @@ def test_a_belief_that_is_always_one_pose_says_nothing_of_confidence():
     run = collected([Tick(0, 0), Tick(1, 1)], [None] * 2, estimates=[single] * 2)
     values = Confidence().step(Context("confidence"), run).metrics.values["confidence"]
     assert values == {"path_m": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("weight", "sigma", "sure"), [(0.5, 1.0, True), (0.49, 1.0, False), (0.5, 1.01, False), (1.0, 0.1, True)]
+)
+def test_half_of_the_belief_within_a_metre_is_confident(weight: float, sigma: float, sure: bool):
+    run = collected([Tick(0, 0)], [None], estimates=[estimate(0.0, sigma, weight)])
+    assert confident(run).tolist() == [sure]
+    found = Confidence().step(Context("confidence"), run).metrics
+    assert found.values["confidence"]["first_confident_frame"] == (0 if sure else None)
+    assert found.values["confidence"]["spread_m"] == pytest.approx(max(sigma, 0.1))
+    assert found.headlines == ("confidence.confident_share", "confidence.spread_m")
+
+
+def test_a_belief_of_two_poses_is_told_by_its_weight_and_one_with_a_spread_by_that():
+    narrow = PoseEstimate(Pose(0.0, 0.0, 0.0), np.zeros((3, 3)), 0.8, Pose(0.0, 0.0, 0.0))
+    values = Confidence().step(Context("c"), collected([Tick(0, 0)], [None], estimates=[narrow])).metrics.values
+    assert values["confidence"]["weight"] == 0.8
+    assert "spread_m" not in values["confidence"]
+    wide = collected([Tick(0, 0)], [None], estimates=[estimate(0.0, 0.5, 1.0)])
+    assert Confidence().step(Context("c"), wide).metrics.values["confidence"]["spread_m"] == pytest.approx(0.5)
+
+
+def test_the_last_log_counts_and_its_estimates_against_odometry_s_turns():
+    poses = [Pose(9.0, 9.0, 1.0), Pose(0.0, 0.0, 0.0), Pose(0.0, 2.0, 0.5), Pose(0.0, 3.0, 1.0), Pose(1.0, 3.0, 3.0)]
+    estimates = [PoseEstimate(pose, np.diag([0.04, 0.01, 0.1]), 0.9, pose) for pose in poses]
+    ticks = [Tick(n, n, int(n > 0), max(n - 1, 0)) for n in range(5)]
+    motion = [None, None, Motion(0.0, 1.0, 0.3), Motion(0.0, 0.0, 0.0), Motion(0.0, 0.0, 0.5)]
+    run = dataclasses.replace(
+        collected(ticks, [None] * 5, motion, estimates), confidence=np.array([0.1, 0.5, 0.4, 0.6, 0.9])
+    )
+    values = Confidence().step(Context("confidence"), run).metrics.values["confidence"]
+    assert (values["path_m"], values["odometry_path_m"]) == pytest.approx((4.0, 1.0))
+    assert values["step_off_odometry_m"] == pytest.approx(1.0)  # 1, 1, 1
+    assert values["turn_off_odometry_deg"] == pytest.approx(math.degrees(0.5))  # 0.2, 0.5, 1.5
+    assert (values["probability"], values["doubtful_share"]) == pytest.approx((0.55, 0.25))
+    assert (values["confident_share"], values["first_confident_frame"]) == (1.0, 0)
+
+
+def test_one_estimate_has_no_motion_to_compare():
+    run = collected(
+        [Tick(0, 0), Tick(1, 1)], [None] * 2, [None, Motion(3.0, 4.0, 0.0)], [None, estimate(0.0, 0.5, 0.9)]
+    )
+    values = Confidence().step(Context("confidence"), run).metrics.values["confidence"]
+    assert values["odometry_path_m"] == 5.0
+    assert "step_off_odometry_m" not in values
+    two = collected(
+        [Tick(0, 0), Tick(1, 1)], [None] * 2, [None, Motion(3.0, 4.0, 0.0)], [estimate(x, 0.5, 0.9) for x in (0.0, 3.0)]
+    )
+    assert Confidence().step(Context("c"), two).metrics.values["confidence"]["step_off_odometry_m"] == pytest.approx(
+        4.0
+    )

@@ -95,3 +95,62 @@ def test_the_last_log_is_drawn_and_nothing_without_truth():
     assert [lap["position_error_m"]["max"] for lap in found["laps"]] == pytest.approx([0.5])
     ticks = [Tick(i, i, 0, i) for i in range(3)]
     assert ErrorCurves().step(Context("curves"), collected(ticks, [None] * 3)).metrics.values == {}
+
+
+def test_a_lap_is_told_by_mean_median_and_largest_error_of_place_and_heading():
+    truth = np.add(circle(2), (7.0, -3.0, 0.0))
+    errors = np.concatenate([np.full(40, 5.0), [1.0] * 30 + [2.0] * 9 + [4.0]])
+    poses = [Pose(*map(float, row)) for row in truth]
+    estimates = [
+        PoseEstimate(Pose(pose.x, pose.y + float(off), pose.heading + 0.1 * float(off)), np.eye(3), 1.0, pose)
+        for pose, off in zip(poses, errors, strict=True)
+    ]
+    ticks = [Tick(i, i, 0, i) for i in range(80)]
+    found = ErrorCurves().step(Context("curves"), collected(ticks, poses, None, estimates)).metrics.values
+    lap = found["laps"][1]
+    assert lap["frames"] == 40
+    assert lap["position_error_m"] == pytest.approx({"mean": 52 / 40, "median": 1.0, "max": 4.0})
+    assert lap["heading_error_deg"]["mean"] == pytest.approx(np.degrees(0.1 * 52 / 40))
+    assert lap["odometry_error_m"]["mean"] is None
+    assert found["over_steps"]["odometry_error_m"] == [None] * 60
+    assert found["over_distance"]["distance_m"][:10] == [0.5 + k for k in range(10)]
+
+
+def test_frames_are_numbered_from_the_first_and_distances_are_from_the_first_true_pose():
+    truth = [None, *[Pose(4.0 + x, 0.0, 0.0) for x in range(5)]]
+    seen = [None, None, *[PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in truth[2:]]]
+    motion = [None, None, *[Motion(1.5, 0.0, 0.0)] * 4]
+    ticks = [Tick(i, i, 0, i) for i in range(6)]
+    stage = ErrorCurves(points=2, distance_m=2.0)
+    found = stage.step(Context("curves"), collected(ticks, truth, motion, seen)).metrics.values
+    assert found["over_steps"]["step"] == [2.5, 4.5]
+    assert found["over_steps"]["odometry_error_m"] == pytest.approx([0.75, 1.75])
+    assert found["over_distance"]["distance_m"] == [1.0, 3.0, 5.0]
+    assert found["over_distance"]["first_lap_odometry_error_m"] == pytest.approx([0.5, 1.25, 2.0])
+    assert found["laps"][0]["odometry_error_m"]["mean"] == pytest.approx(1.25)
+
+
+def test_what_was_never_estimated_has_no_curve_and_a_later_log_without_truth_is_not_drawn():
+    pose = Pose(0.0, 0.0, 0.0)
+    ticks = [Tick(i, i, i // 2, i % 2) for i in range(4)]
+    assert ErrorCurves().step(Context("c"), collected(ticks[:2], [pose] * 2)).metrics.values == {}
+    seen = [PoseEstimate(Pose(1.0 + k, 0.0, 0.0), np.eye(3), 1.0, pose) for k in range(4)]
+    found = ErrorCurves().step(Context("c"), collected(ticks, [pose, pose, None, None], None, seen)).metrics.values
+    assert found["laps"][0]["position_error_m"]["mean"] == 1.5
+
+
+@pytest.mark.parametrize(
+    ("path", "ends"),
+    [
+        ([0, 2, 4, 2, 0], []),  # not beyond twice the radius
+        ([0, 2, 4.5, 2, 0], []),  # back, and not left again
+        ([0, 2, 4.5, 2.25, 4.5], []),  # not near enough
+        ([0, 2, 4.5, 2, 4.5], [3]),
+        ([0, 4.5, 1, 0.5, 0.5, 1, 4.5, 1, 4.5], [3, 7]),  # the first of equals
+    ],
+)
+def test_a_visit_begins_within_the_radius_and_ends_beyond_twice_that(path: list[float], ends: list[int]):
+    poses = np.array([(x, 0.0, 0.0) for x in path])
+    assert lap_ends(poses, poses[0], 2.0) == ends
+    across = np.add(poses, (0.0, 0.0, np.pi / 2 + 0.01))
+    assert lap_ends(across, poses[0], 2.0) == []
