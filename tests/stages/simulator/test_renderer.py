@@ -19,7 +19,7 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.camera.perspective import Perspective
 from omninav.stages.camera.rays import turned
 from omninav.stages.simulator.cameras import camera_of, camera_rays, shutter_times
-from omninav.stages.simulator.config import Block, Lamp, Sensor, WorldConfig
+from omninav.stages.simulator.config import Block, Lamp, Sensor, WorldConfig, mirror
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.people import Person
 from omninav.stages.simulator.renderer import Scene, render
@@ -297,10 +297,10 @@ def test_what_the_grid_hides_is_what_looking_at_every_box_hides(demo: Scene) -> 
         columns=1,
     )
     light = {"light": np.ones_like(demo.light), "contact": np.ones_like(demo.contact)}  # they hang on the grid's corner
+    seen = [camera_rays(camera) for camera in (PANORAMA, camera_of(dataclasses.replace(DEMO, camera=mirror(320))))]
     for pose in ((5.8, 4.5, 0.4), (1.5, 7.4, -2.0), (10.0, 1.0, 1.6)):
         for eye in (0.3, 0.9, 2.5):
-            for camera in (PANORAMA, camera_of(DEMO)):
-                rays = camera_rays(camera)
+            for rays in seen:
                 np.testing.assert_array_equal(
                     render(demo._replace(**light), rays, pose, eye), render(one._replace(**light), rays, pose, eye)
                 )

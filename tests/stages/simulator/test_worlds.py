@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Iterable
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -73,12 +74,20 @@ def test_tours_keep_clear_of_everything_on_the_first_and_on_the_last_day(name: s
     config = load(name)
     for day in (0, len(config.days) - 1):
         world = built(name, day)
-        for route in config.routes.values():
+        for route in _of_each_kind(config.routes.values()):
             line = route_planning.plan(world, route)
             driven = route_planning.jittered(world, line, config.robot.path_jitter_m, np.random.default_rng(day))
             dense = np.concatenate([a + (b - a) * np.linspace(0, 1, 5)[:, None] for a, b in pairwise(driven)])
             assert world.clearance(dense).min() > config.robot.radius
             assert length(line) > 10
+
+
+def _of_each_kind(routes: Iterable[Route]) -> list[Route]:
+    """The one with the most points of all routes of a kind that begin at one place: the others lie along it."""
+    fullest: dict[tuple[object, ...], Route] = {}
+    for route in sorted(routes, key=lambda route: (len(route.waypoints), -route.laps)):
+        fullest[route.kind, route.waypoints[:1], len(route.lead_in)] = route
+    return list(fullest.values())
 
 
 def test_a_robot_that_would_touch_something_keeps_closer_to_its_path(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -318,7 +327,7 @@ def test_clearance_is_exact_far_from_everything() -> None:
 # Bytes
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ["home_store_small", "office", "campus"])
 def test_a_piece_of_a_log_is_the_same_bytes_twice(name: str, tmp_path: Path) -> None:
     config = load(name)
     short = dataclasses.replace(config, routes={"piece": dataclasses.replace(config.routes["drive"], length=0.3)})
