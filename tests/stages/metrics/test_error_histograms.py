@@ -37,3 +37,25 @@ def test_what_is_skipped_does_not_count():
     (late,) = ErrorHistograms(skip=0.5).step(CTX, two_logs([5.0, 5.0, 0.1, 0.1])).metrics.values["error_histograms"]
     assert late["large"] == 0.0
     assert sum(late["share"]) == pytest.approx(1.0)
+
+
+def test_bins_are_a_fifth_of_a_metre_and_limits_belong_to_what_is_small():
+    (found,) = ErrorHistograms().step(CTX, two_logs([0.0, 0.3, 0.4, 2.0, 2.1, 99.0])).metrics.values["error_histograms"]
+    assert found["error_m"] == pytest.approx([0.1 + 0.2 * k for k in range(16)])
+    assert found["share"] == pytest.approx(np.bincount([0, 1, 2, 10, 10, 15], minlength=16) / 6)
+    assert (found["small"], found["large"]) == pytest.approx((3 / 6, 2 / 6))
+
+
+def test_frames_without_truth_or_estimate_and_logs_of_such_do_not_count():
+    drive = two_logs([0.1, 9.0, 9.0], [5.0])
+    drive.truth[1] = np.nan
+    drive.estimate[2] = np.nan
+    drive.estimate[3] = np.nan
+    (found,) = ErrorHistograms().step(CTX, drive).metrics.values["error_histograms"]
+    assert found["small"] == 1.0
+
+
+def test_nothing_is_skipped_unless_asked_for_and_half_a_frame_is_not():
+    (all_,) = ErrorHistograms().step(CTX, two_logs([5.0, 0.1, 0.1])).metrics.values["error_histograms"]
+    (two,) = ErrorHistograms(skip=0.5).step(CTX, two_logs([5.0, 0.1, 0.1])).metrics.values["error_histograms"]
+    assert (all_["large"], two["large"]) == (pytest.approx(1 / 3), 0.0)

@@ -90,3 +90,20 @@ def test_where_the_target_was_never_found_no_error_is_told():
 def test_without_a_vector_or_with_a_gap_in_the_truth_nothing_is_measured():
     assert homing(vectors=[VECTORS[0], None, None, None, None]) is None
     assert homing(path=[*PATH[:2], None, *PATH[3:]]) is None
+
+
+def test_it_was_carried_to_where_it_was_farthest_to_any_side():
+    # Ahead of home by 5 m, then 3 m to its side, and turned most while it was near.
+    path = [(0.0, 0.0, 0.0), (5.0, 0.0, 0.0), (0.0, 3.0, 0.0), (0.25, 0.0, 3.0)]
+    found = homing(path, [None, vector(math.pi), vector(-math.pi / 2), vector(1.0)], (False,) * 4)
+    assert found["start_m"] == 5.0
+    assert found["direction_error_deg"]["max"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_angles_are_compared_the_short_way_around():
+    path = [(0.0, 0.0, 3.0), (4.0, 0.0, -3.0), (3.0, 0.0, -3.0), (2.0, 0.0, -3.0)]
+    ahead = math.pi + 3.0 - 2 * math.pi  # home is behind, and the robot almost looks there
+    vectors = [None, *[vector(ahead + off - 2 * math.pi, 6.0 - 0.5) for off in (0.0, 0.0, 0.9)]]
+    found = homing(path, vectors, (False,) * 4)
+    assert found["direction_error_deg"]["median"] == pytest.approx(0.0, abs=1e-6)
+    assert found["first"]["turn_error_deg"] == pytest.approx(math.degrees(0.5))

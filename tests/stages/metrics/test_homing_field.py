@@ -71,3 +71,37 @@ def test_every_tick_but_the_first_has_a_target_of_its_own() -> None:
     assert outs[0].target is None
     assert [out.target.number for out in outs[1:]] == [1, 2, 3]
     assert all(out.target.features is views[0] and out.features is views[0] for out in outs[1:])
+
+
+def field(poses: list[Pose | None], vectors: list[HomingVector | None], **parameters: float):
+    return HomingFieldErrors(**parameters).step(CTX, poses, vectors)
+
+
+def test_a_view_at_the_edge_of_two_rings_is_in_the_inner_one() -> None:
+    poses = [Pose(0.0, 0.0, 0.0), *[Pose(-x, 0.0, 0.0) for x in (0.5, 1.0, 2.0, 2.5)]]
+    values = field(poses, [None, *[vector(0.0, 0.0)] * 4], rings=2).metrics.values["homing_field"]
+    assert values["views"] == 4
+    assert values["by_distance"]["to_m"] == [1.0, 2.0]
+    assert values["by_distance"]["views"] == [2, 1]
+    assert values["within"]["views"] == [2, 3]
+    wide = field(poses, [None, *[vector(0.0, 0.0)] * 4], width_m=2.5).metrics.values["homing_field"]["by_distance"]
+    assert wide["views"] == [4, *[0] * 7]
+    assert wide["to_m"] == [2.5 * k for k in range(1, 9)]
+
+
+def test_views_without_a_true_pose_or_a_vector_are_told_apart() -> None:
+    poses = [Pose(0.0, 0.0, 0.0), Pose(-1.0, 0.0, 0.0), None, Pose(-2.0, 0.0, 0.0), Pose(-3.0, 0.0, 0.5)]
+    out = field(poses, [None, vector(0.0, 0.0), vector(0.0, 0.0), None, vector(0.25 - 0.5, 0.0)])
+    assert out.metrics.values["homing_field"]["found_rate"] == pytest.approx(2 / 3)
+    assert out.field.inliers.tolist() == [20, 0, 20]
+    assert out.field.directions == pytest.approx([0.0, math.nan, 0.25], nan_ok=True)
+    assert field([None, *poses[1:]], [None] * 5).metrics is None
+
+
+def test_errors_are_medians_of_angles_the_short_way_around() -> None:
+    poses = [Pose(0.0, 0.0, 3.0), *[Pose(float(x), 0.0, -3.0) for x in (1, 2, 3)]]
+    ahead = math.pi + 3.0
+    vectors = [None, *[vector(ahead + off, 6.0 + off) for off in (0.1, -0.2, 0.9)]]
+    values = field(poses, vectors).metrics.values["homing_field"]
+    assert values["of_found_deg"] == pytest.approx(math.degrees(0.2))
+    assert values["turn_deg"] == pytest.approx(math.degrees(0.2))

@@ -46,3 +46,43 @@ def test_trajectory_error_without_alignment_keeps_what_alignment_takes_away():
     found = RelativeErrors().step(Context("errors"), driven([2.0] * 8, degrees=0.0)).metrics.values
     assert found["unaligned_trajectory_error_m"]["rmse"] == pytest.approx(2.0)
     assert found["absolute_trajectory_error_m"]["rmse"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_thresholds_are_those_of_the_benchmarks_and_their_ends_count():
+    def shares(error: float, degrees: float) -> tuple[float, ...]:
+        found = LocalisedShare().step(Context("localised"), driven([error], degrees)).metrics.values["localised"]
+        return tuple(found.values())
+
+    assert shares(0.25, 1.9) == (1.0, 1.0, 1.0)
+    assert shares(0.3125, 1.9) == (0.0, 1.0, 1.0)
+    assert shares(0.25, 2.1) == (0.0, 1.0, 1.0)
+    assert shares(0.5, 4.9) == (0.0, 1.0, 1.0)
+    assert shares(0.5, 5.1) == shares(0.5625, 4.9) == (0.0, 0.0, 1.0)
+    assert shares(5.0, 9.9) == (0.0, 0.0, 1.0)
+    assert shares(5.0, 10.1) == shares(5.125, 9.9) == (0.0, 0.0, 0.0)
+
+
+def test_a_robot_is_lost_beyond_two_and_a_half_metres_and_found_below_one():
+    def told(error: float, then: float) -> dict:
+        stage = LocalisedShare()
+        return stage.step(Context("l"), driven([error] * 3 + [then] * 12)).metrics.values["relocalisation"]
+
+    assert told(2.5, 0.5)["times_lost"] == 0
+    assert told(2.625, 0.9) == {"times_lost": 1, "frames": 3.0, "metres": 1.5, "never": 0}
+    assert told(2.625, 1.1) == {"times_lost": 1, "frames": None, "metres": None, "never": 1}
+
+
+def test_figures_are_medians_over_the_times_that_it_was_found_again():
+    errors = [4.0] * 2 + [0.1] * 12 + [4.0] * 3 + [0.1] * 12 + [4.0] * 10 + [0.1] * 12 + [4.0] * 5
+    found = LocalisedShare().step(Context("l"), driven(errors)).metrics.values["relocalisation"]
+    assert found == {"times_lost": 4, "frames": 3.0, "metres": 1.5, "never": 1}
+
+
+def test_frames_without_truth_or_estimate_do_not_count():
+    drive = driven([0.1, 9.0, 9.0, 0.1])
+    drive.truth[1] = np.nan
+    drive.estimate[2] = np.nan
+    found = LocalisedShare().step(Context("l"), drive).metrics.values
+    assert (found["localised"]["fine"], found["relocalisation"]["times_lost"]) == (1.0, 0)
+    drive.estimate[:] = np.nan
+    assert LocalisedShare().step(Context("l"), drive).metrics is None

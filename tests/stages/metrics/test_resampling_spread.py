@@ -31,3 +31,38 @@ def test_frames_in_which_they_disagree_do_not_count():
     far = cloud(0.1, at=50.0)
     assert agreement(far, seen(1.0)) < 1e-4
     assert ResamplingSpread().step(CTX, [far], [seen(1.0)], [far]).metrics.values == {"resampling": {"frames": 0}}
+
+
+def two(x: float, y: float, heading: float = 0.0) -> Particles:
+    """Two particles of equal weight: the spread is the root of x squared and y squared."""
+    return Particles(np.array([(x, y, heading), (-x, -y, -heading)]), np.full(2, 0.5))
+
+
+def test_spreads_are_means_over_the_frames_and_the_ratio_is_theirs():
+    frames = [(two(0.3, 0.4, 0.2), two(0.0, 0.25)), (two(0.6, 0.8), two(0.6, 0.45))]
+    seen_there = [seen(1.0)] * 2
+    before, after = ([frame[k] for frame in frames] for k in (0, 1))
+    found = ResamplingSpread().step(CTX, before, seen_there, after).metrics.values["resampling"]
+    assert found == {
+        "frames": 2,
+        "before_m": pytest.approx(0.75),
+        "after_m": pytest.approx(0.5),
+        "ratio": pytest.approx(2 / 3),
+    }
+
+
+def test_mixtures_are_not_resampled_and_a_hypothesis_counts_by_its_shape_alone():
+    given = [two(0.1, 0.0), seen(1.0), two(0.1, 0.0)], [seen(1.0)] * 3, [two(0.1, 0.0), two(0.1, 0.0), seen(1.0)]
+    assert ResamplingSpread().step(CTX, *given).metrics.values["resampling"]["frames"] == 1
+    light = GaussianMixture(np.zeros((2, 3)), np.stack([np.eye(3)] * 2), np.array([0.1, 0.3]))
+    assert agreement(two(0.0, 0.0), light) == pytest.approx((2 * np.pi) ** -1.5)
+
+
+def test_they_agree_above_a_density_of_a_ten_thousandth():
+    def frames(away: float) -> int:
+        near = Particles(np.array([(away, 0.001, 0.0), (away, -0.001, 0.0)]), np.full(2, 0.5))
+        unit = GaussianMixture(np.zeros((1, 3)), np.eye(3)[None], np.ones(1))
+        return ResamplingSpread().step(CTX, [near], [unit], [near]).metrics.values["resampling"]["frames"]
+
+    limit = np.sqrt(2 * np.log((2 * np.pi) ** -1.5 / 1e-4))
+    assert [frames(limit - 0.001), frames(limit + 0.001)] == [1, 0]

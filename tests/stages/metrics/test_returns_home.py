@@ -27,3 +27,20 @@ def test_the_error_at_home_is_that_of_the_frames_at_the_end_of_each_lap():
 
 def test_nothing_is_measured_without_truth():
     assert ReturnsHome().step(Context("metric"), collected([Tick(0, 0)], [None])).metrics is None
+
+
+def test_five_frames_at_home_count_of_the_last_log_and_frames_without_truth_or_estimate_do_not():
+    # Out to 4.5 m and back, twice; the estimate is off by the frame's number.
+    xs = [0.0, 4.5, 0.5, 0.0, 0.5, 1.0, 1.5, 2.0, 4.5, 0.0]
+    truth = [Pose(50.0, 0.0, 0.0), None, *[Pose(x, 0.0, 0.0) for x in xs]]
+    poses = [Pose(x, float(n), 0.0) for n, x in enumerate([50.0, 0.0, *xs])]
+    estimates = [PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in poses]
+    estimates[7] = None
+    ticks = [Tick(n, n, int(n > 0), max(n - 1, 0), n < 2) for n in range(12)]
+    returns = ReturnsHome().step(Context("metric"), collected(ticks, truth, None, estimates)).metrics.values["returns"]
+    # Home at frame 5 of the run, which is frame 4 of its log; then frames 6, 8, 9, 10.
+    assert returns == [{"step": 4, "position_error_m": pytest.approx(38 / 5), "odometry_error_m": None}]
+    few = ReturnsHome(frames=1, home_m=2.2).step(Context("m"), collected(ticks, truth, None, estimates)).metrics.values
+    assert few["returns"][0]["position_error_m"] == 5.0
+    wide = ReturnsHome(home_m=2.3).step(Context("m"), collected(ticks, truth, None, estimates)).metrics.values
+    assert wide["returns"] == []

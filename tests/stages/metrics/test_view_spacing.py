@@ -43,3 +43,35 @@ def test_two_views_have_no_spacing():
 
 def test_views_that_are_all_alike_have_no_unevenness():
     assert spaced(np.zeros(4))["unevenness"] is None
+
+
+def test_figures_are_those_of_the_distances():
+    assert spaced(np.array([1.0, 2.0, 4.0, 9.0])) == {
+        "mean": 4.0,
+        "median": 3.0,
+        "p10": pytest.approx(1.3),
+        "p90": pytest.approx(7.5),
+        "unevenness": pytest.approx(np.std([1.0, 2.0, 4.0, 9.0]) / 4.0),
+    }
+
+
+def test_places_lie_apart_in_any_direction_and_three_views_are_enough():
+    found = spacing(a_map([(0, 0), (3, 4), (9, 9)], [(0, 0), (3, 4), (0, 12)]))["spacing"]
+    assert found["between_places_m"]["mean"] == pytest.approx((5.0 + 5.0 + np.hypot(3, 8)) / 3)
+
+
+def test_a_view_that_was_seen_turned_is_compared_as_it_is_kept():
+    known = a_map([(0, 0), (1, 0), (3, 0)], [(0, 0), (1, 0), (2, 0)])
+    turned = Coefficients(np.zeros(2, np.float32), np.full((36, 2), 3.0, np.float32))
+    found = ViewSpacing().step(CTX, collected([], []), known, turned).metrics.values["spacing"]
+    assert found["between_views"]["mean"] == pytest.approx((1 + 1 + 2) / 3)
+
+
+def test_of_more_than_five_hundred_views_so_many_are_asked():
+    xs = np.arange(510.0)
+    xs[255] = 254.5  # between two that are asked or not
+    known = a_map([(x, 0) for x in xs], [(x, 0) for x in xs])
+    rows = np.unique(np.linspace(0, 509, 500).round().astype(int))
+    apart = np.minimum(np.diff(xs, prepend=-np.inf), np.diff(xs, append=np.inf))
+    found = spacing(known)["spacing"]["between_places_m"]
+    assert found["mean"] == pytest.approx(apart[rows].mean(), rel=1e-9)
