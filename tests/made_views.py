@@ -32,7 +32,6 @@ def made_views(
     row = np.arange(number)
     return ComparedViews(
         features=(NO_FEATURES,) * number,
-        segments=(None,) * number,
         descriptors=(GlobalDescriptor(np.zeros(3, np.float32)),) * number,
         poses=np.column_stack([row, 0.0 * row, 0.0 * row]) if poses is None else poses,
         pose_source=pose_source,

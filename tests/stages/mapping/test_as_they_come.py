@@ -309,15 +309,17 @@ def test_no_view_is_passed_over_within_a_part_and_more_than_half_of_the_support_
 
 def test_of_a_view_sixty_segments_are_kept() -> None:
     number = 70
-    segments = VerticalSegments(
+    columns = VerticalSegments(
         np.arange(number) / 100, np.zeros((number, 2)), np.zeros((number, 10), np.float32),
         np.ones(number, np.float32), np.zeros((number, 2, 2)),
     )  # fmt: skip
-    one = replace(made_views(between_looks([0.0])), segments=(segments,))
+    one = replace(made_views(between_looks([0.0])), features=(replace(NO_FEATURES, columns=columns),))
     none = np.zeros(1, np.int64)
     hypotheses = LoopHypotheses(
         one.poses, none, none, none, one.tours, np.empty((0, 2), np.int64), np.empty(0), np.empty((0, 3)),
         np.empty((0, 3)), np.empty(0, np.bool_), "odometry",
     )  # fmt: skip
     made = TopologicalMapping().step(CTX, one, hypotheses).map
-    assert len(made.views.columns(0)) == 60
+    kept = made.views.features(0).columns
+    assert kept is not None
+    assert len(kept) == 60

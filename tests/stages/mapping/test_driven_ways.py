@@ -13,7 +13,6 @@ from omninav.stages.mapping.topological import (
     TopologicalMapping,
     driven_ways,
     known_ways,
-    no_segments,
     spread_to_medoids,
     with_loops,
     with_names,
@@ -137,10 +136,10 @@ def test_the_patches_that_a_view_keeps_are_those_found_again_around_it() -> None
 def test_the_spread_is_the_root_mean_square_over_all_views_but_the_medoids() -> None:
     map = made_map([(0.0, 0.0), (5.0, 0.0)], {})
     looks = [patches(range(20)), patches(range(20), 0.3), patches(range(20)), patches([*range(15), *range(25, 30)])]
-    views = replace(made_views(between_looks([0.0] * 4)), features=tuple(looks), segments=(None,) * 4)
+    views = replace(made_views(between_looks([0.0] * 4)), features=tuple(looks))
     # The map keeps views 0 and 2 as they are; 1 has the same patches, turned: nothing between them but min_angle;
     # of 3 only 15 match: 20 / 15 times as far.
-    stored_views = stored([looks[0], looks[2]], [no_segments()] * 2, [views.descriptors[0]] * 2)
+    stored_views = stored([looks[0], looks[2]], [views.descriptors[0]] * 2)
     map = replace(map, views=stored_views, frames=np.array([0, 20]))
     least = 0.01 / (2 * math.pi)
     spread = spread_to_medoids(map, views, np.array([0, 0, 1, 1]))
@@ -152,17 +151,38 @@ def test_the_spread_is_the_root_mean_square_over_all_views_but_the_medoids() -> 
 
 def test_only_the_heaviest_segments_of_a_view_are_kept() -> None:
     weights = np.array([9.0, 5.0, 2.0], np.float32)
-    segments = VerticalSegments(
+    columns = VerticalSegments(
         np.arange(3.0), np.zeros((3, 2)), np.zeros((3, 10), np.float32), weights, np.zeros((3, 2, 2))
     )
-    views = replace(made_views(between_looks([0.0, 9.0])), features=(patches(range(5)),) * 2, segments=(segments, None))
+    views = replace(
+        made_views(between_looks([0.0, 9.0])), features=(replace(patches(range(5)), columns=columns), patches(range(5)))
+    )
     place = np.arange(2)
     hypotheses = LoopHypotheses(
         views.poses, place, place, place, views.tours, np.array([[0, 1]]), np.empty(0), np.empty((0, 3)),
         np.empty((0, 3)), np.array([False]), "odometry",
     )  # fmt: skip
     made = TopologicalMapping(max_segments=2).step(Context("mapping"), views, hypotheses).map
-    assert made.views.columns(0).weights.tolist() == [9.0, 5.0]
-    assert len(made.views.columns(1)) == 0
+    heaviest, none = made.views.features(0).columns, made.views.features(1).columns
+    assert heaviest is not None
+    assert heaviest.weights.tolist() == [9.0, 5.0]
+    assert none is None
     assert made.links.tolist() == [[0, 1]]
     assert made.frames.tolist() == [0, 10]
+
+
+@pytest.mark.parametrize(("least", "images"), [(1, 1), (0, 0)])
+def test_between_medoids_are_path_images_unless_none_are_asked_for(least: int, images: int) -> None:
+    # From medoid to medoid it is three views of the drive, of which at most two may lie between path images.
+    looks = [0.0, 0.1, 0.2, 9.0, 9.1, 9.2]
+    views = replace(made_views(between_looks(looks)), features=(patches(range(5)),) * 6)
+    place, none = np.array([0, 0, 0, 1, 1, 1]), np.empty((0, 3))
+    pairs = np.empty((0, 2), np.int64)
+    hypotheses = LoopHypotheses(
+        views.poses, place, place, place, views.tours, pairs, np.empty(0), none, none, np.empty(0, np.bool_), "odometry"
+    )
+    stage = TopologicalMapping(min_path_matches=least, max_path_step=2)
+    made = stage.step(Context("mapping"), views, hypotheses).map
+    assert made.links.tolist() == [[0, 1]]
+    assert made.frames[made.places].tolist() == [10, 40]
+    assert len(made.path_of(0)) == images

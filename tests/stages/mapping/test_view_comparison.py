@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -80,7 +81,6 @@ def test_a_known_map_comes_first_and_is_counted_on_from() -> None:
     assert views.owners.tolist() == [0, 1, 0, -1, -1]
     assert views.poses[:3].tolist() == known.poses.tolist()
     assert views.poses[3, :2].tolist() == [4.0, 10.0]
-    assert views.segments[:3] == (None,) * 3
 
 
 def test_every_two_views_are_compared_once_and_have_no_distance_to_themselves() -> None:
@@ -125,10 +125,11 @@ def test_two_views_without_features_have_nothing_in_common() -> None:
     assert views.shares[0, 1] == 0.0
 
 
-def test_vertical_segments_belong_to_their_image_where_there_are_any() -> None:
-    segments = [stretch(0.1), None, stretch(0.3)]
-    views = compared(range(4), vertical_segments=segments)
-    assert [None if each is None else each.azimuths[0] for each in views.segments] == [0.1, None, 0.3, None]
+def test_columns_belong_to_their_image_where_there_are_any() -> None:
+    columns = [stretch(0.1), None, stretch(0.3)]
+    views = compared(range(3), features=[replace(seen, columns=c) for seen, c in zip(SEEN, columns, strict=False)])
+    found = [each.columns for each in views.features]
+    assert [None if each is None else each.azimuths[0] for each in found] == [0.1, None, 0.3]
 
 
 def test_views_say_by_what_they_were_compared() -> None:
