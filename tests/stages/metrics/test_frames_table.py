@@ -7,8 +7,8 @@ from small_run import collected, small_run
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.frames_table import FramesTable, columns_of
-from omninav.stages.values.belief import PlaceBelief
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.belief import PlaceBelief, PoseEstimate
+from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.similarity import BestMatch
 
 
@@ -52,3 +52,33 @@ def test_a_match_says_what_looked_most_like_the_image(tmp_path):
 def test_a_run_without_frames_has_a_table_without_rows(tmp_path):
     assert written(tmp_path, collected([], [])) == []
     assert parquet.read_table(tmp_path / "frames.parquet").num_rows == 0
+
+
+def test_every_column_holds_its_own_figure():
+    covariance = np.array([[0.1, 0.2, 0.3], [0.2, 0.5, 0.6], [0.3, 0.6, 0.9]])
+    seen = PoseEstimate(Pose(1.0, 2.0, 0.3), covariance, 0.7, Pose(4.0, 5.0, 0.6))
+    drive = collected([Tick(0, 7, 0, 3)], [Pose(-1.0, -2.0, -0.3)], [Motion(0.1, 0.2, 0.25)], [seen])
+    columns = {name: column.tolist()[0] for name, column in columns_of(drive).items()}
+    for name, pose in (("estimate", (1.0, 2.0, 0.3)), ("mean", (4.0, 5.0, 0.6)), ("truth", (-1.0, -2.0, -0.3))):
+        assert tuple(columns[f"{name}_{axis}"] for axis in ("x", "y", "heading")) == pose
+    assert tuple(columns[f"motion_{axis}"] for axis in ("x", "y", "turn")) == (0.1, 0.2, 0.25)
+    entries = [columns[f"covariance_{name}"] for name in ("xx", "xy", "xh", "yy", "yh", "hh")]
+    assert entries == [0.1, 0.2, 0.3, 0.5, 0.6, 0.9]
+    assert tuple(columns[f"odometry_{axis}"] for axis in ("x", "y", "heading")) == pytest.approx((-1.0, -2.0, -0.3))
+    assert (columns["log"], columns["frame"], columns["stamp_ns"], columns["time_s"]) == (0, 3, 7, 0.0)
+    assert (columns["confident"], columns["reference"], columns["place"]) == (1, -1, -1)
+
+
+def test_an_error_needs_both_truth_and_estimate_and_the_first_place_and_reference_are_none(tmp_path):
+    seen = PlaceBelief(np.array([0.8, 0.2]), np.zeros((2, 3))).estimate()
+    drive = collected(
+        [Tick(k, k) for k in range(2)], [None, Pose(0.0, 0.0, 0.0)], None, [seen, None], None, [BestMatch(0, 0.0), None]
+    )
+    columns = columns_of(drive)
+    assert np.isnan(columns["position_error_m"]).all()
+    assert np.isnan(columns["heading_error_deg"]).all()
+    assert columns["estimate_weight"].tolist() == pytest.approx([0.8, np.nan], nan_ok=True)
+    first, second = written(tmp_path, drive)
+    assert (first["reference"], first["place"], first["confident"]) == ("0", "0", "1")
+    assert (second["reference"], second["place"], second["confident"]) == ("", "", "")
+    FramesTable().step(Context("frames"), drive)  # a run without a folder has no files

@@ -9,7 +9,8 @@ from omninav.pipeline import Context, Tick
 from omninav.stages.geometry.plane.se2 import chain, compose
 from omninav.stages.metrics.map_history import MapHistory, counted, last_new_ground
 from omninav.stages.metrics.view_map_size import ViewMapSize, stored_bytes, visited_area
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.pose import Motion, Pose
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 
 CTX = Context("metric")
@@ -147,3 +148,101 @@ def test_an_empty_map_has_no_density_and_an_unseen_path_no_area():
     assert found["references"] == 0
     assert found["reference_size_bytes"] is None
     assert found["references_per_m2"] == 0.0
+
+
+def line(xs: list[float | None], off: float = 0.0, stretched: float = 1.0, logs: list[int] | None = None):
+    """A drive along x (None: no truth); estimates lie so far (m) to its side, odometry stretches its steps."""
+    at = [0.0 if x is None else x for x in xs]
+    truth = [None if x is None else Pose(x, 0.0, 0.0) for x in xs]
+    seen = [PoseEstimate(Pose(x, off, 0.0), np.eye(3), 1.0, Pose(x, off, 0.0)) for x in at]
+    motion = [None, *[Motion(stretched * float(step), 0.0, 0.1) for step in np.diff(at)]]
+    ticks = [Tick(n, n, log, n) for n, log in enumerate(logs or [0] * len(xs))]
+    return collected(ticks, truth, motion, seen)
+
+
+def test_what_came_in_each_lap_is_told_of_it_alone():
+    out_and_back = [0.0, 5.0, 10.0, 5.0]
+    events = [event(k + 1, [k], [k]) for k in range(4)]  # four references in the first lap
+    events += [event(5, [4], [4]), None, None, event(3, [], [], [0, 1])]
+    events += [event(4, [5], [8]), event(4)]
+    drive = line([*out_and_back, *out_and_back, 0.0, 5.0], logs=[0] * 8 + [1] * 2)
+    found = MapHistory().step(CTX, drive, events).metrics.values
+    assert found["map_per_lap"] == {
+        "frames": [4, 4, 2],
+        "references": [4, 3, 4],
+        "components": [4, 3, 4],
+        "inserted": [4, 1, 1],
+        "removed": [0, 2, 0],
+    }
+    assert found["map"] == {"inserted": 6, "removed": 2, "new_after_first_lap_rate": 0.5}
+    assert found["map_over_steps"]["step"] == list(range(10))
+    assert found["map_over_steps"]["removed"] == [0] * 7 + [2] * 3
+
+
+def test_of_one_lap_or_an_empty_map_nothing_came_after_the_first():
+    one = MapHistory().step(CTX, line([0.0, 5.0, 10.0]), [event(1, [0], [0]), None, None]).metrics.values
+    assert one["map"] == {"inserted": 1, "removed": 0, "new_after_first_lap_rate": None}
+    later = [None] * 4 + [event(1, [0], [4])] + [None] * 3
+    none = MapHistory().step(CTX, line([0.0, 5.0, 10.0, 5.0] * 2), later).metrics.values
+    assert none["map_per_lap"]["inserted"] == [0, 1]
+    assert none["map"]["new_after_first_lap_rate"] is None
+
+
+def test_what_was_learned_after_the_end_counts_to_the_last_frame():
+    found = MapHistory().step(CTX, line([0.0, 5.0, 10.0]), [None] * 3, event(2, [0, 1], [0, 2])).metrics.values
+    assert found["map_over_steps"]["inserted"] == [1, 1, 2]
+    assert found["map_over_steps"]["references"] == [0, 0, 2]
+
+
+def test_sixty_steps_are_told_and_laps_are_those_within_two_metres():
+    drive = line(np.linspace(0.0, 200.0, 201).tolist())
+    found = MapHistory().step(CTX, drive, [event(0)] * 201).metrics.values
+    assert len(found["map_over_steps"]["step"]) == 60
+    near, far = [0.0, 5.0, 1.9, 5.0], [0.0, 5.0, 2.1, 5.0]
+    laps = [
+        MapHistory().step(CTX, line(xs), [event(0)] * 4).metrics.values["map_per_lap"]["frames"] for xs in (near, far)
+    ]
+    assert laps == [[2, 2], [4]]
+
+
+def test_laps_are_counted_in_frames_of_the_log_also_where_truth_is_missing():
+    found = MapHistory().step(CTX, line([None, 0.0, 5.0, None, 0.5, 5.0]), [event(0)] * 6).metrics.values
+    assert found["map_per_lap"]["frames"] == [4, 2]
+
+
+def test_the_first_map_ends_with_the_last_new_ground():
+    drive = line([None, 0.0, 1.0, 6.0, 7.0, 6.0, 1.0], off=0.25, stretched=2.0)
+    first = MapHistory().step(CTX, drive, [event(0)] * 7).metrics.values["first_map"]
+    assert (first["frames"], first["driven_m"]) == (6, 8.0)  # the end is where it had been
+    assert first["estimate"]["position_error_m"]["max"] == first["estimate"]["final_error_m"] == 0.25
+    assert first["estimate"]["final_heading_error_deg"] == 0.0
+    alone = first["odometry_alone"]
+    path = drive.odometry_alone()
+    away = np.hypot(*(path - drive.truth)[1:6, :2].T)
+    assert alone["position_error_m"]["mean"] == pytest.approx(away.mean())
+    assert alone["final_error_m"] == pytest.approx(away[-1])
+    assert alone["final_heading_error_deg"] == pytest.approx(np.degrees(0.4))
+    assert alone["heading_error_deg"]["median"] == pytest.approx(np.degrees(0.2))
+
+
+def test_without_odometry_or_estimates_there_is_no_drift():
+    still = collected([Tick(n, n) for n in range(2)], [Pose(float(n), 0.0, 0.0) for n in range(2)])
+    assert MapHistory().step(CTX, still, [event(0)] * 2).metrics.values["first_map"] == {}
+    seen = line([0.0, 1.0])
+    seen.motion[:] = np.nan
+    assert "odometry_alone" not in MapHistory().step(CTX, seen, [event(0)] * 2).metrics.values["first_map"]
+
+
+@pytest.mark.parametrize(
+    ("xs", "row"),
+    [
+        ([0.0, 4.0, 0.0], 2),  # it has not left the start by more than twice the radius
+        ([0.0, 4.5, 0.0], 1),
+        ([0.0, 6.5, 2.0], 1),  # within the radius of where it had been
+        ([0.0, 6.5, 2.25], 2),
+        ([0.0, 6.0, 2.0], 2),
+        ([0.0], 0),
+    ],
+)
+def test_ground_is_new_beyond_the_radius_of_what_was_left(xs: list[float], row: int):
+    assert last_new_ground(np.array([(0.0, x) for x in xs]), 2.0) == row

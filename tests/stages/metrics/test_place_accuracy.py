@@ -91,3 +91,40 @@ def test_a_start_is_the_place_closest_to_it(at, place):
 def test_a_start_at_the_truth_needs_one():
     with pytest.raises(BadInput, match="start=uniform"):
         PlacePrior(at="truth").step(Context("start"), tick(0), ROW)
+
+
+def test_figures_are_shares_and_medians_over_all_images():
+    found = hits([0, 0, 1, 2, 3], [0.1, 0.1, 4.0, 4.25, 0.0], {0}).values["localisation"]
+    # The believed medoids are 0.1, 0.1, 2, 0.25 and 6 m away, the nearest 0.1, 0.1, 0, 0.25 and 0.
+    assert (found["images"], found["accuracy"], found["adjacent_accuracy"]) == (5, 3 / 5, 4 / 5)
+    assert (found["place_distance_m"], found["nearest_place_distance_m"]) == pytest.approx((0.25, 0.1))
+    assert found["adjacent_accuracy_after"] == [1.0, 1.0, 1.0]
+
+
+def test_five_updates_are_told_and_half_a_metre_is_tolerated():
+    def tolerant(x: float) -> list[float | None]:
+        drive = collected([tick(0)], [Pose(x, 0.0, 0.0)])
+        out = PlaceAccuracy().step(Context("hits"), drive, [believed(0)], [believed(0)], ROW)
+        return out.metrics.values["localisation"]["tolerant_accuracy_after"]
+
+    assert tolerant(1.25) == [1.0, None, None, None, None]  # half a metre further than the next
+    assert tolerant(1.3125) == [0.0, None, None, None, None]
+
+
+def test_an_image_without_a_belief_is_an_update_that_does_not_count_and_odometry_is_no_truth():
+    drive = collected([tick(k) for k in range(3)], [Pose(0.0, 0.0, 0.0)] * 3)
+    beliefs = [believed(0), None, believed(1)]
+    given = Context("hits"), drive, beliefs, [believed(0), None, None]
+    found = PlaceAccuracy(updates=3).step(*given, ROW).metrics.values["localisation"]
+    assert found["accuracy_after"] == [1.0, None, 0.0]
+    assert found["images"] == 2
+    assert PlaceAccuracy().step(*given, dataclasses.replace(ROW, pose_source="odometry")).metrics is None
+
+
+def test_places_beside_each_other_are_near_in_any_direction():
+    corner = made_map([(0.0, 0.0), (0.0, 2.0), (2.0, 2.0)], {(0, 1): 0, (1, 2): 0})
+    drive = collected([tick(k) for k in range(2)], [Pose(0.0, 1.9, 0.0), Pose(1.9, 1.9, 0.0)])
+    beliefs = [PlaceBelief(np.eye(3)[place], corner.poses) for place in (2, 0)]
+    found = PlaceAccuracy().step(Context("h"), drive, beliefs, beliefs, corner).metrics.values["localisation"]
+    assert (found["accuracy"], found["adjacent_accuracy"]) == (0.0, 0.5)
+    assert found["place_distance_m"] == pytest.approx((np.hypot(2.0, 0.1) + np.hypot(1.9, 1.9)) / 2)

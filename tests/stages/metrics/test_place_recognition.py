@@ -1,6 +1,8 @@
+import dataclasses
+
 import numpy as np
 import pytest
-from small_run import small_run
+from small_run import reference_graph, small_run
 
 from omninav.pipeline import Context
 from omninav.stages.metrics.place_recognition import PlaceRecognition, RankedReferences, RankReferences, recalls
@@ -52,3 +54,80 @@ def test_recall_is_told_for_several_numbers_and_distances():
     out = PlaceRecognition(distances_m=(0.5, 100.0)).step(CTX, run.drive, lists, run.map)
     assert out.metrics.values["place_recognition"]["at_distances"]["recall_at_1"][1] == 1.0
     assert [row[0] for row in out.table.rows] == ["0.5", "100"]
+
+
+def test_a_reference_at_the_distance_itself_is_right_and_lies_in_any_direction():
+    spots = np.array([(0.0, 0.0), (0.0, 30.0)])
+    found = recalls(np.array([(0.0, 2.0), (2.0, 30.0)]), [np.array([0]), np.array([1])], spots, 2.0)
+    assert (found["queries"], found["recall_at_1"], found["distance_m"]) == (2, 1.0, 2.0)
+    beyond = recalls(np.array([(0.0, 2.0625)]), [np.array([0])], spots, 2.0)
+    assert beyond["queries"] == 0
+    wrong = recalls(np.array([(0.0, 2.0)]), [np.array([1])], spots, 2.0)
+    assert (wrong["queries"], wrong["recall_at_1"]) == (1, 0.0)
+
+
+def test_the_first_five_and_ten_count():
+    spots = np.array([(float(100 * k), 0.0) for k in range(12)])
+    position = np.zeros((1, 2))
+
+    def recall(place: int) -> list[float]:
+        ranked = [k for k in range(1, 12)]
+        ranked.insert(place, 0)
+        found = recalls(position, [np.array(ranked)], spots, 1.0)
+        return [found[f"recall_at_{rank}"] for rank in (1, 5, 10)]
+
+    assert [recall(place) for place in (0, 1, 4, 5, 9, 10)] == [
+        [1.0, 1.0, 1.0],
+        [0.0, 1.0, 1.0],
+        [0.0, 1.0, 1.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, 0.0],
+    ]
+
+
+def test_ten_references_are_kept_the_first_of_equals_first_and_none_where_none_was_compared():
+    values = np.zeros((14, 3), np.float32)
+    values[5, 1] = 0.5
+    assert RankReferences().step(CTX, Similarities(values, None)).ranked.references.tolist() == [
+        5,
+        0,
+        1,
+        2,
+        3,
+        4,
+        6,
+        7,
+        8,
+        9,
+    ]
+    assert RankReferences().step(CTX, Similarities(values[:0], None)).ranked.references.tolist() == []
+
+
+def test_an_image_without_a_ranking_is_not_recalled_and_only_the_last_log_counts():
+    run = small_run(frames=10, logs=2)
+    away = [np.hypot(*(run.map.poses[:, :2] - (pose.x, pose.y)).T) for pose in run.truth]
+    ranked = [RankedReferences(np.argsort(-metres)) for metres in away[:10]]
+    ranked += [RankedReferences(np.argsort(metres)) for metres in away[10:]]
+    ranked[12] = None
+    drive = run.drive
+    drive.truth[13] = np.nan
+    out = PlaceRecognition(distances_m=(2.0,)).step(CTX, drive, ranked, run.map)
+    found = out.metrics.values["place_recognition"]
+    assert (found["queries"], found["recall_at_1"], found["distance_m"]) == (9, pytest.approx(8 / 9), 2.0)
+    assert found["at_distances"]["queries"] == [9]
+    assert out.table.rows == (("2", "88.9", "88.9", "88.9", 9),)
+    assert PlaceRecognition().step(CTX, drive, ranked, None).metrics is None
+    odometry = dataclasses.replace(run.map, pose_source="odometry")
+    assert PlaceRecognition().step(CTX, drive, ranked, odometry).metrics is None
+    assert PlaceRecognition().step(CTX, drive, ranked, reference_graph(0)).metrics is None
+
+
+def test_recall_is_told_at_half_a_metre_one_two_and_five():
+    run = small_run(frames=5)
+    lists = [RankedReferences(np.array([0])) for _ in run.truth]
+    far = dataclasses.replace(run.map, poses=run.map.poses + 1000.0)
+    out = PlaceRecognition().step(CTX, run.drive, lists, far)
+    assert out.table.rows == tuple((name, "–", "–", "–", 0) for name in ("0.5", "1", "2", "5"))
+    alone = PlaceRecognition(distances_m=()).step(CTX, run.drive, lists, run.map)
+    assert alone.metrics.values["place_recognition"]["at_distances"] == {}

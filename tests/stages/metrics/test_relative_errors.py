@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import minimize
-from small_run import eight, small_run
+from small_run import collected, eight, small_run
 
-from omninav.pipeline import Context
+from omninav.pipeline import Context, Tick
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.metrics.map_size import MapSize
 from omninav.stages.metrics.pose_estimate import BeliefEstimate
@@ -16,6 +16,8 @@ from omninav.stages.metrics.relative_errors import (
     pairs_apart,
     relative_pose_errors,
 )
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.pose import Pose
 
 
 @given(st.floats(-3, 3), st.floats(-9, 9), st.floats(-9, 9))
@@ -100,3 +102,42 @@ def test_the_estimate_is_the_beliefs_own():
     run = small_run(frames=1)
     out = BeliefEstimate().step(Context("estimate"), run.beliefs[0])
     assert out.estimate.pose.x == run.estimates[0].pose.x
+
+
+def test_figures_of_errors_worked_by_hand():
+    truth = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0), (3.0, 0.0, 0.0)])
+    estimate = np.add(truth, [(0.0, 1.0, 0.0), (0.0, -1.0, 0.1), (0.0, -1.0, 0.1), (0.0, 1.0, 0.4)])
+    ticks = [Tick(n, n) for n in range(4)]
+    seen = [PoseEstimate(Pose(*row), np.eye(3), 1.0, Pose(*row)) for row in estimate.tolist()]
+    drive = collected(ticks, [Pose(*row) for row in truth.tolist()], None, seen)
+    found = RelativeErrors().step(Context("relative"), drive).metrics.values
+    for name in ("absolute_trajectory_error_m", "unaligned_trajectory_error_m"):
+        assert found[name] == pytest.approx({"rmse": 1.0, "mean": 1.0, "median": 1.0, "max": 1.0})
+    turns = np.degrees([0.1, 0.0, 0.3])
+    assert found["relative_heading_error_deg"] == pytest.approx(
+        {"rmse": np.sqrt((turns**2).mean()), "mean": turns.mean(), "median": np.median(turns), "max": turns.max()}
+    )
+    assert found["relative_error_distance_m"] == 1.0
+    two = RelativeErrors().step(Context("relative"), drive.at(slice(2))).metrics.values
+    assert two["unaligned_trajectory_error_m"]["max"] == 1.0
+    assert RelativeErrors().step(Context("relative"), drive.at(slice(1))).metrics.values == {}
+
+
+def test_only_frames_of_the_last_log_with_truth_and_estimate_are_compared_and_a_short_path_has_no_pair():
+    run = small_run(frames=20, logs=2)
+    drive = run.drive
+    drive.truth[:20] += 100.0
+    drive.truth[25] = np.nan
+    drive.estimate[30] = np.nan
+    found = RelativeErrors(distance_m=1000.0).step(Context("relative"), drive).metrics.values
+    assert set(found) == {"absolute_trajectory_error_m", "unaligned_trajectory_error_m"}
+    scored = [row for row in range(20, 40) if row not in (25, 30)]
+    away = np.hypot(*(drive.estimate - drive.truth)[scored, :2].T)
+    assert found["unaligned_trajectory_error_m"]["mean"] == pytest.approx(away.mean())
+
+
+def test_a_pair_lies_exactly_a_metre_apart():
+    truth = np.zeros((21, 3))
+    truth[:, 1] = np.arange(21) * 0.1
+    starts, ends = pairs_apart(truth, 1.0)
+    assert (ends - starts).tolist() == [10] * 11

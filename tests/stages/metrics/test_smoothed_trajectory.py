@@ -13,7 +13,8 @@ from omninav.stages.geometry.plane.smoothing import contradicted, smoothed, smoo
 from omninav.stages.metrics.smoothed_trajectory import SmoothTrajectory
 from omninav.stages.plots.trajectory_file import TrajectoryFile
 from omninav.stages.values.belief import PoseEstimate
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.confidence import PoseConfidence
+from omninav.stages.values.pose import Motion, Pose
 
 FRAMES = 80
 CTX = Context("smoothing")
@@ -99,3 +100,26 @@ def test_one_estimate_is_kept_as_it_is():
     estimates = np.array([[1.0, 2.0, 0.3]])
     found = smoothed(estimates, np.eye(3)[None], np.ones(1), np.zeros((1, 3)))
     assert found == pytest.approx(estimates)
+
+
+def beside(confidence: float | None = None, frame: int = 0, lost_m: float = 2.5) -> np.ndarray:
+    """The smoothed drive of a robot whose estimates lie 3 m to the side from a frame on, with this confidence."""
+    truth, _, covariances, motions = driven(lost=0)
+    estimates = truth + np.where(np.arange(FRAMES) >= frame, 3.0, 0.0)[:, None] * (0.0, 1.0, 0.0)
+    rows = zip(estimates.tolist(), covariances, strict=True)
+    seen = [PoseEstimate(Pose(*row), covariance, 1.0, Pose(*row)) for row, covariance in rows]
+    told = [None if confidence is None or k < frame else PoseConfidence(confidence) for k in range(FRAMES)]
+    poses, steps = [Pose(*row) for row in truth.tolist()], [Motion(*row) for row in motions[1:].tolist()]
+    drive = collected([Tick(k, k, 0, k) for k in range(FRAMES)], poses, [None, *steps], seen, confidences=told)
+    return SmoothTrajectory(lost_m=lost_m).step(CTX, drive)
+
+
+def test_an_estimate_weighs_as_its_confidence_says_and_fully_without_one():
+    none, full, little = (beside(each, 50).drive.estimate for each in (None, 1.0, 0.001))
+    assert np.array_equal(none, full)
+    assert not np.allclose(none, little)
+
+
+def test_smoothed_errors_are_lost_beyond_two_and_a_half_metres_unless_told_otherwise():
+    assert beside().metrics.values["smoothed"]["loss_rate"] == 1.0
+    assert beside(lost_m=3.5).metrics.values["smoothed"]["loss_rate"] == 0.0

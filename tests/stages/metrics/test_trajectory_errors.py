@@ -120,3 +120,52 @@ def test_a_filter_that_finds_itself_converges():
     found = TrajectoryErrors().step(Context("errors"), run.drive).metrics.values
     assert found["converged_after_frames"] < 20
     assert found["after_convergence"]["position_error_m"]["median"] < 0.2
+
+
+def test_a_robot_is_lost_beyond_two_and_a_half_metres():
+    assert measured([at(2.5), at(2.625)], [Pose(0, 0, 0)] * 2)["loss_rate"] == 0.5
+
+
+def test_the_way_is_that_of_the_true_path_in_the_plane():
+    truth = [Pose(0, 0, 0), None, Pose(3, 4, 2.0), Pose(3, 4, -1.0)]
+    found = measured([at(0.0)] * 4, truth)
+    assert found["driven_m"] == 5.0
+    assert found["after_convergence"] is found["converged_after_frames"] is None
+
+
+def test_where_nothing_was_estimated_only_the_drive_is_told():
+    found = measured([None] * 3, [Pose(float(x), 0, 0) for x in range(3)])
+    assert found == {"frames": 3, "driven_m": 2.0, "frames_without_truth": 0, "frames_without_estimate": 3}
+
+
+def test_windows_say_how_many_frames_they_have_and_odometry_is_measured_over_the_same():
+    truth = [Pose(float(x), 0.0, 0.0) for x in range(15)]
+    motion = [None, *[Motion(1.5, 0.0, 0.0)] * 14]
+    estimates = [at(x + (5.0 if x < 3 else 0.0)) for x in range(15)]
+    found = measured(estimates, truth, motion, settle_steps=14)
+    assert (found["after_convergence"]["frames"], found["after_settling"]["frames"]) == (12, 1)
+    assert found["odometry_alone"]["after_convergence"]["position_error_m"]["mean"] == pytest.approx(4.25)
+    assert found["odometry_alone"]["after_settling"]["position_error_m"]["max"] == 7.0
+    assert found["mean_pose"]["after_convergence"]["position_error_m"]["mean"] == 1.0
+
+
+def test_the_first_figures_are_those_after_convergence_where_there_are_such():
+    def first(off: float) -> tuple[str, ...]:
+        drive = collected([Tick(i, i, 0, i) for i in range(12)], [Pose(0, 0, 0)] * 12, None, [at(off)] * 12)
+        return TrajectoryErrors().step(Context("errors"), drive).metrics.headlines
+
+    found, lost = first(0.5), first(5.0)
+    assert found[0] == "after_convergence.position_error_m.median"
+    assert lost[0] == "position_error_m.median"
+    assert found[-2:] == lost[-2:] == ("loss_rate", "converged_after_frames")
+
+
+def test_one_log_has_no_list_of_logs_and_a_run_without_truth_says_so():
+    ctx = Context("errors")
+    blind = collected([Tick(0, 0)], [None], None, [at(0.0)])
+    assert "logs" not in TrajectoryErrors().step(ctx, blind).metrics.values
+    assert "no ground truth" in ctx.facts["errors"]
+    ctx = Context("errors")
+    seen = TrajectoryErrors().step(ctx, collected([Tick(0, 0)], [Pose(0, 0, 0)], None, [at(0.0)])).metrics.values
+    assert "logs" not in seen
+    assert "errors" not in ctx.facts

@@ -5,7 +5,7 @@ import pytest
 from small_run import collected
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.metrics.visited_places import VisitedPlaces, visit_numbers
+from omninav.stages.metrics.visited_places import VisitedPlaces, first_against_later, visit_numbers
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.pose import Motion, Pose
 
@@ -51,3 +51,51 @@ def test_each_number_of_visits_has_its_own_mean():
 def test_nothing_is_measured_without_truth():
     blind = collected([Tick(0, 0)], [None])
     assert VisitedPlaces().step(CTX, blind).metrics.values == {}
+
+
+def test_a_place_is_a_square_of_a_metre_and_another_visit_begins_beyond_five():
+    stage = VisitedPlaces()
+    xs = [0.1, 0.9, 1.1, 3.0, 0.5, 5.0, 0.5]  # back in the first cell after 4.4 m, and after 9 m
+    truth = [Pose(x, -0.5, 0.0) for x in xs]
+    seen = [PoseEstimate(Pose(x, k - 0.5, 0.0), np.eye(3), 1.0, Pose(x, 0.0, 0.0)) for k, x in enumerate(xs)]
+    visits = stage.step(CTX, collected([Tick(n, n) for n in range(7)], truth, None, seen)).metrics.values
+    assert visits == {"visits": {"number": [1, 2], "position_error_m": [15 / 6, 6.0], "frames": [6, 1]}}
+
+
+def test_figures_are_means_over_the_places_that_were_visited_again():
+    cells = np.array([0, 0, 1, 2, 0, 1, 1, 2, 3])
+    numbers = np.array([1, 1, 1, 1, 2, 2, 3, 2, 1])
+    odometry = np.array([1.0, 3.0, 4.0, 6.0, 50.0, 50.0, 50.0, 50.0, 99.0])
+    errors = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 6.0, 4.0, 0.0])
+    found = first_against_later(cells, numbers, errors, odometry)
+    assert found == {
+        "places": 3,
+        "odometry_error_m": 4.0,
+        "position_error_m": 3.0,
+        "ratio": 0.75,
+        "correlation": pytest.approx(np.corrcoef([2.0, 4.0, 6.0], [1.0, 4.0, 4.0])[0, 1]),
+    }
+    assert first_against_later(cells, numbers, np.ones(9), odometry)["correlation"] is None
+    assert first_against_later(cells, numbers, errors, np.ones(9))["correlation"] is None
+    two = first_against_later(cells[[0, 2, 4, 5]], numbers[[0, 2, 4, 5]], errors[:4], odometry[[0, 2, 4, 5]])
+    assert (two["places"], two["correlation"]) == (2, None)
+    assert first_against_later(cells, numbers, errors, np.zeros(9))["ratio"] is None
+    assert first_against_later(cells, numbers, errors, np.where(cells == 3, np.nan, odometry)) == {}
+    assert first_against_later(cells, np.ones(9, int), errors, odometry) == {}
+
+
+def test_a_log_begins_elsewhere_and_frames_without_truth_or_estimate_do_not_count():
+    pose = Pose(0.5, 0.5, 0.0)
+    seen = [PoseEstimate(pose, np.eye(3), 1.0, pose)] * 6
+    ticks = [Tick(n, n, n // 2, n % 2) for n in range(6)]
+    motion = [None, Motion(0.0, 0.0, 0.0)] * 3
+    truth = [pose, pose, pose, None, None, None]
+    found = VisitedPlaces().step(CTX, collected(ticks, truth, motion, [*seen[:2], seen[2], None, *seen[4:]])).metrics
+    assert found.values["visits"]["frames"] == [2, 1]
+    assert found.values["first_visits"]["places"] == 1
+
+
+def test_visits_are_told_apart_by_the_path_and_not_by_frames():
+    cells = np.array([0, 1, 0, 1, 0])
+    assert visit_numbers(cells, np.array([np.inf, 2.5, 2.5, 2.5, 2.625]), 5.0).tolist() == [1, 1, 1, 1, 2]
+    assert visit_numbers(cells, np.array([np.inf, 0.0, np.inf, 0.0, 0.0]), 5.0).tolist() == [1, 1, 2, 2, 2]
