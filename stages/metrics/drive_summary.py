@@ -7,9 +7,13 @@ import numpy as np
 from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.values.drive import Drive
 
+MIN_SPEED = 0.03
+"""m/s, below which a robot makes no way: more than the noise of its wheels."""
+
 QUANTITIES = {
     "drive.collisions": Quantity(title="Collisions", better="lower"),
     "drive.distance_m": Quantity(title="Distance driven", context=True),
+    "drive.stopped_share": Quantity(title="Time in which it stood or turned on the spot", unit="%", better="lower"),
     "drive.duration_s": Quantity(title="Duration", context=True),
 }
 
@@ -17,7 +21,8 @@ QUANTITIES = {
 class DriveSummary(Stage):
     """Measures how long and how far a robot drove by itself, and in a simulated world how often it touched something.
 
-    Of a real robot nobody tallies contacts, and the distance is that of its odometry.
+    `stopped_share`: of the time from its first move to its last, in which it made no way. Of a real robot nobody
+    tallies contacts, and the distance is that of its odometry.
     """
 
     class Out(Outputs):
@@ -34,4 +39,14 @@ class DriveSummary(Stage):
             values |= {"collisions": int(drive.collisions[last]), "distance_m": float(drive.distance[last])}
         else:
             values["distance_m"] = float(np.nansum(np.hypot(drive.motion[:, 0], drive.motion[:, 1])))
+        stopped = stopped_share(drive)
+        if stopped is not None:
+            values["stopped_share"] = stopped
         return self.Out(metrics=Metrics({"frames": len(drive), "drive": values}, QUANTITIES, ("drive.collisions",)))
+
+
+def stopped_share(drive: Drive) -> float | None:
+    """Share of the ticks from the first move to the last slower than `MIN_SPEED` by odometry; None: no move."""
+    speeds = np.hypot(drive.motion[1:, 0], drive.motion[1:, 1]) / np.maximum(np.diff(drive.seconds), 1e-9)
+    moves = np.flatnonzero(speeds >= MIN_SPEED)
+    return float((speeds[moves[0] : moves[-1] + 1] < MIN_SPEED).mean()) if len(moves) else None

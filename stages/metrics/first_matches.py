@@ -49,8 +49,9 @@ class FirstMatches(Stage):
     A match of patches is right where its point, by its depth in one view, is seen in the other close to its partner, or
     within half the patch's diameter, if that is more; one of columns where both of its ends are. Without depths: where
     its bearings lie close to a plane with the direction of travel and meet in front of both views. Under `matches`, by
-    distance and over `all`: `first_right` and `right` (medians over pairs), `right_share`; `by_chance`: the share of
-    wrong partners that would be counted as right. Raises BadInput where no truth says where images were taken.
+    distance and over `all`: `matched`, `first_right` and `right` (medians over pairs), `right_share`;
+    `by_chance`: the share of wrong partners that would be counted as right. Raises BadInput where no truth says where
+    images were taken.
     """
 
     apart_m: tuple[float, ...] = (0.5, 1.0, 2.0)
@@ -210,11 +211,12 @@ def run_of_right(right: Bools) -> int:
 def summary(pairs: Sequence[tuple[Bools, float]]) -> dict[str, float | int | None]:
     """What is judged of some pairs; None where there is none."""
     if not pairs:
-        return {"pairs": 0, "first_right": None, "right": None, "right_share": None, "by_chance": None}
+        return {"pairs": 0, "matched": None, "first_right": None, "right": None, "right_share": None, "by_chance": None}
     chances = np.array([chance for _, chance in pairs])
     matched = sum(len(right) for right, _ in pairs)
     return {
         "pairs": len(pairs),
+        "matched": float(np.median([len(right) for right, _ in pairs])),
         "first_right": float(np.median([run_of_right(right) for right, _ in pairs])),
         "right": float(np.median([np.count_nonzero(right) for right, _ in pairs])),
         "right_share": sum(int(right.sum()) for right, _ in pairs) / matched if matched else None,

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Figure, Metrics, Outputs, Quantity, Stage
 from omninav.pipeline.engine.artifact import artifact_bytes
 from omninav.pipeline.report.chart import Chart
-from omninav.stages.geometry.probability.dempster_shafer import support
+from omninav.stages.geometry.probability.dempster_shafer import support, unknown
 from omninav.stages.values.topological_map import LoopHypotheses, TopologicalMap
 
 Array = npt.NDArray[np.float64]
@@ -40,7 +40,8 @@ class LoopClosures(Stage):
     none, or where the map's poses are not truth. `loop_closures` leaves out those between views of one stretch of the
     drive, and adds `average_precision`, the area under the precision-recall curve over the support, sum over n of
     P_n (R_n - R_(n-1)) with the precision P_n and recall R_n of the n best supported ones; `merged`, of
-    these: counts as accepted what became one place, be it through third ones. `at_supports` is what they would be with
+    these: counts as accepted what became one place, be it through third ones. `neighbours`: what their evidence brings
+    (see there). `at_supports` is what they would be with
     other thresholds of support. `parts`: between which no path leads; more than one where a map was added to from a
     tour that it does not know. `step_m`: how far apart neighbouring path images were taken. `size_bytes`: of the map's
     file, but for what it says of its making.
@@ -84,6 +85,7 @@ class LoopClosures(Stage):
                 "average_precision": None if near is None else average_precision(supports[far], near <= self.near_m),
             },
             "merged": counted((one == other)[far], near, self.near_m),
+            "neighbours": neighbours(hypotheses.initial[far], hypotheses.masses[far], near, self.near_m),
             "at_supports": at_supports(supports[far], near, self.near_m),
         }
         figure = None if near is None else _drawn(supports[far], near <= self.near_m)
@@ -116,6 +118,24 @@ def counted(accepted: npt.NDArray[np.bool_], gaps: Array | None, near: float) ->
         "wrong": int((accepted & ~right).sum()),
         "precision": found / int(accepted.sum()) if accepted.any() else None,
         "recall": found / int(right.sum()) if right.any() else None,
+    }
+
+
+def neighbours(initial: Array, masses: Array, gaps: Array | None, near: float) -> dict[str, float | None]:
+    """What the evidence of neighbouring hypotheses brings, of masses (H, 3) before it and after.
+
+    `area_gain`: by how much the area under the precision-recall curve grows; `wrong_without`: how many wrong ones have
+    a support above one half before; `right_alone`: the share of right ones of which no neighbour has spoken. None where
+    no hypothesis is right, or `gaps` (H,) in metres are not known.
+    """
+    if gaps is None or not (gaps <= near).any():
+        return {"area_gain": None, "wrong_without": None, "right_alone": None}
+    right, before = gaps <= near, support(initial)
+    areas = [average_precision(supports, right) or 0.0 for supports in (before, support(masses))]
+    return {
+        "area_gain": areas[1] - areas[0],
+        "wrong_without": float(np.count_nonzero((before > 0.5) & ~right)),
+        "right_alone": float((unknown(masses) >= unknown(initial))[right].mean()),
     }
 
 

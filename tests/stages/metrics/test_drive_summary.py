@@ -4,6 +4,7 @@ from small_run import collected, small_run
 from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.drive_summary import DriveSummary
 from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.pose import Motion
 
 
 def summary(drive):
@@ -29,3 +30,10 @@ def test_a_real_robot_is_measured_by_its_odometry_and_no_contact_is_claimed():
     assert found["distance_m"] == pytest.approx(
         sum((motion.x**2 + motion.y**2) ** 0.5 for motion in run.motion if motion)
     )
+
+
+def test_a_robot_has_stopped_where_it_makes_no_way_between_its_first_move_and_its_last():
+    ways = [0.0, 0.3, 0.0, 0.01, 0.3, 0.0]
+    motion = [None, *(Motion(x=way, y=0.0, turn=0.1) for way in ways)]
+    drive = collected([Tick(k, 10**9 * k) for k in range(7)], [None] * 7, motion=motion)
+    assert summary(drive)["stopped_share"] == 0.5

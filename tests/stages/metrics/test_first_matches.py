@@ -196,8 +196,8 @@ def test_a_pair_without_features_has_no_match_and_no_chance() -> None:
     found = FirstMatches(apart_m=(1.0, 5.0)).step(Context("m"), poses).metrics.values["matches"]
     none = {"right_share": None, "by_chance": None}
     assert found["apart"] == [
-        {"m": 1.0, "pairs": 1, "first_right": 0.0, "right": 0.0, **none},
-        {"m": 5.0, "pairs": 0, "first_right": None, "right": None, **none},
+        {"m": 1.0, "pairs": 1, "matched": 0.0, "first_right": 0.0, "right": 0.0, **none},
+        {"m": 5.0, "pairs": 0, "matched": None, "first_right": None, "right": None, **none},
     ]
     assert found["depths_known"] == 0
 
@@ -214,6 +214,7 @@ def test_figures_of_pairs_are_medians_and_shares_of_all_matches() -> None:
     judged = [(np.array([yes, yes, no, yes]), 0.1), (np.array([no]), 0.3), (np.array([yes] * 5), np.nan)]
     assert summary(judged) == {
         "pairs": 3,
+        "matched": 4.0,
         "first_right": 2.0,
         "right": 3.0,
         "right_share": 0.8,

@@ -6,7 +6,7 @@ from made_places import made_map
 
 from omninav.pipeline import Context
 from omninav.pipeline.engine.artifact import artifact_bytes
-from omninav.stages.metrics.loop_closures import LoopClosures, average_precision, precision_recall
+from omninav.stages.metrics.loop_closures import LoopClosures, average_precision, neighbours, precision_recall
 from omninav.stages.values.topological_map import LoopHypotheses
 
 
@@ -115,3 +115,13 @@ def test_a_map_is_measured_by_its_places_parts_paths_and_bytes():
     }
     alone = dataclasses.replace(made_map([(0.0, 0.0)], {}), pose_source="odometry")
     assert "step_m" not in measured(hypotheses(), alone)[0]["map"]
+
+
+def test_neighbours_are_judged_by_what_was_known_before_they_spoke():
+    initial = np.array([[0.6, 0.2, 0.2], [0.4, 0.4, 0.2], [0.7, 0.1, 0.2]])
+    masses = np.array([[0.3, 0.6, 0.1], [0.8, 0.1, 0.1], [0.7, 0.1, 0.2]])
+    found = neighbours(initial, masses, np.array([9.0, 1.0, 1.0]), 2.5)
+    assert found["wrong_without"] == 1.0
+    assert found["right_alone"] == 0.5
+    assert found["area_gain"] == pytest.approx(1.0 - (0.5 * 1.0 + 0.5 * 2.0 / 3.0))
+    assert neighbours(initial, masses, None, 2.5)["area_gain"] is None

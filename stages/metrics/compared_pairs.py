@@ -1,0 +1,76 @@
+"""What the comparison of views tells of how far apart they were taken."""
+
+from itertools import pairwise
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import spearmanr
+
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.stages.geometry.appearance.visual_distance import colour_distances
+from omninav.stages.values.compared_views import ComparedViews
+from omninav.stages.values.rooms import Rooms
+
+Array = npt.NDArray[np.float64]
+QUANTITIES = {
+    "comparison.passed_rate": Quantity(title="Pairs of views that pass the colours", unit="%"),
+    "comparison.other_rooms_left_out": Quantity(title="Pairs of two rooms left out by colours", unit="%"),
+    "comparison.own_room_left_out": Quantity(title="Pairs of one room left out by colours", unit="%"),
+    "comparison.rank_correlation": Quantity(title="Rank correlation of visual distance and metres"),
+}
+
+
+class ComparedPairs(Stage):
+    """Measures on every two views of a tour what Goedemé et al. 2007, section 4.2, say of their comparison.
+
+    Under `comparison`: `passed_rate`, the share of pairs whose global colours are close enough for their local features
+    to be compared; `other_rooms_left_out` and `own_room_left_out`, the shares of pairs of two rooms, and of one, that
+    are not; of pairs with something in common, at most `within_m` apart, `rank_correlation` of visual distance and
+    metres (Spearman), and `by_metres`: medians of visual distance out to each of `to_m`. None where poses or rooms are
+    not known.
+    """
+
+    max_global_distance: Annotated[float, Bounds(gt=0)] = 0.5
+    """Between the global colours of two views, for their local features to be compared."""
+    within_m: Annotated[float, Bounds(gt=0)] = 8.0
+    """Distance of views (m) up to which visual distances are looked at."""
+
+    class Out(Outputs):
+        """`metrics`: the entry `comparison` of metrics.json."""
+
+        metrics: Metrics
+
+    def step(self, ctx: Context, views: ComparedViews, rooms: Rooms | None = None) -> Out:
+        """The whole tour at once."""
+        one, other = np.triu_indices(len(views), 1)
+        colours = np.stack([each.values for each in views.descriptors]).astype(np.float64)
+        passed = colour_distances(colours[one], colours[other]) <= self.max_global_distance
+        found: dict[str, Any] = {"passed_rate": _share(passed), "own_room_left_out": None, "other_rooms_left_out": None}
+        known = views.pose_source == "truth"
+        if known and rooms is not None:
+            names = np.array([rooms.at(float(x), float(y)) for x, y, _ in views.poses])
+            inside, same = (names[one] != "") & (names[other] != ""), names[one] == names[other]
+            found["own_room_left_out"] = _share(~passed[inside & same])
+            found["other_rooms_left_out"] = _share(~passed[inside & ~same])
+        if known:
+            metres = np.hypot(*(views.poses[one] - views.poses[other])[:, :2].T)
+            near = (metres <= self.within_m) & np.isfinite(views.distances[one, other])
+            found |= against_metres(views.distances[one, other][near], metres[near], self.within_m)
+        return self.Out(metrics=Metrics({"comparison": found}, QUANTITIES))
+
+
+def against_metres(distances: Array, metres: Array, within: float) -> dict[str, Any]:
+    """Visual distances (K,) against metres (K,): rank correlation, and medians in rings that double in width."""
+    edges = within / np.array([np.inf, 8.0, 4.0, 2.0, 1.0])
+    rings = [(metres > low) & (metres <= high) for low, high in pairwise(edges)]
+    medians = [float(np.median(distances[ring])) if ring.any() else None for ring in rings]
+    varied = len(metres) > 2 and np.ptp(distances) > 0.0 and np.ptp(metres) > 0.0
+    return {
+        "rank_correlation": float(spearmanr(distances, metres).statistic) if varied else None,
+        "by_metres": {"to_m": edges[1:].tolist(), "median": medians},
+    }
+
+
+def _share(hits: npt.NDArray[np.bool_]) -> float | None:
+    return float(hits.mean()) if len(hits) else None

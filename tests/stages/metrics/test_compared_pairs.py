@@ -1,0 +1,34 @@
+"""Comparisons of views against where they were taken, worked by hand."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from made_tour import Landmarks, along, mapped, scattered
+
+from omninav.pipeline import Context
+from omninav.stages.metrics.compared_pairs import ComparedPairs, against_metres
+from omninav.stages.values.local_features import GlobalDescriptor
+from omninav.stages.values.rooms import Rooms
+
+LINE = [(5.0, 5.0), (15.0, 5.0)]
+
+
+def test_shares_of_pairs_that_pass_the_colours_by_room() -> None:
+    views = mapped(Landmarks(scattered(20.0, 10.0)), [along(LINE, 2.0)]).views
+    assert len(views) == 5  # at x = 5, 7, 9, 11, 13
+    colours = [0.0, 0.0, 0.0, 0.9, 0.4]
+    descriptors = tuple(GlobalDescriptor(np.array([value, 0.0, 0.0], np.float32)) for value in colours)
+    views = dataclasses.replace(views, descriptors=descriptors)
+    rooms = Rooms(("west", "east"), np.array([[0.0, 0.0, 10.0, 10.0], [10.0, 0.0, 20.0, 10.0]]))
+    found = ComparedPairs(max_global_distance=0.45).step(Context("pairs"), views, rooms).metrics.values["comparison"]
+    assert found["passed_rate"] == pytest.approx(6 / 10)  # all but 0.9 with the four others
+    assert found["own_room_left_out"] == pytest.approx(1 / 4)  # three pairs in the west, one in the east
+    assert found["other_rooms_left_out"] == pytest.approx(3 / 6)
+
+
+def test_visual_distances_by_rings_of_metres() -> None:
+    found = against_metres(np.array([1.0, 2.0, 4.0, 3.0]), np.array([0.5, 1.5, 6.0, 8.0]), 8.0)
+    assert found["rank_correlation"] == pytest.approx(0.8)
+    assert found["by_metres"] == {"to_m": [1.0, 2.0, 4.0, 8.0], "median": [1.0, 2.0, None, 3.5]}
+    assert against_metres(np.ones(3), np.ones(3), 8.0)["rank_correlation"] is None
