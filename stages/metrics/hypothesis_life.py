@@ -1,0 +1,66 @@
+"""How long a wrong hypothesis stays in the belief."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Stage
+from omninav.stages.geometry.plane.se2 import compose
+from omninav.stages.values.belief import GaussianMixture
+from omninav.stages.values.drive import Array, Drive
+
+
+class HypothesisLife(Stage):
+    """Measures how many updates wrong hypotheses stay in a belief of Gaussians, and how their weight falls meanwhile.
+
+    Gross, Koenig & Müller 2005, section 2.1: "the weights of all unsupported components will be reduced passively …
+    after a number of update cycles they can be deleted". A hypothesis is followed along odometry from the frame in
+    which it was stated; it is gone once the belief has no component within `near_m` of where it would be.
+
+    `wrong_hypotheses`: `number`; `updates`, the mean number until they were gone, or until the end; `kept`, how many
+    were there at the end; `weight`, a list over the updates from the first on: the mean of their weights, 0 once they
+    are gone. Nothing where there is no wrong hypothesis.
+    """
+
+    near_m: Annotated[float, Bounds(gt=0)] = 1.5
+    """Distance (m) up to which a component belongs to the hypothesis."""
+    points: Annotated[int, Bounds(ge=1)] = 30
+    """Length of the list."""
+
+    class Out(Outputs):
+        """`metrics`: the entry `wrong_hypotheses` of metrics.json, absent where there is none."""
+
+        metrics: Metrics | None = None
+
+    def step(
+        self,
+        ctx: Context,
+        drive: Drive,
+        beliefs: Sequence[GaussianMixture],
+        wrong: Sequence[GaussianMixture | None],
+    ) -> Out:
+        """The whole run at once."""
+        motions = np.nan_to_num(drive.motion)
+        places: dict[int, Array] = {}  # of the wrong hypotheses that are not gone yet, by the row of their statement
+        weights: dict[int, list[float]] = {}
+        for row, (belief, stated) in enumerate(zip(beliefs, wrong, strict=True)):
+            places = {born: compose(place, motions[row]) for born, place in places.items()}
+            if stated is not None:
+                places[row], weights[row] = stated.means[0], []
+            for born in list(places):
+                away = np.hypot(*(belief.means[:, :2] - places[born][:2]).T)
+                weights[born].append(float(belief.weights[away <= self.near_m].sum()))
+                if not weights[born][-1]:
+                    del places[born]
+        if not weights:
+            return self.Out()
+        lives = [len(each) - (born not in places) for born, each in weights.items()]
+        curve = np.array([(each + [0.0] * self.points)[: self.points] for each in weights.values()])
+        values = {
+            "number": len(weights),
+            "updates": float(np.mean(lives)),
+            "kept": len(places),
+            "weight": curve.mean(axis=0).tolist(),
+        }
+        return self.Out(metrics=Metrics({"wrong_hypotheses": values}))

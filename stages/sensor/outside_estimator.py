@@ -1,0 +1,67 @@
+"""Another position estimator beside odometry and views, as one more hypothesis; now and then it is wrong."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage, State
+from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.values.belief import GaussianMixture
+from omninav.stages.values.pose import Pose
+
+
+class OutsideEstimatorState(State):
+    """Metres driven since the last statement, and the last position (x, y)."""
+
+    since_m: float = math.inf
+    position: tuple[float, float] | None = None
+
+
+class OutsideEstimator(Stage):
+    """Simulates an estimator that states the robot's pose every few metres, with errors, and at times a wrong one.
+
+    Gross, Koenig & Müller 2005, sections 1 and 2.1: "state hypotheses from other sources of information" are fused as
+    motion and views are. Errors are drawn from Gaussians around the true pose; a wrong statement lies `wrong_m` away
+    from it in any direction, and says that it is as exact as the others. Absent between statements and without truth.
+    """
+
+    every_m: Annotated[float, Bounds(gt=0)] = 5.0
+    """Distance driven between two statements; a log's first image has one."""
+    sigma_m: Annotated[float, Bounds(gt=0)] = 0.3
+    """Standard deviation of the position, in x and y."""
+    sigma_deg: Annotated[float, Bounds(gt=0)] = 10.0
+    """Standard deviation of the heading."""
+    wrong: Annotated[float, Bounds(ge=0, le=1)] = 0.0
+    """Share of the statements that are wrong."""
+    wrong_m: Annotated[float, Bounds(gt=0)] = 8.0
+    """Distance (m) of a wrong one from the truth."""
+    weight: Annotated[float, Bounds(gt=0)] = 1.0
+    """Weight against the other sources, whose weights sum to about 1."""
+
+    class Out(Outputs):
+        """`hypothesis`: one Gaussian; `wrong`: the same where it is wrong."""
+
+        hypothesis: GaussianMixture | None = None
+        wrong: GaussianMixture | None = None
+
+    def step(self, ctx: Context, truth: Pose | None, state: OutsideEstimatorState) -> Out:
+        """State the pose where that is due."""
+        if ctx.tick.first_of_log:
+            state.since_m, state.position = math.inf, None
+        if truth is None:
+            return self.Out()
+        if state.position is not None:
+            state.since_m += math.hypot(truth.x - state.position[0], truth.y - state.position[1])
+        state.position = (truth.x, truth.y)
+        if state.since_m < self.every_m:
+            return self.Out()
+        state.since_m = 0.0
+        sigmas = np.array([self.sigma_m, self.sigma_m, math.radians(self.sigma_deg)])
+        mean = np.array([truth.x, truth.y, truth.heading]) + sigmas * ctx.rng.standard_normal(3)
+        is_wrong, direction = ctx.rng.random() < self.wrong, 2.0 * math.pi * ctx.rng.random()
+        if is_wrong:
+            mean[:2] += self.wrong_m * np.array([math.cos(direction), math.sin(direction)])
+        mean[2] = wrap(mean[2])
+        stated = GaussianMixture(mean[None], np.diag(sigmas**2)[None], np.array([self.weight]))
+        return self.Out(hypothesis=stated, wrong=stated if is_wrong else None)

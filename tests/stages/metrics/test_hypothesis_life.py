@@ -1,0 +1,49 @@
+import numpy as np
+import pytest
+from small_run import collected
+
+from omninav.pipeline import Context, Tick
+from omninav.stages.metrics.hypothesis_life import HypothesisLife
+from omninav.stages.values.belief import GaussianMixture
+from omninav.stages.values.pose import Motion, Pose
+
+CTX = Context("metric")
+
+
+def belief(*places: tuple[float, float, float]) -> GaussianMixture:
+    """Components at x, y, with their weights."""
+    means = np.array([[x, y, 0.0] for x, y, _ in places])
+    return GaussianMixture(means, np.tile(np.eye(3), (len(places), 1, 1)), np.array([w for _, _, w in places]))
+
+
+def followed(weights: list[float]):
+    """A metre a frame along x; in frame 1 a wrong hypothesis 8 m beside, which then has these weights."""
+    frames = len(weights) + 1
+    truth = [Pose(float(n), 0.0, 0.0) for n in range(frames)]
+    drive = collected(
+        [Tick(n, n, 0, n, n == 0) for n in range(frames)], truth, [None, *[Motion(1.0, 0.0, 0.0)] * (frames - 1)]
+    )
+    there = [[(n + 1.0, 8.0, w)] if w else [] for n, w in enumerate(weights)]
+    beliefs = [belief((0.0, 0.0, 1.0)), *(belief((n + 1.0, 0.0, 1.0), *each) for n, each in enumerate(there))]
+    wrong = [None, belief((1.0, 8.0, 1.0)), *[None] * (frames - 2)]
+    return HypothesisLife(points=4).step(CTX, drive, beliefs, wrong).metrics.values["wrong_hypotheses"]
+
+
+def test_a_wrong_hypothesis_lives_until_the_belief_has_nothing_there():
+    found = followed([0.5, 0.2, 0.05, 0.0, 0.0])
+    assert (found["number"], found["updates"], found["kept"]) == (1, 3.0, 0)
+    assert found["weight"] == pytest.approx([0.5, 0.2, 0.05, 0.0])
+
+
+def test_one_that_stays_to_the_end_is_counted():
+    found = followed([0.5, 0.5, 0.5])
+    assert (found["updates"], found["kept"]) == (3.0, 1)
+
+
+def test_a_component_that_comes_there_later_is_another():
+    assert followed([0.5, 0.0, 0.3])["updates"] == 1.0
+
+
+def test_without_wrong_hypotheses_there_is_nothing_to_measure():
+    drive = collected([Tick(0, 0)], [Pose(0.0, 0.0, 0.0)])
+    assert HypothesisLife().step(CTX, drive, [belief((0.0, 0.0, 1.0))], [None]).metrics is None
