@@ -102,11 +102,11 @@ class MixtureInMap(GrowingPrior, Stage):
         known = self.known(map, truth, restart)
         if known is None:
             mean, covariance, _ = moments(map.means, map.covariances, map.weights)
+            covariance[2, :2] = covariance[:2, 2] = 0.0
+            covariance[2, 2] = np.pi**2 / 3.0
             covariance = floored(
                 covariance, (self.initial_sigma_m, self.initial_sigma_m, float(np.radians(self.initial_sigma_deg)))
             )
-            covariance[2, :2] = covariance[:2, 2] = 0.0
-            covariance[2, 2] = np.pi**2 / 3.0
         else:
             mean, covariance = known[0].copy(), np.diag(known[1] ** 2)
             mean[2] = wrap(mean[2])

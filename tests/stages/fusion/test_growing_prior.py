@@ -128,6 +128,17 @@ def test_an_unknown_start_in_a_map_of_one_place_is_no_narrower_than_a_known_one_
     assert belief is not None
     covariance = belief.covariances[0]
     assert covariance[:2, :2] == pytest.approx(np.eye(2) * 0.04)
-    assert covariance[2].tolist() == [0.0, 0.0, np.pi**2 / 3.0]
-    assert covariance[:, 2].tolist() == covariance[2].tolist()
+    assert covariance[2] == pytest.approx([0.0, 0.0, np.pi**2 / 3.0])
+    np.testing.assert_array_equal(covariance, covariance.T)
     assert belief.means[0, :2] == pytest.approx([1.0, 2.0])
+
+
+def test_positions_are_as_spread_as_the_map_whatever_headings_they_go_with() -> None:
+    # Places 2 m apart along x, with headings that hardly differ and go with x.
+    map = ViewMixtures.empty()
+    for x in (-1.0, 1.0):
+        row = map.add_view(np.zeros(1, np.float32), "Coefficients")
+        map.add_component(row, np.array([x, 0.0, 0.002 * x]), np.eye(3) * 1e-6, 0.5, 1.0)
+    belief = MixtureInMap().step(context(), map, None).belief
+    assert belief is not None
+    assert belief.covariances[0] == pytest.approx(np.diag([1.0 + 1e-6, 1e-4, np.pi**2 / 3.0]), abs=1e-12)
