@@ -1,8 +1,8 @@
-"""One session of pytest in which every mutant of a folder runs, each in a process of its own.
+"""One session of pytest in which every mutant of a folder is tried.
 
 Tests are collected once. They run once under coverage, so that of each line it is known which tests reach it and how
-long they work. Then each mutant gets a fork of this process, in which the changed function's code is put in the place
-of the original's, for whoever imported it; the tests that reach its line run, quick ones first, until one fails.
+long they work. Then forks of this process try some mutants each: the changed function's code is put in the place of
+the original's, for whoever imported it; the tests that reach its line run, quick ones first, until one fails.
 """
 
 import gc
@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import CodeType, FunctionType
+from typing import NamedTuple
 
 import coverage
 import pytest
@@ -25,8 +26,20 @@ from mutations import Function, Mutant
 QUICK_S = 3.0
 """A test that works longer is asked only where no quicker one reaches the line."""
 SETUP = "set-up of "
+BATCH = 20
+"""Mutants that are tried in one process, one after the other: a process costs more than most trials."""
+SURVIVES, KILLED = b"0", b"1"
 
 Reached = dict[str, dict[int, set[int]]]
+
+
+class Trial(NamedTuple):
+    """A mutant, the functions that it changes, their changed code, and the tests to ask."""
+
+    mutant: Mutant
+    targets: list[FunctionType]
+    code: CodeType
+    chosen: list[int]
 
 
 class MutantSession:
@@ -40,6 +53,7 @@ class MutantSession:
         self.ends: dict[Mutant, str] = {}
         self.asked: dict[Mutant, list[str]] = {}
         self.items: list[pytest.Item] = []
+        self.seconds: list[float] = []
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
@@ -47,28 +61,31 @@ class MutantSession:
         if session.testsfailed:
             raise session.Failed("tests cannot be collected")
         self.items = session.items
-        reached, seconds = self._observed()
+        reached, self.seconds = self._observed()
         functions = _functions(self.root)
-        running: dict[int, Mutant] = {}
         gc.freeze()  # a fork that collects garbage would copy all of the memory
+        trials: list[Trial] = []
         for mutant in self.mutants:
-            chosen = self._chosen(mutant, reached, seconds)
+            chosen = self._chosen(mutant, reached)
             self.asked[mutant] = [self.items[k].nodeid for k in chosen]
             code = self._changed(mutant)
             targets = functions.get((mutant.file, mutant.function), []) if mutant.function else []
             if not chosen:
-                self.ends[mutant] = "no test"
-                self.survived(mutant, [])
-                continue
-            if code is None or not targets or any(each.__code__.co_freevars != code.co_freevars for each in targets):
+                self._ends(mutant, "no test")
+            elif code is None or not targets or any(each.__code__.co_freevars != code.co_freevars for each in targets):
                 self.ends[mutant] = "import"
-                continue
-            allowed = 10.0 + 5.0 * sum(seconds[k] for k in chosen)
-            running[self._forked(targets, code, chosen, allowed)] = mutant
-            while len(running) >= self.jobs:
-                self._ended(running)
-        while running:
-            self._ended(running)
+            else:
+                trials.append(Trial(mutant, targets, code, chosen))
+        batches = [trials[k : k + BATCH] for k in range(0, len(trials), BATCH)]
+        running: dict[int, tuple[list[Trial], int]] = {}
+        while batches or running:
+            while batches and len(running) < self.jobs:
+                batch = batches.pop(0)
+                child, told = self._forked(batch)
+                running[child] = batch, told
+            child, _ = os.wait()
+            if child in running:
+                batches[:0] = self._ended(*running.pop(child))
         return True
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
@@ -124,7 +141,7 @@ class MutantSession:
             }
         return reached, seconds, failed
 
-    def _chosen(self, mutant: Mutant, reached: Reached, seconds: list[float]) -> list[int]:
+    def _chosen(self, mutant: Mutant, reached: Reached) -> list[int]:
         """The tests that reach a mutant's line, those of its file's own test first, then quick ones.
 
         Whatever is compiled or runs at import is reached by all tests of the file; a line that no test reaches by none.
@@ -132,9 +149,9 @@ class MutantSession:
         lines = reached[mutant.file]
         everywhere = set().union(*lines.values()) or set(range(len(self.items)))
         chosen = lines.get(mutant.line, set()) if mutant.function else everywhere
-        quick = {k for k in chosen if seconds[k] <= QUICK_S}
+        quick = {k for k in chosen if self.seconds[k] <= QUICK_S}
         own = f"test_{Path(mutant.file).name}"
-        return sorted(quick or chosen, key=lambda k: (self.items[k].path.name != own, seconds[k], k))
+        return sorted(quick or chosen, key=lambda k: (self.items[k].path.name != own, self.seconds[k], k))
 
     def _changed(self, mutant: Mutant) -> CodeType | None:
         """The code of the changed function."""
@@ -146,34 +163,64 @@ class MutantSession:
                 return code
         return None
 
-    def _forked(self, targets: list[FunctionType], code: CodeType, chosen: list[int], allowed: float) -> int:
+    def _forked(self, batch: list[Trial]) -> tuple[int, int]:
+        """A process that tries some mutants, and where it tells of each whether it was killed, a byte for each.
+
+        A last byte tells whether the tests that failed pass without a change, so that no mutant has spoilt another's
+        trial.
+        """
+        here, there = os.pipe()
         child = os.fork()
         if child:
-            return child
+            os.close(there)
+            return child, here
         printed_to(Path(os.devnull))
-        ends_after(int(allowed))
-        for function in targets:
-            function.__code__ = code
-        failed = False
+        failed = set()
+        for trial in batch:
+            ends_after(10 + int(5.0 * sum(self.seconds[k] for k in trial.chosen)))
+            originals = [function.__code__ for function in trial.targets]
+            for function in trial.targets:
+                function.__code__ = trial.code
+            by = self._failing(trial.chosen)
+            for function, original in zip(trial.targets, originals, strict=True):
+                function.__code__ = original
+            failed |= {by} - {None}
+            os.write(there, SURVIVES if by is None else KILLED)
+        ends_after(60)
+        os.write(there, SURVIVES if self._failing(sorted(failed)) is None else KILLED)
+        os._exit(0)
+
+    def _failing(self, chosen: list[int]) -> int | None:
+        """The first of some tests that fails."""
         for k, after in zip(chosen, [*chosen[1:], None], strict=True):
             following = None if after is None else self.items[after]
             if any(report.failed for report in runtestprotocol(self.items[k], nextitem=following, log=False)):
-                failed = True
-                break
-        os._exit(int(failed))
+                return k
+        return None
 
-    def _ended(self, running: dict[int, Mutant]) -> None:
-        child, status = os.wait()
-        if child in running:
-            mutant = running.pop(child)
-            self.ends[mutant] = "survived" if status == 0 else "killed"
-            if status == 0:
-                self.survived(mutant, self.asked[mutant])
+    def _ended(self, batch: list[Trial], told: int) -> list[list[Trial]]:
+        """Keep what became of the mutants of a process that ended; those that it did not come to."""
+        with os.fdopen(told, "rb") as pipe:
+            ends = [bytes([each]) for each in pipe.read()]
+        if len(ends) > len(batch) and ends[-1] == KILLED and len(batch) > 1:
+            return [[trial] for trial in batch]
+        for trial, end in zip(batch, ends, strict=False):
+            self._ends(trial.mutant, "killed" if end == KILLED else "survived")
+        if len(ends) >= len(batch):
+            return []
+        self._ends(batch[len(ends)].mutant, "killed")  # it did not end, or ended the process
+        return [rest] if (rest := batch[len(ends) + 1 :]) else []
+
+    def _ends(self, mutant: Mutant, end: str) -> None:
+        self.ends[mutant] = end
+        if end != "killed":
+            self.survived(mutant, self.asked[mutant])
 
 
 def ends_after(seconds: int) -> None:
-    """This process is killed after so many seconds of work, and after ten times as many that it may wait."""
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+    """This process is killed after so many more seconds of work, and after ten times as many that it may wait."""
+    _, most = resource.getrlimit(resource.RLIMIT_CPU)
+    resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time()) + seconds, most))
     signal.alarm(10 * seconds)
 
 
