@@ -32,3 +32,51 @@ def test_visual_distances_by_rings_of_metres() -> None:
     assert found["rank_correlation"] == pytest.approx(0.8)
     assert found["by_metres"] == {"to_m": [1.0, 2.0, 4.0, 8.0], "median": [1.0, 2.0, None, 3.5]}
     assert against_metres(np.ones(3), np.ones(3), 8.0)["rank_correlation"] is None
+
+
+def test_only_pairs_within_eight_metres_that_have_something_in_common_are_ranked() -> None:
+    views = mapped(Landmarks(scattered(20.0, 10.0)), [along(LINE, 2.0)]).views  # at x = 5, 7, 9, 11, 13
+    distances = np.full((5, 5), np.inf)
+    for (one, other), distance in {(0, 1): 1.0, (1, 2): 3.0, (0, 2): 4.0, (0, 3): 5.0, (0, 4): 9.0}.items():
+        distances[one, other] = distances[other, one] = distance
+    views = dataclasses.replace(views, distances=distances)
+    found = ComparedPairs().step(Context("pairs"), views).metrics.values["comparison"]
+    assert found["by_metres"] == {"to_m": [1.0, 2.0, 4.0, 8.0], "median": [None, 2.0, 4.0, 7.0]}
+    assert found["rank_correlation"] > 0.9
+    near = ComparedPairs(within_m=6.5).step(Context("pairs"), views).metrics.values["comparison"]["by_metres"]
+    assert near["median"] == [None, None, 2.0, 4.5]
+    assert (found["own_room_left_out"], found["other_rooms_left_out"]) == (None, None)
+
+
+def test_where_poses_are_not_true_only_colours_are_compared() -> None:
+    views = mapped(Landmarks(scattered(20.0, 10.0)), [along(LINE, 2.0)]).views
+    colours = [0.0, 0.5, 0.5, 1.1, 1.1]
+    descriptors = tuple(GlobalDescriptor(np.array([value, 0.0, 0.0], np.float32)) for value in colours)
+    views = dataclasses.replace(views, descriptors=descriptors, pose_source="odometry")
+    rooms = Rooms(("all",), np.array([[0.0, 0.0, 20.0, 10.0]]))
+    found = ComparedPairs().step(Context("pairs"), views, rooms).metrics.values["comparison"]
+    assert found["passed_rate"] == pytest.approx(4 / 10)  # half apart passes, 0.6 does not
+    assert "by_metres" not in found
+    assert (found["own_room_left_out"], found["other_rooms_left_out"]) == (None, None)
+
+
+def test_a_view_outside_of_all_rooms_is_in_none() -> None:
+    views = mapped(Landmarks(scattered(20.0, 10.0)), [along(LINE, 2.0)]).views
+    colours = [0.0, 0.9, 0.0, 0.0, 0.0]
+    descriptors = tuple(GlobalDescriptor(np.array([value, 0.0, 0.0], np.float32)) for value in colours)
+    rooms = Rooms(("west",), np.array([[0.0, 0.0, 8.0, 10.0]]))
+    given = dataclasses.replace(views, descriptors=descriptors)
+    found = ComparedPairs().step(Context("pairs"), given, rooms).metrics.values["comparison"]
+    assert (found["own_room_left_out"], found["other_rooms_left_out"]) == (1.0, None)
+
+
+def test_a_rank_needs_three_pairs_that_vary() -> None:
+    for distances, metres in (
+        ([1.0, 2.0], [1.0, 2.0]),
+        ([1.0, 1.0, 1.0], [1.0, 2.0, 3.0]),
+        ([1.0, 2.0, 3.0], [1.0] * 3),
+    ):
+        assert against_metres(np.array(distances), np.array(metres), 8.0)["rank_correlation"] is None
+    rising = against_metres(np.array([1.0, 2.0, 9.0]), np.array([1.0, 2.0, 3.0]), 8.0)
+    assert rising["rank_correlation"] == pytest.approx(1.0)
+    assert rising["by_metres"]["median"] == [1.0, 2.0, 9.0, None]  # an edge belongs to the inner ring

@@ -47,3 +47,30 @@ def test_a_component_that_comes_there_later_is_another():
 def test_without_wrong_hypotheses_there_is_nothing_to_measure():
     drive = collected([Tick(0, 0)], [Pose(0.0, 0.0, 0.0)])
     assert HypothesisLife().step(CTX, drive, [belief((0.0, 0.0, 1.0))], [None]).metrics is None
+
+
+def test_hypotheses_are_followed_along_odometry_each_from_its_own_frame_and_figures_are_means():
+    # The robot turns left by a right angle, then drives a metre; what was ahead of the first is followed in its frame.
+    motion = [None, Motion(0.0, 0.0, np.pi / 2), Motion(2.0, 0.0, 0.0), Motion(2.0, 0.0, 0.0)]
+    drive = collected([Tick(n, n) for n in range(4)], [Pose(0.0, 0.0, 0.0)] * 4, motion)
+    one, other = belief((5.0, 0.0, 0.3), (50.0, 0.0, 0.9)), belief((-5.0, 0.0, 1.0))
+    beliefs = [
+        belief((5.0, 1.5, 0.25), (5.0, -1.5, 0.5), (5.0, 1.6, 9.0)),
+        belief((5.0, 0.0, 0.5), (-5.0, 0.0, 0.25)),
+        belief((5.0, 2.0, 0.25), (-3.0, 0.0, 0.5)),
+        belief((5.0, 4.0, 0.125), (5.0, -4.0, 1.0)),
+    ]
+    found = HypothesisLife(points=5).step(CTX, drive, beliefs, [one, other, None, None]).metrics.values
+    assert found["wrong_hypotheses"] == {
+        "number": 2,
+        "updates": 3.0,  # four to the end, and two until it was gone in the third
+        "kept": 1,
+        "weight": pytest.approx([(0.75 + 0.25) / 2, (0.5 + 0.5) / 2, 0.25 / 2, 0.125 / 2, 0.0]),
+    }
+
+
+def test_the_list_has_thirty_updates():
+    drive = collected([Tick(n, n) for n in range(40)], [Pose(0.0, 0.0, 0.0)] * 40)
+    there = belief((1.0, 0.0, 0.5))
+    found = HypothesisLife().step(CTX, drive, [there] * 40, [there, *[None] * 39]).metrics.values["wrong_hypotheses"]
+    assert (found["weight"], found["updates"], found["kept"]) == ([0.5] * 30, 40.0, 1)

@@ -61,3 +61,58 @@ def test_an_answer_is_right_where_it_was_taken_near_by_and_looks_the_same_way() 
     assert found["first_nearby_rate"] == pytest.approx(0.5)
     assert found["background_rate"] == pytest.approx(3 / 6)
     assert (found["first_similarity"], found["last_similarity"]) == pytest.approx((0.8, 0.6))
+
+
+def own(values, *, at=(0.0, 0.0, 0.0), poses=POSES, **parameters):
+    graph = ReferenceGraph(
+        np.array(poses, np.float64),
+        np.ones((len(poses), 1, 2), np.float32),
+        "histograms",
+        np.zeros((0, 2), np.int64),
+        "truth",
+    )
+    similarities = Similarities(np.array(values, np.float32).reshape(len(poses), -1))
+    return OwnPlace(**parameters).step(Context("own"), similarities, Pose(*at), graph).likeness
+
+
+@pytest.mark.parametrize(
+    ("off", "found"), [((0.09, 0.0), 0.9), ((0.0, -0.09), 0.9), ((0.11, 0.0), None), ((0.08, 0.08), None)]
+)
+def test_the_own_place_is_within_a_tenth_of_a_metre(off: tuple[float, float], found: float | None) -> None:
+    likeness = own([0.9, 0.2], poses=[(3.0 + off[0], 4.0 + off[1], 0.0), (90.0, 0.0, 0.0)], at=(3.0, 4.0, 0.0))
+    assert (likeness and likeness.own) == (found and pytest.approx(found))
+
+
+def test_places_nearby_are_half_a_metre_to_one_and_a_half_away_and_others_from_five_on() -> None:
+    xs = [0.0, 0.45, 0.5, 1.5, 1.55, 4.95, 5.0, 9.0]
+    values = [0.9, 0.1, 0.5, 0.7, 0.1, 0.99, 0.4, 0.2]
+    found = own(values, poses=[(0.0, x, 0.0) for x in xs])
+    assert (found.own, found.nearby, found.average, found.most) == pytest.approx((0.9, 0.6, 0.3, 0.4))
+    alone = own([0.9, 0.4], poses=[(0.0, 0.0, 0.0), (0.0, 5.0, 0.0)])
+    assert np.isnan(alone.nearby)
+    assert own([0.9, 0.4], poses=[(0.0, 0.0, 0.0), (0.0, 4.0, 0.0)]) is None
+
+
+def test_a_view_that_looks_another_way_by_more_than_five_degrees_is_not_of_the_place() -> None:
+    far = (90.0, 0.0, 0.0)
+    assert own([0.9, 0.2], poses=[(0.0, 0.0, np.radians(4.9)), far]).own == pytest.approx(0.9)
+    assert own([0.9, 0.2], poses=[(0.0, 0.0, np.radians(-5.1)), far]) is None
+    # Compared at 36 headings the robot's own is 3 degrees off the nearest.
+    values = np.full((2, 36), 0.1)
+    values[0, 4] = 0.8
+    assert own(
+        values, poses=[(0.0, 0.0, np.radians(-20.0)), far], at=(0.0, 0.0, np.radians(23.0))
+    ).own == pytest.approx(0.8)
+
+
+def test_without_truth_or_map_nothing_is_compared_and_without_views_nothing_is_told() -> None:
+    values = Similarities(np.ones((6, 1), np.float32))
+    assert OwnPlace().step(Context("own"), values, None, MAP).likeness is None
+    empty = ReferenceGraph.empty()
+    none = Similarities(np.ones((0, 1), np.float32))
+    assert OwnPlace().step(Context("own"), none, Pose(0.0, 0.0, 0.0), empty).likeness is None
+    assert OwnPlaceRecognition().step(Context("own"), [None]).metrics is None
+    lone = OwnPlaceRecognition().step(Context("own"), [Likeness(0.5, float("nan"), 0.0, 0.5)]).metrics
+    found = lone.values["own_place"]
+    assert (found["similarity_nearby"], found["lost_nearby"], found["told_rate"]) == (None, None, 0.0)
+    assert (found["lost"], found["similarity_elsewhere"], found["images"]) == (0.5, 0.0, 1)
