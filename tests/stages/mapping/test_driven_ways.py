@@ -186,3 +186,23 @@ def test_between_medoids_are_path_images_unless_none_are_asked_for(least: int, i
     assert made.links.tolist() == [[0, 1]]
     assert made.frames[made.places].tolist() == [10, 40]
     assert len(made.path_of(0)) == images
+
+
+@pytest.mark.parametrize(
+    ("place", "names", "links"), [([0, 1, 0, 1], ("", "desk"), [[1, 0]]), ([0, 0, 0, 1], ("desk", ""), [[0, 1]])]
+)
+def test_a_known_map_keeps_its_links_and_names(
+    place: list[int], names: tuple[str, ...], links: list[list[int]]
+) -> None:
+    # Known: from 1 to 0, and 1 is the desk. The tour drives from what looks as 0 to what looks as 1: the same link. Or
+    # both known places have become one, with the name of either, and the tour leads on to a new place.
+    known = made_map([(0.0, 0.0), (1.0, 0.0)], {(1, 0): 0}, names=["", "desk"])
+    views = made_views(between_looks([0.0, 10.0, 0.1, 10.1]), tours=[0, 0, 1, 1], owners=[0, 1, -1, -1])
+    views = replace(views, features=(patches(range(5)),) * 4)
+    own, none, pairs = np.array(place), np.empty((0, 3)), np.empty((0, 2), np.int64)
+    hypotheses = LoopHypotheses(
+        views.poses, own, own, own, views.tours, pairs, np.empty(0), none, none, np.empty(0, np.bool_), "odometry"
+    )
+    made = TopologicalMapping(min_path_matches=6).step(Context("mapping"), views, hypotheses, known).map
+    assert made.names == names
+    assert made.links.tolist() == links
