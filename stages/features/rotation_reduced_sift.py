@@ -65,10 +65,10 @@ class RotationReducedSift(Stage):
             seen = np.ones(pixels.shape[:2], np.bool_)
         grey = cast(Pixels, cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY))
         mask = None if read.ring is None else seen.astype(np.uint8)
-        found = self._strongest(list(self._sift.detect(grey, mask)), read, seam)
+        found = self._strongest(self._detected(grey, mask), read, seam)
         if not found:
             return self.Out(features=none_found())
-        _, descriptors = self._sift.compute(grey, found)
+        descriptors = self._described(grey, found)
         points = np.array([point.pt for point in found], np.float64)
         sizes = np.array([point.size for point in found], np.float32)
         colours = disc_colours(pixels, seen, points, self.colour_radius * sizes)
@@ -77,6 +77,12 @@ class RotationReducedSift(Stage):
         features = LocalFeatures(read.bearings(points), points, descriptors.astype(np.uint8), colours, sizes)
         shown = np.isfinite(features.bearings).all(axis=1)  # beyond the mirror's edge there is nothing to see
         return self.Out(features=features.chosen(np.flatnonzero(shown)))
+
+    def _detected(self, grey: Pixels, mask: Pixels | None) -> list[cv2.KeyPoint]:
+        return list(self._sift.detect(grey, mask))
+
+    def _described(self, grey: Pixels, found: list[cv2.KeyPoint]) -> npt.NDArray[np.float32]:
+        return cast(npt.NDArray[np.float32], self._sift.compute(grey, found)[1])
 
     def _strongest(self, found: list[cv2.KeyPoint], read: PreparedImage, seam: int) -> list[cv2.KeyPoint]:
         if not found:

@@ -1,21 +1,24 @@
 """Where a second view was taken, seen from the first."""
 
 import math
-from typing import Annotated
+from typing import Annotated, Literal
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.two_views.generate_and_select import generate_and_select
 from omninav.stages.geometry.two_views.relative_pose_ransac import Solver, relative_pose
 from omninav.stages.values.two_views import BearingPairs, RelativeView
 
 
 class TwoViewPose(Stage):
-    """Relative pose of two views from pairs of bearings of which many are wrong, by one of three solvers.
+    """Relative pose of two views from pairs of bearings of which many are wrong, by one of four solvers.
 
-    Goedemé et al. 2007, section 7.1.1: of random samples the one counts with which most pairs agree.
+    Goedemé et al. 2007, section 7.1.1: of random samples the one counts with which most pairs agree; or Svoboda's
+    algorithm, which they could not use.
     """
 
-    solver: Solver = "planar"
-    """`planar`: two pairs in a sample, for a robot on a floor; `five_point`; `eight_point`, the paper's."""
+    solver: Solver | Literal["generate_and_select"] = "planar"
+    """`planar`: two pairs in a sample, for a robot on a floor; `five_point`; `eight_point`, the paper's;
+    `generate_and_select`, which draws no samples and refines nothing."""
     max_error_deg: Annotated[float, Bounds(gt=0)] = 0.5
     """By which the two bearings of a pair may together miss the pose."""
     confidence: Annotated[float, Bounds(gt=0, lt=1)] = 0.9999
@@ -32,16 +35,12 @@ class TwoViewPose(Stage):
 
     def step(self, ctx: Context, pairs: BearingPairs) -> Out:
         """Solve one problem."""
-        found = relative_pose(
-            pairs.first,
-            pairs.second,
-            ctx.rng,
-            self.solver,
-            math.radians(self.max_error_deg),
-            self.confidence,
-            self.max_samples,
-            self.refine,
-        )
+        threshold = math.radians(self.max_error_deg)
+        if self.solver == "generate_and_select":
+            found = generate_and_select(pairs.first, pairs.second, threshold)
+        else:
+            by = ctx.rng, self.solver, threshold, self.confidence, self.max_samples, self.refine
+            found = relative_pose(pairs.first, pairs.second, *by)
         if found is None:
             ctx.count("no_relative_pose")
             return self.Out()

@@ -26,6 +26,7 @@ from omninav.stages.simulator.streams import stream
 from omninav.stages.simulator.world import World
 from omninav.stages.values.command import Command
 from omninav.stages.values.drive_tally import DriveTally
+from omninav.stages.values.homing import PathProgress
 from omninav.stages.values.image import Image
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import Motion, Pose
@@ -86,7 +87,7 @@ class ClosedLoop(Source):
     rate_hz: Annotated[float, Bounds(ge=1)] = 5.0
     """Ticks a second."""
     rest_s: Annotated[float, Bounds(ge=0)] = 1.0
-    """How long it goes on once the planned route has ended: the robot has arrived, or given up."""
+    """How long it goes on once the planned route, or a path without one, has ended: it has arrived, or given up."""
     kidnappings: tuple[Kidnapping, ...] = ()
     """When and how somebody lifts it: {at: 30.0, turn: 1.5} or {at: 30.0, to: [x, y, heading]} (s, m, rad)."""
 
@@ -129,9 +130,11 @@ class ClosedLoop(Source):
         simulation: ClosedLoopState,
         command: Command | None = None,
         route: PlannedRoute | None = None,
+        progress: PathProgress | None = None,
     ) -> Out | None:
         """Drive on under the last command, then perceive; None when the time, or the route, is over."""
         simulation.ended += route is not None and route.state in ("arrived", "gave up")
+        simulation.ended += progress is not None and progress.arrived
         if simulation.ticks >= int(self.seconds * self.rate_hz) or simulation.ended > self.rest_s * self.rate_hz:
             return None
         motion = None

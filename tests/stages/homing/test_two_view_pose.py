@@ -50,6 +50,19 @@ def test_every_problem_of_a_robot_on_a_floor_is_solved() -> None:
     assert metrics["rotation_error_deg"]["p95"] < 0.4
 
 
+def test_generate_and_select_solves_what_has_few_wrong_pairs_and_not_what_has_many() -> None:
+    shares = {}
+    for wrong in (0.0, 0.05, 0.5):
+        right = []
+        for out in problems(problems=10, planar=False, noise_deg=0.05, outlier_ratio=wrong):
+            view = TwoViewPose(solver="generate_and_select").step(Context("pose"), out.pairs).view
+            assert view is not None
+            right.append(float(view.translation @ out.truth.translation) > math.cos(math.radians(3.0)))
+        shares[wrong] = np.mean(right)
+    assert shares[0.0] == 1.0
+    assert shares[0.0] >= shares[0.05] > shares[0.5]
+
+
 def test_too_few_pairs_are_counted() -> None:
     ctx = Context("homing")
     assert TwoViewPose().step(ctx, BearingPairs(np.zeros((1, 3)), np.zeros((1, 3)))).view is None

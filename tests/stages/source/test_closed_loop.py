@@ -21,6 +21,7 @@ from omninav.stages.simulator.robot import around, limits, reach, steer
 from omninav.stages.simulator.world import World
 from omninav.stages.source.closed_loop import ClosedLoop, ClosedLoopState
 from omninav.stages.values.command import Command
+from omninav.stages.values.homing import PathProgress
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.scan import Scan
 
@@ -64,6 +65,17 @@ def test_a_way_that_has_ended_ends_the_drive_a_moment_later(state):
     loop = Loop(seconds=20.0, rest_s=1.0)
     ways = [None, *[PlannedRoute(np.array([3]), "under way", 0)] * 5, *[PlannedRoute(np.array([3]), state, 0)] * 9]
     outs = [loop.source.step(loop.ctx, loop.state, None, way) for way in ways]
+    assert [out is not None for out in outs] == [True] * 11 + [False] * 4
+
+
+def test_a_path_that_has_been_gone_ends_the_drive_a_moment_later():
+    loop = Loop(seconds=20.0, rest_s=1.0)
+    gone = [
+        None,
+        *[PathProgress(0, 1, 2, 1, True, False, False)] * 5,
+        *[PathProgress(0, 2, 2, 1, True, True, True)] * 9,
+    ]
+    outs = [loop.source.step(loop.ctx, loop.state, None, None, progress) for progress in gone]
     assert [out is not None for out in outs] == [True] * 11 + [False] * 4
 
 
