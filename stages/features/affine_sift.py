@@ -35,5 +35,5 @@ class AffineSift(RotationReducedSift):
         return list(found)
 
     def _described(self, grey: Pixels, found: list[cv2.KeyPoint]) -> npt.NDArray[np.float32]:
-        rows: npt.NDArray[np.float32] = self._rows[[point.class_id for point in found]]
+        rows = self._rows[[point.class_id for point in found]].astype(np.float32)
         return rows

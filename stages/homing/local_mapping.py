@@ -59,7 +59,7 @@ class LocalMapping(Stage):
     """
 
     matching: Literal["every_image", "at_start"] = "every_image"
-    """Whether features are matched with the target's anew in every image, or, as in the paper, once, and then only
+    """Whether features are matched with the target's fresh in every image, or, as in the paper, once, and then only
     tracked: until the target is lost, which is a new start."""
 
     solver: Solver = "planar"
@@ -124,15 +124,15 @@ class LocalMapping(Stage):
         """The map with the robot in it, or a new one."""
         why = ""
         if len(local_map):
-            anew = matches if self.matching == "every_image" else NO_MATCHES
-            local_map = self._resection(ctx, local_map, tracks, anew)
+            fresh = matches if self.matching == "every_image" else NO_MATCHES
+            local_map = self._resection(ctx, local_map, tracks, fresh)
             if local_map.state == "tracking":
-                if self._could_be_better(local_map, len(anew.rows)):
+                if self._could_be_better(local_map, len(fresh.rows)):
                     more = round(self.rebuild_ratio * local_map.first_inliers)
-                    new, _ = self._made(ctx, state, local_map, anew, more)
+                    new, _ = self._made(ctx, state, local_map, fresh, more)
                     if new is not None:
                         return new
-                if not self._contradicted(local_map, anew):
+                if not self._contradicted(local_map, fresh):
                     return local_map
                 ctx.count("false_map")
                 local_map = LocalMap(-1, local_map.target, "lost")

@@ -9,30 +9,30 @@ from .epipolar import angular_residuals, decompose, eight_points, in_front
 from .ransac import AgreedPose
 from .relative_pose_ransac import agreement
 
-LEAST = 8
+MIN_PAIRS = 8
 """Pairs of a linear fit."""
 
 
 def generate_and_select(
-    first: npt.ArrayLike, second: npt.ArrayLike, threshold: float, rounds: int = 20, least_share: float = 0.3
+    first: npt.ArrayLike, second: npt.ArrayLike, threshold: float, rounds: int = 20, min_share: float = 0.3
 ) -> AgreedPose | None:
     """Where view 2 was taken, seen from view 1, by Svoboda's algorithm as Goedemé et al. 2007, section 7.1.1, tell it.
 
     An overdetermined system is solved again and again, built from the pairs of unit bearings (N, 3) and (N, 3) that
-    missed the essential matrix before by least, fewer in each of the `rounds`, down to `least_share` of all; the matrix
+    missed the essential matrix before by the least, fewer in each of the `rounds`, down to `min_share` of all; the matrix
     with the best quality q_e counts. Which pairs agree with it is said as in `relative_pose`, within `threshold` (rad).
     None for fewer than eight pairs. How many pairs are left out in a round is our reading.
     """
     first, second = np.asarray(first, np.float64), np.asarray(second, np.float64)
-    if len(first) < LEAST:
+    if len(first) < MIN_PAIRS:
         return None
     chosen, best, found = np.arange(len(first)), math.inf, np.zeros((3, 3))
-    for share in np.linspace(1.0, least_share, rounds):
+    for share in np.linspace(1.0, min_share, rounds):
         matrix, quality = eight_points(first[chosen], second[chosen])
         if quality < best:
             best, found = float(quality), matrix
         outlierness = angular_residuals(matrix, first, second)
-        chosen = np.argsort(outlierness, kind="stable")[: max(LEAST, round(share * len(first)))]
+        chosen = np.argsort(outlierness, kind="stable")[: max(MIN_PAIRS, round(share * len(first)))]
     rotations, translations = decompose(found)
     close = angular_residuals(found, first, second) <= threshold
     k = int(np.argmax(in_front((rotations, translations), first[close], second[close])))
