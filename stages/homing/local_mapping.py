@@ -59,7 +59,7 @@ class LocalMapping(Stage):
     """
 
     matching: Literal["every_image", "at_start"] = "every_image"
-    """Whether features are matched with the target's fresh in every image, or, as in the paper, once, and then only
+    """Whether features are matched with the target's again in every image, or, as in the paper, once, and then only
     tracked: until the target is lost, which is a new start."""
 
     solver: Solver = "planar"

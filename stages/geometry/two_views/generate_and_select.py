@@ -19,7 +19,7 @@ def generate_and_select(
     """Where view 2 was taken, seen from view 1, by Svoboda's algorithm as Goedemé et al. 2007, section 7.1.1, tell it.
 
     An overdetermined system is solved again and again, built from the pairs of unit bearings (N, 3) and (N, 3) that
-    missed the essential matrix before by the least, fewer in each of the `rounds`, down to `min_share` of all; the matrix
+    missed the essential matrix before by the least, fewer in each of the `rounds`, down to `min_share` of all; that
     with the best quality q_e counts. Which pairs agree with it is said as in `relative_pose`, within `threshold` (rad).
     None for fewer than eight pairs. How many pairs are left out in a round is our reading.
     """
