@@ -26,6 +26,7 @@ NO_VIDEO = ("~nodes.video", "~wires.video")
 
 RUNS: dict[str, tuple[str, ...]] = {
     "homing": (*SMALL_CAMERA, *NO_VIDEO, "nodes.source.seconds=4"),
+    "homing_as_printed": (*SMALL_CAMERA, *NO_VIDEO, "nodes.source.seconds=4"),
     "homing_field": ("world=home_store_demo", *SMALL_CAMERA, "nodes.field.rings=2"),
     "matched_pairs": (MAPPED, "nodes.matches.pairs=4"),
     "omninav": (TOUR, DRIVE),
@@ -57,8 +58,17 @@ RUNS: dict[str, tuple[str, ...]] = {
         "log=out.mcap",
     ),
     "topological_localisation": (TOUR, DRIVE, EVERY_SECOND),
+    "topological_localisation_as_printed": (TOUR, DRIVE, EVERY_SECOND),
     "topological_nav": ("world=home_store_demo", *SMALL_CAMERA, *NO_VIDEO, "goal=3", "nodes.source.seconds=3"),
+    "topological_nav_as_printed": (
+        "world=home_store_demo",
+        *SMALL_CAMERA,
+        *NO_VIDEO,
+        "goal=3",
+        "nodes.source.seconds=3",
+    ),
     "topological_nav_map": (MAPPED, EVERY_SECOND),
+    "topological_nav_map_as_printed": (MAPPED, EVERY_SECOND),
     "two_views": (),
     "wander": (*SMALL_CAMERA, "nodes.source.seconds=4"),
 }
