@@ -323,16 +323,17 @@ def test_each_mode_confirms_the_component_that_is_nearest_to_it_and_a_far_one_is
     row = map.add_view(np.zeros(2, np.float32), "Coefficients")
     for x in (0.0, 0.5, 5.0):
         map.add_component(row, np.array([x, 0.0, 0.0]), np.eye(3) * 0.01, 0.5, 3.0)
-    modes = state([0.4, 0, 0], [5.1, 0, 0], [9.0, 0, 0], weights=[0.5, 0.25, 0.25])
+    modes = state([9.0, 0, 0], [0.4, 0, 0], [5.1, 0, 0], sigma=0.2, weights=[0.25, 0.5, 0.25])
     learn(map, view(0, 0), modes, min_sigma_m=0.1, min_sigma_deg=np.degrees(0.1), merge_below=7.81)
     order = np.argsort(map.means[:, 0])
     # Counts 3 and 0.5 or 0.25: (3 * 0.5 + 0.5 * 0.4) / 3.5 and (3 * 5 + 0.25 * 5.1) / 3.25.
     assert map.means[order, 0] == pytest.approx([0.0, 1.7 / 3.5, 16.275 / 3.25, 9.0])
     assert map.counts[order] == pytest.approx([3.0, 3.5, 3.25, 0.25])
-    assert map.weights[order] == pytest.approx([0.45, 0.1 * 0.5 + 0.45, 0.1 * 0.25 + 0.45, 0.1 * 0.25])
-    shares = np.array([3.0, 0.5]) / 3.5
-    spread = 0.01 + shares[0] * shares[1] * 0.1**2
-    assert map.covariances[order[1], 0, 0] == pytest.approx(spread)
+    # The mode at 0.4 m fits both of the first: 0.4^2 / 0.05 is 3.2.
+    assert map.weights[order] == pytest.approx([0.1 * 0.5 + 0.45, 0.1 * 0.5 + 0.45, 0.1 * 0.25 + 0.45, 0.1 * 0.25])
+    apart = 3.0 * 0.5 / 3.5**2 * 0.1**2
+    assert np.diag(map.covariances[order[1]]) == pytest.approx([0.01 + apart, 0.01, 0.01])
+    assert np.diag(map.covariances[order[3]]) == pytest.approx([0.04, 0.04, 0.04])
 
 
 def test_only_modes_that_are_similar_and_heavy_enough_are_learned():

@@ -108,3 +108,7 @@ def test_a_known_threshold_is_taken_as_it_is_and_nothing_measured() -> None:
     assert found == [known.threshold] * 3
     assert ctx.facts["novelty_threshold"] == 7.1234
     assert not len(state.views)
+
+
+def test_the_manifest_has_the_threshold_to_four_decimals() -> None:
+    assert limits(CalibratedThreshold(min_separation=1), [0.0, 1.23456])[1].facts["novelty_threshold"] == 0.6173

@@ -206,3 +206,15 @@ def test_a_known_map_keeps_its_links_and_names(
     made = TopologicalMapping(min_path_matches=6).step(Context("mapping"), views, hypotheses, known).map
     assert made.names == names
     assert made.links.tolist() == links
+
+
+def test_the_first_view_has_none_before_it() -> None:
+    # Of the first view those patches come first that the second shows, not those that the last does.
+    seen = [range(40), range(10, 30), range(25, 40)]
+    views = replace(made_views(between_looks([0.0, 9.0, 20.0])), features=tuple(map(patches, seen)))
+    own, none, pairs = np.arange(3), np.empty((0, 3)), np.empty((0, 2), np.int64)
+    hypotheses = LoopHypotheses(
+        views.poses, own, own, own, views.tours, pairs, np.empty(0), none, none, np.empty(0, np.bool_), "odometry"
+    )
+    made = TopologicalMapping(max_patches=12, window=1).step(Context("mapping"), views, hypotheses).map
+    np.testing.assert_array_equal(made.views.features(0).descriptors, LOOKS[10:22])

@@ -122,3 +122,8 @@ def test_an_image_without_a_pose_is_passed_over() -> None:
     assert map.poses[:, 0].tolist() == [0.0, 2.0]
     assert map.edges.tolist() == [[0, 1]]
     assert ctx.counts == {"view_without_pose": 1}
+
+
+def test_a_turn_at_the_limit_is_far_enough() -> None:
+    tour: Tour = [(0.0, 0.0, 0.0), (0.0, 0.0, math.pi / 2)]
+    assert len(learned(ImageDatabase(min_turn_deg=90.0), tour, SegmentHistograms(views(4)))) == 2

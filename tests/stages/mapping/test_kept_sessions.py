@@ -69,6 +69,7 @@ def test_small_ways_add_up_in_both_directions() -> None:
     [
         (believed(2.0), [2.0, 0.0, 0.5]),
         (believed(2.0, sigma_rad=np.radians(44.9)), [2.0, 0.0, 0.5]),
+        (believed(2.0, sigma_rad=np.radians(45.0)), [2.0, 0.0, 0.5]),
         (believed(2.0, sigma_rad=np.radians(45.1)), None),
         (believed(2.0, 9.0, weights=(0.5, 0.5)), None),
         (believed(), None),

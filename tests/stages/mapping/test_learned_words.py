@@ -3,7 +3,8 @@ import pytest
 from made_words import NOTHING, seen_along
 
 from omninav.pipeline import Context
-from omninav.stages.mapping.learned_words import LearnVisualWords
+from omninav.stages.geometry.appearance.visual_words import learned_words, root_descriptors
+from omninav.stages.mapping.learned_words import LearnVisualWords, vocabulary_and_words
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceEvent
 from omninav.stages.values.visual_words import VisualWords
@@ -60,3 +61,9 @@ def test_a_map_of_one_image_knows_it() -> None:
     view = seen_along(1)[0]
     assert learned([view]).similarities(view.descriptors) == pytest.approx([1.0], abs=1e-5)
     assert len(learned([])) == 0
+
+
+def test_a_vocabulary_is_learned_from_descriptors_at_even_steps_from_the_first_to_the_last() -> None:
+    looks = np.random.default_rng(0).integers(0, 200, (5, 128)).astype(np.uint8)
+    made = vocabulary_and_words([looks[:2], looks[:0], looks[2:]], 1, 3)
+    np.testing.assert_array_equal(made.centres, learned_words(root_descriptors(looks[[0, 2, 4]]), 1))
