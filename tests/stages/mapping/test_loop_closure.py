@@ -128,3 +128,10 @@ def test_tours_are_not_gone_on_with() -> None:
     assert found.subcluster.tolist() == [0, 1, 1]
     assert found.tour.tolist() == [1, 2, 2]
     assert found.place.tolist() == [0, 1, 1]
+
+
+def test_parts_of_known_places_and_of_a_new_tour_are_told_apart() -> None:
+    looks, owners = [0.0, 9.0, 9.1, 0.1], [0, 1, -1, -1]
+    found = closed(made_views(between_looks(looks), tours=[0, 0, 1, 1], owners=owners))
+    assert found.cluster.tolist() == [0, 1, 1, 0]
+    assert found.subcluster.tolist() == [0, 1, 2, 3]

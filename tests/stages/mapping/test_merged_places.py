@@ -174,3 +174,13 @@ def test_a_known_place_holds_together_and_takes_new_views_in_by_any_of_its_own()
     assert merged_by_hand(looks, place, accepted, **known, min_spacing=0.01) == [0, 0, 1, 1, 2, 3]
     # The known places stay two, however near the tour shows them to be.
     assert merged_by_hand(looks, place, [(0, 4), (2, 4)], **known, min_spacing=99.0)[:4] == [0, 0, 1, 1]
+
+
+def test_views_of_a_known_map_were_not_driven_in_their_order_those_of_a_tour_were() -> None:
+    # Known: 0 and its path image 5, then place 5.1. New: 5.05, where the path image is, and 5.2 after it. Along the
+    # drive they are 1.05 and 1.2 from 0 (a step is 1 at most), and no way leads to 5.1.
+    known = {"tours": [0, 0, 0, 1, 1], "owners": [0, 0, 1, -1, -1]}
+    found = merged_by_hand(
+        [0.0, 5.0, 5.1, 5.05, 5.2], [0, 0, 1, 2, 3], [(1, 3)], **known, min_spacing=2.0, min_share=1.5
+    )
+    assert found == [0, 0, 1, 0, 0]

@@ -214,3 +214,11 @@ def test_how_much_more_certain_a_state_must_become_is_the_root_of_the_determinan
 def test_where_nothing_before_was_as_certain_nothing_is_propagated() -> None:
     assert grown(2.0, first=0.05) == {}
     assert list(grown(2.0, first=0.028)) == [1, 2, 3]
+
+
+def test_a_jump_is_from_the_last_certain_state_be_it_the_first() -> None:
+    drive = Straight()
+    for state, by in ((at(0.0), 0), (SPLIT, 3), (at(2.0, 5.0), 3)):
+        drive.to(state, (by,))
+    assert drive.ctx.counts == {"belief_jumped": 1}
+    assert drive.path.jumps == [(0, 7)]
