@@ -29,8 +29,9 @@ def test_learning_from_turned_copies_is_learning_from_each_written_out() -> None
     assert rows @ rows.T == pytest.approx(np.eye(len(rows)), abs=1e-9)
 
 
-def test_no_more_components_are_kept_than_there_is_to_tell_apart() -> None:
-    rows, explained = principal_components(RNG.normal(size=(4, 24)).astype(np.float32), 20)
+@pytest.mark.parametrize("scale", [1e-4, 1.0, 1e4])
+def test_no_more_components_are_kept_than_there_is_to_tell_apart(scale: float) -> None:
+    rows, explained = principal_components(scale * RNG.normal(size=(4, 24)).astype(np.float32), 20)
     assert len(rows) == 3
     assert explained.sum() == pytest.approx(1.0)
 

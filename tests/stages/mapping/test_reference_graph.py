@@ -143,7 +143,7 @@ def test_a_view_is_compared_with_all_around_it_at_its_own_heading() -> None:
     ring[:4, 3] = ring[4:, 7] = 1.0
     ctx, along, map = Context("mapping"), LearnReferenceGraphState(), ReferenceGraph.empty()
     stage = LearnReferenceGraph(distance_m=5.0, vicinity_m=5.0, similarity=0.9)
-    seen = ((ring, 0.0), (np.roll(ring, 4, axis=0), np.pi), (ring, np.pi), (ring, 0.3 * np.pi / 4))
+    seen = ((ring, 1.0), (np.roll(ring, 4, axis=0), 1.0 + np.pi), (ring, 1.0 + np.pi), (ring, 1.0 + 0.3 * np.pi / 4))
     for tick, (looks, heading) in enumerate(seen):
         ctx.tick = Tick(index=tick, stamp=tick, first_of_log=tick == 0)
         stage.step(ctx, SegmentHistograms(looks), None, Pose(0.01 * tick, 0.0, heading), map, along)
@@ -163,9 +163,15 @@ def test_the_closest_reference_is_where_an_edge_leads_and_none_leads_across_a_ga
         LearnReferenceGraphState(),
     )
     map = ReferenceGraph.empty()
-    for tick, x in enumerate((0.0, 1.0, 2.0, None, 0.9, 0.1)):
+    for tick, x in enumerate((0.0, 1.0, 2.0, 3.0, None, 3.1, None, 0.9, 0.1)):
         ctx.tick = Tick(index=tick, stamp=tick, first_of_log=tick == 0)
         stage.step(ctx, view(3), None, None if x is None else Pose(x, 0.0, 0.0), map, along)
-    assert map.edges.tolist() == [[0, 1], [1, 2]]
+    assert map.edges.tolist() == [[0, 1], [1, 2], [2, 3]]
     assert along.reference == 0
-    assert ctx.counts == {"view_without_pose": 1}
+    assert ctx.counts == {"view_without_pose": 2}
+
+
+def test_of_several_references_around_a_view_belongs_to_the_closest() -> None:
+    map = drive(LearnReferenceGraph(distance_m=0.4, similarity=0.0), [(x, 0.0, 3) for x in (0.0, 0.45, 2.0, 0.4)])
+    assert map.poses[:, 0].tolist() == [0.0, 0.45, 2.0]
+    assert map.edges.tolist() == [[0, 1], [1, 2]]

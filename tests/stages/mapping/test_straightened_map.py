@@ -4,6 +4,10 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
+from omninav.stages.geometry.appearance.closures import closures_by_appearance
+from omninav.stages.geometry.appearance.length_scale import length_scale
+from omninav.stages.geometry.appearance.segments import MAX_DISTANCES
+from omninav.stages.geometry.plane.drive_graph import straightened_drives
 from omninav.stages.geometry.plane.se2 import between, chain, compose
 from omninav.stages.mapping.straightened_map import StraightenMap
 from omninav.stages.values.maps import ReferenceGraph
@@ -105,3 +109,20 @@ def test_fewer_references_that_look_for_others_find_fewer():
 def test_closures_that_are_held_to_be_vague_move_less():
     vague = StraightenMap(closure_sigma=300.0, closure_sigma_deg=170.0).step(Context("straightened"), bent(), [])
     assert error(vague.map) > 0.8 * error(bent())
+
+
+def test_poses_are_those_of_odometry_and_closures_in_units_of_the_length_scale():
+    map = bent()
+    looks = map.features[:].copy()
+    looks[60] = looks[20]  # one that is wrong
+    map = ReferenceGraph(map.poses, looks, "histograms", np.zeros((0, 2), np.int64), "odometry")
+    out, _ = straightened(map)
+    unit = length_scale(map.poses, map.features, "histograms")
+    steps = np.hypot(*np.diff(map.poses[:, :2], axis=0).T)
+    driven = np.append(0.0, np.cumsum(steps))
+    closures = closures_by_appearance(looks, driven, True, MAX_DISTANCES["histograms"], 36, 0.7, 5.0 * unit, 1000)
+    drives = np.zeros(len(looks), np.int64)
+    poses, weights = straightened_drives(map.poses, drives, closures, 0.5 * unit, np.radians(5.0))
+    np.testing.assert_allclose(out.map.poses, poses, atol=1e-9)
+    assert 0 < (weights < 0.1).sum() < len(weights)
+    assert out.metrics.values["straightened"]["rejected"] == (weights < 0.1).sum()

@@ -267,3 +267,20 @@ def test_the_limits_of_closures_are_in_units_of_the_threshold():
 def test_closures_that_are_held_to_be_vague_move_less():
     vague, _ = at_log(drive(None, TWICE), closure_sigma=300.0, closure_sigma_deg=170.0)
     assert error(learned(vague), TWICE) > 0.8 * error(compose(TWICE[0], drive(None, TWICE).by_odometry), TWICE)
+
+
+def test_poses_are_those_of_odometry_and_closures_from_where_the_first_drive_was_believed_to_begin():
+    # In the threshold's unit of 0.4 m: closures at 2.4 of 4, 2 m along, to within 0.2 m and 5 degrees.
+    moved = TWICE + np.array([3.0, -2.0, 0.0])
+    sessions = drive(None, moved)
+    looks = sessions.views.copy()
+    looks[20] = looks[40]  # one that is wrong
+    sessions.put(views=looks)
+    out, _ = straightened(sessions)
+    closures = closures_between(sessions, 0.6 * 4.0, 5.0 * 0.4, 1000)
+    start, _ = placed_drives(compose(moved[0], sessions.by_odometry), sessions.drives, closures, 5.0 * 0.4)
+    poses, weights = straightened_drives(start, sessions.drives, closures, 0.5 * 0.4, np.radians(5.0), sessions.motions)
+    np.testing.assert_array_equal(learned(out), poses)
+    assert 0 < (weights < 0.1).sum() < len(weights) - 1
+    assert out.metrics.values["straightened"]["rejected"] == (weights < 0.1).sum()
+    assert poses[0] == pytest.approx(moved[0], abs=1e-3)

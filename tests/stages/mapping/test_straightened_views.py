@@ -8,6 +8,7 @@ from made_tour import Landmarks, along, mapped, scattered
 from made_views import between_looks, made_views
 
 from omninav.pipeline import Context
+from omninav.stages.geometry.plane.drive_graph import Closures, straightened_drives
 from omninav.stages.geometry.plane.se2 import between, chain, compose
 from omninav.stages.mapping.straightened_views import StraightenViews
 
@@ -92,3 +93,22 @@ def test_a_closure_is_as_alike_as_two_that_follow_each_other_and_some_views_apar
 def test_tours_that_look_elsewhere_are_not_moved_by_the_others():
     first, second = [0, 1, 2, 3, 4, 5], [100, 101, 102, 103]
     assert closures(first + second, [1] * 6 + [2] * 4, min_gap=2) == 0
+
+
+def test_views_in_turn_that_have_nothing_in_common_do_not_say_what_is_usual():
+    there = [0, 1, 2, 3, 4, 5, 6, 7, 8]
+    distances = between_looks(there + there[:4])
+    distances[8, 9] = distances[9, 8] = np.inf
+    out = StraightenViews(min_gap=4).step(Context("straightened"), made_views(distances))
+    assert out.metrics.values["straightened"]["closures"] == 4
+
+
+def test_poses_are_those_of_odometry_and_closures_in_units_of_the_way_between_views():
+    # Round a square of eight views twice, 2 m from view to view, by odometry that turns too far.
+    around = chain(np.tile([2.0, 0.0, np.pi / 4 + 0.03], (16, 1)))[:16]
+    made = made_views(between_looks(list(range(8)) * 2), poses=around)
+    out = StraightenViews(min_gap=4).step(Context("straightened"), made)
+    closures = Closures(np.array([(n, n + 8) for n in range(8)]), np.zeros(8))
+    poses, weights = straightened_drives(around, np.zeros(16, np.int64), closures, 0.5 * 2.0, np.radians(5.0))
+    np.testing.assert_allclose(out.views.poses, poses, atol=1e-9)
+    assert out.metrics.values["straightened"]["closures"] == len(weights)

@@ -52,6 +52,10 @@ def test_each_window_that_became_a_reference_is_one() -> None:
     assert snapshots is not None
     assert levels(snapshots.jpegs) == [10, 20]
     assert state.references == 2
+    map.insert(Pose(0.0, 0.0, 0.0), np.ones((1, 1), np.float32), "histograms")
+    third = ReferenceSnapshot().step(CTX, seen, map, state).snapshots
+    assert third is not None
+    assert levels(third.jpegs) == [10]
 
 
 def test_better_quality_takes_more_bytes() -> None:
