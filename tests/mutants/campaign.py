@@ -135,17 +135,19 @@ def in_session(tried: list[Mutant], tests: str, place: Path, jobs: int) -> Ends:
 def imported_anew(asked: dict[Mutant, list[str]], places: list[Path]) -> Ends:
     """Try each mutant in a process that imports our code anew, with the change in its file."""
     ends: Ends = {}
+    originals = {each.file: (places[0] / each.file).read_text() for each in asked}
     free = list(places)
     running: dict[int, tuple[Mutant, Path]] = {}
     waiting = list(asked)
     while waiting or running:
         if waiting and free:
             mutant, place = waiting.pop(), free.pop()
-            running[written_and_asked(mutant, asked[mutant], place, len(waiting))] = mutant, place
+            written(mutant.source(originals[mutant.file]), place / mutant.file, len(waiting))
+            running[asked_of(asked[mutant], place)] = mutant, place
             continue
         child, status = os.wait()
         mutant, place = running.pop(child)
-        (place / mutant.file).write_text((REPOSITORY / mutant.file).read_text())
+        (place / mutant.file).write_text(originals[mutant.file])
         free.append(place)
         ends[mutant] = ("survived" if status == 0 else "killed", asked[mutant])
         if status == 0:
@@ -153,11 +155,14 @@ def imported_anew(asked: dict[Mutant, list[str]], places: list[Path]) -> Ends:
     return ends
 
 
-def written_and_asked(mutant: Mutant, tests: list[str], place: Path, number: int) -> int:
-    """Start the tests of a mutant in a process; the process."""
-    file = place / mutant.file
-    file.write_text(mutant.source((REPOSITORY / mutant.file).read_text()))
-    os.utime(file, (number, number))  # Python tells by the time whether its compiled file is of this one
+def written(source: str, file: Path, number: int) -> None:
+    """Write a mutant's file, with a time of its own: by that Python tells whether its compiled file is of this one."""
+    file.write_text(source)
+    os.utime(file, (number, number))
+
+
+def asked_of(tests: list[str], place: Path) -> int:
+    """Start tests in a process that imports our code from a place; the process."""
     child = os.fork()
     if child:
         return child

@@ -1,8 +1,8 @@
 """One session of pytest in which every mutant of a folder is tried.
 
 Tests are collected once. They run once under coverage, so that of each line it is known which tests reach it and how
-long they work. Then forks of this process try some mutants each: the changed function's code is put in the place of
-the original's, for whoever imported it; the tests that reach its line run, quick ones first, until one fails.
+long they work. Then forks of this process try some mutants each: the change is put in the place of the original, for
+whoever imported it; the tests that reach its line run, quick ones first, until one fails.
 """
 
 import gc
@@ -15,31 +15,39 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import CodeType, FunctionType
 from typing import NamedTuple
 
 import coverage
 import pytest
 from _pytest.runner import runtestprotocol
-from mutations import Function, Mutant
+from changes import Change, Imported
+from mutations import Mutant
 
 QUICK_S = 3.0
 """A test that works longer is asked only where no quicker one reaches the line."""
 SETUP = "set-up of "
 BATCH = 20
 """Mutants that are tried in one process, one after the other: a process costs more than most trials."""
-SURVIVES, KILLED = b"0", b"1"
+SURVIVES, KILLED, NOTICED = b"0", b"1", b"2"
+UNCHANGED_S = 120
+"""How long tests may work without a change."""
 
 Reached = dict[str, dict[int, set[int]]]
 
 
 class Trial(NamedTuple):
-    """A mutant, the functions that it changes, their changed code, and the tests to ask."""
+    """A mutant, how to make its change, and the tests to ask."""
 
     mutant: Mutant
-    targets: list[FunctionType]
-    code: CodeType
+    change: Change
     chosen: list[int]
+
+
+class Batch(NamedTuple):
+    """Mutants for one process; before the first it tries `unchanged`, which no test may notice."""
+
+    trials: list[Trial]
+    unchanged: Change | None = None
 
 
 class MutantSession:
@@ -62,22 +70,9 @@ class MutantSession:
             raise session.Failed("tests cannot be collected")
         self.items = session.items
         reached, self.seconds = self._observed()
-        functions = _functions(self.root)
+        batches = self._batches(Imported(self.root), reached)
         gc.freeze()  # a fork that collects garbage would copy all of the memory
-        trials: list[Trial] = []
-        for mutant in self.mutants:
-            chosen = self._chosen(mutant, reached)
-            self.asked[mutant] = [self.items[k].nodeid for k in chosen]
-            code = self._changed(mutant)
-            targets = functions.get((mutant.file, mutant.function), []) if mutant.function else []
-            if not chosen:
-                self._ends(mutant, "no test")
-            elif code is None or not targets or any(each.__code__.co_freevars != code.co_freevars for each in targets):
-                self.ends[mutant] = "import"
-            else:
-                trials.append(Trial(mutant, targets, code, chosen))
-        batches = [trials[k : k + BATCH] for k in range(0, len(trials), BATCH)]
-        running: dict[int, tuple[list[Trial], int]] = {}
+        running: dict[int, tuple[Batch, int]] = {}
         while batches or running:
             while batches and len(running) < self.jobs:
                 batch = batches.pop(0)
@@ -87,6 +82,25 @@ class MutantSession:
             if child in running:
                 batches[:0] = self._ended(*running.pop(child))
         return True
+
+    def _batches(self, imported: Imported, reached: Reached) -> list[Batch]:
+        """Mutants of functions together, and those of what runs at import file by file."""
+        within: list[Trial] = []
+        at_import: dict[str, list[Trial]] = {}
+        for mutant in self.mutants:
+            chosen = self._chosen(mutant, reached)
+            self.asked[mutant] = [self.items[k].nodeid for k in chosen]
+            change = imported.change(mutant)
+            if not chosen:
+                self._ends(mutant, "no test")
+            elif change is None:
+                self.ends[mutant] = "import"
+            elif mutant.function is None:
+                at_import.setdefault(mutant.file, []).append(Trial(mutant, change, chosen))
+            else:
+                within.append(Trial(mutant, change, chosen))
+        files = [Batch(trials, imported.unchanged(file)) for file, trials in at_import.items()]
+        return [*(Batch(within[k : k + BATCH]) for k in range(0, len(within), BATCH)), *files]
 
     @pytest.hookimpl(wrapper=True, tryfirst=True)
     def pytest_runtest_setup(self, item: pytest.Item) -> Iterator[None]:
@@ -153,17 +167,7 @@ class MutantSession:
         own = f"test_{Path(mutant.file).name}"
         return sorted(quick or chosen, key=lambda k: (self.items[k].path.name != own, self.seconds[k], k))
 
-    def _changed(self, mutant: Mutant) -> CodeType | None:
-        """The code of the changed function."""
-        if mutant.function is None:
-            return None
-        changed = mutant.source((self.root / mutant.file).read_text())
-        for code in _codes(compile(changed, str(self.root / "omninav" / mutant.file), "exec")):
-            if Function(code.co_qualname, code.co_firstlineno) == mutant.function:
-                return code
-        return None
-
-    def _forked(self, batch: list[Trial]) -> tuple[int, int]:
+    def _forked(self, batch: Batch) -> tuple[int, int]:
         """A process that tries some mutants, and where it tells of each whether it was killed, a byte for each.
 
         A last byte tells whether the tests that failed pass without a change, so that no mutant has spoilt another's
@@ -175,18 +179,26 @@ class MutantSession:
             os.close(there)
             return child, here
         printed_to(Path(os.devnull))
+        if batch.unchanged is not None:
+            ends_after(UNCHANGED_S)
+            back = batch.unchanged()
+            noticed = self._failing(sorted(set().union(*(trial.chosen for trial in batch.trials))))
+            back()
+            if noticed is not None:
+                os.write(there, NOTICED)
+                os._exit(0)
         failed = set()
-        for trial in batch:
+        for trial in batch.trials:
             ends_after(10 + int(5.0 * sum(self.seconds[k] for k in trial.chosen)))
-            originals = [function.__code__ for function in trial.targets]
-            for function in trial.targets:
-                function.__code__ = trial.code
+            try:
+                back = trial.change()
+            except Exception:  # it cannot be imported
+                os._exit(1)
             by = self._failing(trial.chosen)
-            for function, original in zip(trial.targets, originals, strict=True):
-                function.__code__ = original
+            back()
             failed |= {by} - {None}
             os.write(there, SURVIVES if by is None else KILLED)
-        ends_after(60)
+        ends_after(UNCHANGED_S)
         os.write(there, SURVIVES if self._failing(sorted(failed)) is None else KILLED)
         os._exit(0)
 
@@ -198,18 +210,23 @@ class MutantSession:
                 return k
         return None
 
-    def _ended(self, batch: list[Trial], told: int) -> list[list[Trial]]:
+    def _ended(self, batch: Batch, told: int) -> list[Batch]:
         """Keep what became of the mutants of a process that ended; those that it did not come to."""
+        trials = batch.trials
         with os.fdopen(told, "rb") as pipe:
             ends = [bytes([each]) for each in pipe.read()]
-        if len(ends) > len(batch) and ends[-1] == KILLED and len(batch) > 1:
-            return [[trial] for trial in batch]
-        for trial, end in zip(batch, ends, strict=False):
-            self._ends(trial.mutant, "killed" if end == KILLED else "survived")
-        if len(ends) >= len(batch):
+        if NOTICED in ends or (batch.unchanged and not ends):
+            self.ends |= {trial.mutant: "import" for trial in trials}
             return []
-        self._ends(batch[len(ends)].mutant, "killed")  # it did not end, or ended the process
-        return [rest] if (rest := batch[len(ends) + 1 :]) else []
+        if len(ends) > len(trials) and ends[-1] == KILLED and len(trials) > 1:
+            return [Batch([trial], batch.unchanged) for trial in trials]
+        for trial, end in zip(trials, ends, strict=False):
+            self._ends(trial.mutant, "killed" if end == KILLED else "survived")
+        if len(ends) >= len(trials):
+            return []
+        self._ends(trials[len(ends)].mutant, "killed")  # it did not end, or ended the process
+        rest = trials[len(ends) + 1 :]
+        return [Batch(rest, batch.unchanged)] if rest else []
 
     def _ends(self, mutant: Mutant, end: str) -> None:
         self.ends[mutant] = end
@@ -229,24 +246,3 @@ def printed_to(file: Path) -> None:
     sys.stdout = sys.stderr = file.open("w", buffering=1)
     for stream in (1, 2):
         os.dup2(sys.stdout.fileno(), stream)
-
-
-def _codes(code: CodeType) -> Iterator[CodeType]:
-    yield code
-    for each in code.co_consts:
-        if isinstance(each, CodeType):
-            yield from _codes(each)
-
-
-def _functions(root: Path) -> dict[tuple[str, Function], list[FunctionType]]:
-    """All functions of the repository that exist by now, however they were decorated."""
-    found: dict[tuple[str, Function], list[FunctionType]] = {}
-    names: dict[str, str] = {}
-    for each in gc.get_objects():
-        if isinstance(each, FunctionType):
-            code = each.__code__
-            file = code.co_filename
-            if file not in names:
-                names[file] = os.path.relpath(os.path.realpath(file), root)
-            found.setdefault((names[file], Function(code.co_qualname, code.co_firstlineno)), []).append(each)
-    return found
