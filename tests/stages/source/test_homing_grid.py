@@ -55,6 +55,17 @@ def test_the_same_seed_gives_the_same_views() -> None:
     assert one[1].truth.heading != third[1].truth.heading
 
 
+def test_a_drawn_target_is_free_and_another_for_each_seed_and_draw() -> None:
+    other_world = replace(WORLD, draw=1)
+    found = []
+    for world, seed in ((WORLD, 0), (WORLD, 0), (WORLD, 1), (other_world, 0)):
+        target = ticks(HomingGrid(world=world, target="drawn", radius_m=1.0), seed)[0].truth
+        assert World(world, 0).is_free([(target.x, target.y)], world.robot.radius).all()
+        found.append((target.x, target.y, target.heading))
+    assert found[0] == found[1]
+    assert len(set(found)) == 3
+
+
 def test_a_target_without_room_is_refused() -> None:
     wall = (0.0, 0.0, 0.0)
     with pytest.raises(UnreadableRecording, match="no room for the robot at 0, 0"):
