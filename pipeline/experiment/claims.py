@@ -16,7 +16,7 @@ CLAIMS = "claims.yaml"
 """The list's name, in the folder of the pages."""
 BEGIN, END = "<!-- claims: omninav experiments -->", "<!-- end of the claims -->"
 HEAD = ("claim", "where", "experiment", "verdict", "ours")
-UNJUDGED, NOT_HERE = "no experiment", "not testable here"
+UNRUN, UNJUDGED, NOT_HERE = "not run yet", "no experiment", "not testable here"
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class ListedClaim:
     experiment: str = ""
     """The page that judges it, without `.md`."""
     statement: str = ""
-    """The page's claim that does, as its verdict file has it."""
+    """The page's claim that does, as its verdict file has it, or will have it once it is run."""
     case: str = ""
     """Labels of the cases that count (`second, 60`), as the file has them; '' where all do."""
     needs: str = ""
@@ -52,8 +52,8 @@ class ClaimList:
 def claim_tables(path: Path, found: Mapping[str, Sequence[Verdict]]) -> tuple[Path, str]:
     """The page that a list goes into, and its Markdown: how many claims there are of each kind, a table for each paper.
 
-    `found`: page -> its verdicts. Raises BadInput where the list cannot be read, ProblemsFound with all that is wrong
-    in it: a page, a statement or a case that no verdict file has too.
+    `found`: page -> its verdicts. A page or a statement that no verdict file has is not run yet. Raises BadInput where
+    the list cannot be read, ProblemsFound with all that is wrong in it: a case that the verdict does not have too.
     """
     listed, problems = convert(read_yaml(path), ClaimList, str(path))
     if problems:
@@ -87,19 +87,18 @@ def _cells(claim: ListedClaim, found: Mapping[str, Sequence[Verdict]], away: str
         told = f"needs {claim.needs}" if claim.needs else claim.not_here
         return claim.claim, claim.where, told, UNJUDGED if claim.needs else NOT_HERE, ""
     verdict = _judged(claim, found, where)
+    if verdict is None:
+        return claim.claim, claim.where, f"{claim.experiment}: {claim.statement}", UNRUN, ""
     case = f" ({claim.case})" if claim.case else ""
     link = f"[{claim.experiment}]({away}/{claim.experiment}.md): {verdict.claim}{case}"
     return claim.claim, claim.where, link, in_words(verdict.holds), _ours(verdict)
 
 
-def _judged(claim: ListedClaim, found: Mapping[str, Sequence[Verdict]], where: str) -> Verdict:
-    """The verdict that a claim names, with the cases that it names."""
-    if claim.experiment not in found:
-        raise _unknown(f"{where}.experiment", claim.experiment, list(found), "pages")
-    verdicts = [verdict for verdict in found[claim.experiment] if verdict.claim == claim.statement]
+def _judged(claim: ListedClaim, found: Mapping[str, Sequence[Verdict]], where: str) -> Verdict | None:
+    """The verdict that a claim names, with the cases that it names; None where there is none yet."""
+    verdicts = [verdict for verdict in found.get(claim.experiment, ()) if verdict.claim == claim.statement]
     if not verdicts:
-        statements = [verdict.claim for verdict in found[claim.experiment]]
-        raise _unknown(f"{where}.statement", claim.statement, statements, f"claims of {claim.experiment}")
+        return None
     labels = {label.strip() for label in claim.case.split(",") if label.strip()}
     fitting = [
         Verdict(verdict.claim, verdict.measure, verdict.paper, cases)
@@ -145,7 +144,7 @@ def _figure(value: float) -> str:
 
 def _counts(verdicts: Sequence[str]) -> str:
     """How many claims there are, and what they come to."""
-    judged = [f"{words}: {verdicts.count(words)}" for words in map(in_words, (True, False, None))]
+    judged = [f"{words}: {verdicts.count(words)}" for words in (*map(in_words, (True, False, None)), UNRUN)]
     beside = [verdicts.count(kind) for kind in (UNJUDGED, NOT_HERE)]
     return (
         f"{len(verdicts)} claims: {len(verdicts) - sum(beside)} have an experiment ({'; '.join(judged)}), "

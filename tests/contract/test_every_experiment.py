@@ -4,11 +4,13 @@ import shlex
 from pathlib import Path
 
 import pytest
+import yaml
 from hydra import compose, initialize_config_module
 from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.cli.overrides import with_unlisted_parameters
+from omninav.pipeline.experiment.index import read_verdicts, verdict_files
 from omninav.pipeline.experiment.specification import read_experiment
 from omninav.pipeline.run.plan import plan
 
@@ -68,3 +70,17 @@ def test_at_a_small_scale_no_test_world_is_looked_at(name, profile):
     config = OmegaConf.to_container(compose("config", overrides=[f"+experiment={name}"]), resolve=True)
     if profile in config["experiment"].get("profiles", {}):
         assert "draw" not in " ".join(read_experiment(config["experiment"], profile).all_scenarios.values())
+
+
+def test_every_listed_claim_is_one_of_an_experiment():
+    """Or one of a page that was made before; what is not run yet stands in no verdict file."""
+    pages = CONF.parents[1] / "docs" / "experiments"
+    there = {(path.name.partition(".")[0], v.claim) for path in verdict_files(pages) for v in read_verdicts(path)}
+    for path in CONF.glob("*/*.yaml"):
+        file = yaml.safe_load(path.read_text())
+        there |= {(file["name"], claim["statement"]) for claim in file.get("claims", ())}
+    listed = yaml.safe_load((pages / "claims.yaml").read_text())["papers"].values()
+    named = {
+        (claim["experiment"], claim["statement"]) for claims in listed for claim in claims if "experiment" in claim
+    }
+    assert not named - there
