@@ -199,3 +199,18 @@ RESULT = {
 def test_a_measure_is_read_from_metrics_timing_or_facts(measure: dict[str, object], figure: float | None):
     measures = {"error": {"title": "Error", **measure}}
     assert figure_of(read_experiment(FILE | {"measures": measures}, "paper").measures["error"], RESULT) == figure
+
+
+def test_what_a_file_leaves_out():
+    file = FILE | {"curves": [CURVE], "reference_runs": [RUN | {"over": "data"}], "claims": [CLAIM]}
+    found = read_experiment(file, "paper")
+    error, (curve,), (run,), (claim,) = found.measures["error"], found.curves, found.reference_runs, found.claims
+    assert (found.repetitions, found.shared, found.cores) == (50, True, None)
+    assert (error.scale, error.digits, error.aggregate, error.window, error.pooled) == (
+        1.0,
+        1,
+        "mean",
+        (0.0, 1.0),
+        False,
+    )
+    assert (curve.scale, run.scale, claim.scale, claim.lowest) == (1.0, 1.0, 1.0, False)

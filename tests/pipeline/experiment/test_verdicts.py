@@ -399,6 +399,7 @@ def test_five_percent_of_a_negative_figure_are_as_much_as_of_a_positive_one():
     assert held({"not_above": {"method": "b"}}, a=[-9.6] * 6, b=[-10.0] * 6) is True
     assert held({"not_above": {"method": "b"}}, a=[-9.4] * 6, b=[-10.0] * 6) is False
     assert held({"not_above": {"method": "b"}}, a=[10.4] * 6, b=[10.0] * 6) is True
+    assert held({"not_above": {"method": "b"}}, a=[10.51] * 6, b=[10.0] * 6) is False
 
 
 def test_a_ratio_is_of_repetitions_that_have_both_figures():
@@ -420,3 +421,16 @@ def test_of_the_rivals_of_the_best_the_closest_call_is_shown_and_what_fails_or_i
     assert shown(b=wide, c=[9.0] * 6, d=[8.0] * 6) == ("d", False)
     assert shown(b=[each - 3.5 for each in wide], c=[]) == ("b", None)  # 0.5 below
     assert shown(b=[each - 2.5 for each in wide], c=[]) == ("c", None)  # 0.5 above, where c is not known
+
+
+def test_a_case_of_a_file_of_before_has_no_scenarios_and_says_nothing_of_repetitions():
+    old = {"where": "a", "ours": 1.0, "other": None, "against": "", "difference": None, "interval": None, "holds": None}
+    (case,) = verdict_of({"claim": "c", "measure": "m", "paper": "", "cases": [old]}).cases
+    assert (case.judged, case.repetitions, case.ratio, case.scenarios) == (0, 0, False, 0)
+
+
+def test_figures_that_are_zero_together_have_a_ratio_where_they_are_not_zero_each():
+    (case,) = judged(
+        {"ratio_to": {"method": "b"}, "below": 1.0}, a=[1.0] * 6, b=[-1.0, 0.0, -1.0, -1.0, -1.0, -1.0]
+    ).cases
+    assert case.ours == pytest.approx(-1.2)

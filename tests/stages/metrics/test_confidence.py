@@ -120,3 +120,27 @@ def test_one_estimate_has_no_motion_to_compare():
     assert Confidence().step(Context("c"), two).metrics.values["confidence"]["step_off_odometry_m"] == pytest.approx(
         4.0
     )
+
+
+def test_where_one_frame_has_doubt_the_run_has_and_its_spread_is_told():
+    def frame(sigma: float, weight: float, x: float = 0.0) -> PoseEstimate:
+        pose = Pose(x, 0.0, 2.0 * x)
+        return PoseEstimate(pose, np.diag([sigma**2, 0.0, 0.0]), weight, pose)
+
+    for frames in ([frame(0.0, 1.0), frame(0.0, 0.9)], [frame(0.0, 1.0), frame(0.5, 1.0)]):
+        run = collected([Tick(n, n) for n in range(2)], [None] * 2, estimates=frames)
+        values = Confidence().step(Context("c"), run).metrics.values["confidence"]
+        assert values["weight"] == pytest.approx(np.median([each.mode_weight for each in frames]))
+        assert ("spread_m" in values) == (frames[1].covariance[0, 0] > 0.0)
+
+
+def test_ways_are_in_the_plane_and_medians_are_told():
+    poses = [Pose(x, 0.0, x) for x in (0.0, 1.0, 2.0, 9.0)]
+    estimates = [PoseEstimate(pose, np.eye(3) * 0.01, 0.9, pose) for pose in poses]
+    motion = [None, *[Motion(0.0, 0.0, 0.0)] * 2, Motion(3.0, 4.0, 1.0)]
+    matches = [BestMatch(0, 0.0, similarity=similarity) for similarity in (0.1, 0.2, 0.4, 1.0)]
+    run = collected([Tick(n, n) for n in range(4)], [None] * 4, motion, estimates, None, matches)
+    values = Confidence().step(Context("c"), run).metrics.values["confidence"]
+    assert (values["path_m"], values["odometry_path_m"]) == (9.0, 5.0)
+    assert values["step_off_odometry_m"] == 1.0
+    assert values["similarity"] == pytest.approx(0.3)

@@ -17,9 +17,9 @@ def test_a_simulated_robot_is_measured_by_its_tally():
 
 
 def test_the_last_tally_counts_and_the_last_tick_ends_the_drive():
-    ticks = [Tick(k, 10**9 * (2 + 3 * k)) for k in range(3)]
-    drive = collected(ticks, [None] * 3, tallies=[DriveTally(0, 0.5), DriveTally(3, 1.5), None])
-    assert summary(drive) == {"collisions": 3, "distance_m": 1.5, "duration_s": 6.0}
+    ticks = [Tick(k, 10**9 * (2 + 3 * k)) for k in range(4)]
+    drive = collected(ticks, [None] * 4, tallies=[DriveTally(0, 0.5), DriveTally(1, 1.0), DriveTally(3, 1.5), None])
+    assert summary(drive) == {"collisions": 3, "distance_m": 1.5, "duration_s": 9.0}
     assert summary(collected([], [])) == {"duration_s": 0.0, "distance_m": 0.0}
 
 
