@@ -218,3 +218,24 @@ def test_the_first_view_has_none_before_it() -> None:
     )
     made = TopologicalMapping(max_patches=12, window=1).step(Context("mapping"), views, hypotheses).map
     np.testing.assert_array_equal(made.views.features(0).descriptors, LOOKS[10:22])
+
+
+@pytest.mark.parametrize(("source", "name"), [("truth", "hall"), ("odometry", "")])
+def test_places_are_called_after_rooms_where_poses_are_true_and_a_spread_is_always_known(
+    source: str, name: str
+) -> None:
+    # One view is its place's medoid: nothing is measured against it, and the spread within parts is 1 without any.
+    place, none, pairs = np.zeros(1, np.int64), np.empty((0, 3)), np.empty((0, 2), np.int64)
+    views = made_views(between_looks([0.0]), pose_source=source)  # type: ignore[arg-type]
+    hypotheses = LoopHypotheses(
+        views.poses, place, place, place, views.tours, pairs, np.empty(0), none, none, np.empty(0, np.bool_), "truth"
+    )
+    rooms = Rooms(("hall",), np.array([[-1.0, -1.0, 1.0, 1.0]]))
+    made = TopologicalMapping().step(Context("mapping"), views, hypotheses, rooms=rooms).map
+    assert (made.names, made.spread) == ((name,), 1.0)
+    assert TopologicalMapping().step(Context("mapping"), views, hypotheses).map.names == ("",)
+    three = replace(made_views(between_looks([0.0, 0.1, 0.3])), features=(patches(range(20)),) * 3)
+    parts = np.zeros(3, np.int64)
+    together = replace(hypotheses, poses=three.poses, cluster=parts, subcluster=parts, place=parts, tour=three.tours)
+    made = TopologicalMapping().step(Context("mapping"), three, together).map
+    assert made.spread == pytest.approx(0.01 / (2 * math.pi), rel=1e-3)

@@ -97,7 +97,7 @@ def test_tours_that_look_elsewhere_are_not_moved_by_the_others():
 
 def test_views_in_turn_that_have_nothing_in_common_do_not_say_what_is_usual():
     there = [0, 1, 2, 3, 4, 5, 6, 7, 8]
-    distances = between_looks(there + there[:4])
+    distances = between_looks([*there, 0.5, 1.5, 2.5, 3.5])
     distances[8, 9] = distances[9, 8] = np.inf
     out = StraightenViews(min_gap=4).step(Context("straightened"), made_views(distances))
     assert out.metrics.values["straightened"]["closures"] == 4

@@ -61,6 +61,7 @@ def test_views_between_two_unimodal_states_get_reconstructed_states_in_order():
     for update in updates:
         assert len(update.state) == 1
         assert update.state.weights.tolist() == [1.0]
+        assert (update.state.means.shape, update.state.covariances.shape) == ((1, 3), (1, 3, 3))
         np.testing.assert_allclose(update.state.means[0, :2], place(update.index)[:2], atol=1e-6)
     assert drive.ctx.counts == {"view_reconstructed": 4}
 
@@ -121,6 +122,7 @@ def test_a_state_of_which_both_spreads_are_small_enough_is_unimodal():
     for wide in (spread(1.1, 0.5, 9.0), spread(0.5, 1.1, 9.0), spread(0.5, 0.5, 11.0)):
         assert not given(stage, wide)
     assert given(UnimodalQueue(length=0), spread(30.0, 30.0, 44.0))
+    assert given(UnimodalQueue(length=0, max_sigma_m=0.05), spread(0.04, 0.04, 9.0))  # 0.16 rad are no metres
 
 
 def test_a_component_without_company_is_taken_as_it_is_and_given_with_its_tick():
