@@ -122,7 +122,7 @@ def test_an_unknown_start_in_a_map_of_one_place_is_no_narrower_than_a_known_one_
     map = ViewMixtures.empty()
     row = map.add_view(np.zeros(1, np.float32), "Coefficients")
     bent = np.diag([1e-6, 4e-6, 1e-6])
-    bent[0, 2] = bent[2, 0] = 5e-7
+    bent[0, 2] = bent[2, 0] = bent[1, 2] = bent[2, 1] = 5e-7
     map.add_component(row, np.array([1.0, 2.0, 3.0]), bent, 0.5, 1.0)
     belief = MixtureInMap(initial_sigma_m=0.2).step(context(), map, None).belief
     assert belief is not None
