@@ -119,12 +119,15 @@ def in_session(tried: list[Mutant], tests: str, place: Path, jobs: int) -> Ends:
     terminal = os.dup(1)
     child = os.fork()
     if child == 0:
-        enter(place)
-        printed_to(log)
-        session = MutantSession(place, tried, jobs, lambda each, tests: os.write(terminal, survives(each, tests)))
-        status = pytest.main([*PYTEST, tests], plugins=[session])
-        kept.write_bytes(pickle.dumps({each: (session.ends[each], session.asked[each]) for each in tried}))
-        os._exit(int(status))
+        status = 1
+        try:
+            enter(place)
+            printed_to(log)
+            session = MutantSession(place, tried, jobs, lambda each, tests: os.write(terminal, survives(each, tests)))
+            status = int(pytest.main([*PYTEST, tests], plugins=[session]))
+            kept.write_bytes(pickle.dumps({each: (session.ends[each], session.asked[each]) for each in tried}))
+        finally:
+            os._exit(status)  # the copies are the other process's to remove
     os.close(terminal)
     if os.waitpid(child, 0)[1]:
         raise SystemExit(f"{tests}: without any change, pytest ends with\n{log.read_text()}")

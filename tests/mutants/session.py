@@ -178,6 +178,13 @@ class MutantSession:
         if child:
             os.close(there)
             return child, here
+        try:
+            self._tried(batch, there)
+        finally:
+            os._exit(1)  # whatever a mutant raised, nothing of the session is done twice
+
+    def _tried(self, batch: Batch, there: int) -> None:
+        """Try mutants in this process, which then ends."""
         printed_to(Path(os.devnull))
         if batch.unchanged is not None:
             ends_after(UNCHANGED_S)
