@@ -20,11 +20,13 @@ class VisitedPlaces(Stage):
     3, say of a map that is learned while it is used that its error at a place is that of the odometry of the first
     visit.
 
-    `visits`: lists with an entry for each number of visits: `number` (1: the first), `position_error_m`, the mean over
-    all frames of such visits, `frames`. `first_visits`, over the places that were visited again: `places`, how many;
-    `odometry_error_m`, the mean error of odometry alone at their first visits; `position_error_m`, that of the estimate
-    at all later ones; `ratio`, the second over the first; `correlation` of the two over the places (None where one of
-    them does not vary). Odometry alone starts at each log's first true pose and is not aligned.
+    `visits`, over the places that were visited at least as often as half of all places, so that every entry is of the
+    same ones: lists with an entry for each number of visits, `number` (1: the first) and `position_error_m`, the mean
+    over the places of the error at that visit; `places`, how many there are. `first_visits`, over the places that were
+    visited again: `places`, how many; `odometry_error_m`, the mean error of odometry alone at their first visits;
+    `position_error_m`, that of the estimate at all later ones; `ratio`, the second over the first; `correlation` of the
+    two over the places (None where one of them does not vary). Odometry alone starts at each log's first true pose and
+    is not aligned.
     """
 
     place_m: Annotated[float, Bounds(gt=0)] = 1.0
@@ -48,14 +50,7 @@ class VisitedPlaces(Stage):
         odometry = np.concatenate([odometry_errors(log) for log in logs])
         cells = np.unique(np.floor(truth[:, :2] / self.place_m).astype(np.int64), axis=0, return_inverse=True)[1]
         numbers = visit_numbers(cells.ravel(), driven_between(scored), self.away_m)
-        each = np.arange(1, numbers.max() + 1)
-        values: dict[str, Any] = {
-            "visits": {
-                "number": each.tolist(),
-                "position_error_m": [float(errors[numbers == number].mean()) for number in each],
-                "frames": [int((numbers == number).sum()) for number in each],
-            }
-        }
+        values: dict[str, Any] = {"visits": over_visits(cells.ravel(), numbers, errors)}
         found = first_against_later(cells.ravel(), numbers, errors, odometry)
         return self.Out(metrics=Metrics(values | ({"first_visits": found} if found else {})))
 
@@ -85,6 +80,23 @@ def visit_numbers(cells: Ints, ways: Array, away_m: float) -> Ints:
             count[cell] = count.get(cell, 0) + 1
         last_m[cell], numbers[row] = driven, count[cell]
     return numbers
+
+
+def over_visits(cells: Ints, numbers: Ints, errors: Array) -> dict[str, Any]:
+    """What `visits` holds, of frames (N,) with their cell (0, 1, 2 …), the number of the visit and the error."""
+    shape = int(cells.max()) + 1, int(numbers.max())
+    frames, summed = np.zeros(shape, np.int64), np.zeros(shape)
+    np.add.at(frames, (cells, numbers - 1), 1)
+    np.add.at(summed, (cells, numbers - 1), errors)
+    visited = (frames > 0).sum(axis=1)
+    often = int(np.median(visited))
+    same = visited >= often
+    means = summed[same, :often] / frames[same, :often]
+    return {
+        "number": list(range(1, often + 1)),
+        "position_error_m": means.mean(axis=0).tolist(),
+        "places": int(same.sum()),
+    }
 
 
 def first_against_later(cells: Ints, numbers: Ints, errors: Array, odometry: Array) -> dict[str, Any]:

@@ -5,7 +5,7 @@ import pytest
 from small_run import collected
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.metrics.visited_places import VisitedPlaces, first_against_later, visit_numbers
+from omninav.stages.metrics.visited_places import VisitedPlaces, first_against_later, over_visits, visit_numbers
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.pose import Motion, Pose
 
@@ -43,9 +43,22 @@ def test_each_number_of_visits_has_its_own_mean():
     drive = there_and_back(2, 0.1, 1.0)
     drive.estimate[20:, 1] += 1.0  # the second time
     visits = VisitedPlaces(away_m=0.5).step(CTX, drive).metrics.values["visits"]
-    assert visits["number"] == [1, 2, 3, 4]
-    assert visits["frames"] == [11, 11, 9, 9]
-    assert visits["position_error_m"] == pytest.approx([0.5, (5.5 + 2.0) / 11, 1.5, 1.5])
+    # The nine places between the ends are passed four times, 0.1 to 0.9 m off; the ends twice.
+    assert visits == {"number": [1, 2, 3, 4], "position_error_m": pytest.approx([0.5, 0.5, 1.5, 1.5]), "places": 9}
+
+
+def test_the_places_are_the_same_at_every_visit():
+    # Places 0 and 1, near the start, are exact and come four times; 2, 3 and 4 are 1 m off and come twice or once.
+    cells = np.array([0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 3, 3, 4])
+    numbers = np.array([1, 2, 3, 4, 1, 2, 3, 4, 1, 2, 1, 2, 1])
+    found = over_visits(cells, numbers, np.array([0.0] * 8 + [1.0] * 5))
+    assert found == {"number": [1, 2], "position_error_m": [0.5, 0.5], "places": 4}
+
+
+def test_every_place_counts_alike_however_many_frames_a_visit_has():
+    cells, numbers = np.array([0, 0, 0, 1, 0, 1]), np.array([1, 1, 1, 1, 2, 2])
+    found = over_visits(cells, numbers, np.array([1.0, 2.0, 3.0, 4.0, 5.0, 9.0]))
+    assert found == {"number": [1, 2], "position_error_m": [3.0, 7.0], "places": 2}
 
 
 def test_nothing_is_measured_without_truth():
@@ -59,7 +72,9 @@ def test_a_place_is_a_square_of_a_metre_and_another_visit_begins_beyond_five():
     truth = [Pose(x, -0.5, 0.0) for x in xs]
     seen = [PoseEstimate(Pose(x, k - 0.5, 0.0), np.eye(3), 1.0, Pose(x, 0.0, 0.0)) for k, x in enumerate(xs)]
     visits = stage.step(CTX, collected([Tick(n, n) for n in range(7)], truth, None, seen)).metrics.values
-    assert visits == {"visits": {"number": [1, 2], "position_error_m": [15 / 6, 6.0], "frames": [6, 1]}}
+    # At their first visits four places are off by (0 + 1 + 4) / 3, 2, 3 and 5 m; only one comes twice.
+    first = (5 / 3 + 2.0 + 3.0 + 5.0) / 4
+    assert visits == {"visits": {"number": [1], "position_error_m": [pytest.approx(first)], "places": 4}}
 
 
 def test_figures_are_means_over_the_places_that_were_visited_again():
@@ -91,7 +106,7 @@ def test_a_log_begins_elsewhere_and_frames_without_truth_or_estimate_do_not_coun
     motion = [None, Motion(0.0, 0.0, 0.0)] * 3
     truth = [pose, pose, pose, None, None, None]
     found = VisitedPlaces().step(CTX, collected(ticks, truth, motion, [*seen[:2], seen[2], None, *seen[4:]])).metrics
-    assert found.values["visits"]["frames"] == [2, 1]
+    assert found.values["visits"] == {"number": [1, 2], "position_error_m": [0.0, 0.0], "places": 1}
     assert found.values["first_visits"]["places"] == 1
 
 
