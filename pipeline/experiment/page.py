@@ -17,7 +17,7 @@ from omninav.pipeline.report.rendering import render
 
 from .conditions import ConditionRun
 from .plots import plots_of, row_labels
-from .specification import Experiment, Measure, figure_of
+from .specification import DEVELOPMENT, Experiment, Measure, figure_of
 from .verdicts import MIN_SCENARIOS, Case, Results, Verdict, in_words, judge, key_of, over_runs, pooled, samples
 
 STYLES = {"holds": "held", "does not hold": "broken", "undecided": "quiet"}
@@ -66,7 +66,7 @@ def write_page(content: PageContent, results: Results, development: Results, fol
         "command": shlex.join(content.argv),
         "verdicts": [_verdict(experiment, verdict) for verdict in verdicts],
         "tables": [_table(experiment, results, development, name) for name in experiment.measures],
-        "reference_runs": [_reference(content, number) for number in range(len(experiment.reference_runs))],
+        "reference_runs": [reference_text(content, number) for number in range(len(experiment.reference_runs))],
         "recordings": [(name, _facts(facts)) for name, facts in content.recordings],
         "conditions": rows,
         "context_columns": list(dict.fromkeys(name for row in rows for name in row["context"])),
@@ -191,14 +191,15 @@ def _table(experiment: Experiment, results: Results, development: Results, name:
     }
 
 
-def _reference(content: PageContent, index: int) -> str:
-    """A sentence with the figures of its reference runs."""
+def reference_text(content: PageContent, index: int) -> str:
+    """A sentence with the figures of its reference runs, but those of the development world."""
     reference = content.experiment.reference_runs[index]
     measure = Measure("", (reference.measure,), reference.scale)
     parts = []
     for label in content.experiment.labels(reference.over):
         runs = [run for run in content.references[index] if run.condition.labels[reference.over] == label]
-        found = [figure_of(measure, result) for run in runs for result in run.results.values()]
+        counted = [run for run in runs if run.scenario != DEVELOPMENT]
+        found = [figure_of(measure, result) for run in counted for result in run.results.values()]
         known = [figure for figure in found if figure is not None]
         parts.append(f"{label} {number(float(np.mean(known)), 1) if known else 'not run'}")
     return reference.text.replace("{}", "; ".join(parts))

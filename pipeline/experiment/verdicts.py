@@ -231,7 +231,7 @@ def _holds(side: Side, interval: tuple[float, float], other: float, judged: Samp
     allowed = MARGIN * other if side == "not_above" else 0.0
     if high < 0.0 or (high <= allowed + ROUNDING and not strict):
         return True if len(judged) == ran else None  # a claim about survivors holds for nobody else
-    return False if low > ROUNDING or (strict and low >= 0.0) else None
+    return False if low > allowed + ROUNDING or (strict and low >= 0.0) else None
 
 
 def _by_scenario(figures: Samples) -> list[Array]:

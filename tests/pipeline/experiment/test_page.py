@@ -1,8 +1,12 @@
 """Figures on an experiment's page."""
 
+from pathlib import Path
+
 import pytest
 
-from omninav.pipeline.experiment.page import number
+from omninav.pipeline.experiment.conditions import ConditionRun
+from omninav.pipeline.experiment.page import PageContent, number, reference_text
+from omninav.pipeline.experiment.specification import Condition, read_experiment
 
 
 @pytest.mark.parametrize(
@@ -11,3 +15,25 @@ from omninav.pipeline.experiment.page import number
 )
 def test_a_figure_has_its_digits_and_looks_like_nought_only_where_it_is(value: float | None, text: str) -> None:
     assert number(value, 1) == text
+
+
+def test_a_sentence_about_reference_runs_leaves_the_development_world_out() -> None:
+    file = {
+        "name": "test",
+        "title": "A test",
+        "about": "",
+        "variant": "none",
+        "sweep": {"tour": {"one": "x=1"}},
+        "measures": {"error": {"title": "Error", "path": ["error"]}},
+        "page": {"rows": [], "columns": "tour"},
+        "reference_runs": [{"text": "Without: {}.", "variant": "other", "measure": "error", "over": "tour"}],
+    }
+    of = Condition({"tour": "one"}, "x=1")
+    runs = [
+        ConditionRun(
+            of, scenario, "other", (), Path(), (0,), results={0: {"metrics": {"error": e}, "timing": {}, "facts": {}}}
+        )
+        for scenario, e in (("world 1", 1.0), ("world 2", 2.0), ("development", 9.0))
+    ]
+    content = PageContent(read_experiment(file, "paper"), "paper", [], [], [runs], [], "")
+    assert reference_text(content, 0) == "Without: one 1.5."

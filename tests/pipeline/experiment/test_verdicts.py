@@ -273,11 +273,17 @@ def test_a_difference_that_is_rounding_is_none_and_five_percent_are_not_above(co
     assert held({comparison: 10.0}, a=[10.0 + by] * 6) is holds
 
 
-def test_not_above_is_open_where_the_interval_reaches_from_below_to_beyond_the_margin():
+def test_not_above_is_open_where_the_interval_reaches_beyond_the_margin():
     figures = [9.0, 9.5, 10.0, 10.5, 11.0, 11.0]
     assert held({"not_above": 10.0}, a=figures) is None
     assert held({"not_above": 12.0}, a=figures) is True
-    assert held({"not_above": 9.0}, a=figures) is False
+    assert held({"not_above": 8.0}, a=figures) is False
+
+
+def test_not_above_is_open_where_the_interval_begins_above_the_other_side_and_within_the_margin():
+    figures = [10.1, 10.2, 10.4, 10.6, 10.9, 11.0]  # by 0.1 to 1.0 above 10: 0.5 is the margin
+    assert held({"not_above": 10.0}, a=figures) is None
+    assert held({"at_most": 10.0}, a=figures) is False
 
 
 def swept(claim: dict[str, object], figures: dict[tuple[str, str], float]) -> list[Case]:
