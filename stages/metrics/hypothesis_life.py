@@ -20,7 +20,8 @@ class HypothesisLife(Stage):
 
     `wrong_hypotheses`: `number`; `updates`, the mean number until they were gone, or until the end; `kept`, how many
     were there at the end; `weight`, a list over the updates from the first on: the mean of their weights, 0 once they
-    are gone. Nothing where there is no wrong hypothesis.
+    are gone. One that is there when the drive ends is in as many entries as it had updates, and the list ends where
+    none had more. Nothing where there is no wrong hypothesis.
     """
 
     near_m: Annotated[float, Bounds(gt=0)] = 1.5
@@ -56,11 +57,13 @@ class HypothesisLife(Stage):
         if not weights:
             return self.Out()
         lives = [len(each) - (born not in places) for born, each in weights.items()]
-        curve = np.array([(each + [0.0] * self.points)[: self.points] for each in weights.values()])
+        after = {born: np.nan if born in places else 0.0 for born in weights}
+        curve = np.array([(each + [after[born]] * self.points)[: self.points] for born, each in weights.items()])
+        curve = curve[:, np.isfinite(curve).any(axis=0)]
         values = {
             "number": len(weights),
             "updates": float(np.mean(lives)),
             "kept": len(places),
-            "weight": curve.mean(axis=0).tolist(),
+            "weight": np.nanmean(curve, axis=0).tolist(),
         }
         return self.Out(metrics=Metrics({"wrong_hypotheses": values}))

@@ -38,6 +38,7 @@ def test_a_wrong_hypothesis_lives_until_the_belief_has_nothing_there():
 def test_one_that_stays_to_the_end_is_counted():
     found = followed([0.5, 0.5, 0.5])
     assert (found["updates"], found["kept"]) == (3.0, 1)
+    assert found["weight"] == [0.5, 0.5, 0.5]  # it has not gone because the drive has ended
 
 
 def test_a_component_that_comes_there_later_is_another():
