@@ -22,7 +22,9 @@ from omninav.pipeline.run.plan import plan
 
 CONF = Path(__file__).resolve().parents[2] / "conf"
 FILES = [
-    path for path in sorted(CONF.rglob("*.yaml")) if path.name != "config.yaml" and path.parent.name != "recording"
+    path
+    for path in sorted(CONF.rglob("*.yaml"))
+    if path.name not in ("config.yaml", "test_worlds.yaml") and path.parent.name != "recording"
 ]
 each = pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.stem}")
 
@@ -116,7 +118,7 @@ def test_a_variant_declares_the_inputs_that_its_graph_reads(path: Path):
             assert declared <= read | settings_read(live)
 
 
-@pytest.mark.parametrize("path", sorted((CONF / "experiment").rglob("*.yaml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", sorted((CONF / "experiment").glob("*/*.yaml")), ids=lambda path: path.stem)
 @pytest.mark.parametrize("profile", ["paper", "quick"])
 def test_every_experiment_can_be_read(path: Path, profile: str):
     option = path.relative_to(CONF / "experiment").with_suffix("")
@@ -131,7 +133,7 @@ def test_every_group_is_listed_before_the_variant():
     defaults = yaml.safe_load((CONF / "config.yaml").read_text())["defaults"]
     groups = [next(iter(item)) for item in defaults if isinstance(item, dict)]
     folders = {path.name for path in CONF.iterdir() if path.is_dir() and any(path.glob("*.yaml"))}
-    assert folders - {"recording", "graph"} <= set(groups)
+    assert folders - {"recording", "graph", "experiment"} <= set(groups)
     assert OmegaConf.load(CONF / "config.yaml").nodes == {}
 
 

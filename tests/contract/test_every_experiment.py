@@ -12,6 +12,7 @@ from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.cli.overrides import with_unlisted_parameters
 from omninav.pipeline.experiment.index import read_verdicts, verdict_files
 from omninav.pipeline.experiment.specification import read_experiment
+from omninav.pipeline.experiment.verdicts import MIN_SCENARIOS
 from omninav.pipeline.run.plan import plan
 
 CONF = Path(__file__).resolve().parents[2] / "conf" / "experiment"
@@ -62,6 +63,12 @@ def test_the_last_condition_of_an_experiment_can_be_built(name):
     planned = plan(complete(compose("config", overrides=typed(found, found.conditions()[-1]))))
     if name in NAMES:
         assert {"errors", "error_curves", "map_history"} <= set(planned.graph.nodes)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_nothing_is_claimed_that_too_few_scenarios_leave_undecided(name):
+    found = experiment(name, "paper")
+    assert not found.claims or len(found.scenarios) >= MIN_SCENARIOS
 
 
 @pytest.mark.parametrize("name", ALL)
