@@ -14,7 +14,10 @@ UNRUN = ("experiment: one, statement: it will", "experiment: two, statement: it 
 
 
 def verdict(statement: str, *cases: tuple[str, bool | None, float]) -> Verdict:
-    plain = (Case(where, ours, 9.0, "the limit", ours - 9.0, (-1.0, 1.5), holds, 7, 7) for where, holds, ours in cases)
+    plain = (
+        Case(where, ours, 9.0, "the limit", ours - 9.0, (-1.0, 1.5), holds, 7, 7, scenarios=7)
+        for where, holds, ours in cases
+    )
     return Verdict(statement, "Error (cm)", "", tuple(plain))
 
 
@@ -62,6 +65,15 @@ def test_each_claim_stands_with_its_verdict_and_figure(folder: Path) -> None:
         assert row in text
     assert "former" not in text
     assert text.endswith(f"{claims.END}\n\nafter\n")
+
+
+def test_a_verdict_of_before_scenarios_counted_says_so(folder: Path) -> None:
+    former = Case("first", 3.0, 9.0, "the limit", -6.0, (-7.0, -5.0), True, 7, 7)
+    (folder / "one.verdicts.json").write_text(json.dumps([Verdict("it holds", "Error (cm)", "", (former,)).plain()]))
+    assert written(folder, GOOD) == 0
+    text = (folder.parent / "papers.md").read_text()
+    assert "| holds, earlier rule | Error (cm): 3, beside 9" in text
+    assert "(holds: 0; does not hold: 0; undecided: 0; holds, earlier rule: 1; not run yet: 0)" in text
 
 
 @pytest.mark.parametrize(
