@@ -11,6 +11,10 @@ from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.homing import HomingVector, PathProgress
 
+from .after_lifts import lifted
+
+CARRIED_M = 0.5
+"""Distance between true motion and odometry of one tick from which the robot was carried."""
 QUANTITIES = {
     "homing.end_error_m": Quantity(title="Distance to the target at the end", better="lower"),
     "homing.end_turn_deg": Quantity(title="Heading error at the end", better="lower"),
@@ -25,11 +29,12 @@ QUANTITIES = {
 class HomingErrors(Stage):
     """Measures where a robot ends that returns to its first pose, and the errors of its homing vectors.
 
-    Under `homing`: `start_m`, how far away it was put; `arrived` (1 or 0); `end_error_m` and `end_turn_deg`, from the
-    first pose to the last (and `end`, the same as experiments that pool runs read it); `time_s` until it arrived;
-    `lost_rate`, the share of ticks in which the target was lost; `direction_error_deg` (median, p90, max), between the
-    homing vector and the true direction of the target; `inliers`, median; `first`: `direction_error_deg`,
-    `turn_error_deg` and `inliers` of the first vector, None where the target was not found at first.
+    It begins where the robot was put down last, or where it drove to that is furthest away. Under `homing`: `start_m`,
+    how far away that is; `arrived` (1 or 0); `end_error_m` and `end_turn_deg`, from the first pose to the last (and
+    `end`, the same as experiments that pool runs read it); `time_s` until it arrived; `lost_rate`, the share of ticks
+    in which the target was lost; `direction_error_deg` (median, p90, max), between the homing vector and the true
+    direction of the target; `inliers`, median; `first`: `direction_error_deg`, `turn_error_deg` and `inliers` of the
+    first vector, None where the target was not found at first.
     """
 
     from_m: Annotated[float, Bounds(ge=0)] = 0.3
@@ -52,7 +57,8 @@ class HomingErrors(Stage):
         if not len(poses) or not known(poses).all():
             return self.Out()
         targets = between(poses, poses[0])
-        away = int(np.argmax(np.hypot(targets[:, 0], targets[:, 1])))  # where it was carried to, or drove to
+        carried = lifted(drive, CARRIED_M, 360.0)  # of turns there is none so large: where it was put down alone counts
+        away = int(carried[-1] if len(carried) else np.argmax(np.hypot(targets[:, 0], targets[:, 1])))
         after = {k: vector for k, vector in enumerate(vectors) if k >= away and vector is not None}
         if not after:
             return self.Out()

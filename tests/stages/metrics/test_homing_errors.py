@@ -6,7 +6,7 @@ from small_run import collected
 from omninav.pipeline import Context, Tick
 from omninav.stages.metrics.homing_errors import HomingErrors
 from omninav.stages.values.homing import HomingVector, PathProgress
-from omninav.stages.values.pose import Pose
+from omninav.stages.values.pose import Motion, Pose
 
 EAST, NORTH = 0.0, math.pi / 2
 HOME = (2.0, 1.0, NORTH)
@@ -54,6 +54,18 @@ def test_it_begins_where_it_was_carried_to():
         "turn_error_deg": pytest.approx(math.degrees(0.3)),
         "inliers": 30,
     }
+
+
+def test_a_robot_that_drives_on_away_from_home_begins_where_it_was_put_down():
+    path = [(0.0, 0.0, EAST), (3.0, 0.0, EAST), (3.3, 0.0, EAST), (2.0, 0.0, EAST)]
+    motion = [None, Motion(0.0, 0.0, 0.0), Motion(0.3, 0.0, 0.0), Motion(-1.3, 0.0, 0.0)]
+    drive = collected([Tick(k, k * 10**9) for k in range(4)], [Pose(*pose) for pose in path], motion)
+    vectors = [None, vector(EAST, 0.0, 7), vector(math.pi), vector(math.pi, 0.0, 8, "lost")]
+    found = (
+        HomingErrors().step(Context("homing"), drive, vectors, [at(False)] * 3 + [at(True)]).metrics.values["homing"]
+    )
+    assert (found["start_m"], found["time_s"], found["lost_rate"]) == (3.0, 2.0, pytest.approx(1 / 3))
+    assert found["first"]["direction_error_deg"] == pytest.approx(180.0)
 
 
 def test_errors_of_the_direction_are_those_of_found_vectors_farther_away_than_from_m():
