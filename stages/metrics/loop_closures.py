@@ -192,8 +192,7 @@ def at_supports(support: Array, gaps: Array | None, near: float) -> dict[str, li
 
 def hypothesis_gaps(found: LoopHypotheses) -> Array:
     """How far apart the two subclusters of each hypothesis came: (H,) metres, between their nearest images."""
-    at = found.poses[:, :2]
-    members = [at[found.subcluster == number] for number in range(int(found.subcluster.max(initial=-1)) + 1)]
+    members = [found.poses[found.subcluster == number] for number in range(int(found.subcluster.max(initial=-1)) + 1)]
     gaps = np.empty(len(found.pairs))
     for row, (one, other) in enumerate(found.subcluster[found.pairs]):
         between = members[one][:, None] - members[other][None]

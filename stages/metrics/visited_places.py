@@ -42,12 +42,13 @@ class VisitedPlaces(Stage):
     def step(self, ctx: Context, drive: Drive) -> Out:
         """The whole run at once."""
         logs = [log for log in drive.by_log if log.has_truth]
-        scored = [log.at(known(log.truth) & known(log.estimate)) for log in logs]
+        rows = [known(log.truth) & known(log.estimate) for log in logs]
+        scored = [log.at(each) for log, each in zip(logs, rows, strict=True)]
         if not sum(map(len, scored)):
             return self.Out(metrics=Metrics({}))
         truth = np.concatenate([log.truth for log in scored])
         errors = np.concatenate([position_errors(log.estimate, log.truth) for log in scored])
-        odometry = np.concatenate([odometry_errors(log) for log in logs])
+        odometry = np.concatenate([odometry_errors(log)[each] for log, each in zip(logs, rows, strict=True)])
         cells = np.unique(np.floor(truth[:, :2] / self.place_m).astype(np.int64), axis=0, return_inverse=True)[1]
         numbers = visit_numbers(cells.ravel(), driven_between(scored), self.away_m)
         values: dict[str, Any] = {"visits": over_visits(cells.ravel(), numbers, errors)}
@@ -56,10 +57,9 @@ class VisitedPlaces(Stage):
 
 
 def odometry_errors(log: Drive) -> Array:
-    """Position errors of odometry alone in a log's frames that have truth and estimate: (N,), NaN without odometry."""
-    rows = known(log.truth) & known(log.estimate)
+    """Position errors of odometry alone in a log's frames: (N,), NaN without truth or without odometry."""
     path = log.odometry_alone()
-    return np.full(int(rows.sum()), np.nan) if path is None else position_errors(path[rows], log.truth[rows])
+    return position_errors(np.full_like(log.truth, np.nan) if path is None else path, log.truth)
 
 
 def driven_between(logs: list[Drive]) -> Array:
@@ -70,16 +70,16 @@ def driven_between(logs: list[Drive]) -> Array:
 
 def visit_numbers(cells: Ints, ways: Array, away_m: float) -> Ints:
     """The number of the visit that each frame belongs to, from 1, of its cell (N,): (N,)."""
-    numbers = np.zeros(len(cells), np.int64)
+    numbers: list[int] = []
     last_m: dict[int, float] = {}
     count: dict[int, int] = {}
-    driven = 0.0
-    for row, (cell, way) in enumerate(zip(cells.tolist(), ways.tolist(), strict=True)):
-        driven += min(way, away_m + 1.0)  # between two logs the robot has been away from everywhere
+    along = np.cumsum(np.minimum(ways, away_m + 1.0))  # between two logs the robot has been away from everywhere
+    for cell, driven in zip(cells.tolist(), along.tolist(), strict=True):
         if cell not in last_m or driven - last_m[cell] > away_m:
             count[cell] = count.get(cell, 0) + 1
-        last_m[cell], numbers[row] = driven, count[cell]
-    return numbers
+        last_m[cell] = driven
+        numbers.append(count[cell])
+    return np.array(numbers, np.int64)
 
 
 def over_visits(cells: Ints, numbers: Ints, errors: Array) -> dict[str, Any]:

@@ -53,11 +53,29 @@ def test_half_a_metre_to_any_side_is_a_lift(sideways, steps):
     assert AfterLifts().step(CTX, drive).metrics.values["lifts"]["step"] == steps
 
 
-@pytest.mark.parametrize(("degrees", "steps"), [(14.0, [12]), (16.0, [12, 30]), (-16.0, [12, 30])])
+@pytest.mark.parametrize(("degrees", "steps"), [(14.5, [12]), (16.0, [12, 30]), (-16.0, [12, 30])])
 def test_fifteen_degrees_to_either_side_are_a_lift(degrees, steps):
     drive = lifted_drive(0)
     drive.motion[30, 2] = np.radians(degrees)
     assert AfterLifts().step(CTX, drive).metrics.values["lifts"]["step"] == steps
+
+
+def test_what_is_at_a_limit_is_no_lift():
+    def lifts(motion: Motion):
+        pose = Pose(0.0, 0.0, 0.0)
+        drive = collected(
+            [Tick(0, 0), Tick(1, 1)], [pose] * 2, [None, motion], [PoseEstimate(pose, np.eye(3), 1.0, pose)] * 2
+        )
+        return AfterLifts(jump_deg=90.0).step(CTX, drive).metrics
+
+    assert lifts(Motion(0.0, 0.5, 0.0)) is lifts(Motion(0.0, 0.0, np.pi / 2)) is None
+    assert lifts(Motion(0.0, 0.51, 0.0)).values["lifts"]["number"] == 1
+
+
+def test_the_end_is_the_last_frame_that_has_truth_and_estimate():
+    drive = lifted_drive(None)
+    drive.estimate[39] = np.nan
+    assert AfterLifts().step(CTX, drive).metrics.values["lifts"]["seconds"] == [52.0]
 
 
 def test_frames_without_truth_or_estimate_do_not_count_and_one_frame_alone_has_no_lift():

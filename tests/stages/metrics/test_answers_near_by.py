@@ -47,7 +47,7 @@ def told(
         ((0.0, 5.1, 0.0), 0.0, 0.0),
         ((4.0, 4.0, 0.0), 0.0, 0.0),
         ((0.0, 0.0, 29.0), 0.0, 1.0),
-        ((0.0, 0.0, -31.0), 0.0, 0.0),
+        ((0.0, 0.0, -30.5), 0.0, 0.0),
         ((0.0, 0.0, 90.0), -70.0, 1.0),  # the robot stands turned to the right against it
         ((0.0, 0.0, 90.0), 70.0, 0.0),
         ((0.0, 0.0, -170.0), -170.0, 1.0),  # 20 degrees, the short way around
@@ -62,9 +62,19 @@ def test_an_answer_is_near_within_five_metres_and_thirty_degrees(
 
 def test_an_answer_at_the_limits_is_near() -> None:
     at = ReferenceGraph(
-        np.array([(3.0, 3.0, 1.0)]), np.ones((1, 1, 2), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth"
+        np.array([(3.0, 3.0, np.pi / 2)]),
+        np.ones((1, 1, 2), np.float32),
+        "histograms",
+        np.zeros((0, 2), np.int64),
+        "truth",
     )
-    assert told(at, [(0, 0.5, 0.0)])["nearby_rate"] == 1.0
+    found = told(at, [(0, 0.5, 0.0)], truth=Pose(3.0, -2.0, 0.0), within_deg=90.0)
+    assert (found["nearby_rate"], found["background_rate"]) == (1.0, 1.0)
+
+
+def test_the_first_answer_is_the_most_similar_one() -> None:
+    found = told(map_of((0, 0, 0), (9, 0, 0)), [(0, 0.9, 0), (1, 0.8, 0)])
+    assert (found["first_nearby_rate"], found["nearby_rate"]) == (1.0, 0.5)
 
 
 def test_figures_are_means_over_the_images_with_answers() -> None:

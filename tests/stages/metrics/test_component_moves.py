@@ -51,3 +51,9 @@ def test_an_entry_is_the_mean_of_as_many_moves_as_it_needs():
     assert ComponentMoves().step(Context("m"), ten).metrics.values["component_moves"]["moves"] == [10]
     nine = [now(*((view, 0.0) for view in range(9))), now(*((view, 0.5) for view in range(9)))]
     assert ComponentMoves().step(Context("m"), nine).metrics.values["component_moves"]["moves"] == []
+
+
+def test_beyond_a_metre_is_another_place_unless_asked_for():
+    ticks = [now((1, 0.0), (2, 0.0)), now((1, 1.0), (2, 1.5))]
+    found = ComponentMoves(min_moves=1).step(Context("metric"), ticks).metrics.values["component_moves"]
+    assert found == {"updates": [0], "moved_m": [1.0], "moves": [1]}

@@ -40,10 +40,11 @@ def test_what_is_skipped_does_not_count():
 
 
 def test_bins_are_a_fifth_of_a_metre_and_limits_belong_to_what_is_small():
-    (found,) = ErrorHistograms().step(CTX, two_logs([0.0, 0.3, 0.4, 2.0, 2.1, 99.0])).metrics.values["error_histograms"]
+    drive = two_logs([0.0, 0.3, 0.4, 0.5, 2.0, 2.1, 99.0])
+    (found,) = ErrorHistograms().step(CTX, drive).metrics.values["error_histograms"]
     assert found["error_m"] == pytest.approx([0.1 + 0.2 * k for k in range(16)])
-    assert found["share"] == pytest.approx(np.bincount([0, 1, 2, 10, 10, 15], minlength=16) / 6)
-    assert (found["small"], found["large"]) == pytest.approx((3 / 6, 2 / 6))
+    assert found["share"] == pytest.approx(np.bincount([0, 1, 2, 2, 10, 10, 15], minlength=16) / 7)
+    assert (found["small"], found["large"]) == pytest.approx((3 / 7, 2 / 7))
 
 
 def test_frames_without_truth_or_estimate_and_logs_of_such_do_not_count():

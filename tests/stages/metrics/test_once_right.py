@@ -32,7 +32,7 @@ def once_right(off: list[tuple[float, float]]):
 
 
 def test_frames_before_the_first_right_one_do_not_count() -> None:
-    found = once_right([(9.0, 0.0), (1.0, 40.0), (1.9, 34.0), (2.1, 0.0), (0.0, 0.0), (0.0, 36.0)])
+    found = once_right([(9.0, 0.0), (1.0, 40.0), (1.9, 34.5), (2.1, 0.0), (0.0, 0.0), (0.0, 36.0)])
     assert found == {"after_frames": 2, "right_rate": pytest.approx(2 / 4)}
 
 
@@ -40,8 +40,36 @@ def test_a_robot_that_was_never_right_has_no_share() -> None:
     assert once_right([(9.0, 0.0), (1.0, 40.0)]) == {"after_frames": None, "right_rate": None}
 
 
+def test_an_estimate_at_the_limits_is_right() -> None:
+    out = OnceRight(within_deg=90.0).step(Context("once_right"), believed([(2.0, 90.0), (2.0, -91.0)]))
+    assert out.metrics is not None
+    assert out.metrics.values["once_right"] == {"after_frames": 0, "right_rate": 0.5}
+
+
+def test_frames_without_truth_are_not_judged_and_those_without_estimate_are_not_right() -> None:
+    drive = believed([(0.0, 0.0), (9.0, 0.0), (0.0, 0.0), (0.0, 0.0)])
+    drive.truth[0] = np.nan
+    drive.estimate[3] = np.nan
+    out = OnceRight().step(Context("once_right"), drive)
+    assert out.metrics is not None
+    assert out.metrics.values["once_right"] == {"after_frames": 2, "right_rate": 0.5}
+    drive.truth[:] = np.nan
+    assert OnceRight().step(Context("once_right"), drive).metrics is None
+
+
 def test_the_mean_counts_from_the_middle_of_the_free_cells() -> None:
     free = FreeSpace(np.array([[0.0, 0.0], [6.0, 0.0], [0.0, 9.0]]), 1.0)  # their mean is (2, 3)
     out = MeanAtFirst().step(Context("mean"), believed([(3.5, 0.0), (0.0, 0.0)]), free)
     assert out.metrics is not None
     assert out.metrics.values["mean_at_first"]["from_middle_m"] == pytest.approx(math.hypot(2.0, 4.0))
+
+
+def test_the_first_mean_is_that_of_the_first_frame_that_has_one() -> None:
+    free = FreeSpace(np.array([[1.0, 3.0], [3.0, 3.0]]), 1.0)
+    drive = believed([(0.0, 0.0), (3.5, 0.0), (0.0, 0.0)])
+    drive.mean[0] = np.nan
+    out = MeanAtFirst().step(Context("mean"), drive, free)
+    assert out.metrics is not None
+    assert out.metrics.values["mean_at_first"]["from_middle_m"] == pytest.approx(math.hypot(2.0, 4.0))
+    drive.mean[:] = np.nan
+    assert MeanAtFirst().step(Context("mean"), drive, free).metrics is None

@@ -44,3 +44,11 @@ def test_five_frames_at_home_count_of_the_last_log_and_frames_without_truth_or_e
     assert few["returns"][0]["position_error_m"] == 5.0
     wide = ReturnsHome(home_m=2.3).step(Context("m"), collected(ticks, truth, None, estimates)).metrics.values
     assert wide["returns"] == []
+
+
+def test_home_is_within_two_metres_of_the_start():
+    truth = [Pose(x, 0.0, 0.0) for x in (0.0, 4.5, 1.5, 4.5)]
+    estimates = [PoseEstimate(Pose(pose.x, 0.25, 0.0), np.eye(3), 1.0, pose) for pose in truth]
+    drive = collected([Tick(n, n, 0, n) for n in range(4)], truth, None, estimates)
+    returns = ReturnsHome().step(Context("metric"), drive).metrics.values["returns"]
+    assert returns == [{"step": 2, "position_error_m": 0.25, "odometry_error_m": None}]

@@ -77,6 +77,24 @@ def test_a_place_is_a_square_of_a_metre_and_another_visit_begins_beyond_five():
     assert visits == {"visits": {"number": [1], "position_error_m": [pytest.approx(first)], "places": 4}}
 
 
+def seen_at(places: list[tuple[float, float, float]], **parameters):
+    """`visits` of a robot that was at these true poses, with estimates 1 m off."""
+    truth = [Pose(*place) for place in places]
+    seen = [PoseEstimate(Pose(x, y + 1.0, turn), np.eye(3), 1.0, Pose(x, y, turn)) for x, y, turn in places]
+    drive = collected([Tick(n, n) for n in range(len(truth))], truth, None, seen)
+    return VisitedPlaces(**parameters).step(CTX, drive).metrics.values["visits"]
+
+
+def test_a_place_is_a_cell_of_the_floor_whichever_way_the_robot_looks():
+    places = [(0.5, 0.5, 0.0), (1.5, 1.5, 2.0), (2.0, 0.5, 0.0), (0.5, 2.5, 0.0)]
+    assert seen_at(places, place_m=2.0) == {"number": [1], "position_error_m": [1.0], "places": 3}
+
+
+def test_five_and_a_half_metres_are_away():
+    found = seen_at([(0.5, 0.0, 0.0), (3.25, 0.0, 0.0), (0.5, 0.0, 0.0), (3.25, 0.0, 0.0)])
+    assert found == {"number": [1, 2], "position_error_m": [1.0, 1.0], "places": 2}
+
+
 def test_figures_are_means_over_the_places_that_were_visited_again():
     cells = np.array([0, 0, 1, 2, 0, 1, 1, 2, 3])
     numbers = np.array([1, 1, 1, 1, 2, 2, 3, 2, 1])
@@ -92,7 +110,8 @@ def test_figures_are_means_over_the_places_that_were_visited_again():
     }
     assert first_against_later(cells, numbers, np.ones(9), odometry)["correlation"] is None
     assert first_against_later(cells, numbers, errors, np.ones(9))["correlation"] is None
-    two = first_against_later(cells[[0, 2, 4, 5]], numbers[[0, 2, 4, 5]], errors[:4], odometry[[0, 2, 4, 5]])
+    few = [0, 2, 4, 5]
+    two = first_against_later(cells[few], numbers[few], errors[few], odometry[few])
     assert (two["places"], two["correlation"]) == (2, None)
     assert first_against_later(cells, numbers, errors, np.zeros(9))["ratio"] is None
     assert first_against_later(cells, numbers, errors, np.where(cells == 3, np.nan, odometry)) == {}
@@ -104,8 +123,8 @@ def test_a_log_begins_elsewhere_and_frames_without_truth_or_estimate_do_not_coun
     seen = [PoseEstimate(pose, np.eye(3), 1.0, pose)] * 6
     ticks = [Tick(n, n, n // 2, n % 2) for n in range(6)]
     motion = [None, Motion(0.0, 0.0, 0.0)] * 3
-    truth = [pose, pose, pose, None, None, None]
-    found = VisitedPlaces().step(CTX, collected(ticks, truth, motion, [*seen[:2], seen[2], None, *seen[4:]])).metrics
+    truth = [pose, pose, pose, pose, None, None]
+    found = VisitedPlaces().step(CTX, collected(ticks, truth, motion, [*seen[:3], None, *seen[4:]])).metrics
     assert found.values["visits"] == {"number": [1, 2], "position_error_m": [0.0, 0.0], "places": 1}
     assert found.values["first_visits"]["places"] == 1
 
