@@ -120,11 +120,11 @@ def last_new_ground(path: Array, near_m: float) -> int:
     """The last row of a path (N, 2) at a place that it had not been to: within `near_m`, and left beyond twice that."""
 
     def is_new(row: int) -> bool:
-        away = np.hypot(*(path[: row + 1] - path[row]).T)
+        away = np.hypot(*(path[:row] - path[row]).T)
         left = np.flatnonzero(away > 2.0 * near_m)
         return not len(left) or bool((away[: left[-1]] > near_m).all())
 
-    return next(row for row in range(len(path) - 1, -1, -1) if is_new(row))
+    return next(row for row in reversed(range(len(path))) if is_new(row))
 
 
 def first_map(drive: Drive, home_m: float) -> dict[str, Any]:

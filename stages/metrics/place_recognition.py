@@ -84,7 +84,7 @@ class PlaceRecognition(Stage):
         last = last.at(known(last.truth))
         if map is None or map.pose_source != "truth" or not len(last) or not len(map):
             return self.Out()
-        lists = [entry.references if (entry := ranked[row]) is not None else np.empty(0, np.int64) for row in last.row]
+        lists = [entry.references if (entry := ranked[row]) is not None else np.array([], int) for row in last.row]
         given = last.truth[:, :2], lists, map.poses[:, :2]
         found = recalls(*given, self.distance_m)
         rows = [recalls(*given, distance) for distance in self.distances_m]

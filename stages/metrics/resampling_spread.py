@@ -50,7 +50,7 @@ class ResamplingSpread(Stage):
         if spreads:
             before_m, after_m = np.mean(spreads, axis=0)
             values |= {"before_m": float(before_m), "after_m": float(after_m), "ratio": float(after_m / before_m)}
-        return self.Out(metrics=Metrics({"resampling": values}, QUANTITIES if spreads else {}))
+        return self.Out(metrics=Metrics({"resampling": values}, QUANTITIES))
 
 
 def agreement(particles: Particles, hypothesis: GaussianMixture) -> float:

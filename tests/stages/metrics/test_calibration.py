@@ -139,3 +139,12 @@ def test_an_ellipse_ends_where_chi_squared_of_two_degrees_says():
     found = Calibration().step(Context("calibration"), drive).metrics.values["calibration"]
     assert (found["ellipse_50"], found["ellipse_95"]) == (0.25, 0.75)
     assert found["nees"] == pytest.approx(np.mean([1.17**2, 1.185**2, 2.44**2, 2.455**2]))
+
+
+def test_an_estimate_at_both_tolerances_is_right() -> None:
+    poses = [Pose(0.5, 0.0, np.pi / 2), Pose(0.5, 0.0, 1.6)]
+    estimates = [PoseEstimate(pose, np.eye(3), 1.0, pose) for pose in poses]
+    told = [PoseConfidence(0.5)] * 2
+    drive = collected([Tick(0, 0), Tick(1, 1)], [Pose(0.0, 0.0, 0.0)] * 2, estimates=estimates, confidences=told)
+    found = Calibration(within_deg=90.0).step(Context("calibration"), drive).metrics.values["calibration"]
+    assert found["right_share"] == 0.5

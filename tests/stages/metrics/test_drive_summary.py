@@ -33,7 +33,24 @@ def test_a_real_robot_is_measured_by_its_odometry_and_no_contact_is_claimed():
 
 
 def test_a_robot_has_stopped_where_it_makes_no_way_between_its_first_move_and_its_last():
-    ways = [0.0, 0.3, 0.0, 0.01, 0.3, 0.0]
-    motion = [None, *(Motion(x=way, y=0.0, turn=0.1) for way in ways)]
-    drive = collected([Tick(k, 10**9 * k) for k in range(7)], [None] * 7, motion=motion)
-    assert summary(drive)["stopped_share"] == 0.5
+    # Half a second a frame, and none at all at the fifth. Ways ahead and aside (m); 0.015 m in it are 0.03 m/s.
+    seconds = [0.0, 0.5, 1.0, 1.5, 2.0, 2.0, 2.5, 3.0, 3.5, 4.0]
+    ways = [
+        (0.0, 0.0),
+        (0.0, 0.3),
+        (0.0, 0.0),
+        (0.02, 0.0),
+        (0.0, 0.0),
+        (0.01, 0.0),
+        (0.0, 0.0),
+        (0.0, 0.015),
+        (0.0, 0.0),
+    ]
+    motion = [None, *(Motion(x, y, 0.1) for x, y in ways)]
+    drive = collected([Tick(k, int(10**9 * at)) for k, at in enumerate(seconds)], [None] * 10, motion=motion)
+    assert summary(drive)["stopped_share"] == pytest.approx(4 / 7)
+
+
+def test_a_way_by_odometry_counts_in_every_direction():
+    motion = [None, Motion(0.3, -0.4, 0.7), Motion(0.0, 0.25, 0.0), Motion(-0.5, 0.0, 0.0)]
+    assert summary(collected([Tick(k, k) for k in range(4)], [None] * 4, motion=motion))["distance_m"] == 1.25

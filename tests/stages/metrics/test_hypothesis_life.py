@@ -75,3 +75,11 @@ def test_the_list_has_thirty_updates():
     there = belief((1.0, 0.0, 0.5))
     found = HypothesisLife().step(CTX, drive, [there] * 40, [there, *[None] * 39]).metrics.values["wrong_hypotheses"]
     assert (found["weight"], found["updates"], found["kept"]) == ([0.5] * 30, 40.0, 1)
+
+
+def test_updates_are_the_mean_over_all_hypotheses():
+    drive = collected([Tick(n, n) for n in range(4)], [Pose(0.0, 0.0, 0.0)] * 4)
+    stays, goes = belief((0.0, 9.0, 0.5)), belief((0.0, 5.0, 0.5))
+    beliefs = [stays, belief((0.0, 5.0, 0.5), (0.0, 9.0, 0.5)), belief((0.0, 5.0, 0.5), (0.0, 9.0, 0.5)), stays]
+    found = HypothesisLife().step(CTX, drive, beliefs, [stays, None, goes, goes]).metrics.values["wrong_hypotheses"]
+    assert (found["updates"], found["kept"]) == (pytest.approx((4 + 1 + 0) / 3), 1)

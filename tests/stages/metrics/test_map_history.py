@@ -246,3 +246,16 @@ def test_without_odometry_or_estimates_there_is_no_drift():
 )
 def test_ground_is_new_beyond_the_radius_of_what_was_left(xs: list[float], row: int):
     assert last_new_ground(np.array([(0.0, x) for x in xs]), 2.0) == row
+
+
+def test_what_is_new_is_a_share_of_the_references_of_the_first_lap_up_to_the_last_frame():
+    events = [dataclasses.replace(event(2, [0, 1], [0, 0]), components=7), None]
+    events += [event(1, removed=[1]), event(1, [2], [3], [0])]
+    found = MapHistory().step(CTX, line([0.0, 5.0, None, None], logs=[0, 0, 1, 1]), events).metrics.values
+    assert found["map"] == {"inserted": 3, "removed": 2, "new_after_first_lap_rate": 0.5}
+    assert found["map_per_lap"]["removed"] == [0, 2]
+    assert found["first_map"]["frames"] == 2  # only the first log has ground truth
+
+
+def test_what_a_known_map_held_had_what_the_first_event_removes():
+    assert counted([None, event(2, [5], [1], [0])]).tolist() == [[2, 2, 0, 0], [2, 2, 1, 1]]

@@ -39,20 +39,21 @@ def two(x: float, y: float, heading: float = 0.0) -> Particles:
 
 
 def test_spreads_are_means_over_the_frames_and_the_ratio_is_theirs():
-    frames = [(two(0.3, 0.4, 0.2), two(0.0, 0.25)), (two(0.6, 0.8), two(0.6, 0.45))]
-    seen_there = [seen(1.0)] * 2
+    frames = [(two(0.3, 0.4, 0.2), two(0.0, 0.25)), (two(0.6, 0.8), two(0.6, 0.45)), (two(0.0, 0.3), two(0.2, 0.0))]
+    seen_there = [seen(1.0)] * 3
     before, after = ([frame[k] for frame in frames] for k in (0, 1))
     found = ResamplingSpread().step(CTX, before, seen_there, after).metrics.values["resampling"]
     assert found == {
-        "frames": 2,
-        "before_m": pytest.approx(0.75),
-        "after_m": pytest.approx(0.5),
+        "frames": 3,
+        "before_m": pytest.approx(0.6),
+        "after_m": pytest.approx(0.4),
         "ratio": pytest.approx(2 / 3),
     }
 
 
 def test_mixtures_are_not_resampled_and_a_hypothesis_counts_by_its_shape_alone():
-    given = [two(0.1, 0.0), seen(1.0), two(0.1, 0.0)], [seen(1.0)] * 3, [two(0.1, 0.0), two(0.1, 0.0), seen(1.0)]
+    near = two(0.1, 0.0)
+    given = [seen(1.0), near, near], [seen(1.0)] * 3, [near, seen(1.0), near]
     assert ResamplingSpread().step(CTX, *given).metrics.values["resampling"]["frames"] == 1
     light = GaussianMixture(np.zeros((2, 3)), np.stack([np.eye(3)] * 2), np.array([0.1, 0.3]))
     assert agreement(two(0.0, 0.0), light) == pytest.approx((2 * np.pi) ** -1.5)
@@ -66,3 +67,9 @@ def test_they_agree_above_a_density_of_a_ten_thousandth():
 
     limit = np.sqrt(2 * np.log((2 * np.pi) ** -1.5 / 1e-4))
     assert [frames(limit - 0.001), frames(limit + 0.001)] == [1, 0]
+
+
+def test_at_the_limit_itself_they_do_not_agree():
+    near, there = two(0.1, 0.0), seen(1.0)
+    stage = ResamplingSpread(agree_above=agreement(near, there))
+    assert stage.step(CTX, [near], [there], [near]).metrics.values["resampling"]["frames"] == 0

@@ -79,9 +79,13 @@ def test_without_a_settling_window_nothing_is_said_of_one():
 
 
 def test_frames_without_truth_or_estimate_are_left_out_and_counted():
-    found = measured([at(0.0), at(99.0), None, at(1.0)], [Pose(0, 0, 0), None, Pose(0, 0, 0), Pose(0, 0, 0)])
-    assert (found["frames"], found["frames_without_truth"], found["frames_without_estimate"]) == (4, 1, 1)
-    assert found["position_error_m"]["max"] == 1.0
+    estimates = [at(0.0), at(99.0), None, at(0.25), None, at(98.0), at(2.0), None]
+    truth = [Pose(0, 0, 0), None, Pose(0, 0, 0), Pose(0, 0, 0), Pose(0, 0, 0), None, Pose(0, 0, 0), None]
+    found = measured(estimates, truth)
+    assert (found["frames"], found["frames_without_truth"], found["frames_without_estimate"]) == (8, 3, 2)
+    assert found["position_error_m"] == pytest.approx(
+        {"mean": 0.75, "std": np.std([0.0, 0.25, 2.0]), "median": 0.25, "p90": 1.65, "max": 2.0}
+    )
 
 
 def test_convergence_counts_frames_of_the_log_also_where_truth_is_missing():
