@@ -192,9 +192,9 @@ def at_supports(support: Array, gaps: Array | None, near: float) -> dict[str, li
 
 def hypothesis_gaps(found: LoopHypotheses) -> Array:
     """How far apart the two subclusters of each hypothesis came: (H,) metres, between their nearest images."""
-    members = [found.poses[found.subcluster == number] for number in range(int(found.subcluster.max(initial=-1)) + 1)]
+    members = {number: found.poses[found.subcluster == number] for number in np.unique(found.subcluster).tolist()}
     gaps = np.empty(len(found.pairs))
-    for row, (one, other) in enumerate(found.subcluster[found.pairs]):
+    for row, (one, other) in enumerate(found.subcluster[found.pairs].tolist()):
         between = members[one][:, None] - members[other][None]
         gaps[row] = np.hypot(between[..., 0], between[..., 1]).min()
     return gaps

@@ -125,3 +125,19 @@ def test_neighbours_are_judged_by_what_was_known_before_they_spoke():
     assert found["right_alone"] == 0.5
     assert found["area_gain"] == pytest.approx(1.0 - (0.5 * 1.0 + 0.5 * 2.0 / 3.0))
     assert neighbours(initial, masses, None, 2.5)["area_gain"] is None
+
+
+def test_neighbours_that_said_nothing_bring_nothing_and_a_gap_at_the_limit_is_right():
+    known = np.array([[0.6, 0.2, 0.2], [0.7, 0.1, 0.2], [0.9, 0.0, 0.1], [0.2, 0.6, 0.2]])
+    found = neighbours(known, known, np.array([9.0, 9.0, 2.5, 9.0]), 2.5)
+    assert found == {"area_gain": 0.0, "wrong_without": 2.0, "right_alone": 1.0}
+    assert neighbours(known, known, np.zeros(4), 2.5)["wrong_without"] == 0.0
+
+
+def test_three_metres_are_not_near_and_nine_images_are_no_leap():
+    given = hypotheses()
+    poses = given.poses.copy()
+    poses[given.subcluster == 4, 1] = 3.0
+    assert measured(dataclasses.replace(given, poses=poses))[0]["loops"]["recall"] == 1.0  # of the first alone
+    close = dataclasses.replace(given, pairs=np.array([*PAIRS[:4], (9, 18)]))
+    assert measured(close)[0]["loops"]["loop_closures"]["hypotheses"] == 3
