@@ -18,7 +18,7 @@ BEGIN, END = "<!-- claims: omninav experiments -->", "<!-- end of the claims -->
 HEAD = ("claim", "where", "experiment", "verdict", "ours")
 UNRUN, UNJUDGED, NOT_HERE = "not run yet", "no experiment", "not testable here"
 EARLIER = ", earlier rule"
-"""Behind a verdict of before scenarios counted: of the development world alone."""
+"""Behind a verdict of before scenarios counted: of the scenario of development alone."""
 
 
 @dataclass(frozen=True)

@@ -60,13 +60,21 @@ class ConditionRun:
 
 def condition_runs(experiment: Experiment, folder: Path, overrides: Sequence[str]) -> list[ConditionRun]:
     """A run for each condition in each scenario. `overrides`: what was typed after the experiment's name."""
-    seeds = tuple(range(experiment.repetitions))
+    number = experiment.repetitions
     return [
         _run(
-            experiment, folder, overrides, condition, scenario, (experiment.set, condition.overrides, own), seeds=seeds
+            experiment,
+            folder,
+            overrides,
+            condition,
+            scenario,
+            (experiment.set, condition.overrides, own),
+            seeds=tuple(
+                range(index * number, (index + 1) * number)
+            ),  # draws of stages differ, too
         )
         for condition in experiment.conditions()
-        for scenario, own in experiment.all_scenarios.items()
+        for index, (scenario, own) in enumerate(experiment.all_scenarios.items())
     ]
 
 

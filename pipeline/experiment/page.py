@@ -192,7 +192,7 @@ def _table(experiment: Experiment, results: Results, development: Results, name:
 
 
 def reference_text(content: PageContent, index: int) -> str:
-    """A sentence with the figures of its reference runs, but those of the development world."""
+    """A sentence with the figures of its reference runs, but those of development."""
     reference = content.experiment.reference_runs[index]
     measure = Measure("", (reference.measure,), reference.scale)
     parts = []

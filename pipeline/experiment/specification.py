@@ -148,9 +148,9 @@ class Experiment:
     set: str = ""
     """Overrides of all conditions, but not of the reference runs."""
     repetitions: int = 50
-    """Each condition is run with the seeds 0 to `repetitions` - 1."""
+    """Each condition is run with this many seeds in each scenario, 0, 1, 2, … in the order of the scenarios."""
     scenarios: Mapping[str, str] = field(default_factory=dict)
-    """Label -> overrides: other worlds, days, routes. Each condition is run in each of them with every seed. A claim is
+    """Label -> overrides: other data. Each condition is run in each of them, with seeds of its own. A claim is
     decided by six or more, which intervals resample first."""
     development: str = ""
     """Overrides of one more scenario, on which choices were made: it stands beside the others and is never judged."""

@@ -297,7 +297,7 @@ def test_series_within_runs_drives_as_repetitions_and_times_of_stages(omninav, p
     page = (folder / "laps.md").read_text()
     assert f", {judged} of 12" in page
     assert f"({judged} of 12)" in page
-    assert "with seeds 0 to 1 over 6 scenarios (a, b, c, d, e, f)" in page
+    assert "with seeds 0 to 11, 2 in each of 6 scenarios (a, b, c, d, e, f)" in page
     assert page.count(", development ") >= 3  # beside the figures of every condition, and in no verdict
     assert re.search(r"\*\*Time \(ms\)\*\*\n(.*\n){3}\| fair \| [1-9]", page)
     pictures = ["laps.png", "laps_curve_1.png", "laps_curve_2.png", "laps_last.png"]
