@@ -69,9 +69,7 @@ def condition_runs(experiment: Experiment, folder: Path, overrides: Sequence[str
             condition,
             scenario,
             (experiment.set, condition.overrides, own),
-            seeds=tuple(
-                range(index * number, (index + 1) * number)
-            ),  # draws of stages differ, too
+            seeds=tuple(range(index * number, (index + 1) * number)),  # draws of stages differ, too
         )
         for condition in experiment.conditions()
         for index, (scenario, own) in enumerate(experiment.all_scenarios.items())
