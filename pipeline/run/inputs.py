@@ -17,8 +17,14 @@ class Input:
 
 
 def read_inputs(config: Mapping[str, Any]) -> dict[str, Input]:
-    """The inputs that a plain configuration declares. Raises `ProblemsFound` where the block cannot be understood."""
-    declared, problems = convert(config.get("inputs") or {}, dict[str, str | Input], "inputs")
+    """The inputs that a plain configuration declares, but those that a variant takes out with null.
+
+    Raises `ProblemsFound` where the block cannot be understood.
+    """
+    inputs = config.get("inputs") or {}
+    if isinstance(inputs, Mapping):
+        inputs = {name: given for name, given in inputs.items() if given is not None}
+    declared, problems = convert(inputs, dict[str, str | Input], "inputs")
     if problems:
         raise ProblemsFound(problems)
     return {name: Input(given) if isinstance(given, str) else given for name, given in declared.items()}
