@@ -9,7 +9,7 @@ import pytest
 
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.experiment.index import BEGIN, END, index_table, page_of, read_verdicts, verdict_files
-from omninav.pipeline.experiment.verdicts import Case, Verdict, headline, in_words
+from omninav.pipeline.experiment.verdicts import Case, Verdict, in_words
 from omninav.pipeline.graph.problems import BadInput
 
 PAGES = Path(__file__).resolve().parents[3] / "docs" / "experiments"
@@ -25,23 +25,6 @@ def verdict(*cases: tuple[bool | None, int]) -> Verdict:
         Case("", 1.0, 2.0, "the limit", -1.0, (-1.5, -0.5), holds, many, many, False, many) for holds, many in cases
     )
     return Verdict("it holds", "error", "", tuple(plain))
-
-
-@pytest.mark.parametrize(
-    ("verdicts", "said"),
-    [
-        ([True], "holds"),
-        ([False], "does not hold"),
-        ([None], "undecided"),
-        ([True, True], "holds"),
-        ([None, None], "undecided"),
-        ([False, False], "0 of 2 hold"),
-        ([True, True, False], "2 of 3 hold"),
-        ([True, None, False], "1 of 3 hold, 1 undecided"),
-    ],
-)
-def test_a_page_holds_only_where_every_claim_does(verdicts: list[bool | None], said: str) -> None:
-    assert headline([verdict((holds, 12)) for holds in verdicts]) == said
 
 
 def test_the_committed_tables_are_what_the_command_writes(tmp_path: Path) -> None:

@@ -366,6 +366,8 @@ def test_a_verdict_holds_where_all_of_its_cases_do_and_is_written_as_one_figure_
         ([None, None], "undecided"),
         ([False, False], "0 of 2 hold"),
         ([True, False], "1 of 2 hold"),
+        ([True, True, False], "2 of 3 hold"),
+        ([True, None, False], "1 of 3 hold, 1 undecided"),
         ([None, True, False, None], "1 of 4 hold, 2 undecided"),
     ],
 )
