@@ -11,6 +11,7 @@ from omninav.stages.simulator.config import CameraErrors, Ramps, Sensor, WorldCo
 from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.robot_camera import RobotCamera, lean
+from omninav.stages.simulator.scene import Scene
 from omninav.stages.simulator.world import World
 
 PLAIN = replace(DEMO, camera=mirror(160), sensor=Sensor(noise=0.0, exposure_drift=0.0))
@@ -20,7 +21,7 @@ STRIP = {"projection": "cylindrical", "image": {"width": 90, "height": 30}, "hei
 
 
 @pytest.fixture(scope="module")
-def scene():  # type: ignore[no-untyped-def]
+def scene() -> Scene:
     return World(PLAIN).scene
 
 
@@ -31,7 +32,7 @@ def upright(camera: RobotCamera, x: float = 0.0, heading: float = 0.0) -> np.nda
     row = np.argsort(rays.pixels)
     true, said = rays.directions[row].astype(float), told.directions[np.argsort(told.pixels)].astype(float)
     rotation = np.linalg.lstsq(said, true, rcond=None)[0].T
-    return rotation @ (0.0, 0.0, 1.0)  # type: ignore[no-any-return]
+    return np.asarray(rotation @ (0.0, 0.0, 1.0))
 
 
 def test_leaning_tips_the_vertical_towards_an_azimuth() -> None:
@@ -40,7 +41,7 @@ def test_leaning_tips_the_vertical_towards_an_azimuth() -> None:
     np.testing.assert_allclose(lean(0.1, 2.0) @ lean(-0.1, 2.0), np.eye(3), atol=1e-12)
 
 
-def test_a_camera_that_leans_by_nothing_takes_the_same_image(scene) -> None:  # type: ignore[no-untyped-def]
+def test_a_camera_that_leans_by_nothing_takes_the_same_image(scene: Scene) -> None:
     rays = camera_rays(RobotCamera(PLAIN).described, 0.1, 0.25)
     np.testing.assert_array_equal(render(scene, leaning(rays, np.eye(3)), POSE, 0.9), render(scene, rays, POSE, 0.9))
 
@@ -54,7 +55,7 @@ def test_a_tilted_camera_leans_by_so_much_in_each_draw_elsewhere() -> None:
     assert len({round(float(np.arctan2(up[1], up[0])), 2) for up in ups}) == 3
 
 
-def test_a_leaning_camera_sees_what_its_rays_point_at(scene) -> None:  # type: ignore[no-untyped-def]
+def test_a_leaning_camera_sees_what_its_rays_point_at(scene: Scene) -> None:
     """Each pixel shows what the level camera shows where the pixel's turned ray is seen."""
     tilted = RobotCamera(replace(PLAIN, camera_errors=CameraErrors(tilt_deg=5.0)))
     level, leant = RobotCamera(PLAIN).image(scene, POSE, 0.0, 1), tilted.image(scene, POSE, 0.0, 1)
@@ -83,7 +84,7 @@ def test_an_error_that_a_camera_cannot_have_is_refused() -> None:
         RobotCamera(replace(PLAIN, camera=STRIP, camera_errors=CameraErrors(focal=0.01)))
 
 
-def test_exposure_jumps_and_holds(scene) -> None:  # type: ignore[no-untyped-def]
+def test_exposure_jumps_and_holds(scene: Scene) -> None:
     sensor = replace(PLAIN.sensor, exposure_jumps=0.5, exposure_hold_s=4.0)
     camera = RobotCamera(replace(PLAIN, sensor=sensor), "tour", 1)
     factors = np.array([camera._exposure(second + 0.5) for second in range(400)])
