@@ -98,11 +98,11 @@ def number(value: float | None, digits: int) -> str:
     return f"{value:.1g}" if value and not float(text) else text
 
 
-def made_with(version: str, commit: str | None, words: str = "Made with") -> str:
-    """At which version and commit a page was made, or judged again: in 12 digits, and whether it had changes."""
+def made_with(version: str, commit: str | None) -> str:
+    """At which version and commit a page was made: in 12 digits, and whether it had changes."""
     known, dirty, _ = (commit or "").partition("-dirty")
     at = f", commit {known[:12]}" + (" with changes that are not committed" if dirty else "") if known else ""
-    return f"{words} omninav {version}{at}"
+    return f"Made with omninav {version}{at}"
 
 
 def summary(measure: Measure, values: Sequence[float]) -> str:
