@@ -229,10 +229,13 @@ def settings_read(config: Any) -> set[str]:
 
 
 def _without_taken_out(config: dict[str, Any]) -> dict[str, Any]:
-    """A configuration without the inputs, the artifacts and what is saved that a variant upon another sets to null."""
+    """A configuration without the artifacts and what is saved that a variant upon another sets to null.
+
+    Inputs that are null `read_inputs` leaves out.
+    """
     blocks = {
         block: {name: value for name, value in config[block].items() if value is not None}
-        for block in ("inputs", "artifacts", "saves")
+        for block in ("artifacts", "saves")
         if isinstance(config.get(block), Mapping)
     }
     return {**config, **blocks}
