@@ -24,15 +24,22 @@ def bootstrap_interval(groups: Sequence[Array], over: Sequence[Array] | None = N
     columns = [[group for group in column if len(group)] for column in ((groups,) if over is None else (groups, over))]
     whole = [np.concatenate(column) for column in columns]
     if all(np.ptp(values) == 0.0 for values in whole):
-        mean = float(whole[0][0]) if over is None else float(whole[0][0] / whole[1][0])
+        mean = float(whole[0][0]) if over is None else float(_ratios(whole[0], whole[1])[0])
         return mean, mean
     counts = [len(group) for group in columns[0]]
     drawn, there = _draws(counts)
     sums = [np.sum(_padded(column)[drawn], axis=(1, 2), where=there) for column in columns]
-    figures = sums[0] / (there.sum(axis=(1, 2)) if over is None else sums[1])
+    figures = sums[0] / there.sum(axis=(1, 2)) if over is None else _ratios(*sums)
     independent = len(counts) if len(counts) > 1 else counts[0]
-    low, high = np.quantile(figures, _expanded(independent))
+    method = "linear" if np.isfinite(figures).all() else "nearest"  # between infinite figures there is nothing
+    low, high = np.quantile(figures, _expanded(independent), method=method)
     return float(low), float(high)
+
+
+def _ratios(of: Array, over: Array) -> Array:
+    """Ratios of sums, where nothing over nothing is one and something over nothing infinite."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where((of == 0.0) & (over == 0.0), 1.0, of / over)
 
 
 def _draws(counts: Sequence[int]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:

@@ -17,14 +17,18 @@ class ComponentMoves(Stage):
     stabilizes gradually". A component is followed to the nearest one of the same view after an update, where that lies
     within `near_m`; an update that leaves its mean as it was (one of its weight alone) does not count.
 
-    `component_moves`: lists with an entry for each number of earlier updates, from 0 on: `updates`; `moved_m`, the mean
-    distance in x and y; `moves`, how many there were. Numbers with fewer than `min_moves` end the lists.
+    `component_moves`: lists with an entry for each of a component's first `moves` moves: `updates`, how many it had had
+    before, from 0 on; `moved_m`, the mean distance in x and y. They are the same components in each entry, those that
+    move at least so often: others are seen elsewhere. `components`: how many they are; the lists are empty where there
+    are fewer than `min_components`.
     """
 
     near_m: Annotated[float, Bounds(gt=0)] = 1.0
     """Distance (m) beyond which a component is another one."""
-    min_moves: Annotated[int, Bounds(ge=1)] = 10
-    """Moves that an entry needs."""
+    moves: Annotated[int, Bounds(ge=2)] = 3
+    """Moves of a component that count; those of fewer are left out."""
+    min_components: Annotated[int, Bounds(ge=1)] = 10
+    """Components that a curve needs."""
 
     class Out(Outputs):
         """`metrics`: the entry `component_moves` of metrics.json."""
@@ -33,39 +37,37 @@ class ComponentMoves(Stage):
 
     def step(self, ctx: Context, mixtures: Sequence[MixturesNow | None]) -> Out:
         """The whole run at once."""
-        by_number: dict[int, list[float]] = {}
-        for number, moved in moves(mixtures, self.near_m):
-            by_number.setdefault(number, []).append(moved)
-        numbers: list[int] = []
-        while len(by_number.get(len(numbers), [])) >= self.min_moves:
-            numbers.append(len(numbers))
+        often = [moved[: self.moves] for moved in moves(mixtures, self.near_m) if len(moved) >= self.moves]
+        enough = len(often) >= self.min_components
         values = {
-            "updates": numbers,
-            "moved_m": [float(np.mean(by_number[number])) for number in numbers],
-            "moves": [len(by_number[number]) for number in numbers],
+            "updates": list(range(self.moves)) if enough else [],
+            "moved_m": np.mean(often, axis=0).tolist() if enough else [],
+            "components": len(often),
         }
         return self.Out(metrics=Metrics({"component_moves": values}))
 
 
-def moves(mixtures: Sequence[MixturesNow | None], near_m: float) -> list[tuple[int, float]]:
-    """Each move of a component: how many updates it had had before, and its distance (m)."""
-    found: list[tuple[int, float]] = []
-    places: dict[int, tuple[Array, list[int]]] = {}  # of a view: means of its components, updates of each
+def moves(mixtures: Sequence[MixturesNow | None], near_m: float) -> list[list[float]]:
+    """Of each component the distances (m) that updates moved it by, one after the other."""
+    found: list[list[float]] = []
+    places: dict[int, tuple[Array, list[list[float]]]] = {}  # of a view: means of its components, moves of each
     for now in mixtures:
         for name in [] if now is None else np.unique(now.ids).tolist():
             assert now is not None
             means = now.means[now.ids == name].astype(np.float64)
-            known, updates = places.get(name, (np.empty((0, 3)), []))
-            numbers = []
+            known, moved = places.get(name, (np.empty((0, 3)), []))
+            followed: list[list[float]] = []
+            taken: set[int] = set()
             for mean in means:
                 away = np.hypot(*(known[:, :2] - mean[:2]).T)
                 nearest = int(away.argmin()) if len(away) else -1
-                if nearest < 0 or away[nearest] > near_m:
-                    numbers.append(0)
-                elif (known[nearest] == mean).all():
-                    numbers.append(updates[nearest])
-                else:
-                    found.append((updates[nearest], float(away[nearest])))
-                    numbers.append(updates[nearest] + 1)
-            places[name] = means, numbers
+                if nearest < 0 or away[nearest] > near_m or nearest in taken:
+                    found.append([])
+                    followed.append(found[-1])
+                    continue
+                taken.add(nearest)
+                if not (known[nearest] == mean).all():
+                    moved[nearest].append(float(away[nearest]))
+                followed.append(moved[nearest])
+            places[name] = means, followed
     return found

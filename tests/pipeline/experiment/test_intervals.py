@@ -95,3 +95,13 @@ def test_its_percentiles_are_student_s_expanded():
     spread = np.sqrt(np.var([group.mean() for group in groups]) / 6 + np.mean([group.var() for group in groups]) / 300)
     low, high = bootstrap_interval(groups)
     assert (high - low) / 2 == pytest.approx(np.sqrt(6 / 5) * t.ppf(0.975, 5) * spread, rel=0.02)
+
+
+def test_a_ratio_to_worlds_without_error_is_infinite_and_of_nothing_to_nothing_one():
+    zeros = [np.zeros(1)] * 6
+    assert bootstrap_interval(zeros, zeros) == (1.0, 1.0)
+    low, high = bootstrap_interval([np.array([value]) for value in (1.0, 2.0, 1.0, 2.0, 1.0, 2.0)], zeros)
+    assert (low, high) == (np.inf, np.inf)
+    once = [np.array([value]) for value in (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)]  # many resamples have nothing but zeros
+    low, high = bootstrap_interval([np.ones(1)] * 6, once)
+    assert low > 1.0 and high == np.inf

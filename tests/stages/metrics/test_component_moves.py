@@ -15,7 +15,7 @@ def now(*places: tuple[int, float]) -> MixturesNow:
 def test_a_component_is_followed_from_update_to_update():
     ticks = [now((1, 0.0)), None, now((1, 0.5)), now((1, 0.5)), now((1, 0.75), (2, 9.0)), now((1, 0.75), (1, 5.0))]
     # An update that leaves the mean where it is moves nothing; a place far off is another one.
-    assert moves(ticks, 1.0) == [(0, 0.5), (1, 0.25)]
+    assert moves(ticks, 1.0) == [[0.5, 0.25], [], []]
 
 
 def test_a_running_mean_moves_less_with_every_update():
@@ -25,35 +25,49 @@ def test_a_running_mean_moves_less_with_every_update():
         seen = rng.normal(0.0, 0.2, 40)
         places = places + (seen - places) / (update + 1)
         ticks += [now((view, x)) for view, x in enumerate(places.tolist())]
-    found = ComponentMoves().step(Context("metric"), ticks).metrics.values["component_moves"]
+    found = ComponentMoves(moves=11).step(Context("metric"), ticks).metrics.values["component_moves"]
     assert found["updates"] == list(range(11))
-    assert found["moves"] == [40] * 11
+    assert found["components"] == 40
     assert found["moved_m"][-1] < 0.2 * found["moved_m"][0]
     assert found["moved_m"][0] == pytest.approx(0.2 * np.sqrt(1 / np.pi), rel=0.3)  # half the gap between two draws
 
 
-def test_numbers_with_few_moves_end_the_list():
-    found = ComponentMoves(min_moves=2).step(Context("metric"), [now((1, 0.0)), now((1, 0.5))])
-    assert found.metrics.values["component_moves"]["updates"] == []
+def test_every_entry_is_of_the_same_components():
+    # Ten that move twice by 0.25 and 0.5, and ten that move once, by 1.0, and are in neither entry.
+    first = [(view, 0.0) for view in range(20)]
+    then = [(view, 0.25) for view in range(10)] + [(view, 1.0) for view in range(10, 20)]
+    last = [(view, 0.75) for view in range(10)]
+    found = ComponentMoves(moves=2).step(Context("m"), [now(*first), now(*then), now(*last)])
+    assert found.metrics.values["component_moves"] == {"updates": [0, 1], "moved_m": [0.25, 0.5], "components": 10}
+
+
+def test_only_the_first_moves_of_a_component_count():
+    ticks = [now((1, x)) for x in (0.0, 0.5, 0.75, 0.875)]
+    found = ComponentMoves(moves=2, min_components=1).step(Context("m"), ticks).metrics.values["component_moves"]
+    assert found == {"updates": [0, 1], "moved_m": [0.5, 0.25], "components": 1}
+
+
+def test_a_curve_of_few_components_is_left_out():
+    ticks = [now(*((view, x) for view in range(9))) for x in (0.0, 0.5, 0.25, 0.5)]
+    found = ComponentMoves().step(Context("m"), ticks).metrics.values["component_moves"]
+    assert found == {"updates": [], "moved_m": [], "components": 9}
+    ten = [now(*((view, x) for view in range(10))) for x in (0.0, 0.5, 0.25, 0.5)]
+    found = ComponentMoves().step(Context("m"), ten).metrics.values["component_moves"]
+    assert found["updates"] == [0, 1, 2]
+    fewer = ComponentMoves().step(Context("m"), ten[:-1]).metrics.values["component_moves"]
+    assert fewer["components"] == 0
 
 
 def test_a_component_is_the_nearest_of_its_view_and_beyond_a_metre_another():
     ticks = [now((1, 0.0), (1, 0.75)), now((1, 0.125), (1, 1.75))]
-    assert moves(ticks, 1.0) == [(0, 0.125), (0, 1.0)]
-    assert moves(ticks, 0.99) == [(0, 0.125)]
+    assert moves(ticks, 1.0) == [[0.125], [1.0]]
+    assert moves(ticks, 0.99) == [[0.125], [], []]
+    found = ComponentMoves(moves=2, min_components=1).step(Context("m"), [now((1, x)) for x in (0.0, 1.0, 2.5)])
+    assert found.metrics.values["component_moves"]["components"] == 0
+    found = ComponentMoves(moves=2, min_components=1).step(Context("m"), [now((1, x)) for x in (0.0, 1.0, 2.0)])
+    assert found.metrics.values["component_moves"]["components"] == 1
 
 
-def test_an_entry_is_the_mean_of_as_many_moves_as_it_needs():
-    ticks = [now((1, 0.0), (2, 0.0), (3, 0.0)), now((1, 0.25), (2, 0.25), (3, 1.0))]
-    found = ComponentMoves(min_moves=3).step(Context("metric"), ticks).metrics.values["component_moves"]
-    assert found == {"updates": [0], "moved_m": [0.5], "moves": [3]}
-    ten = [now(*((view, 0.0) for view in range(10))), now(*((view, 0.5) for view in range(10)))]
-    assert ComponentMoves().step(Context("m"), ten).metrics.values["component_moves"]["moves"] == [10]
-    nine = [now(*((view, 0.0) for view in range(9))), now(*((view, 0.5) for view in range(9)))]
-    assert ComponentMoves().step(Context("m"), nine).metrics.values["component_moves"]["moves"] == []
-
-
-def test_beyond_a_metre_is_another_place_unless_asked_for():
-    ticks = [now((1, 0.0), (2, 0.0)), now((1, 1.0), (2, 1.5))]
-    found = ComponentMoves(min_moves=1).step(Context("metric"), ticks).metrics.values["component_moves"]
-    assert found == {"updates": [0], "moved_m": [1.0], "moves": [1]}
+def test_of_two_near_one_component_the_second_is_another():
+    ticks = [now((1, 0.0)), now((1, 0.25), (1, 0.5)), now((1, 0.25), (1, 0.75))]
+    assert moves(ticks, 1.0) == [[0.25], [0.25]]
