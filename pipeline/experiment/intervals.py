@@ -31,8 +31,11 @@ def bootstrap_interval(groups: Sequence[Array], over: Sequence[Array] | None = N
     sums = [np.sum(_padded(column)[drawn], axis=(1, 2), where=there) for column in columns]
     figures = sums[0] / there.sum(axis=(1, 2)) if over is None else _ratios(*sums)
     independent = len(counts) if len(counts) > 1 else counts[0]
-    method = "linear" if np.isfinite(figures).all() else "nearest"  # between infinite figures there is nothing
-    low, high = np.quantile(figures, _expanded(independent), method=method)
+    shares = _expanded(independent)
+    if np.isfinite(figures).all():
+        low, high = np.quantile(figures, shares)
+    else:  # between infinite figures there is nothing
+        low, high = np.quantile(figures, shares, method="nearest")
     return float(low), float(high)
 
 
