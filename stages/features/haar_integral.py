@@ -56,34 +56,38 @@ class Binning(NamedTuple):
 
 
 @compiled(nogil=True)
+def _place(value: float, bins: int, weighted: bool) -> tuple[int, float]:
+    """The bin of a value, and the share of it that counts for the next one."""
+    place = value * bins - (0.5 if weighted else 0.0)
+    low = min(max(int(np.floor(place)), 0), bins - 1)
+    return low, min(max(place - low, 0.0), 1.0) if weighted and low + 1 < bins else 0.0
+
+
+@compiled(nogil=True)
 def _count(values: Floats, usable: Bools, bins: int, joint: bool, weighted: bool, counts: Array) -> float:
     # Gives the sum over values of their squared shares: 1 each where all of a value goes to one bin.
-    low, part = np.empty(3, np.int64), np.empty(3)
     squares = 0.0
     for n in range(len(values)):
         if not usable[n]:
             continue
-        for c in range(3):
-            place = values[n, c] * bins - (0.5 if weighted else 0.0)
-            low[c] = min(max(int(np.floor(place)), 0), bins - 1)
-            part[c] = min(max(place - low[c], 0.0), 1.0) if weighted and low[c] + 1 < bins else 0.0
         if joint:
+            i, x = _place(values[n, 0], bins, weighted)
+            j, y = _place(values[n, 1], bins, weighted)
+            k, z = _place(values[n, 2], bins, weighted)
             for corner in range(8):
-                share, cell = 1.0, 0
-                for c in range(3):
-                    upper = (corner >> c) & 1
-                    share *= part[c] if upper else 1.0 - part[c]
-                    cell = cell * bins + low[c] + upper
+                a, b, c = corner & 1, (corner >> 1) & 1, corner >> 2
+                share = (x if a else 1.0 - x) * (y if b else 1.0 - y) * (z if c else 1.0 - z)
                 if share > 0.0:
-                    counts[cell] += share
+                    counts[((i + a) * bins + j + b) * bins + k + c] += share
                     squares += share * share
         else:
-            for c in range(3):
-                below, above = (1.0 - part[c]) / 3.0, part[c] / 3.0
-                counts[c * bins + low[c]] += below
+            for channel in range(3):
+                low, part = _place(values[n, channel], bins, weighted)
+                below, above = (1.0 - part) / 3.0, part / 3.0
+                counts[channel * bins + low] += below
                 squares += below * below
                 if above > 0.0:
-                    counts[c * bins + low[c] + 1] += above
+                    counts[channel * bins + low + 1] += above
                     squares += above * above
     return squares
 

@@ -76,6 +76,8 @@ def _means(
     # One row of all channels at a time, angle by angle: the inner loops are whole vector instructions.
     angles, (rows, length) = len(first), out.shape
     share = np.float32(1.0 / angles)
+    # A neighbour at distance 0 is the pixel itself, whatever the angle: it is read once.
+    still = (first == first[0]).all() and (first_weights == first_weights[0]).all()
     one, other, total = np.empty(length, np.float32), np.empty(length, np.float32), np.empty(length, np.float32)
     others = np.empty((angles if linear else 0, length), np.float32)
     for row in range(rows):
@@ -84,7 +86,8 @@ def _means(
             _row_of_taps(flat, at, second[p], second_weights[p], others[p])
         total[:] = np.float32(0)
         for p in range(angles):
-            _row_of_taps(flat, at, first[p], first_weights[p], one)
+            if p == 0 or not still:
+                _row_of_taps(flat, at, first[p], first_weights[p], one)
             if linear:
                 before, here, after = others[p - 1], others[p], others[p + 1 if p + 1 < angles else 0]
                 for x in range(length):
