@@ -75,7 +75,7 @@ class LoopClosures(Stage):
             held["step_m"] = {"median": float(np.median(steps)), "p90": float(np.quantile(steps, 0.9)),
                               "max": float(steps.max())}  # fmt: skip
         gaps = hypothesis_gaps(hypotheses) if hypotheses.pose_source == "truth" else None
-        far = np.abs(np.diff(hypotheses.pairs, axis=1))[:, 0] >= self.min_images_between
+        far = np.abs(hypotheses.pairs[:, 1] - hypotheses.pairs[:, 0]) >= self.min_images_between
         one, other = hypotheses.place[hypotheses.pairs].T
         supports, near = support(hypotheses.masses), None if gaps is None else gaps[far]
         loops = {
@@ -131,7 +131,7 @@ def neighbours(initial: Array, masses: Array, gaps: Array | None, near: float) -
     if gaps is None or not (gaps <= near).any():
         return {"area_gain": None, "wrong_without": None, "right_alone": None}
     right, before = gaps <= near, support(initial)
-    areas = [average_precision(supports, right) or 0.0 for supports in (before, support(masses))]
+    areas = [_area(*precision_recall(supports, right)) for supports in (before, support(masses))]
     return {
         "area_gain": areas[1] - areas[0],
         "wrong_without": float(np.count_nonzero((before > 0.5) & ~right)),
@@ -144,10 +144,7 @@ def average_precision(support: Array, right: npt.NDArray[np.bool_]) -> float | N
 
     The sum of precision times the increase of recall, with hypotheses of equal support accepted together.
     """
-    if not right.any():
-        return None
-    precision, recall = precision_recall(support, right)
-    return float((precision * np.diff(recall, prepend=0.0)).sum())
+    return _area(*precision_recall(support, right)) if right.any() else None
 
 
 def precision_recall(support: Array, right: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -162,9 +159,12 @@ def precision_recall(support: Array, right: npt.NDArray[np.bool_]) -> tuple[Arra
     return found / accepted, found / right.sum()
 
 
+def _area(precision: Array, recall: Array) -> float:
+    return float((precision * np.diff(recall, prepend=0.0)).sum())
+
+
 def _drawn(support: Array, right: npt.NDArray[np.bool_]) -> Figure | None:
-    area = average_precision(support, right)
-    if area is None:
+    if not right.any():
         return None
     precision, recall = precision_recall(support, right)
     chart = Chart((0.0, 1.0), (0.0, 1.0), "recall", "precision", height=(260.0, 260.0))
@@ -176,7 +176,7 @@ def _drawn(support: Array, right: npt.NDArray[np.bool_]) -> Figure | None:
         name="precision_recall",
         title="Precision and recall of loop closures",
         caption=f"Loop closures accepted by falling support, {int(right.sum())} of {len(right)} right. The area below "
-        f"the line, the sum of Pₙ (Rₙ - Rₙ₋₁), is {100 * area:.1f} %.",
+        f"the line, the sum of Pₙ (Rₙ - Rₙ₋₁), is {100 * _area(precision, recall):.1f} %.",
         content=chart.svg(),
         media_type="image/svg+xml",
         order=31,

@@ -244,3 +244,106 @@ def test_thirty_pairs_are_taken_of_each_distance_evenly() -> None:
     assert [(each["m"], each["pairs"]) for each in found["apart"]] == [(0.5, 30), (1.0, 30), (2.0, 30)]
     assert found["all"]["pairs"] == 90
     assert pairs_apart(poses, 0.5, 3) == [(0, 1), (49, 50), (98, 99)]
+
+
+def looking(first: np.ndarray, second: np.ndarray, **parameters) -> dict[str, float]:
+    """What is found of two views of points far to the sides, a metre apart, that look so: descriptors (20, 128)."""
+    views = [
+        dataclasses.replace(sides(x)[0], descriptors=looks.astype(np.uint8), colours=np.full((len(looks), 3), 0.3))
+        for x, looks in ((0.0, first), (1.0, second))
+    ]
+    depths = [sides(x)[1] for x in (0.0, 1.0)]
+    stage = FirstMatches(**{"apart_m": (1.0,)} | parameters)
+    out = stage.step(Context("m"), [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)], views, (), depths)
+    return dict(out.metrics.values["matches"]["all"])
+
+
+PLAIN = np.clip(LOOKS[:20], 20, 200).astype(np.int64)
+
+
+def with_entry(looks: np.ndarray, row: int, entry: int, more: int) -> np.ndarray:
+    changed = looks.copy()
+    changed[row, entry] += more
+    return changed
+
+
+@pytest.mark.parametrize("search", ["both_ways", "one_way"])
+def test_the_clearest_come_first_or_the_nearest(search: Search) -> None:
+    # Two that look alike but for 10, and are seen as each other, 3 off; all others far from each other, and 50 off.
+    first = PLAIN.copy()
+    first[1] = with_entry(first, 0, 0, 10)[0]
+    second = first + 5
+    second[:, 100:] -= 5
+    second[0], second[1] = first[1], first[0]
+    second[:2, 1] += 3
+    assert looking(first, second, search=search, best="clearest")["first_right"] == 18.0
+    assert looking(first, second, search=search, best="nearest")["first_right"] == 0.0
+
+
+def test_one_way_two_patches_may_have_one_partner_and_both_ways_not() -> None:
+    first = PLAIN.copy()
+    first[1] = with_entry(first, 0, 0, 10)[0]
+    second = PLAIN.copy()
+    second[1] = 255 - second[1]
+    assert looking(first, second, search="one_way")["matched"] == 20.0
+    assert looking(first, second, search="both_ways")["matched"] == 19.0
+
+
+@pytest.mark.parametrize(("second_nearest", "matched"), [(13.0, 20.0), (12.0, 19.0)])
+def test_a_partner_is_clearer_than_the_second_by_a_fifth(second_nearest: float, matched: float) -> None:
+    second = PLAIN.copy()
+    second[0, 0] += 10  # 10 from its partner, and this far from another of the second view
+    second[1] = PLAIN[0]
+    second[1, 1] += int(second_nearest)
+    first = PLAIN.copy()
+    first[1] = 255 - first[1]
+    assert looking(first, second, search="one_way")["matched"] == matched - 1.0  # none looks like the second patch
+
+
+@pytest.mark.parametrize("given", [(True, False), (False, True)])
+def test_depths_of_one_view_alone_do_not_judge_a_match(given: tuple[bool, bool]) -> None:
+    views, poses = [sides(0.0), sides(1.0, axis=2, degrees=1.9)], [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
+    depths = [depth if there else None for (_, depth), there in zip(views, given, strict=True)]
+    found = FirstMatches(apart_m=(1.0,)).step(Context("m"), poses, [view for view, _ in views], (), depths)
+    assert found.metrics.values["matches"]["depths_known"] == 1
+    assert found.metrics.values["matches"]["all"] == of_sides(degrees=1.9, known=False)["all"]
+    uprights = [columns(0.0), columns(1.0, 2.0)]
+    depths = [depth if there else None for (_, depth), there in zip(uprights, given, strict=True)]
+    stage = FirstMatches(apart_m=(1.0,), by="columns")
+    found = stage.step(Context("m"), poses, (), [view for view, _ in uprights], depths)
+    assert found.metrics.values["matches"]["all"] == of_columns(2.0, known=False)
+
+
+def test_a_column_is_wrong_where_its_lower_end_is() -> None:
+    (first, near), (second, far) = columns(0.0), columns(1.0)
+    for end in (0, 1):
+        elevations = second.elevations.copy()
+        elevations[:, end] += np.radians(9.0)
+        views = [first, dataclasses.replace(second, elevations=elevations)]
+        poses = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
+        out = FirstMatches(apart_m=(1.0,), by="columns").step(Context("m"), poses, (), views, [near, far])
+        assert out.metrics.values["matches"]["all"]["right"] == 0.0
+
+
+def test_the_partner_of_another_is_at_least_one_away() -> None:
+    for number, partners in ((2, [1, 0]), (3, [2, 0, 1])):
+        pairs = Pairs(np.arange(number), np.arange(number), np.zeros(number), np.zeros(number))
+        assert shifted(pairs).second.tolist() == partners
+
+
+@pytest.mark.parametrize("step", [(1, 0), (-1, 0), (0, 1), (0, -1), None])
+def test_half_a_patch_is_what_the_lens_sees_of_it(step: tuple[int, int] | None) -> None:
+    patches = sides(0.0)[0].chosen(np.array([0]))
+    middle, reach = patches.points[0], patches.sizes[0] / 2.0
+    edge = turned(patches.bearings, 2, 5.0)
+
+    class Keyhole(Equirectangular):
+        """A lens that sees one of the patch's four ends."""
+
+        def unproject(self, points):
+            seen = step is not None and np.allclose(points[0], middle + reach * np.array(step))
+            return (edge if seen else np.full((1, 3), np.nan)), np.array([seen])
+
+    widths = np.degrees(half_widths(patches, Keyhole(360, 90, 180.0)))
+    apart = np.degrees(np.arccos(np.clip(patches.bearings[0] @ edge[0], -1.0, 1.0)))
+    assert widths == pytest.approx([0.0 if step is None else apart], abs=1e-6)

@@ -92,6 +92,17 @@ def test_the_curve_is_drawn_where_a_loop_closure_is_right():
     assert measured(hypotheses(), near_m=0.5)[1] is None
 
 
+def test_each_step_of_the_curve_is_as_high_as_the_precision_where_it_ends():
+    drawn = measured(hypotheses())[1].content.decode()
+    # Both axes from 0 to 1, over 484 x 260 points from (64, 290) up: recall 0 to 1/2 at 1, then 1 at 2/3, then at 1/2.
+    assert "M64.0 30.0L306.0 30.0L306.0 160.0L306.0 116.7L548.0 116.7L548.0 160.0L548.0 160.0" in drawn
+    assert 'viewBox="0 0 560 340"' in drawn
+    for tick in ('x="64.0" y="308.0" text-anchor="middle">0<', 'x="548.0" y="308.0" text-anchor="middle">1<'):
+        assert tick in drawn
+    for tick in ('x="58.0" y="294.0" text-anchor="end">0<', 'x="58.0" y="34.0" text-anchor="end">1<'):
+        assert tick in drawn
+
+
 def test_without_truth_it_is_not_said_what_is_right():
     values, figure = measured(hypotheses("odometry"))
     assert figure is None
@@ -125,6 +136,11 @@ def test_neighbours_are_judged_by_what_was_known_before_they_spoke():
     assert found["right_alone"] == 0.5
     assert found["area_gain"] == pytest.approx(1.0 - (0.5 * 1.0 + 0.5 * 2.0 / 3.0))
     assert neighbours(initial, masses, None, 2.5)["area_gain"] is None
+
+
+def test_a_support_of_one_half_accepts_nothing():
+    initial = np.array([[0.5, 0.5, 0.0], [0.9, 0.1, 0.0]])
+    assert neighbours(initial, initial, np.array([9.0, 1.0]), 2.5)["wrong_without"] == 0.0
 
 
 def test_neighbours_that_said_nothing_bring_nothing_and_a_gap_at_the_limit_is_right():

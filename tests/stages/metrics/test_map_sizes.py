@@ -63,6 +63,14 @@ def test_the_visited_area_is_that_of_discs_and_of_strips(near):
     assert visited_area(np.repeat(spots[:1], 9, axis=0), near) == visited_area(spots[:1], near)
 
 
+def test_the_area_of_a_spot_is_that_of_the_cells_whose_middles_are_within_reach():
+    # Cells of 1 m, and the spot as the middle of the eighth of a metre that it is in.
+    for spot, middle in (((0.1, 0.3), (0.125, 0.375)), ((-0.6, 0.95), (-0.625, 0.875))):
+        cells = [(x + 0.5, y + 0.5) for x in range(-6, 6) for y in range(-6, 6)]
+        near = sum(math.dist(cell, middle) <= 2.0 for cell in cells)
+        assert visited_area(np.array([spot]), 2.0) == near
+
+
 def learned(by_odometry, source="odometry", truths=((0, 0), (2, 0), (2, 2), (0, 2), (5, 5))):
     """Reference k comes in frame 2 k; its true pose is `truths[k]`."""
     map = dataclasses.replace(reference_graph(len(by_odometry)), pose_source=source)
