@@ -1,4 +1,4 @@
-"""Windows shifted, turned, enlarged and seen in part."""
+"""Windows shifted, turned, enlarged, sheared and seen in part."""
 
 import numpy as np
 import pytest
@@ -25,8 +25,9 @@ def moved(**how: float) -> Windows:
         ({"turn_deg": 90.0}, (0, 40)),
         ({"scale": 2.0}, (20, 80)),
         ({"scale": 0.5}, (20, 50)),
+        ({"turn_deg": 90.0, "shear": 0.5}, (0, 50)),
     ],
-    ids=["left as it is", "to the right", "counter-clockwise", "larger", "smaller"],
+    ids=["left as it is", "to the right", "counter-clockwise", "larger", "smaller", "sheared"],
 )
 def test_a_pixel_goes_where_it_is_moved(how: dict[str, float], where: tuple[int, int]) -> None:
     found = moved(**how).pixels[0, :, :, 0].astype(float)
