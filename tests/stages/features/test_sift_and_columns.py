@@ -6,6 +6,7 @@ import numpy as np
 from turned_robot import CAMERA, look, wrapped
 
 from omninav.pipeline import Context
+from omninav.stages.features.columns_alone import ColumnsAlone
 from omninav.stages.features.sift_and_columns import SiftAndColumns
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, compare
 from omninav.stages.match.correspondences import MatchFeatures
@@ -35,6 +36,20 @@ def test_a_turned_robot_matches_patches_and_both_ends_of_columns() -> None:
     turned = wrapped(np.arctan2(there[:, 1], there[:, 0]) - np.arctan2(here[:, 1], here[:, 0]) + 0.7)
     assert (np.abs(turned[ends]) < math.radians(4.0)).mean() > 0.85
     assert np.isfinite(one.point_pixels()[pairs.first]).all()
+
+
+def test_columns_alone_are_those_of_both_kinds() -> None:
+    both = described(0.0).columns
+    stage, context = ColumnsAlone(), Context("features")
+    stage.setup(context)
+    alone = stage.step(context, image=look("mirror", 0.0), camera=CAMERA).features
+    assert len(alone) == 0
+    assert alone.columns is not None
+    assert both is not None
+    assert np.array_equal(alone.columns.descriptors, both.descriptors)
+    pairs = MatchFeatures().step(Context("match"), features=alone, target=alone).correspondences
+    assert np.array_equal(pairs.first, pairs.second)
+    assert len(pairs.first) > 200  # both ends
 
 
 def test_a_map_keeps_columns_and_views_are_compared_by_them_too() -> None:
