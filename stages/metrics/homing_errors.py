@@ -18,7 +18,8 @@ CARRIED_M = 0.5
 QUANTITIES = {
     "homing.end_error_m": Quantity(title="Distance to the target at the end", better="lower"),
     "homing.end_turn_deg": Quantity(title="Heading error at the end", better="lower"),
-    "homing.arrived": Quantity(title="Arrived", unit="%", better="higher"),
+    "homing.reached": Quantity(title="Target reached", unit="%", better="higher"),
+    "homing.arrived": Quantity(title="Said that it had arrived", unit="%", better="higher"),
     "homing.time_s": Quantity(title="Time until it arrived", better="lower", absent="never"),
     "homing.lost_rate": Quantity(title="Target lost", better="lower"),
     "homing.direction_error_deg": Quantity(title="Error of the homing direction", better="lower"),
@@ -30,7 +31,8 @@ class HomingErrors(Stage):
     """Measures where a robot ends that returns to its first pose, and the errors of its homing vectors.
 
     It begins where the robot was put down last, or where it drove to that is furthest away. Under `homing`: `start_m`,
-    how far away that is; `arrived` (1 or 0); `end_error_m` and `end_turn_deg`, from the first pose to the last (and
+    how far away that is; `arrived`, whether it said so (1 or 0); `reached`, whether it was within `within_m` of
+    the target then; `end_error_m` and `end_turn_deg`, from the first pose to the last (and
     `end`, the same as experiments that pool runs read it); `time_s` until it arrived; `lost_rate`, the share of ticks
     in which the target was lost; `direction_error_deg` (median, p90, max), between the homing vector and the true
     direction of the target; `inliers`, median; `first`: `direction_error_deg`, `turn_error_deg` and `inliers` of the
@@ -39,6 +41,9 @@ class HomingErrors(Stage):
 
     from_m: Annotated[float, Bounds(ge=0)] = 0.3
     """Distance (m) to the target beyond which the homing direction is measured."""
+
+    within_m: Annotated[float, Bounds(gt=0)] = 0.5
+    """Largest distance (m) from the target at which it is reached."""
 
     class Out(Outputs):
         """Absent where there was never a vector, or no truth."""
@@ -69,6 +74,7 @@ class HomingErrors(Stage):
         first = min(after)
         values = {
             "start_m": float(math.hypot(*targets[away, :2])),
+            "reached": int(arrived is not None and math.hypot(*targets[arrived, :2]) <= self.within_m),
             "arrived": int(arrived is not None),
             "end_error_m": float(math.hypot(*targets[-1, :2])),
             "end": {"error_m": {"mean": float(math.hypot(*targets[-1, :2])), "std": 0.0}, "frames": 1},
@@ -87,7 +93,7 @@ class HomingErrors(Stage):
                 "inliers": after[first].inliers,
             },
         }
-        headlines = ("homing.end_error_m", "homing.arrived")
+        headlines = ("homing.end_error_m", "homing.reached")
         return self.Out(metrics=Metrics({"homing": values}, QUANTITIES, headlines, details=("homing.end",)))
 
 

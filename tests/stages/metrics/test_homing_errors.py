@@ -89,6 +89,16 @@ def test_who_never_says_that_it_arrived_has_not():
     assert (found["arrived"], found["time_s"]) == (0, None)
 
 
+def test_it_has_reached_what_it_was_near_when_it_said_so():
+    path = [(0.0, 0.0, EAST), (4.0, 0.0, EAST), (0.5, 0.0, EAST), (0.6, 0.0, EAST)]
+    vectors = [None, *[vector(math.pi)] * 3]
+    found = homing(path, vectors, (False, False, True, True))
+    assert (found["arrived"], found["reached"]) == (1, 1)
+    assert homing(path, vectors, (False, False, False, True))["reached"] == 0
+    assert homing(path, vectors, (False, False, False, True), within_m=0.6)["reached"] == 1
+    assert homing(path, vectors, (False,) * 4)["reached"] == 0
+
+
 def test_where_the_target_was_never_found_no_error_is_told():
     lost = [None, *[vector(0.0, inliers=3, state="lost")] * 4]
     found = homing(vectors=lost)
