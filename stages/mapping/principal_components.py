@@ -17,7 +17,7 @@ FloatArray = npt.NDArray[np.float32]
 def principal_components(images: FloatArray, number: int, headings: int = 1) -> tuple[Array, Array]:
     """Directions of greatest variance of images (N, P), and their shares of it: (D, P) orthonormal, (D,).
 
-    With `headings` H > 1 over all H turned copies of each: a image runs column by column around the robot, a turn
+    With `headings` H > 1 over all H turned copies of each: an image runs column by column around the robot, a turn
     moves it by P / H. From the eigenvectors of the scatter matrix, which are the right singular vectors of the centred
     images. A direction's largest number is positive. D is `number`, or less where there is less to tell apart.
     """
