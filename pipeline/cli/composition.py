@@ -4,13 +4,12 @@ import copy
 import functools
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from hydra import compose
 from hydra.core.config_store import ConfigStore
 from hydra.errors import HydraException, MissingConfigException
 from omegaconf import OmegaConf
@@ -23,6 +22,7 @@ from omninav.pipeline.graph.stage import Bounds
 from omninav.pipeline.run.artifact_specification import ArtifactSpecification, read_specifications, without_absent
 from omninav.pipeline.run.inputs import not_taken, read_inputs
 
+from .composition_cache import compose
 from .config_groups import group_files, settings_left_open
 from .hydra_session import hydra_started
 from .overrides import invalid_overrides, with_unlisted_parameters
@@ -34,8 +34,6 @@ OF_THE_RUN = ("seed", "runs", "cache", "checkpoint_s", "validate", "record", "ob
 """Settings that every run reads, whatever its graph is."""
 UNSET = "(unset)"
 INTERPOLATION = re.compile(r"\$\{(?:oc\.select:|unless:(\w+),)?\s*(\w+)")
-
-Variants = Callable[[str], Any]
 
 
 def _unless(given: str, wanted: str, *, _root_: Any) -> Any:
@@ -60,7 +58,7 @@ def composed(arguments: Sequence[str], offer: bool = True) -> Iterator[Any]:
         offer_plugins()
     with hydra_started(folders):
         try:
-            config = compose("config", overrides=with_unlisted_parameters(words, folders))
+            config = compose(with_unlisted_parameters(words, folders))
         except HydraException as error:
             raise ProblemsFound(invalid_overrides(words, folders, str(error))) from None
         yield config
@@ -76,23 +74,12 @@ def offer_plugins() -> None:
         ConfigStore.instance().store(name, {"_target_": entry.target}, group=entry.role, package=f"nodes.{entry.role}")
 
 
-def configured_variants() -> Variants:
-    """Gives the configuration of a variant as its file has it, composed once."""
-
-    @functools.cache
-    def of(variant: str) -> Any:
-        return compose("config", overrides=[f"variant={variant}"])
-
-    return lambda variant: copy.deepcopy(of(variant))
-
-
-def complete(config: Any, variants: Variants | None = None) -> dict[str, Any]:
+def complete(config: Any) -> dict[str, Any]:
     """A composed configuration, resolved, with the graphs of its artifacts composed too: plain dicts, all written out.
 
     An artifact's graph is its variant's, under this run's settings but for those that the artifact sets, and with the
-    nodes that it inherits. Settings that nothing reads are left out. `variants` gives the variants' configurations.
+    nodes that it inherits. Settings that nothing reads are left out.
     """
-    variants = variants or configured_variants()
     try:
         _name_past_links(config)
         plain: dict[str, Any] = _without_taken_out(OmegaConf.to_container(config, resolve=True))  # type: ignore[arg-type]
@@ -102,6 +89,7 @@ def complete(config: Any, variants: Variants | None = None) -> dict[str, Any]:
             problems += _given_twice(config, name, spec)
         if problems:
             raise ProblemsFound(problems)
+        graph_of = functools.cache(lambda maker: _graph_of(config, maker, specs[maker]))
         for name, spec in specs.items():
             own = plain["artifacts"][name]
             maker = spec.together_with or name
@@ -111,7 +99,7 @@ def complete(config: Any, variants: Variants | None = None) -> dict[str, Any]:
             if spec.file is not None:
                 own["file"] = _past_links(spec.file)
             elif making.variant is not None and making.file is None and not _lacks(config, maker):
-                own["graph"] = _graph_of(config, maker, making, variants)
+                own["graph"] = copy.deepcopy(graph_of(maker))
     except OmegaConfBaseException as error:
         where = getattr(error, "full_key", None) or "config"
         raise ProblemsFound([Problem(str(where), str(error).split("\n")[0])]) from None
@@ -142,9 +130,9 @@ def _is_repeatable(node: Any) -> bool:
         return True
 
 
-def _graph_of(config: Any, name: str, spec: ArtifactSpecification, variants: Variants) -> dict[str, Any]:
+def _graph_of(config: Any, name: str, spec: ArtifactSpecification) -> dict[str, Any]:
     try:
-        other = variants(str(spec.variant))
+        other = compose([f"variant={spec.variant}"])
     except MissingConfigException:
         hint = suggest(
             str(spec.variant), [file.name.removesuffix(".yaml") for file in group_files("variant")], "variants"
@@ -219,7 +207,8 @@ def settings_read(config: Any) -> set[str]:
     waiting = list(OF_THE_VARIANT)
     while waiting:
         raw = config._get_node(waiting.pop())
-        for unless, name in INTERPOLATION.findall(OmegaConf.to_yaml(raw) if OmegaConf.is_config(raw) else str(raw)):
+        text = str(OmegaConf.to_container(raw, resolve=False) if OmegaConf.is_config(raw) else raw)
+        for unless, name in INTERPOLATION.findall(text):
             names = [unless] if unless and config.get(unless) is not None else [unless, name] if unless else [name]
             for each in names:
                 if each in config and each not in read:

@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 from typing import Any
 
-from hydra import compose
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
 from omninav.pipeline.experiment.runner import ExperimentRun, plan_experiment
 from omninav.pipeline.graph.problems import ProblemsFound
 
-from .composition import complete, configured_variants, read_words
+from .composition import complete, read_words
+from .composition_cache import compose
 from .overrides import invalid_overrides, with_unlisted_parameters
 from .terminal import shown
 
@@ -37,14 +37,13 @@ def planned_experiment(config: Any, arguments: Sequence[str]) -> ExperimentRun:
     """The experiment of a composed configuration, with every condition checked. Raises `ProblemsFound`."""
     plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
     typed, folders = read_words(arguments)
-    variants = configured_variants()
 
     def composed(words: Sequence[str]) -> dict[str, Any]:
         try:
-            config = compose("config", overrides=with_unlisted_parameters(words, folders))
+            config = compose(with_unlisted_parameters(words, folders))
         except HydraException as error:
             raise ProblemsFound(invalid_overrides(words, folders, str(error))) from None
-        return complete(config, variants)
+        return complete(config)
 
     words = [*condition_words(typed), f"cache={plain['cache'] or 'null'}"]
     return plan_experiment(plain, composed, words, ["omninav", *arguments])

@@ -107,6 +107,17 @@ class CheckedFolder(FileConfigSource):
         return super().load_config(config_path)
 
 
+@contextmanager
+def hydra_errors() -> Iterator[None]:
+    """Whatever Hydra stumbles over is an error of Hydra's."""
+    try:
+        yield
+    except (HydraException, OmegaConfBaseException, BadInput):
+        raise
+    except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
+        raise ConfigCompositionException(f"{type(error).__name__}: {error}") from None
+
+
 class CheckedLoader(ConfigLoaderImpl):
     """Refuses whatever stands under `hydra.` beyond the folders of jobs, launcher and sweeper, whoever composes it."""
 
@@ -116,12 +127,8 @@ class CheckedLoader(ConfigLoaderImpl):
         """A composed configuration. Raises `ProblemsFound`, or Hydra's own errors."""
         if any(word.lstrip("+~").startswith("hydra.searchpath") for word in overrides):
             raise ProblemsFound([not_settable("hydra.searchpath")])  # Hydra imports a package that it names
-        try:
+        with hydra_errors():
             config = super().load_configuration(config_name, overrides, *args, **kwargs)
-        except (HydraException, OmegaConfBaseException, BadInput):
-            raise
-        except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
-            raise ConfigCompositionException(f"{type(error).__name__}: {error}") from None
         if overrides and config_name is not None:
             if self._own is None:
                 self._own = super().load_configuration(None, [*OWN_WORDS], *args, **kwargs).hydra

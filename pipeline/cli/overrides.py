@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from hydra import compose
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import ChoiceSweep, Override, RangeSweep, ValueType
@@ -20,6 +19,7 @@ from omninav.pipeline.graph.problems import BadInput, Problem, nearest, shown, s
 from omninav.pipeline.graph.registry import UnknownStage, resolve
 from omninav.pipeline.graph.signature import BadStage, signature
 
+from .composition_cache import compose
 from .hydra_session import SETTABLE, not_settable
 
 MAX_JOBS = 100_000
@@ -103,7 +103,7 @@ def _number_of_values(word: Override) -> int:
 def _plain(swaps: Sequence[Override], folders: Sequence[str]) -> dict[str, Any]:
     """The configuration with these options of groups alone, the first of each that is swept; {} where there is none."""
     try:
-        config = compose("config", overrides=[text for word in swaps for text in _texts(word)[:1]])
+        config = compose([text for word in swaps for text in _texts(word)[:1]])
         plain: Any = OmegaConf.to_container(config, resolve=False)
     except HydraException:
         plain = {}

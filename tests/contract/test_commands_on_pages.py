@@ -70,7 +70,4 @@ def composed(words: list[str]) -> None:
     if len(rest) < len(words) and named in ([], ["variant=omniview_mcl"]):
         rest += ["tour=T", *(() if any(word.startswith("log=") for word in rest) else ("log=L",))]
 
-    def of_variant(variant: str) -> Any:
-        return compose("config", overrides=[f"variant={variant}"])
-
-    plan(complete(compose("config", overrides=with_unlisted_parameters(rest, [])), of_variant))
+    plan(complete(compose("config", overrides=with_unlisted_parameters(rest, []))))

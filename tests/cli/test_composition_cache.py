@@ -1,0 +1,59 @@
+"""Configurations that are composed from what was kept are those that Hydra composes."""
+
+from collections.abc import Iterator
+from unittest.mock import patch
+
+import hydra
+import pytest
+from hydra.errors import HydraException
+from omegaconf import OmegaConf
+
+from omninav.pipeline.cli.composition_cache import compose
+from omninav.pipeline.cli.hydra_session import hydra_started
+from omninav.pipeline.graph.problems import ProblemsFound
+
+
+@pytest.fixture(autouse=True)
+def _configured() -> Iterator[None]:
+    with hydra_started():
+        yield
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        [],
+        ["variant=omninav", "seed=3", "nodes.prior.number=7", "++nodes.match.headings=18"],
+        ["world=office", "match=l2", "+nodes.sensor.new=[1,{a:2}]", "topics.image=/omni", "rate=null"],
+        ["world.draw=1", "world={draw:2}", "~nodes.fusion", "~match", "cuts=[[3,6]]"],
+        ["tour='a=b.mcap'", "+experiment=particle_cml/slip", "log=${tour}"],
+    ],
+)
+def test_words_give_what_hydra_makes_of_them(words: list[str]):
+    assert OmegaConf.to_yaml(compose(words)) == OmegaConf.to_yaml(hydra.compose("config", overrides=words))
+
+
+def test_options_are_composed_once_and_what_was_set_is_not_kept():
+    with patch("omninav.pipeline.cli.composition_cache.hydra.compose", wraps=hydra.compose) as hydras:
+        first, second = compose(["world=office", "seed=3"]), compose(["day=2", "world=office"])
+        first.nodes.match = None
+        third = compose(["world=office"])
+    assert hydras.call_count == 1
+    assert [config.seed for config in (first, second, third)] == [3, 0, 0]
+    assert [config.day for config in (first, second, third)] == [1, 2, 1]
+    assert third.nodes.match is not None
+
+
+@pytest.mark.parametrize("word", ["sead=3", "match=l3", "+seed=3", "++match=l2", "seed=1,2", "a@b=1", "=", "day={"])
+def test_words_that_do_not_fit_are_refused_as_by_hydra(word: str):
+    with pytest.raises(HydraException) as expected:
+        hydra.compose("config", overrides=[word])
+    with pytest.raises(HydraException) as found:
+        compose([word])
+    assert str(found.value) == str(expected.value)
+
+
+@pytest.mark.parametrize("word", ["hydra.searchpath=[a]", "hydra={job:{chdir:true}}", "hydra.job.chdir=true"])
+def test_what_cannot_be_set_of_hydra_is_refused_here_too(word: str):
+    with pytest.raises(ProblemsFound, match="hydra"):
+        compose([word])
