@@ -64,13 +64,12 @@ def main() -> int:
     preload()
     poor = []
     with copies(asked.jobs) as places:
-        for folder, (names, tests) in FOLDERS.items():
-            paths = [path for name in names.split() for path in (REPOSITORY / folder).glob(f"{name}.py")]
-            files = sorted(f"{folder}/{path.name}" for path in paths)
-            files = [file for file in files if not asked.only or file.startswith(tuple(asked.only))]
-            if not files:
-                continue
-            counted = without_equivalent([each for file in files for each in mutants(places[0], file)], files)
+        files = files_of(asked.only)
+        found = {file: mutants(places[0], file) for each in files.values() for file in each}
+        counts = without_equivalent(found)
+        for folder, names in files.items():
+            tests = FOLDERS[folder][1]
+            counted = [mutant for file in names for mutant in counts[file]]
             tried = counted
             if not asked.all and len(counted) > asked.sample:
                 tried = random.Random(asked.seed).sample(counted, asked.sample)
@@ -102,15 +101,28 @@ def copies(number: int) -> Iterator[list[Path]]:
         yield made
 
 
-def without_equivalent(found: list[Mutant], files: list[str]) -> list[Mutant]:
-    """Those that equivalent.txt does not list. An entry that is no mutant of these files any more ends the program."""
+def files_of(only: list[str]) -> dict[str, list[str]]:
+    """The files of each folder, of those that are asked for."""
+    found = {}
+    for folder, (names, _) in FOLDERS.items():
+        paths = [path for name in names.split() for path in (REPOSITORY / folder).glob(f"{name}.py")]
+        files = sorted(f"{folder}/{path.name}" for path in paths)
+        found[folder] = [file for file in files if not only or file.startswith(tuple(only))]
+    return {folder: files for folder, files in found.items() if files}
+
+
+def without_equivalent(found: dict[str, list[Mutant]]) -> dict[str, list[Mutant]]:
+    """Those of each file that equivalent.txt does not list. Entries that are no mutant any more end the program."""
     blocks = [block.splitlines() for block in (HERE / "equivalent.txt").read_text().split("\n\n")[1:]]
     listed = {(file, before.strip(), after.strip()): because for file, before, after, because in blocks}
-    known = {(each.file, each.before, each.after) for each in found}
-    for entry in listed:
-        if entry[0] in files and entry not in known:
-            raise SystemExit("equivalent.txt lists what is no mutant: " + " | ".join(entry))
-    return [each for each in found if (each.file, each.before, each.after) not in listed]
+    known = {(each.file, each.before, each.after) for mutants in found.values() for each in mutants}
+    stale = [" | ".join(entry) for entry in listed if entry[0] in found and entry not in known]
+    if stale:
+        raise SystemExit("\n".join(["equivalent.txt lists what is no mutant:", *stale]))
+    return {
+        file: [each for each in mutants if (each.file, each.before, each.after) not in listed]
+        for file, mutants in found.items()
+    }
 
 
 def in_session(tried: list[Mutant], tests: str, place: Path, jobs: int) -> Ends:
