@@ -8,6 +8,7 @@ from omninav.pipeline import Context
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import MAX_COLOUR_DISTANCE, penalties, sorting_network
+from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms
 from omninav.stages.values.length_scale import LengthScale
@@ -170,14 +171,14 @@ class ExpectedObservation(NearReferences):
         self, poses: Array, map: ReferenceGraph, rows: Ints, values: Floats, unit: float, floor: float
     ) -> Array:
         near = self._cells.of(poses)
-        used = np.unique(near)[1:] if (near < 0).any() else np.unique(near)
+        used, rows = self._rows.of(distinct(near[near >= 0].astype(np.int64)))
         return similarity_of_expected(
             poses,
             map.poses[used],
             map.features[used],
             self._view.values,
             isinstance(self._view, SegmentHistograms),
-            np.where(near < 0, -1, np.searchsorted(used, near)).astype(np.int32),
+            np.where(near < 0, -1, rows[near]).astype(np.int32),
             self.fade_distance * unit,
             floor,
             self._exponent,
