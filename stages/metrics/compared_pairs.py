@@ -1,5 +1,6 @@
 """What the comparison of views tells of how far apart they were taken."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Any
 
@@ -10,6 +11,7 @@ from scipy.stats import spearmanr
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.geometry.appearance.visual_distance import colour_distances
 from omninav.stages.values.compared_views import ComparedViews
+from omninav.stages.values.local_features import GlobalDescriptor
 from omninav.stages.values.rooms import Rooms
 
 Array = npt.NDArray[np.float64]
@@ -17,6 +19,8 @@ QUANTITIES = {
     "comparison.passed_rate": Quantity(title="Pairs of views that pass the colours", unit="%"),
     "comparison.other_rooms_left_out": Quantity(title="Pairs of two rooms left out by colours", unit="%"),
     "comparison.own_room_left_out": Quantity(title="Pairs of one room left out by colours", unit="%"),
+    "comparison.two_lights.passed_rate": Quantity(title="Pairs of one place in two lights that pass the colours"),
+    "comparison.two_lights.change": Quantity(title="Change of colours with the light, of that between two rooms"),
     "comparison.rank_correlation": Quantity(title="Rank correlation of visual distance and metres"),
 }
 
@@ -28,7 +32,8 @@ class ComparedPairs(Stage):
     to be compared; `other_rooms_left_out` and `own_room_left_out`, the shares of pairs of two rooms, and of one, that
     are not; of pairs with something in common, at most `within_m` apart, `rank_correlation` of visual distance and
     metres (Spearman), and `by_metres`: medians of visual distance out to each of `to_m`. None where poses or rooms are
-    not known.
+    not known. With global colours in other light, under `two_lights`: `passed_rate`, the share of pairs of a view and
+    its own place in that light that pass; `change`, the median distance of their colours over that of two rooms' views.
     """
 
     max_global_distance: Annotated[float, Bounds(gt=0)] = 0.5
@@ -41,23 +46,47 @@ class ComparedPairs(Stage):
 
         metrics: Metrics
 
-    def step(self, ctx: Context, views: ComparedViews, rooms: Rooms | None = None) -> Out:
-        """The whole tour at once."""
+    def step(
+        self,
+        ctx: Context,
+        views: ComparedViews,
+        rooms: Rooms | None = None,
+        other_light: Sequence[GlobalDescriptor | None] = (),
+    ) -> Out:
+        """The whole tour at once. `other_light`: of each of its images, the colours of its place in other light."""
         one, other = np.triu_indices(len(views), 1)
         colours = np.stack([each.values for each in views.descriptors]).astype(np.float64)
-        passed = colour_distances(colours[one], colours[other]) <= self.max_global_distance
+        apart = colour_distances(colours[one], colours[other])
+        passed = apart <= self.max_global_distance
         found: dict[str, Any] = {"passed_rate": _share(passed), "own_room_left_out": None, "other_rooms_left_out": None}
-        known = views.pose_source == "truth"
+        known, of_two_rooms = views.pose_source == "truth", np.zeros(0)
         if known and rooms is not None:
             names = np.array([rooms.at(float(x), float(y)) for x, y, _ in views.poses])
             inside, same = (names[one] != "") & (names[other] != ""), names[one] == names[other]
             found["own_room_left_out"] = _share(~passed[inside & same])
             found["other_rooms_left_out"] = _share(~passed[inside & ~same])
+            of_two_rooms = apart[inside & ~same]
         if known:
             metres = np.hypot(*(views.poses[one] - views.poses[other])[:, :2].T)
             near = (metres <= self.within_m) & np.isfinite(views.distances[one, other])
             found |= against_metres(views.distances[one, other][near], metres[near], self.within_m)
+        if other_light:
+            found["two_lights"] = self._two_lights(views, colours, other_light, of_two_rooms)
         return self.Out(metrics=Metrics({"comparison": found}, QUANTITIES))
+
+    def _two_lights(
+        self, views: ComparedViews, colours: Array, other_light: Sequence[GlobalDescriptor | None], of_two_rooms: Array
+    ) -> dict[str, float | None]:
+        """Of the views that are of this tour and not of a known map."""
+        new = np.flatnonzero(views.owners < 0)
+        first = 1 + int(views.frames[views.owners >= 0].max(initial=-1))
+        seen = [(view, other_light[views.frames[view] - first]) for view in new]
+        pairs = [(colours[view], other.values) for view, other in seen if other is not None]
+        if not pairs:
+            return {"passed_rate": None, "change": None}
+        apart = colour_distances(*(np.stack(each) for each in zip(*pairs, strict=True)))
+        change = float(np.median(apart) / np.median(of_two_rooms)) if len(of_two_rooms) else None
+        return {"passed_rate": _share(apart <= self.max_global_distance), "change": change}
 
 
 def against_metres(distances: Array, metres: Array, within: float) -> dict[str, Any]:

@@ -22,6 +22,15 @@ Bools = npt.NDArray[np.bool_]
 Each = TypeVar("Each")
 
 
+class Judged(NamedTuple):
+    """A pair of images: which of its matches are `right`, the best first; the share of wrong partners that pass as
+    right `by_chance`; how many `features` of the first image could be found again."""
+
+    right: Bools
+    by_chance: float
+    features: int
+
+
 class Seen(NamedTuple):
     """What is known of an image: its pose, its features, and their depths."""
 
@@ -34,6 +43,7 @@ class Seen(NamedTuple):
 QUANTITIES = {
     "matches.all.right_share": Quantity(title="Matches, share right", unit="%", better="higher"),
     "matches.all.first_right": Quantity(title="Matches right before the first wrong one, median", better="higher"),
+    "matches.all.found_again": Quantity(title="Features found again", unit="%", better="higher"),
     "matches.all.right": Quantity(title="Matches right, median", better="higher"),
     "matches.all.by_chance": Quantity(title="Wrong partners that pass as right", unit="%"),
     "matches.all.pairs": Quantity(title="Pairs of images", context=True),
@@ -49,9 +59,9 @@ class FirstMatches(Stage):
     A match of patches is right where its point, by its depth in one view, is seen in the other close to its partner, or
     within half the patch's diameter, if that is more; one of columns where both of its ends are. Without depths: where
     its bearings lie close to a plane with the direction of travel and meet in front of both views. Under `matches`, by
-    distance and over `all`: `matched`, `first_right` and `right` (medians over pairs), `right_share`;
-    `by_chance`: the share of wrong partners that would be counted as right. Raises BadInput where no truth says where
-    images were taken.
+    distance and over `all`: `matched`, `first_right` and `right` (medians over pairs), `right_share`; `found_again`:
+    the share of the first images' features that a right match finds in the second; `by_chance`: the share of wrong
+    partners that would be counted as right. Raises BadInput where no truth says where images were taken.
     """
 
     apart_m: tuple[float, ...] = (0.5, 1.0, 2.0)
@@ -92,44 +102,52 @@ class FirstMatches(Stage):
         vertical_segments: Sequence[VerticalSegments | None] = (),
         depths: Sequence[Depths | None] = (),
         camera: Sequence[Camera | None] = (),
+        other_features: Sequence[LocalFeatures | None] = (),
+        other_segments: Sequence[VerticalSegments | None] = (),
+        other_depths: Sequence[Depths | None] = (),
     ) -> Out:
-        """The whole log at once."""
+        """The whole log at once. The `other_` ones are of the same places in other light: the second image of each pair
+        is one of these, where they are there."""
         there = [row for row, pose in enumerate(truth) if pose is not None]
         if not there:
             raise BadInput("matches: no image of the log has a true pose; use a log with /ground_truth/pose")
         lens = next((each for each in camera if each is not None), None)
-        views = []
-        for row in there:
-            pose = truth[row]
-            assert pose is not None
-            at = np.array([pose.x, pose.y, pose.heading])
-            views.append(Seen(at, _at(features, row), _at(vertical_segments, row), _at(depths, row)))
-        chosen = [pairs_apart(np.array([view.pose for view in views]), far, self.pairs) for far in self.apart_m]
-        judged = [[self._judged(views[one], views[other], lens) for one, other in pairs] for pairs in chosen]
+        poses = np.array([(pose.x, pose.y, pose.heading) for pose in truth if pose is not None])
+
+        def seen(*described: Sequence[Any]) -> list[Seen]:
+            rows = zip(poses, there, strict=True)
+            return [Seen(pose, *(_at(values, row) for values in described)) for pose, row in rows]
+
+        views = seconds = seen(features, vertical_segments, depths)
+        if other_features or other_segments:
+            seconds = seen(other_features, other_segments, other_depths)
+        chosen = [pairs_apart(poses, far, self.pairs) for far in self.apart_m]
+        judged = [[self._judged(views[one], seconds[other], lens) for one, other in pairs] for pairs in chosen]
         found: dict[str, Any] = {"depths_known": int(any(view.depths is not None for view in views))}
         found["apart"] = [{"m": far, **summary(pairs)} for far, pairs in zip(self.apart_m, judged, strict=True)]
         found["all"] = summary([pair for pairs in judged for pair in pairs])
         return self.Out(metrics=Metrics({"matches": found}, QUANTITIES, ("matches.all.right_share",)))
 
-    def _judged(self, one: Seen, other: Seen, lens: Camera | None) -> tuple[Bools, float]:
-        """Which matches are right, the best first, and the share of wrong partners that pass as right."""
+    def _judged(self, one: Seen, other: Seen, lens: Camera | None) -> Judged:
         x, y, turn = (float(number) for number in between(one.pose, other.pose))
-        moved, ratios, rights, chances = (x, y, turn), [], [], []
+        moved, ratios, rights, chances, features = (x, y, turn), [], [], [], 0
         if self.by != "columns" and one.patches is not None and other.patches is not None:
             pairs = self._patches(one.patches, other.patches)
             rights.append(self._right_patches(one, other, pairs, moved, lens))
             ratios.append(pairs.distance if self.best == "nearest" else pairs.ratio)
             chances.append(self._right_patches(one, other, shifted(pairs), moved, lens))
+            features += len(one.patches)
         if self.by != "patches" and one.columns is not None and other.columns is not None:
             pairs = mahalanobis_matches(one.columns.descriptors, other.columns.descriptors, self.column_ratio)
             rights.append(self._right_columns(one, other, pairs, moved))
             ratios.append(pairs.distance if self.best == "nearest" else pairs.ratio)
             chances.append(self._right_columns(one, other, shifted(pairs), moved))
+            features += len(one.columns)
         if not ratios:
-            return np.zeros(0, np.bool_), math.nan
+            return Judged(np.zeros(0, np.bool_), math.nan, 0)
         order = np.argsort(np.concatenate(ratios), kind="stable")
         chance = np.concatenate(chances)
-        return np.concatenate(rights)[order], float(chance.mean()) if len(chance) else math.nan
+        return Judged(np.concatenate(rights)[order], float(chance.mean()) if len(chance) else math.nan, features)
 
     def _patches(self, one: LocalFeatures, other: LocalFeatures) -> Pairs:
         if self.search == "both_ways":
@@ -208,17 +226,20 @@ def run_of_right(right: Bools) -> int:
     return int(wrong[0]) if len(wrong) else len(right)
 
 
-def summary(pairs: Sequence[tuple[Bools, float]]) -> dict[str, float | int | None]:
+def summary(pairs: Sequence[Judged]) -> dict[str, float | int | None]:
     """What is judged of some pairs; None where there is none."""
     if not pairs:
-        return {"pairs": 0, "matched": None, "first_right": None, "right": None, "right_share": None, "by_chance": None}
-    chances = np.array([chance for _, chance in pairs])
-    matched = sum(len(right) for right, _ in pairs)
+        names = ("matched", "first_right", "right", "right_share", "found_again", "by_chance")
+        return {"pairs": 0, **dict.fromkeys(names)}
+    chances = np.array([pair.by_chance for pair in pairs])
+    matched, features = sum(len(pair.right) for pair in pairs), sum(pair.features for pair in pairs)
+    right = sum(int(pair.right.sum()) for pair in pairs)
     return {
         "pairs": len(pairs),
-        "matched": float(np.median([len(right) for right, _ in pairs])),
-        "first_right": float(np.median([run_of_right(right) for right, _ in pairs])),
-        "right": float(np.median([np.count_nonzero(right) for right, _ in pairs])),
-        "right_share": sum(int(right.sum()) for right, _ in pairs) / matched if matched else None,
+        "matched": float(np.median([len(pair.right) for pair in pairs])),
+        "first_right": float(np.median([run_of_right(pair.right) for pair in pairs])),
+        "right": float(np.median([np.count_nonzero(pair.right) for pair in pairs])),
+        "right_share": right / matched if matched else None,
+        "found_again": right / features if features else None,
         "by_chance": float(np.nanmean(chances)) if np.isfinite(chances).any() else None,
     }

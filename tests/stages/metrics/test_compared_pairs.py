@@ -27,6 +27,26 @@ def test_shares_of_pairs_that_pass_the_colours_by_room() -> None:
     assert found["other_rooms_left_out"] == pytest.approx(2 / 6)
 
 
+def test_colours_of_a_place_in_two_lights_against_those_of_two_rooms() -> None:
+    views = mapped(Landmarks(scattered(20.0, 10.0)), [along(LINE, 2.0)]).views  # at x = 5, 7, 9, 11, 13
+    here, there = [0.0, 0.0, 0.0, 0.4, 0.4], [0.1, 0.0, 0.2, None, 0.9]
+
+    def colours(values: list[float | None]) -> list[GlobalDescriptor | None]:
+        return [None if each is None else GlobalDescriptor(np.array([each, 0.0, 0.0], np.float32)) for each in values]
+
+    shown = [each for each in colours([*here]) if each is not None]
+    views = dataclasses.replace(views, descriptors=tuple(shown), frames=np.array([1, 2, 3, 4, 5]))
+    rooms = Rooms(("west", "east"), np.array([[0.0, 0.0, 10.0, 10.0], [10.0, 0.0, 20.0, 10.0]]))
+    lit = colours([None, *there])  # the first image became no view
+    found = ComparedPairs(max_global_distance=0.45).step(Context("pairs"), views, rooms, lit)
+    two = found.metrics.values["comparison"]["two_lights"]
+    assert two["passed_rate"] == pytest.approx(3 / 4)
+    assert two["change"] == pytest.approx(0.15 / 0.4)  # the median of 0.1, 0, 0.2 and 0.5 over 0.4
+    known = dataclasses.replace(views, frames=np.array([7, 9, 10, 11, 12]), owners=np.array([0, -1, -1, -1, -1]))
+    found = ComparedPairs(max_global_distance=0.45).step(Context("pairs"), known, None, colours([None, *there[1:]]))
+    assert found.metrics.values["comparison"]["two_lights"] == {"passed_rate": pytest.approx(2 / 3), "change": None}
+
+
 def test_visual_distances_by_rings_of_metres() -> None:
     found = against_metres(np.array([1.0, 2.0, 4.0, 3.0]), np.array([0.5, 1.5, 6.0, 8.0]), 8.0)
     assert found["rank_correlation"] == pytest.approx(0.8)

@@ -12,6 +12,7 @@ from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.geometry.appearance.feature_matching import Pairs
 from omninav.stages.metrics.first_matches import (
     FirstMatches,
+    Judged,
     half_widths,
     pairs_apart,
     run_of_right,
@@ -191,10 +192,25 @@ def test_patches_and_columns_are_counted_together_the_best_of_both_first() -> No
     assert [found[by]["right_share"] for by in found] == [1.0, 0.0, 0.5]
 
 
+def test_the_second_image_is_of_other_light_where_there_is_one() -> None:
+    given = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
+    segments, depths = zip(columns(0.0), columns(1.0), strict=True)
+    others, other_depths = zip(columns(0.0), columns(1.0, 9.0), strict=True)
+    stage = FirstMatches(apart_m=(1.0,), by="columns")
+    plain = stage.step(Context("m"), given, (), segments, depths).metrics.values["matches"]["all"]
+    lit = {"other_segments": others, "other_depths": other_depths}
+    other = stage.step(Context("m"), given, (), segments, depths, **lit).metrics.values["matches"]["all"]
+    assert (plain["right"], plain["found_again"]) == (20.0, 1.0)
+    assert (other["matched"], other["right"], other["found_again"]) == (20.0, 0.0, 0.0)
+    few = [segments[0], segments[1].chosen(slice(0, 5))]
+    found = stage.step(Context("m"), given, (), few, [depths[0], Depths(depths[1].patches, depths[1].ends[:5])])
+    assert found.metrics.values["matches"]["all"]["found_again"] == 0.25  # of twenty in the first image
+
+
 def test_a_pair_without_features_has_no_match_and_no_chance() -> None:
     poses = [Pose(x, 0.0, 0.0) for x in (0.0, 1.0)]
     found = FirstMatches(apart_m=(1.0, 5.0)).step(Context("m"), poses).metrics.values["matches"]
-    none = {"right_share": None, "by_chance": None}
+    none = {"right_share": None, "found_again": None, "by_chance": None}
     assert found["apart"] == [
         {"m": 1.0, "pairs": 1, "matched": 0.0, "first_right": 0.0, "right": 0.0, **none},
         {"m": 5.0, "pairs": 0, "matched": None, "first_right": None, "right": None, **none},
@@ -211,13 +227,15 @@ def test_images_without_a_true_pose_make_no_pair() -> None:
 
 def test_figures_of_pairs_are_medians_and_shares_of_all_matches() -> None:
     yes, no = True, False
-    judged = [(np.array([yes, yes, no, yes]), 0.1), (np.array([no]), 0.3), (np.array([yes] * 5), np.nan)]
+    rights = np.array([yes, yes, no, yes]), np.array([no]), np.array([yes] * 5)
+    judged = [Judged(*each) for each in zip(rights, (0.1, 0.3, np.nan), (20, 7, 5), strict=True)]
     assert summary(judged) == {
         "pairs": 3,
         "matched": 4.0,
         "first_right": 2.0,
         "right": 3.0,
         "right_share": 0.8,
+        "found_again": 0.25,
         "by_chance": pytest.approx(0.2),
     }
 

@@ -1,0 +1,41 @@
+"""What the camera of a simulated robot would see from the same place on another day."""
+
+from typing import Annotated
+
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.values.image import Image
+from omninav.stages.values.pose import Pose
+
+from .config import WorldConfig
+from .demo import DEMO
+from .robot_camera import RobotCamera
+from .world import World
+
+
+class OtherDay(Stage):
+    """The image that is taken from where the robot truly is, on another day: in its light, and without people.
+
+    For what is said to stay the same as the light changes: of no two drives are images taken from the same places.
+    Noise is drawn anew for each image.
+    """
+
+    world: WorldConfig = DEMO
+    """The simulated world."""
+    day: Annotated[int, Bounds(ge=0)] = 1
+    """The other day."""
+
+    class Out(Outputs):
+        """Of the camera of the drive."""
+
+        image: Image
+
+    def setup(self, ctx: Context) -> None:
+        """Build the world of that day."""
+        self._scene, self._camera = World(self.world, self.day).scene, RobotCamera(self.world, "other day", self.day)
+
+    def step(self, ctx: Context, truth: Pose) -> Out:
+        """Render the image of one place."""
+        pose = np.array([[truth.x, truth.y, truth.heading]])
+        return self.Out(image=Image(self._camera.image(self._scene, pose, 0.0, key=int(ctx.rng.integers(2**62)))))
