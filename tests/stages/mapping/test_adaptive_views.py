@@ -102,20 +102,30 @@ def test_covariances_grow_without_end_only_where_each_state_adds_its_own(state_c
         assert spreads == pytest.approx([math.sqrt(0.4**2 / 12 + 0.01)] * 2, rel=0.05)
 
 
-def test_headings_are_kept_as_seen_by_a_robot_that_sees_the_kept_view():
+def turned(steps):
+    """A view from a robot that has turned counter-clockwise: what was ahead is now further on in the panorama."""
     signal = np.random.default_rng(0).normal(size=(1, 36))
+    spectrum = np.fft.rfft(np.roll(signal, steps, axis=1), axis=1)[:, :10] / 6.0
+    return Spectrum(packed(spectrum), 1, 36)
+
+
+def test_headings_are_kept_as_seen_by_a_robot_that_sees_the_kept_view():
     turn = 7 * 2 * math.pi / 36
-
-    def turned(steps):  # counter-clockwise: what was ahead is now to the right, further on in the panorama
-        spectrum = np.fft.rfft(np.roll(signal, steps, axis=1), axis=1)[:, :10] / 6.0
-        return Spectrum(packed(spectrum), 1, 36)
-
     map = ViewMixtures.empty()
     learn(map, turned(0), state([0, 0, 3.0]))
     learn(map, turned(7), state([0, 0, 3.0 + turn]))
     assert len(map.weights) == 1, "one place: seen with another heading"
     assert map.means[0, 2] == pytest.approx(3.0, abs=0.01)
     assert map.counts.tolist() == [2.0]
+
+
+def test_a_place_that_is_seen_with_another_heading_is_confirmed_by_each_of_two_modes():
+    map = ViewMixtures.empty()
+    both = {"sigma": 0.1, "weights": [0.5, 0.5]}
+    learn(map, turned(0), state([0, 0, 1.0], [9, 0, 1.0], **both))
+    learn(map, turned(7), state([0, 0, 1.0 + 7 * 2 * math.pi / 36], [9, 0, 1.0 + 7 * 2 * math.pi / 36], **both))
+    # w = beta S / 2 + (1 - beta S) * beta / 2, with S = 1 and beta = 0.1 (passive).
+    assert map.weights.tolist() == pytest.approx([0.05 + 0.9 * 0.05] * 2, abs=1e-3)
 
 
 def test_places_that_fit_grow_and_the_others_of_the_same_view_fade():
