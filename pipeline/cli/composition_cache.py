@@ -31,7 +31,7 @@ def compose(words: Sequence[str]) -> Any:
     return config
 
 
-@functools.lru_cache(maxsize=64)
+@functools.lru_cache(maxsize=256)
 def _of_options(session: Hydra, options: tuple[str, ...]) -> bytes:
     # A configuration is read from its bytes five times as fast as it is copied.
     return pickle.dumps(hydra.compose("config", overrides=[*options]))

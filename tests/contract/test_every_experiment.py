@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 import yaml
-from hydra import compose, initialize_config_module
 from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import complete
+from omninav.pipeline.cli.composition_cache import compose
+from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.overrides import with_unlisted_parameters
 from omninav.pipeline.experiment.index import read_verdicts, verdict_files
 from omninav.pipeline.experiment.specification import read_experiment
@@ -25,14 +26,14 @@ ALL = [path.relative_to(CONF).with_suffix("").as_posix() for path in sorted(CONF
 each = pytest.mark.parametrize("name", NAMES)
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture(autouse=True, scope="module")
 def hydra():
-    with initialize_config_module("omninav.conf", version_base="1.3"):
+    with hydra_started():
         yield
 
 
 def experiment(name: str, profile: str):
-    config = OmegaConf.to_container(compose("config", overrides=[f"+experiment={name}"]), resolve=True)
+    config = OmegaConf.to_container(compose([f"+experiment={name}"]), resolve=True)
     return read_experiment(config["experiment"], profile)
 
 
@@ -60,7 +61,7 @@ def test_it_is_a_claim_that_odometry_alone_ends_two_metres_off(name):
 @pytest.mark.parametrize("name", ALL)
 def test_the_last_condition_of_an_experiment_can_be_built(name):
     found = experiment(name, "paper")
-    planned = plan(complete(compose("config", overrides=typed(found, found.conditions()[-1]))))
+    planned = plan(complete(compose(typed(found, found.conditions()[-1]))))
     if name in NAMES:
         assert {"errors", "error_curves", "map_history"} <= set(planned.graph.nodes)
 
@@ -74,7 +75,7 @@ def test_nothing_is_claimed_that_too_few_scenarios_leave_undecided(name):
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("profile", ["quick", "development"])
 def test_at_a_small_scale_no_test_world_is_looked_at(name, profile):
-    config = OmegaConf.to_container(compose("config", overrides=[f"+experiment={name}"]), resolve=True)
+    config = OmegaConf.to_container(compose([f"+experiment={name}"]), resolve=True)
     if profile in config["experiment"].get("profiles", {}):
         assert "draw" not in " ".join(read_experiment(config["experiment"], profile).all_scenarios.values())
 
