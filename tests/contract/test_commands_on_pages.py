@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hydra import compose, initialize_config_module
 from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.commands.simulate import is_live
 from omninav.pipeline.cli.composition import complete
+from omninav.pipeline.cli.composition_cache import compose
+from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.main import COMMANDS
 from omninav.pipeline.cli.overrides import jobs_to_try, with_unlisted_parameters
 from omninav.pipeline.run.plan import plan
@@ -37,6 +38,12 @@ CASES = {line: page for page in PAGES for line in commands(page) if not any(word
 """Line -> a page that it is on; without those of a stage that the reader writes."""
 
 
+@pytest.fixture(autouse=True, scope="module")
+def hydra():
+    with hydra_started():
+        yield
+
+
 @pytest.mark.parametrize("line", CASES)
 def test_a_command_on_a_page_composes(line: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(ROOT)
@@ -48,11 +55,10 @@ def test_a_command_on_a_page_composes(line: str, monkeypatch: pytest.MonkeyPatch
     if (ROOT / f"conf/variant/{tool}.yaml").is_file():
         words = [f"variant={tool}", *words[2:]]
     words = [word for word in words if "=" in word and "…" not in word and not word.startswith("hydra")]
-    with initialize_config_module("omninav.conf", version_base="1.3"):
-        for job in jobs_to_try(
-            [f"variant=simulate{'_live' if is_live(words) else ''}", *words] if command == "simulate" else words, []
-        ):
-            composed(job)
+    for job in jobs_to_try(
+        [f"variant=simulate{'_live' if is_live(words) else ''}", *words] if command == "simulate" else words, []
+    ):
+        composed(job)
 
 
 def composed(words: list[str]) -> None:
@@ -62,7 +68,7 @@ def composed(words: list[str]) -> None:
         word for word in words if word not in own and not word.startswith(("map=", "words="))
     ]  # no saved map is there
     if any(word.startswith("+experiment=") for word in own):
-        config: Any = OmegaConf.to_container(compose("config", overrides=own), resolve=True)
+        config: Any = OmegaConf.to_container(compose(own), resolve=True)
         if not rest:
             return  # what its conditions are is checked where all experiments are
         rest = [f"variant={config['experiment']['variant']}", *rest]
@@ -70,4 +76,4 @@ def composed(words: list[str]) -> None:
     if len(rest) < len(words) and named in ([], ["variant=omniview_mcl"]):
         rest += ["tour=T", *(() if any(word.startswith("log=") for word in rest) else ("log=L",))]
 
-    plan(complete(compose("config", overrides=with_unlisted_parameters(rest, []))))
+    plan(complete(compose(with_unlisted_parameters(rest, []))))

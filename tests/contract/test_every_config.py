@@ -8,11 +8,12 @@ from typing import Any
 
 import pytest
 import yaml
-from hydra import compose, initialize_config_module
 from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import complete, settings_read
+from omninav.pipeline.cli.composition_cache import compose
 from omninav.pipeline.cli.config_groups import settings_left_open
+from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.overrides import with_unlisted_parameters
 from omninav.pipeline.experiment.specification import read_experiment
 from omninav.pipeline.graph.ports import convert
@@ -27,6 +28,12 @@ FILES = [
     if path.name not in ("config.yaml", "test_worlds.yaml") and path.parent.name != "recording"
 ]
 each = pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.stem}")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def hydra():
+    with hydra_started():
+        yield
 
 
 def group(path: Path) -> str:
@@ -66,9 +73,8 @@ def test_the_command_in_its_head_composes(path: Path):
     option = path.relative_to(CONF / group(path)).with_suffix("")
     if group(path) != "graph":  # its files are included by variants
         assert f"{'+' if group(path) == 'experiment' else ''}{group(path)}={option}" in command, command
-    with initialize_config_module("omninav.conf", version_base="1.3"):
-        words = [word for word in command if not word.startswith("-")]
-        compose("config", overrides=with_unlisted_parameters(words, []))
+    words = [word for word in command if not word.startswith("-")]
+    compose(with_unlisted_parameters(words, []))
 
 
 def graphs_of(path: Path) -> set[str]:
@@ -100,30 +106,27 @@ def test_it_states_only_what_differs_from_its_stages_defaults(path: Path):
 
 @pytest.mark.parametrize("path", sorted((CONF / "variant").glob("*.yaml")), ids=lambda path: path.stem)
 def test_every_variant_builds(path: Path):
-    with initialize_config_module("omninav.conf", version_base="1.3"):
-        planned = plan(complete(compose("config", overrides=[f"variant={path.stem}"])))
+    planned = plan(complete(compose([f"variant={path.stem}"])))
     assert planned.variant == path.stem
     assert planned.graph.nodes
 
 
 @pytest.mark.parametrize("path", sorted((CONF / "variant").glob("*.yaml")), ids=lambda path: path.stem)
 def test_a_variant_declares_the_inputs_that_its_graph_reads(path: Path):
-    with initialize_config_module("omninav.conf", version_base="1.3"):
-        config = compose("config", overrides=[f"variant={path.stem}"])
-        declared = {name for name, meaning in config.inputs.items() if meaning is not None}
-        read = settings_read(config) & {*settings_left_open(), *declared}
-        assert read <= declared
-        if read != declared:  # what else it declares, it reads on a robot
-            live = compose("config", overrides=[f"variant={path.stem}", "source=live"])
-            assert declared <= read | settings_read(live)
+    config = compose([f"variant={path.stem}"])
+    declared = {name for name, meaning in config.inputs.items() if meaning is not None}
+    read = settings_read(config) & {*settings_left_open(), *declared}
+    assert read <= declared
+    if read != declared:  # what else it declares, it reads on a robot
+        live = compose([f"variant={path.stem}", "source=live"])
+        assert declared <= read | settings_read(live)
 
 
 @pytest.mark.parametrize("path", sorted((CONF / "experiment").glob("*/*.yaml")), ids=lambda path: path.stem)
 @pytest.mark.parametrize("profile", ["paper", "quick"])
 def test_every_experiment_can_be_read(path: Path, profile: str):
     option = path.relative_to(CONF / "experiment").with_suffix("")
-    with initialize_config_module("omninav.conf", version_base="1.3"):
-        config = OmegaConf.to_container(compose("config", overrides=[f"+experiment={option}"]), resolve=True)
+    config = OmegaConf.to_container(compose([f"+experiment={option}"]), resolve=True)
     experiment = read_experiment(config["experiment"], profile)
     assert experiment.claims or path.stem in ("home_store", "office")  # to start from
     assert experiment.conditions()
