@@ -18,7 +18,7 @@ from .hydra_session import hydra_errors
 def compose(words: Sequence[str]) -> Any:
     """The configuration that words describe, where Hydra has been started. Raises Hydra's errors.
 
-    Nearly all of Hydra's time goes into finding and merging the files of options (`variant=…`, `world=…`). So what
+    Nearly all of Hydra's time goes into finding and merging the files of options (`variant=…`, `engine=…`). So what
     options give is kept, and all else (`day=2`) is set in a copy of it, by Hydra's own function.
     """
     session = GlobalHydra.instance().hydra
