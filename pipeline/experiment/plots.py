@@ -45,7 +45,7 @@ def plots_of(experiment: Experiment, results: Results) -> list[PagePlot]:
         found.append(PagePlot(f"{file}.png", measure.title, f"{caption}.", content))
     for index, curve in enumerate(experiment.curves):
         content = _curve(experiment, results, curve)
-        what = "mean of the repetitions, in a band that holds the middle half of them"
+        what = "mean of the repetitions, in a band from the least to the largest of them"
         caption = f"{curve.title} along {curve.x_label}: {what}"
         file = f"{experiment.name}_curve_{index + 1}.png"
         found.append(PagePlot(file, curve.title, f"{caption}.", content))
@@ -53,7 +53,7 @@ def plots_of(experiment: Experiment, results: Results) -> list[PagePlot]:
 
 
 def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
-    """A line for each condition: the mean of the repetitions' series, in a band that holds the middle half of them."""
+    """A line for each condition: the mean of the repetitions' series, in a band from the least to the largest of them."""
     panel_labels = experiment.labels(curve.panels) if curve.panels else [""]
     conditions = [condition for condition in experiment.conditions() if condition.fits(curve.only)]
     shown = [f for f in experiment.sweep if f != curve.panels and f not in curve.only]
@@ -83,8 +83,9 @@ def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
                     x, middle, color=colours[name], label=name or "ours", linewidth=1.5, marker=marker, markersize=3
                 )
                 if len(y) > 1:
-                    low, high = np.nanpercentile(y, [25, 75], axis=0)
-                    axes.fill_between(x, low, high, color=colours[name], alpha=0.18, linewidth=0)
+                    axes.fill_between(
+                        x, np.nanmin(y, axis=0), np.nanmax(y, axis=0), color=colours[name], alpha=0.15, linewidth=0
+                    )
             for index, (label, (x, y)) in enumerate(common.items()):
                 levels.append(float(np.nanmedian(y)))
                 axes.plot(x, y, color="#555555", linestyle=("--", ":", "-.")[index % 3], linewidth=1.3, label=label)
