@@ -53,7 +53,7 @@ def plots_of(experiment: Experiment, results: Results) -> list[PagePlot]:
 
 
 def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
-    """A line for each condition: the mean of the repetitions' series, in a band from the least to the largest of them."""
+    """A line for each condition: the mean of the repetitions, in a band from the least to the largest of them."""
     panel_labels = experiment.labels(curve.panels) if curve.panels else [""]
     conditions = [condition for condition in experiment.conditions() if condition.fits(curve.only)]
     shown = [f for f in experiment.sweep if f != curve.panels and f not in curve.only]
