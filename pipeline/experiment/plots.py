@@ -15,6 +15,9 @@ from .series import series_at
 from .specification import Condition, Curve, Experiment, Labels, Measure, space_of
 from .verdicts import Results, key_of, over_runs, samples
 
+LEGEND_LINES_IN = 0.45
+"""Height of a legend (inches) for which a plot has room as it is: two lines."""
+
 
 @dataclass(frozen=True)
 class PagePlot:
@@ -57,8 +60,9 @@ def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
     panel_labels = experiment.labels(curve.panels) if curve.panels else [""]
     conditions = [condition for condition in experiment.conditions() if condition.fits(curve.only)]
     shown = [f for f in experiment.sweep if f != curve.panels and f not in curve.only]
-    colours = {
-        name: PALETTE[n % len(PALETTE)] for n, name in enumerate(dict.fromkeys(_named(c, shown) for c in conditions))
+    styles = {
+        name: (PALETTE[n % len(PALETTE)], ("-", "--", "-.", ":")[n // len(PALETTE) % 4])
+        for n, name in enumerate(dict.fromkeys(_named(c, shown) for c in conditions))
     }
     levels: list[float] = []  # of each line: one that only begins near zero is no reason for powers of ten
     with plot(4.6 * len(panel_labels) + 0.4, 3.8) as drawn:
@@ -78,14 +82,20 @@ def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
                 y = curve.scale * y
                 name, middle = _named(condition, shown), np.nanmean(y, axis=0)
                 levels.append(float(np.nanmedian(middle)))
-                marker = "o" if len(x) <= 30 else None
+                colour, line = styles[name]
                 axes.plot(
-                    x, middle, color=colours[name], label=name or "ours", linewidth=1.5, marker=marker, markersize=3
+                    x,
+                    middle,
+                    color=colour,
+                    linestyle=line,
+                    label=name or "ours",
+                    linewidth=1.5,
+                    marker="o" if len(x) <= 30 else None,
+                    markersize=3,
                 )
                 if len(y) > 1:
-                    axes.fill_between(
-                        x, np.nanmin(y, axis=0), np.nanmax(y, axis=0), color=colours[name], alpha=0.15, linewidth=0
-                    )
+                    low, high = np.nanmin(y, axis=0), np.nanmax(y, axis=0)
+                    axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0)
             for index, (label, (x, y)) in enumerate(common.items()):
                 levels.append(float(np.nanmedian(y)))
                 axes.plot(x, y, color="#555555", linestyle=("--", ":", "-.")[index % 3], linewidth=1.3, label=label)
@@ -95,7 +105,7 @@ def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
         if not levels:
             return b""
         _scale(grid[0], levels, 10.0)
-        grid[0].set_ylabel(curve.title)
+        _title_beside(grid[0], curve.title)
         _legend_above(drawn.canvas, grid)
     return drawn.content
 
@@ -153,7 +163,7 @@ def _lines(experiment: Experiment, results: Results, name: str, along: str, pane
             axes.set_title(panel)
             axes.set_xlabel(along)
         _scale(grid[0], heights)
-        grid[0].set_ylabel(measure.title)
+        _title_beside(grid[0], measure.title)
         _legend_above(drawn.canvas, grid)
     return drawn.content
 
@@ -191,11 +201,10 @@ def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
         if experiment.published.get(name):
             axes.plot([], [], "D", color="white", markeredgecolor="#111111", markersize=5, label="paper")
         axes.set_xticks(np.arange(len(columns)), [textwrap.fill(c, 14) for c in columns])
-        axes.set_ylabel(measure.title)
+        _title_beside(axes, measure.title)
         _scale(axes, all_heights)
         axes.grid(axis="x", visible=False)
-        if axes.get_legend_handles_labels()[1]:
-            axes.legend(ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
+        _legend_above(drawn.canvas, [axes])
     return drawn.content
 
 
@@ -241,14 +250,26 @@ def _spread(measure: Measure, figures: Sequence[float]) -> float:
     return float(np.std(figures)) if figures and measure.over_runs == "mean" else np.nan
 
 
+def _title_beside(axes: Any, title: str) -> None:
+    """The title of the axis on the left, in as many lines as its height needs."""
+    axes.set_ylabel(textwrap.fill(title, 38))
+
+
 def _legend_above(canvas: Any, grid: Any) -> None:
-    """One legend for all panels, where it hides none of the lines."""
+    """One legend for all panels, where it hides none of the lines, in as many columns as fit; height is added for it."""
     lines: dict[str, Any] = {}
     for axes in grid:
         handles, labels = axes.get_legend_handles_labels()
         lines |= dict(zip(labels, handles, strict=True))
-    if lines:
-        canvas.legend(lines.values(), lines.keys(), loc="outside upper left", ncols=min(3, len(lines)))
+    if not lines:
+        return
+    for columns in range(min(3, len(lines)), 0, -1):
+        legend = canvas.legend(lines.values(), lines.keys(), loc="outside upper left", ncols=columns)
+        size = legend.get_window_extent()
+        if columns == 1 or size.width <= canvas.bbox.width:
+            break
+        legend.remove()
+    canvas.set_figheight(canvas.get_figheight() + max(0.0, size.height / canvas.dpi - LEGEND_LINES_IN))
 
 
 def _scale(axes: Any, figures: Sequence[float], ratio: float = 20.0, axis: Literal["x", "y"] = "y") -> None:

@@ -1,0 +1,51 @@
+"""Plots on an experiment's page."""
+
+import cv2
+import numpy as np
+import pytest
+
+from omninav.pipeline.experiment.plots import plots_of
+from omninav.pipeline.experiment.specification import read_experiment
+from omninav.pipeline.experiment.verdicts import key_of
+
+LONG = "Error of the direction up to 6 m away, median, not found is 180 (degrees)"
+
+
+def drawn(methods: int, **page: object) -> list[np.ndarray]:
+    """Images of the plots of an experiment with long names."""
+    file = {
+        "name": "test",
+        "title": "A test",
+        "about": "",
+        "variant": "none",
+        "sweep": {
+            "method": {f"a method with the long name number {n}": f"x={n}" for n in range(methods)},
+            "side": {"1": "y=1", "2": "y=2"},
+        },
+        "measures": {"error": {"title": LONG, "path": ["error"]}},
+        "curves": [{"title": LONG, "x_label": "step", "path": "along"}],
+        "page": page,
+    }
+    experiment = read_experiment(file, "paper")
+    run = {"metrics": {"error": 2.0, "along": [1.0, 2.0, 3.0]}, "timing": {}, "facts": {}}
+    results = {key_of(c.labels): {("world 1", 0): run, ("world 2", 0): run} for c in experiment.conditions()}
+    return [
+        cv2.imdecode(np.frombuffer(p.content, np.uint8), cv2.IMREAD_GRAYSCALE) for p in plots_of(experiment, results)
+    ]
+
+
+@pytest.mark.parametrize(
+    "page",
+    [{"rows": ["method"], "columns": "side"}, {"rows": ["method"], "columns": "side", "along": "side"}],
+    ids=["bars", "lines"],
+)
+def test_titles_and_legends_are_drawn_whole(page: dict[str, object]) -> None:
+    for image in drawn(5, **page):
+        border = np.concatenate([image[:2].ravel(), image[-2:].ravel(), image[:, :2].ravel(), image[:, -2:].ravel()])
+        assert border.min() > 200
+
+
+def test_a_tall_legend_takes_no_room_from_the_plot() -> None:
+    assert (
+        drawn(5, rows=["method"], columns="side")[-1].shape[0] > drawn(1, rows=["method"], columns="side")[-1].shape[0]
+    )
