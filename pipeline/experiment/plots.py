@@ -256,7 +256,7 @@ def _title_beside(axes: Any, title: str) -> None:
 
 
 def _legend_above(canvas: Any, grid: Any) -> None:
-    """One legend for all panels, where it hides none of the lines, in as many columns as fit; height is added for it."""
+    """One legend for all panels, where it hides none of the lines, in as many columns as fit; it adds height."""
     lines: dict[str, Any] = {}
     for axes in grid:
         handles, labels = axes.get_legend_handles_labels()
