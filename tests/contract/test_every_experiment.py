@@ -33,8 +33,7 @@ def hydra():
 
 
 def experiment(name: str, profile: str):
-    config = OmegaConf.to_container(compose([f"+experiment={name}"]), resolve=True)
-    return read_experiment(config["experiment"], profile)
+    return read_experiment(OmegaConf.to_container(compose([f"+experiment={name}"]).experiment), profile)
 
 
 def typed(found, condition):
