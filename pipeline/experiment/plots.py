@@ -17,6 +17,8 @@ from .verdicts import Results, key_of, over_runs, samples
 
 LEGEND_LINES_IN = 0.45
 """Height of a legend (inches) for which a plot has room as it is: two lines."""
+LETTER_IN = 0.08
+"""Width of a letter (inches) in names below a plot."""
 
 
 @dataclass(frozen=True)
@@ -173,8 +175,9 @@ def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
     measure = experiment.measures[name]
     columns, rows = experiment.labels(experiment.page.columns), row_labels(experiment)
     width = 0.8 / len(rows)
+    column_in = max(0.42 * (len(rows) + 1), 0.95, 3.9 / len(columns))
     all_heights: list[float] = []
-    with plot(max(5.0, 1.1 + len(columns) * max(0.42 * (len(rows) + 1), 0.95)), 3.6) as drawn:
+    with plot(1.1 + len(columns) * column_in, 3.6) as drawn:
         axes = drawn.canvas.subplots()
         for index, labels in enumerate(rows):
             at = np.arange(len(columns)) + (index - (len(rows) - 1) / 2) * width
@@ -200,7 +203,7 @@ def _bars(experiment: Experiment, results: Results, name: str) -> bytes:
                 )
         if experiment.published.get(name):
             axes.plot([], [], "D", color="white", markeredgecolor="#111111", markersize=5, label="paper")
-        axes.set_xticks(np.arange(len(columns)), [textwrap.fill(c, 14) for c in columns])
+        axes.set_xticks(np.arange(len(columns)), [textwrap.fill(c, int(column_in / LETTER_IN)) for c in columns])
         _title_beside(axes, measure.title)
         _scale(axes, all_heights)
         axes.grid(axis="x", visible=False)
