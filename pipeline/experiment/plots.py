@@ -255,7 +255,7 @@ def _spread(measure: Measure, figures: Sequence[float]) -> float:
 
 def _title_beside(axes: Any, title: str) -> None:
     """The title of the axis on the left, in as many lines as its height needs."""
-    axes.set_ylabel(textwrap.fill(title, 38))
+    axes.set_ylabel(textwrap.fill(title, 40))
 
 
 def _legend_above(canvas: Any, grid: Any) -> None:
