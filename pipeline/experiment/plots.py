@@ -164,6 +164,7 @@ def _lines(experiment: Experiment, results: Results, name: str, along: str, pane
                 )
             axes.set_title(panel)
             axes.set_xlabel(along)
+            axes.locator_params(axis="x", integer=all(float(x).is_integer() for x in experiment.labels(along)))
         _scale(grid[0], heights)
         _title_beside(grid[0], measure.title)
         _legend_above(drawn.canvas, grid)
