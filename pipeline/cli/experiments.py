@@ -36,7 +36,7 @@ def run_experiment(config: Any, arguments: Sequence[str]) -> int:
 def planned_experiment(config: Any, arguments: Sequence[str]) -> ExperimentRun:
     """The experiment of a composed configuration, with every condition checked. Raises `ProblemsFound`."""
     plain: dict[str, Any] = OmegaConf.to_container(config, resolve=True)  # type: ignore[assignment]
-    # `${world}` in an experiment's words is the world of each condition, not of the line that asks for the experiment.
+    # What a file interpolates is of each condition, and not of the line that asks for the experiment.
     plain["experiment"] = OmegaConf.to_container(config.experiment)
     typed, folders = read_words(arguments)
 

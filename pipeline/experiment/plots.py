@@ -16,7 +16,7 @@ from .specification import Condition, Curve, Experiment, Labels, Measure, space_
 from .verdicts import Results, key_of, over_runs, samples
 
 LEGEND_LINES_IN = 0.45
-"""Height of a legend (inches) for which a plot has room as it is: two lines."""
+"""Height of a legend (inches) that fits a plot as it is: two lines."""
 LETTER_IN = 0.08
 """Width of a letter (inches) in names below a plot."""
 
