@@ -17,3 +17,13 @@ def test_an_interpolation_is_of_the_condition_and_not_of_the_line_that_asks_for_
     assert worlds
     assert all(world == other for world, other in worlds)
     assert "home_store_demo" not in {world for world, _ in worlds}  # the world of a line that names none
+
+
+def test_an_interpolation_may_name_what_only_the_conditions_have() -> None:
+    words = ["+experiment=topological_nav/comparison", "profile=quick"]
+    with hydra_started():
+        config = compose(words)
+        assert "other_day" not in config.get("nodes", {})
+        config.experiment.about = "${nodes.other_day.world.name}"
+        planned = planned_experiment(config, words)
+    assert planned.experiment.about == "${nodes.other_day.world.name}"
