@@ -34,6 +34,7 @@ RUNS: dict[str, tuple[str, ...]] = {
     "omninav_map_words": (MAPPED,),
     "omniview_cml": (BOTH, "nodes.novelty_threshold.views=30"),
     "omniview_cml_as_printed": (BOTH, "nodes.novelty_threshold.views=30"),
+    "omniview_cml_as_printed_map": (MAPPED, "nodes.novelty_threshold.views=30"),
     "omniview_cml_map": (MAPPED, "nodes.novelty_threshold.views=30"),
     "omniview_mcl": (TOUR, DRIVE),
     "omniview_mcl_as_printed": (TOUR, DRIVE),
