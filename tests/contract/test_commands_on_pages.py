@@ -3,10 +3,8 @@
 import re
 import shlex
 from pathlib import Path
-from typing import Any
 
 import pytest
-from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.commands.simulate import is_live
 from omninav.pipeline.cli.composition import complete
@@ -68,10 +66,10 @@ def composed(words: list[str]) -> None:
         word for word in words if word not in own and not word.startswith(("map=", "words="))
     ]  # no saved map is there
     if any(word.startswith("+experiment=") for word in own):
-        config: Any = OmegaConf.to_container(compose(own), resolve=True)
+        config = compose(own)
         if not rest:
             return  # what its conditions are is checked where all experiments are
-        rest = [f"variant={config['experiment']['variant']}", *rest]
+        rest = [f"variant={config.experiment.variant}", *rest]
     named = [word for word in rest if word.startswith("variant=")]
     if len(rest) < len(words) and named in ([], ["variant=omniview_mcl"]):
         rest += ["tour=T", *(() if any(word.startswith("log=") for word in rest) else ("log=L",))]
