@@ -35,7 +35,7 @@ def run_experiment(config: Any, arguments: Sequence[str]) -> int:
 
 def planned_experiment(config: Any, arguments: Sequence[str]) -> ExperimentRun:
     """The experiment of a composed configuration, with every condition checked. Raises `ProblemsFound`."""
-    # What a file interpolates is of each condition, and not of the line that asks for the experiment: it may name what only a condition has.
+    # What a file interpolates is of each condition, not of this line: it may name what only a condition has.
     line = OmegaConf.masked_copy(config, [key for key in config if key != "experiment"])
     plain: dict[str, Any] = OmegaConf.to_container(line, resolve=True)  # type: ignore[assignment]
     plain["experiment"] = OmegaConf.to_container(config.experiment)
