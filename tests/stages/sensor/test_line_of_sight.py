@@ -143,8 +143,10 @@ def test_a_ray_meets_the_cell_that_clipping_meets_first(seed: int):
     start, direction = rng.uniform(0, (9, 11)), rng.uniform(-np.pi, np.pi)
     sight = first_occupied(cells, start[None], np.array([direction]))
     way = np.array([np.sin(direction), np.cos(direction)])
-    lengths = np.arange(0, 15, 1e-3)
-    along = np.floor(start + lengths[:, None] * way).astype(int)
+    # In the middle between two lines of the grid that follow each other on the way, the ray is inside a cell.
+    crossed = np.sort(np.concatenate([(np.arange(12) - at) / step for at, step in zip(start, way, strict=True)]))
+    crossed = np.concatenate([[0.0], crossed[(crossed > 0) & (crossed < 15)], [15.0]])
+    along = np.floor(start + ((crossed[1:] + crossed[:-1]) / 2)[:, None] * way).astype(int)
     inside = ((along >= 0) & (along < cells.shape)).all(axis=1)
     along = along[: int(np.argmin(inside)) if not inside.all() else None]
     states = cells[along[:, 0], along[:, 1]]
