@@ -33,12 +33,19 @@ def run_experiment(config: Any, arguments: Sequence[str]) -> int:
     return 0 if well else 1
 
 
+def resolved_but_for_the_experiment(config: Any) -> dict[str, Any]:
+    """A composed configuration as plain dicts: what the experiment's file interpolates is left to its conditions.
+
+    It may name what only a condition has.
+    """
+    others = OmegaConf.masked_copy(config, [key for key in config if key != "experiment"])
+    plain: Any = OmegaConf.to_container(others, resolve=True)
+    return {**plain, "experiment": OmegaConf.to_container(config.experiment)}
+
+
 def planned_experiment(config: Any, arguments: Sequence[str]) -> ExperimentRun:
     """The experiment of a composed configuration, with every condition checked. Raises `ProblemsFound`."""
-    # What a file interpolates is of each condition, not of this line: it may name what only a condition has.
-    line = OmegaConf.masked_copy(config, [key for key in config if key != "experiment"])
-    plain: dict[str, Any] = OmegaConf.to_container(line, resolve=True)  # type: ignore[assignment]
-    plain["experiment"] = OmegaConf.to_container(config.experiment)
+    plain = resolved_but_for_the_experiment(config)
     typed, folders = read_words(arguments)
 
     def composed(words: Sequence[str]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import pytest
 from omninav.pipeline.cli.commands.simulate import is_live
 from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.cli.composition_cache import compose
+from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.main import COMMANDS
 from omninav.pipeline.cli.overrides import jobs_to_try, with_unlisted_parameters
@@ -66,10 +67,10 @@ def composed(words: list[str]) -> None:
         word for word in words if word not in own and not word.startswith(("map=", "words="))
     ]  # no saved map is there
     if any(word.startswith("+experiment=") for word in own):
-        config = compose(own)
+        config = resolved_but_for_the_experiment(compose(own))
         if not rest:
             return  # what its conditions are is checked where all experiments are
-        rest = [f"variant={config.experiment.variant}", *rest]
+        rest = [f"variant={config['experiment']['variant']}", *rest]
     named = [word for word in rest if word.startswith("variant=")]
     if len(rest) < len(words) and named in ([], ["variant=omniview_mcl"]):
         rest += ["tour=T", *(() if any(word.startswith("log=") for word in rest) else ("log=L",))]

@@ -13,6 +13,7 @@ from omegaconf import OmegaConf
 from omninav.pipeline.cli.composition import complete, settings_read
 from omninav.pipeline.cli.composition_cache import compose
 from omninav.pipeline.cli.config_groups import settings_left_open
+from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.overrides import with_unlisted_parameters
 from omninav.pipeline.experiment.specification import read_experiment
@@ -126,7 +127,8 @@ def test_a_variant_declares_the_inputs_that_its_graph_reads(path: Path):
 @pytest.mark.parametrize("profile", ["paper", "quick"])
 def test_every_experiment_can_be_read(path: Path, profile: str):
     option = path.relative_to(CONF / "experiment").with_suffix("")
-    experiment = read_experiment(OmegaConf.to_container(compose([f"+experiment={option}"]).experiment), profile)
+    config = resolved_but_for_the_experiment(compose([f"+experiment={option}"]))
+    experiment = read_experiment(config["experiment"], profile)
     assert experiment.claims or path.stem in ("home_store", "office")  # to start from
     assert experiment.conditions()
 

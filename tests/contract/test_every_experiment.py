@@ -9,6 +9,7 @@ from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.cli.composition_cache import compose
+from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.overrides import with_unlisted_parameters
 from omninav.pipeline.experiment.index import read_verdicts, verdict_files
@@ -81,9 +82,9 @@ def test_nothing_is_claimed_that_too_few_scenarios_leave_undecided(name):
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("profile", ["quick", "development"])
 def test_at_a_small_scale_no_test_world_is_looked_at(name, profile):
-    file = OmegaConf.to_container(compose([f"+experiment={name}"]).experiment)
-    if profile in file.get("profiles", {}):
-        assert "draw" not in " ".join(read_experiment(file, profile).all_scenarios.values())
+    config = resolved_but_for_the_experiment(compose([f"+experiment={name}"]))
+    if profile in config["experiment"].get("profiles", {}):
+        assert "draw" not in " ".join(read_experiment(config["experiment"], profile).all_scenarios.values())
 
 
 def test_every_listed_claim_is_one_of_an_experiment():
