@@ -9,7 +9,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.geometry.appearance.segments import LANES, Rows, turned_views
+from omninav.stages.geometry.appearance.segments import Rows, turned_views
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.candidates import Candidates
@@ -23,6 +23,8 @@ from .reference_match import check_same_kind
 
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
+LANES = 8
+"""Turns of the query are padded to a multiple of this, so that the inner loops are whole vector instructions."""
 
 
 @compiled(nogil=True)

@@ -14,8 +14,8 @@ Rows = Floats | StoredRows[np.float32]
 """Views of a map, in memory or in its file."""
 Ints = npt.NDArray[np.int64]
 
-LANES = 8
-"""Headings are padded to a multiple of this, so that the inner loops are whole vector instructions."""
+BLOCK = 64
+"""References that are compared at once: few enough for what belongs to a segment to stay in the fastest cache."""
 
 EXPONENTS = {"sqrt": 0.5, "cube_root": 1.0 / 3.0, "three_quarters": 0.75, "none": 0.0}
 """Penalties on the number k of segments by name: the exponent of 1 / k (the rest of 1 goes to 1 / n)."""
@@ -78,55 +78,76 @@ def penalties(segments: int, exponent: float) -> Floats:
 @compiled(nogil=True)
 def _compare(
     references: Floats,
-    query: Floats,
+    turned: Floats,
     histograms: bool,
     network: Ints,
     factors: Floats,
     scale: np.float32,
     out: Floats,
 ) -> None:
-    # Headings are the innermost axis throughout: each loop over them is vector instructions, the sorting too.
-    segments, bins, lanes = query.shape
-    headings = out.shape[1]
-    alike = np.empty((segments, lanes), np.float32)
-    total = np.empty(lanes, np.float32)
-    best = np.empty(lanes, np.float32)
-    for n in range(len(references)):
-        reference = references[n]
+    # References are the innermost axis throughout: each loop over them is vector instructions, the sorting too.
+    headings, segments, bins = turned.shape
+    block = np.empty((bins, BLOCK), np.float32)
+    alike = np.empty((headings, segments, BLOCK), np.float32)
+    total = np.empty(BLOCK, np.float32)
+    best = np.empty(BLOCK, np.float32)
+    zero = np.float32(0)
+    fours = bins - bins % 4
+    for start in range(0, len(references), BLOCK):
+        count = min(BLOCK, len(references) - start)
         for j in range(segments):
-            row = alike[j]
-            row[:] = np.float32(0)
-            for b in range(bins):
-                here = reference[j, b]
-                there = query[j, b]
+            for n in range(count):
+                reference = references[start + n, j]
+                for b in range(bins):
+                    block[b, n] = reference[b]
+            for h in range(headings):
+                row, view = alike[h, j], turned[h, j]
+                for n in range(count):
+                    row[n] = zero
                 if histograms:
-                    if here > 0:
-                        for h in range(lanes):
-                            row[h] += there[h] if there[h] < here else here
+                    # Four bins at once load and store the sums a quarter as often; their order stays.
+                    for b in range(0, fours, 4):
+                        r0, r1, r2, r3 = block[b], block[b + 1], block[b + 2], block[b + 3]
+                        v0, v1, v2, v3 = view[b], view[b + 1], view[b + 2], view[b + 3]
+                        if v0 == zero and v1 == zero and v2 == zero and v3 == zero:
+                            continue
+                        for n in range(count):
+                            row[n] = (
+                                row[n]
+                                + (r0[n] if r0[n] < v0 else v0)
+                                + (r1[n] if r1[n] < v1 else v1)
+                                + (r2[n] if r2[n] < v2 else v2)
+                                + (r3[n] if r3[n] < v3 else v3)
+                            )
+                    for b in range(fours, bins):
+                        r0, v0 = block[b], view[b]
+                        for n in range(count):
+                            row[n] += r0[n] if r0[n] < v0 else v0
                 else:
-                    for h in range(lanes):
-                        gap = there[h] - here
-                        row[h] += gap * gap
-            if not histograms:
-                for h in range(lanes):
-                    row[h] = max(np.float32(1) - np.sqrt(row[h]) / scale, np.float32(0))
-        for p in range(len(network)):
-            high, low = alike[network[p, 0]], alike[network[p, 1]]
-            for h in range(lanes):
-                a, b_ = high[h], low[h]
-                high[h] = a if a > b_ else b_
-                low[h] = b_ if a > b_ else a
-        total[:] = np.float32(0)
-        best[:] = np.float32(0)
-        for k in range(segments):
-            row = alike[k]
-            factor = factors[k]
-            for h in range(lanes):
-                total[h] += row[h]
-                score = total[h] * factor
-                best[h] = score if score > best[h] else best[h]
+                    for b in range(bins):
+                        r0, v0 = block[b], view[b]
+                        for n in range(count):
+                            gap = v0 - r0[n]
+                            row[n] += gap * gap
+                    for n in range(count):
+                        row[n] = max(np.float32(1) - np.sqrt(row[n]) / scale, zero)
         for h in range(headings):
-            out[n, h] = best[h]
+            for p in range(len(network)):
+                high, low = alike[h, network[p, 0]], alike[h, network[p, 1]]
+                for n in range(count):
+                    a, b_ = high[n], low[n]
+                    high[n] = a if a > b_ else b_
+                    low[n] = b_ if a > b_ else a
+            total[:] = zero
+            best[:] = zero
+            for k in range(segments):
+                row, factor = alike[h, k], factors[k]
+                for n in range(count):
+                    total[n] += row[n]
+                    score = total[n] * factor
+                    best[n] = score if score > best[n] else best[n]
+            for n in range(count):
+                out[start + n, h] = best[n]
 
 
 def similarities(
@@ -150,8 +171,7 @@ def similarities(
     """
     some = references[:] if chosen is None else references[chosen]
     out = np.empty((len(some), headings), np.float32)
-    query = np.zeros((*view.shape, -(-headings // LANES) * LANES), np.float32)
-    query[..., :headings] = turned_views(view, headings).transpose(1, 2, 0)
+    turned = np.ascontiguousarray(turned_views(view, headings), np.float32)
     segments = len(view)
     network = sorting_network(segments) if selective else np.empty((0, 2), np.int64)
     if selective:
@@ -160,7 +180,7 @@ def similarities(
         factors = np.zeros(segments, np.float32)
         factors[-1] = 1.0 / segments
     scale = np.float32(max_distance)
-    _compare(np.ascontiguousarray(some, np.float32), query, histograms, network, factors, scale, out)
+    _compare(np.ascontiguousarray(some, np.float32), turned, histograms, network, factors, scale, out)
     return np.minimum(out, np.float32(1.0))
 
 
