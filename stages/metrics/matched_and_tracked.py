@@ -1,7 +1,7 @@
 """How many features two images of a homing drive share, and how exactly: matched, or tracked from one to the other."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.epipolar import shared_residuals, turn_about_vertical
+from omninav.stages.geometry.two_views.true_matches import right_by_epipolar
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.homing import LOST, HomingTarget, LocalMap, TrackedFeatures
@@ -17,39 +18,57 @@ from omninav.stages.values.local_features import LocalFeatures
 
 Array = npt.NDArray[np.float64]
 QUANTITIES = {
-    "pairs.matched.right": Quantity(title="Matches of the first and the target image, right", better="higher"),
-    "pairs.matched.noise_deg": Quantity(title="… their median distance from the epipolar plane", better="lower"),
-    "pairs.tracked.right": Quantity(title="Features tracked from the first to the last image, right", better="higher"),
-    "pairs.tracked.noise_deg": Quantity(title="… their median distance from the epipolar plane", better="lower"),
+    "pairs.kept": Quantity(title="Right tracks / right matches", better="higher"),
+    "pairs.matched.right": Quantity(title="Right matches of a local map", better="higher"),
+    "pairs.tracked.right": Quantity(title="Right tracks in a local map's last image", better="higher"),
+    "pairs.matched.noise_deg": Quantity(title="Angle by which right matches miss the epipolar plane", better="lower"),
+    "pairs.tracked.noise_deg": Quantity(title="Angle by which right tracks miss the epipolar plane", better="lower"),
 }
 
 
+class Span(NamedTuple):
+    """A local map: the ticks in which it was made and first tracked, and the last in which it was tracked.
+
+    Both are None for a map that was lost at once.
+    """
+
+    made: int
+    first: int | None
+    last: int | None
+
+
 class Judged(NamedTuple):
-    """Pairs of bearings of two images taken `metres` apart, and by how many degrees each misses the epipolar plane."""
+    """Pairs of bearings of two images taken `metres` apart, one for each feature of a map.
+
+    `angles` (N,), degrees, by which the two together miss a common plane with the baseline, and which of them are
+    `right` (N,); NaN and False where there is no pair.
+    """
 
     metres: float
-    degrees: Array
+    angles: Array
+    right: npt.NDArray[np.bool_]
 
 
 class MatchedAndTracked(Stage):
-    """Compares the matches of two images, of which local maps are made, with what is tracked from one of them on.
+    """Compares the matched pairs from which a local map was triangulated with the same features as they are tracked.
 
     Goedemé et al. 2007, section 7.1.2, where matches of the first and the target image are called "more plentiful and
-    less influenced by noise" than tracked features. Of every local map that was tracked over `apart_m` at least: the
-    features that it was made of, between the image then and the target's, which was taken at the drive's first pose;
-    and the tracks that agree with the robot's pose, between the image then and the last in which it was tracked. Of
-    both kinds every pair's angle to the true epipolar plane is taken.
+    less influenced by noise" than tracked features. Matches: between the image in which the map was made and the
+    target's, which was taken at the drive's first pose. Tracks: between the same image and the last in which the map
+    was tracked, without those that contradict the robot's pose then, and without features that were matched anew on the
+    way. Every map that was made `apart_m` from the target or farther counts.
 
-    Under `pairs`: `maps`, how many; for `matched` and `tracked` each `used` and `right` (those within `right_deg`), per
-    map; `noise_deg`, the median angle of all that are right; `apart_m`, how far apart the two images were taken on
-    average. `more`: right matches over right tracks; `noise_ratio`: the noise of matches over that of tracks. Nothing
-    where no map was tracked so far, or without truth.
+    A pair is right where its bearings lie within `right_deg` of a plane with the true baseline and meet in front of
+    both views; errors along that plane are not seen. Under `pairs`: `maps`, how many; for `matched` and `tracked` each
+    `used` and `right`, per map, `noise_deg`, the median angle of the features that are right as both, and `apart_m`,
+    the mean distance of the two images; `kept`, right tracks over right matches; `noise_ratio`, the noise of matches
+    over that of tracks. Nothing where no map was made, or without truth.
     """
 
     right_deg: Annotated[float, Bounds(gt=0)] = 1.0
-    """Largest angle (degrees) to the true epipolar plane of a pair that is right: the local map's limit for matches."""
+    """Largest angle (degrees) of a pair that is right: local_map.max_epipolar_error_deg, here to the true plane."""
     apart_m: Annotated[float, Bounds(gt=0)] = 0.3
-    """Smallest distance (m) between two images that have epipolar planes."""
+    """Images closer than this (m) are not compared: a map that was not tracked so far has no tracks."""
 
     class Out(Outputs):
         """`metrics`: the entry `pairs` of metrics.json, absent where there is nothing to compare."""
@@ -71,66 +90,90 @@ class MatchedAndTracked(Stage):
         if not len(poses) or not known(poses).all():
             return self.Out()
         matched, tracked = [], []
-        for begun, ended in _spans(maps):
-            new, last, track = maps[begun], maps[ended], tracks[ended]
-            target, seen, pairs = targets[begun], features[begun], correspondences[begun]
-            assert new is not None
-            assert last is not None
-            assert target is not None
-            assert seen is not None
-            assert pairs is not None
-            home, moved = between(poses[begun], poses[0]), between(poses[begun], poses[ended])
-            if track is None or track.number != new.number or min(_metres(home), _metres(moved)) < self.apart_m:
+        for span in spans(maps, tracks):
+            made, target = maps[span.made], targets[span.made]
+            seen, pairs = features[span.made], correspondences[span.made]
+            home = between(poses[span.made], poses[0])
+            if made is None or target is None or seen is None or pairs is None or metres(home) < self.apart_m:
                 continue
-            used = np.isin(pairs.second, new.rows)
-            here, there = seen.point_bearings()[pairs.first], target.features.point_bearings()[pairs.second]
-            matched.append(Judged(_metres(home), _angles_deg(here[used], there[used], home)))
-            held = (track.kinds != LOST) & (last.kinds != LOST) & np.isfinite(track.bearings).all(axis=1)
-            # The map's origin is where it was made, so that its places lie along the bearings of that image.
-            here = track.places[held] / np.linalg.norm(track.places[held], axis=1, keepdims=True)
-            tracked.append(Judged(_metres(moved), _angles_deg(here, track.bearings[held], moved)))
+            partner = dict(zip(pairs.second.tolist(), pairs.first.tolist(), strict=True))
+            here = seen.point_bearings()[[partner[row] for row in made.rows.tolist()]]
+            matched.append(self._judged(here, target.features.point_bearings()[made.rows], home))
+            tracked.append(self._tracked(span, poses, maps, tracks, len(made)))
         if not matched:
             return self.Out()
+        right, still = sum(_count(each.right) for each in matched), sum(_count(each.right) for each in tracked)
+        both = np.concatenate([one.right & other.right for one, other in zip(matched, tracked, strict=True)])
         values: dict[str, Any] = {
             "maps": len(matched),
-            "matched": self._summary(matched),
-            "tracked": self._summary(tracked),
+            "matched": _summary(matched, both),
+            "tracked": _summary(tracked, both),
+            "kept": still / right if right else None,
         }
-        one, other = values["matched"], values["tracked"]
-        values["more"] = one["right"] / other["right"] if other["right"] else None
-        known_noise = one["noise_deg"] is not None and other["noise_deg"]
-        values["noise_ratio"] = one["noise_deg"] / other["noise_deg"] if known_noise else None
-        headlines = ("pairs.matched.right", "pairs.tracked.right")
-        return self.Out(metrics=Metrics({"pairs": values}, QUANTITIES, headlines))
+        noise, other = values["matched"]["noise_deg"], values["tracked"]["noise_deg"]
+        values["noise_ratio"] = noise / other if noise is not None and other else None
+        return self.Out(metrics=Metrics({"pairs": values}, QUANTITIES, ("pairs.kept",)))
 
-    def _summary(self, judged: Sequence[Judged]) -> dict[str, float | int | None]:
-        degrees = np.concatenate([each.degrees for each in judged])
-        right = degrees[degrees <= self.right_deg]
-        return {
-            "used": len(degrees) / len(judged),
-            "right": len(right) / len(judged),
-            "noise_deg": float(np.median(right)) if len(right) else None,
-            "apart_m": float(np.mean([each.metres for each in judged])),
-        }
+    def _tracked(
+        self,
+        span: Span,
+        poses: Array,
+        maps: Sequence[LocalMap | None],
+        tracks: Sequence[TrackedFeatures | None],
+        number: int,
+    ) -> Judged:
+        none = Judged(math.nan, np.full(number, np.nan), np.zeros(number, np.bool_))
+        if span.first is None or span.last is None:
+            return none
+        start, end, last = tracks[span.first], tracks[span.last], maps[span.last]
+        moved = between(poses[span.made], poses[span.last])
+        if start is None or end is None or last is None or metres(moved) < self.apart_m:
+            return none
+        # The tracker lays each place along the bearing of the point that it tracks, in the image the map was made in.
+        held = (end.kinds != LOST) & (last.kinds != LOST) & np.isfinite(end.bearings).all(axis=1)
+        held &= (start.places == end.places).all(axis=1)
+        here = end.places / np.linalg.norm(end.places, axis=1, keepdims=True)
+        found = self._judged(here[held], end.bearings[held], moved)
+        none.angles[held], none.right[held] = found.angles, found.right
+        return none._replace(metres=found.metres)
+
+    def _judged(self, first: Array, second: Array, moved: Array) -> Judged:
+        """Bearings (N, 3) of two images, the second taken at `moved` (3,) as seen from the first."""
+        x, y, turn = (float(each) for each in moved)
+        way = np.array([x, y, 0.0]) / metres(moved)
+        angles = np.degrees(shared_residuals(turn_about_vertical(turn), way, first, second))
+        right = right_by_epipolar(first, second, (x, y, turn), math.radians(self.right_deg))
+        return Judged(metres(moved), angles, right)
 
 
-def _spans(maps: Sequence[LocalMap | None]) -> list[tuple[int, int]]:
-    """Of each local map that was tracked: the tick in which it was made, and the last in which it was tracked."""
-    begun: dict[int, int] = {}
-    ended: dict[int, int] = {}
-    for k, each in enumerate(maps):
-        if each is not None and each.state == "new":
-            begun[each.number] = k
-        elif each is not None and each.state == "tracking":
-            ended[each.number] = k
-    return [(begun[number], ended[number]) for number in ended if number in begun]
+def spans(maps: Sequence[LocalMap | None], tracks: Sequence[TrackedFeatures | None]) -> Iterator[Span]:
+    """Every local map that was made, in their order."""
+    made = {each.number: k for k, each in enumerate(maps) if each is not None and each.state == "new"}
+    for number, begun in made.items():
+        ticks = [
+            k
+            for k, (each, track) in enumerate(zip(maps, tracks, strict=True))
+            if each is not None and each.number == number and each.state == "tracking"
+            if track is not None and track.number == number
+        ]
+        yield Span(begun, ticks[0] if ticks else None, ticks[-1] if ticks else None)
 
 
-def _metres(motion: Array) -> float:
+def metres(motion: Array) -> float:
+    """How far a motion (3,) leads."""
     return math.hypot(motion[0], motion[1])
 
 
-def _angles_deg(first: Array, second: Array, moved: Array) -> Array:
-    # Of two images' bearings (N, 3); the second was taken at `moved` (3,), as seen from the first.
-    way = np.array([moved[0], moved[1], 0.0]) / _metres(moved)
-    return np.degrees(shared_residuals(turn_about_vertical(float(moved[2])), way, first, second))
+def _count(which: npt.NDArray[np.bool_]) -> int:
+    return int(np.count_nonzero(which))
+
+
+def _summary(judged: Sequence[Judged], both: npt.NDArray[np.bool_]) -> dict[str, float | None]:
+    angles = np.concatenate([each.angles for each in judged])
+    apart = [each.metres for each in judged if math.isfinite(each.metres)]
+    return {
+        "used": _count(np.isfinite(angles)) / len(judged),
+        "right": sum(_count(each.right) for each in judged) / len(judged),
+        "noise_deg": float(np.median(angles[both])) if both.any() else None,
+        "apart_m": float(np.mean(apart)) if apart else None,
+    }

@@ -1,6 +1,7 @@
-"""Matches and tracks of a made-up drive, whose right angles to the epipolar plane are known."""
+"""Matches and tracks of a made-up drive, whose angles to the epipolar plane are known."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,17 +13,23 @@ from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.epipolar import turn_about_vertical
 from omninav.stages.metrics.matched_and_tracked import MatchedAndTracked
 from omninav.stages.values.correspondences import Correspondences
-from omninav.stages.values.homing import LOST, MATCHED, TRACKED, HomingTarget, LocalMap, TrackedFeatures
+from omninav.stages.values.homing import FOUND_AGAIN, LOST, MATCHED, TRACKED, HomingTarget, LocalMap, TrackedFeatures
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.pose import Pose
 
-POSES = [(1.0, 1.0, 0.3), (4.0, 1.0, 2.0), (3.0, 1.4, 2.2), (1.1, 1.05, 0.4)]
+HOME, AWAY, HALF, NEAR = (1.0, 1.0, 0.3), (4.0, 1.0, 2.0), (3.0, 1.4, 2.2), (1.4, 1.05, 0.4)
+POSES = [HOME, AWAY, HALF, NEAR]
 """Where the target was seen, where the robot was carried to, and its way back."""
-POINTS = np.random.default_rng(3).uniform((-4.0, -4.0, -1.0), (8.0, 6.0, 2.0), (60, 3))
+POINTS = np.random.default_rng(3).uniform((-4.0, -4.0, -1.0), (8.0, 6.0, 2.0), (400, 3))
+ROWS = np.arange(1, 400, 2)
+"""The target's features that maps are made of: every other one."""
+N = len(ROWS)
+SHUFFLED = np.random.default_rng(4).permutation(400)
+"""In which order the robot's features are."""
 
 
-def seen(pose, noise_deg=0.0, seed=0, number=60) -> np.ndarray:
-    away = (POINTS[:number] - (pose[0], pose[1], 0.0)) @ turn_about_vertical(pose[2])
+def seen(pose, noise_deg=0.0, seed=0) -> np.ndarray:
+    away = (POINTS - (pose[0], pose[1], 0.0)) @ turn_about_vertical(pose[2])
     noise = np.random.default_rng(seed).normal(size=away.shape)
     return unit(unit(away) + math.radians(noise_deg) * noise)
 
@@ -33,78 +40,118 @@ def described(bearings) -> LocalFeatures:
     return LocalFeatures(bearings, *nothing)
 
 
-def pairs_of(poses=POSES, used=40, alive=20, match_noise=0.1, track_noise=0.3, wrong_tracks=0, number=1, state="new"):
-    kinds = np.where(np.arange(used) < alive, TRACKED, LOST)
-    rows, places = np.arange(used), 5.0 * seen(poses[1], 0.0, number=used)
-    made = LocalMap(
-        number, 0, state, rows=rows, places=places, kinds=np.full(used, MATCHED), points=np.zeros((used, 2))
-    )
-    maps, tracks = [None, made], [None, None]
-    for pose in poses[2:]:
-        bearings = seen(pose, track_noise, 7, used)
-        bearings[:wrong_tracks] = np.roll(bearings[:wrong_tracks], 1, axis=0)
-        bearings[kinds == LOST] = np.nan
-        maps.append(LocalMap(number, 0, "tracking", rows=rows, places=places, kinds=kinds, points=np.zeros((used, 2))))
-        tracks.append(TrackedFeatures(number, rows, kinds, np.zeros((used, 2)), bearings, places))
-    target = HomingTarget(0, described(seen(poses[0])))
-    features = [described(seen(pose, match_noise, 5)) for pose in poses]
-    all_rows = np.arange(60)
-    matches = [Correspondences(all_rows, all_rows, np.zeros(60))] * len(poses)
-    drive = collected([Tick(k, k * 10**9) for k in range(len(poses))], [pose and Pose(*pose) for pose in poses])
-    found = MatchedAndTracked().step(Context("pairs"), drive, maps, tracks, [target] * len(poses), features, matches)
-    return found.metrics and found.metrics.values["pairs"]
+class Run:
+    """What a homing drive of 4 ticks collects: one map, made in the second."""
+
+    def __init__(self, poses=POSES, match_noise=0.0, track_noise=0.0) -> None:
+        self.poses = poses
+        depths = np.linspace(1.0, 9.0, N)[:, None]
+        self.places = depths * seen(poses[1])[ROWS]
+        kinds = np.full(N, MATCHED)
+        new = LocalMap(5, 0, "new", rows=ROWS, places=self.places, kinds=kinds, points=np.zeros((N, 2)))
+        self.maps, self.tracks = [None, new], [None, None]
+        for pose in poses[2:]:
+            self.maps.append(replace(new, state="tracking", kinds=np.full(N, TRACKED)))
+            self.tracks.append(self.track(seen(pose, track_noise, 7)[ROWS]))
+        self.features = [described(seen(pose, match_noise, 5)[SHUFFLED]) for pose in poses]
+        self.matches = Correspondences(np.argsort(SHUFFLED), np.arange(400), np.zeros(400))
+
+    def track(self, bearings) -> TrackedFeatures:
+        return TrackedFeatures(5, ROWS, np.full(N, TRACKED), np.zeros((N, 2)), bearings, self.places.copy())
+
+    def judged(self, **parameters):
+        ticks = len(self.poses)
+        drive = collected([Tick(k, k * 10**9) for k in range(ticks)], [Pose(*pose) for pose in self.poses])
+        target = HomingTarget(0, described(seen(self.poses[0])))
+        found = MatchedAndTracked(**parameters).step(
+            Context("pairs"), drive, self.maps, self.tracks, [target] * ticks, self.features, [self.matches] * ticks
+        )
+        return found.metrics and found.metrics.values["pairs"]
 
 
-def test_it_counts_what_the_map_was_made_of_and_what_is_still_tracked_in_the_end():
-    found = pairs_of()
-    assert found["matched"]["used"] == found["matched"]["right"] == 40
-    assert found["tracked"]["used"] == found["tracked"]["right"] == 20
-    assert found["more"] == 2.0
+def test_exact_pairs_are_all_right_and_have_no_noise():
+    found = Run().judged()
+    for kind in ("matched", "tracked"):
+        assert found[kind]["used"] == found[kind]["right"] == N
+        assert found[kind]["noise_deg"] == pytest.approx(0.0, abs=1e-6)
+    assert (found["maps"], found["kept"]) == (1, 1.0)
 
 
-def test_noise_is_the_angle_to_the_true_epipolar_plane():
-    exact = pairs_of(match_noise=0.0, track_noise=0.0)
-    assert exact["matched"]["noise_deg"] == pytest.approx(0.0, abs=1e-6)
-    assert exact["tracked"]["noise_deg"] == pytest.approx(0.0, abs=1e-6)
-    some = pairs_of(match_noise=0.1, track_noise=0.2, alive=40)
-    # The median of |N(0, s)| is 0.67 s; one view of the two is noisy, and both share the blame: at most that.
-    assert 0.02 < some["matched"]["noise_deg"] < 0.07
-    assert some["tracked"]["noise_deg"] == pytest.approx(2.0 * some["matched"]["noise_deg"], rel=0.6)
-    assert some["noise_ratio"] == some["matched"]["noise_deg"] / some["tracked"]["noise_deg"] < 1.0
-
-
-def test_a_wrong_track_is_used_but_not_right():
-    found = pairs_of(wrong_tracks=10, track_noise=0.0)["tracked"]
-    assert found["used"] == 20
-    assert 10 <= found["right"] < 20  # one that lies on the plane by chance passes
-
-
-def test_the_images_are_those_the_pairs_are_of():
-    found = pairs_of()
+def test_pairs_are_of_the_images_they_are_said_to_be():
+    found = Run().judged()
     assert found["matched"]["apart_m"] == pytest.approx(3.0)
-    assert found["tracked"]["apart_m"] == pytest.approx(math.hypot(*between(POSES[1], POSES[3])[:2]))
+    assert found["tracked"]["apart_m"] == pytest.approx(math.hypot(*between(AWAY, NEAR)[:2]))
 
 
-def test_without_a_track_in_the_end_there_is_nothing_to_compare_with():
-    found = pairs_of(alive=0)
-    assert found["tracked"] == {"used": 0, "right": 0, "noise_deg": None, "apart_m": pytest.approx(2.9, abs=0.01)}
-    assert found["more"] is None
-    assert found["noise_ratio"] is None
-    assert found["matched"]["right"] == 40
+def test_noise_in_one_of_two_views_is_shared_by_both():
+    found = Run(match_noise=0.1, track_noise=0.2).judged()
+    # The median of |N(0, s)| is 0.67 s, of which the noisy view has its share by how both lie to the baseline.
+    assert 0.5 < found["matched"]["noise_deg"] / (0.67 * 0.1) < 0.85
+    assert 0.5 < found["tracked"]["noise_deg"] / (0.67 * 0.2) < 0.85
+    assert found["noise_ratio"] == found["matched"]["noise_deg"] / found["tracked"]["noise_deg"]
 
 
-def test_a_map_that_is_tracked_no_further_than_30_cm_is_left_out():
-    assert pairs_of(poses=[*POSES[:2], (3.9, 1.1, 2.2), (3.8, 1.2, 2.2)]) is None
+def test_tracks_that_are_lost_or_contradict_the_map_do_not_count():
+    run = Run()
+    run.tracks[-1].kinds[:4] = LOST
+    run.tracks[-1].kinds[4] = FOUND_AGAIN
+    run.maps[-1].kinds[5:11] = LOST
+    found = run.judged()
+    assert found["tracked"]["used"] == found["tracked"]["right"] == N - 10
+    assert found["matched"]["right"] == N
+    assert found["kept"] == (N - 10) / N
 
 
-def test_without_a_map_there_is_nothing():
-    assert pairs_of(state="lost") is None
+def test_a_feature_that_was_matched_anew_on_the_way_is_not_tracked():
+    run = Run()
+    run.tracks[-1].places[:3] *= 1.1
+    assert run.judged()["tracked"]["used"] == N - 3
 
 
-def test_without_truth_there_is_nothing():
-    drive = collected([Tick(k, k) for k in range(2)], [Pose(*POSES[0]), None])
+def test_wrong_pairs_are_used_and_not_right_and_their_angle_is_no_noise():
+    run = Run()
+    run.tracks[-1].bearings[:] = np.roll(run.tracks[-1].bearings, 1, axis=0)
+    run.tracks[-1].bearings[50:] = seen(NEAR)[ROWS][50:]
+    wrong = np.arange(400)
+    wrong[ROWS] = np.roll(ROWS, 1)
+    run.matches = replace(run.matches, first=np.argsort(SHUFFLED)[wrong])
+    found = run.judged()
+    assert found["matched"]["used"] == found["tracked"]["used"] == N
+    assert N - 50 <= found["tracked"]["right"] < N - 25  # some lie on the plane by chance
+    assert found["matched"]["right"] < N / 2
+    assert run.judged(right_deg=90.0)["tracked"]["right"] > found["tracked"]["right"]
+    run.matches = replace(run.matches, first=np.argsort(SHUFFLED))
+    assert run.judged()["tracked"]["noise_deg"] < 0.3
+
+
+def test_a_map_that_was_lost_at_once_or_before_the_least_distance_has_no_tracks():
+    run = Run()
+    run.maps[2:] = [replace(each, state="lost") for each in run.maps[2:]]
+    at_once = run.judged()
+    too_near = Run(poses=[HOME, AWAY, (3.9, 1.1, 2.2), (3.8, 1.2, 2.2)]).judged()
+    for found in (at_once, too_near):
+        assert found["tracked"] == {"used": 0, "right": 0, "noise_deg": None, "apart_m": None}
+        assert (found["matched"]["right"], found["kept"], found["noise_ratio"]) == (N, 0.0, None)
+
+
+def test_counts_are_per_map():
+    run = Run()
+    again = replace(run.maps[1], number=6)
+    run.maps[3] = again  # a second map, made in the last tick
+    run.tracks[3] = None
+    run.places = run.places.copy()
+    found = run.judged()
+    assert (found["maps"], found["tracked"]["used"], found["matched"]["used"]) == (2, N / 2, N)
+    assert found["tracked"]["apart_m"] == pytest.approx(math.hypot(*between(AWAY, HALF)[:2]))
+
+
+def test_without_a_map_or_truth_there_is_nothing():
+    run = Run()
+    run.maps[1] = None
+    assert run.judged() is None
+    drive = collected([Tick(k, k) for k in range(2)], [Pose(*HOME), None])
     assert MatchedAndTracked().step(Context("pairs"), drive, *[[None, None]] * 5).metrics is None
 
 
 def test_a_map_made_where_the_target_is_has_no_epipolar_plane():
-    assert pairs_of(poses=[POSES[0], (1.1, 1.0, 0.3), *POSES[2:]]) is None
+    assert Run(poses=[HOME, (1.1, 1.0, 0.3), HALF, NEAR]).judged() is None
