@@ -277,10 +277,17 @@ def _legend_above(canvas: Any, grid: Any) -> None:
 
 
 def _scale(axes: Any, figures: Sequence[float], ratio: float = 20.0, axis: Literal["x", "y"] = "y") -> None:
-    """From zero up; in powers of ten where the highest is more than `ratio` times the lowest."""
+    """From zero up; in powers of ten where the highest is more than `ratio` times the lowest above zero.
+
+    Where one is zero, the axis is linear up to the lowest above zero, so that a line at zero is seen.
+    """
     above = [figure for figure in figures if figure > 0]
     if above and max(above) > ratio * min(above):
-        axes.set(**{f"{axis}scale": "log", f"{axis}lim": (0.5 * min(above), None)})
+        if 0.0 in figures:
+            getattr(axes, f"set_{axis}scale")("symlog", linthresh=min(above), linscale=0.5)
+            axes.set(**{f"{axis}lim": (-0.2 * min(above), None)})
+        else:
+            axes.set(**{f"{axis}scale": "log", f"{axis}lim": (0.5 * min(above), None)})
     else:
         axes.set(**{f"{axis}lim": (0, None)})
 

@@ -7,12 +7,13 @@ import pytest
 from omninav.pipeline.experiment.plots import plots_of
 from omninav.pipeline.experiment.specification import read_experiment
 from omninav.pipeline.experiment.verdicts import key_of
+from omninav.pipeline.report.plot_style import PALETTE
 
 LONG = "Error of the direction up to 6 m away, median, not found is 180 (degrees)"
 
 
-def drawn(methods: int, **page: object) -> list[np.ndarray]:
-    """Images of the plots of an experiment with long names."""
+def drawn(methods: int, along: tuple[float, ...] = (1.0,), **page: object) -> list[np.ndarray]:
+    """Images (colour, BGR) of the plots of an experiment with long names; method n's curve lies at along[n]."""
     file = {
         "name": "test",
         "title": "A test",
@@ -27,11 +28,12 @@ def drawn(methods: int, **page: object) -> list[np.ndarray]:
         "page": page,
     }
     experiment = read_experiment(file, "paper")
-    run = {"metrics": {"error": 2.0, "along": [1.0, 2.0, 3.0]}, "timing": {}, "facts": {}}
-    results = {key_of(c.labels): {("world 1", 0): run, ("world 2", 0): run} for c in experiment.conditions()}
-    return [
-        cv2.imdecode(np.frombuffer(p.content, np.uint8), cv2.IMREAD_GRAYSCALE) for p in plots_of(experiment, results)
-    ]
+    results = {}
+    for condition in experiment.conditions():
+        level = along[int(condition.labels["method"][-1]) % len(along)]
+        run = {"metrics": {"error": 2.0, "along": 3 * [level]}, "timing": {}, "facts": {}}
+        results[key_of(condition.labels)] = {("world 1", 0): run, ("world 2", 0): run}
+    return [cv2.imdecode(np.frombuffer(p.content, np.uint8), cv2.IMREAD_COLOR) for p in plots_of(experiment, results)]
 
 
 @pytest.mark.parametrize(
@@ -49,3 +51,10 @@ def test_a_tall_legend_takes_no_room_from_the_plot() -> None:
     assert (
         drawn(5, rows=["method"], columns="side")[-1].shape[0] > drawn(1, rows=["method"], columns="side")[-1].shape[0]
     )
+
+
+def test_a_line_at_zero_is_drawn_beside_one_that_is_a_hundred_times_another() -> None:
+    curve = drawn(3, along=(0.0, 1.0, 100.0), rows=["method"], columns="side")[-1]
+    colour = [int(PALETTE[1][n : n + 2], 16) for n in (5, 3, 1)]
+    of_the_line = np.abs(curve.astype(int) - colour).max(axis=2) < 8
+    assert of_the_line.any(axis=0).sum() > curve.shape[1] / 2
