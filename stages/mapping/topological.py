@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Callable
 from typing import Annotated
 
 import numpy as np
@@ -75,7 +76,9 @@ class TopologicalMapping(Stage):
 
         medoids = place_clusters.medoids(views.distances, place)
         ways = {} if known is None else known_ways(known, place)
-        for pair, way in driven_ways(views.distances, place, views.tours, medoids).items():
+        shared = matches if self.min_path_matches else None
+        enough = self.min_path_matches
+        for pair, way in driven_ways(views.distances, place, views.tours, medoids, shared, enough).items():
             if pair not in ways and pair[::-1] not in ways:
                 between = np.empty(0, np.int64)
                 if self.min_path_matches:
@@ -138,12 +141,32 @@ def spread_to_medoids(map: TopologicalMap, views: ComparedViews, place: Ints) ->
     return math.sqrt(float(np.mean(finite**2))) if len(finite) else 0.0
 
 
-def driven_ways(distances: Array, place: Ints, tour: Ints, medoids: Ints) -> dict[tuple[int, int], Ints]:
+def driven_ways(
+    distances: Array,
+    place: Ints,
+    tour: Ints,
+    medoids: Ints,
+    matches: Callable[[int, int], int] | None = None,
+    min_matches: int = 0,
+) -> dict[tuple[int, int], Ints]:
     """For each two places that were driven through one after the other: the views from one medoid to the other.
 
     Of several passes the one that comes nearest to both medoids. Where a medoid is of another pass, the way starts (or
-    ends) with the medoid and with the view of this pass that looks most like it.
+    ends) with the medoid and with the view of this pass that looks most like it, of those that share `min_matches` with
+    it; where none does, with the one that shares most. Few matches ahead and behind agree over metres in a corridor.
     """
+
+    def nearest(medoid: int, run: Ints) -> int:
+        order = run[np.argsort(distances[medoid, run], kind="stable")]
+        if matches is None:
+            return int(order[0])
+        shared: list[int] = []
+        for view in order.tolist():
+            shared.append(min(matches(medoid, view), matches(view, medoid)))
+            if shared[-1] >= min_matches:
+                return int(view)
+        return int(order[np.argmax(shared)])
+
     best: dict[tuple[int, int], tuple[float, int, Ints]] = {}
     runs = np.flatnonzero((np.diff(place) != 0) | (np.diff(tour) != 0)) + 1
     starts, ends = np.append(0, runs), np.append(runs, len(place))
@@ -153,8 +176,7 @@ def driven_ways(distances: Array, place: Ints, tour: Ints, medoids: Ints) -> dic
             continue
         leave = np.arange(starts[before], ends[before])
         reach = np.arange(starts[before + 1], ends[before + 1])
-        out = leave[np.argmin(distances[medoids[one], leave])]
-        into = reach[np.argmin(distances[medoids[other], reach])]
+        out, into = nearest(int(medoids[one]), leave), nearest(int(medoids[other]), reach)
         cost = float(distances[medoids[one], out] + distances[into, medoids[other]])
         way = np.arange(out, into + 1)
         if out != medoids[one]:

@@ -18,6 +18,7 @@ from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.visual_distance import VisualDistances
 
 Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
 
 
@@ -53,10 +54,11 @@ class ShortestPathPlanner(Stage):
 
     It plans once the belief is sure enough or has had time enough, and again where the robot has lost its target or
     finds its way blocked. Routes without the link on which that happened are then preferred, and a link that has failed
-    too often is closed. Where the robot did not come to a place's own medoid, it is half as likely to be at that place,
-    and the next route from there begins behind the medoid. After too many routes, or where no route is left, the
-    planner gives up with the reason and an empty path, so that the robot stands. Raises BadInput for a goal that the
-    map does not have, and for an image of no place in it.
+    too often is closed. A robot that is lost before it has come to the first view of its route is perhaps elsewhere:
+    each time it is half as likely to be at that place, and every other route from there begins behind the medoid. Lost
+    again where it has been lost before, it looks around before it plans. After too many routes, or where no route is
+    left, the planner gives up with the reason and an empty path, so that the robot stands. Raises BadInput for a goal
+    that the map does not have, and for an image of no place in it.
     """
 
     goal: str | int | None = None
@@ -72,6 +74,9 @@ class ShortestPathPlanner(Stage):
     """Time for which the robot looks before it plans, even if it is sure."""
     locate_timeout_s: Annotated[float, Bounds(gt=0)] = 5.0
     """Time after which it plans even if it is not sure."""
+    search_s: Annotated[float, Bounds(ge=0)] = 15.0
+    """Time for which a robot that is lost again on the same link, or again as it sets out from the same place, looks
+    around (it stands, then wanders) before it plans; sure of another place, it plans at once."""
     max_failures: Annotated[int, Bounds(ge=1)] = 3
     """Of a link, after which it is closed."""
     max_routes: Annotated[int, Bounds(ge=1)] = 20
@@ -110,7 +115,7 @@ class ShortestPathPlanner(Stage):
         if state.ended or not self._must_plan(state, tick, belief, status, progress):
             return self.Out(route=_route(state))
         if state.number >= 0 and not state.renewed and progress is not None and status is not None:
-            _remember(state, progress.at)
+            _remember(state, _failing(state, progress.at, lost=status.state == "lost"))
             state.blocked = status.why if status.state == "blocked" else state.blocked
         path = self._plan(ctx, state, belief.probabilities, goals, map)
         return self.Out(path=path, route=_route(state))
@@ -140,6 +145,11 @@ class ShortestPathPlanner(Stage):
         if state.waiting_since is None:
             state.waiting_since = tick.stamp
         waited_s = (tick.stamp - state.waiting_since) / 1e9
+        failing = _failing(state, progress.at, lost=True) if progress is not None and state.number >= 0 else None
+        if failing is not None and status is not None and status.state == "lost" and _same(state, failing).any():
+            place, _ = _likeliest(belief.probabilities, state)
+            elsewhere = place not in failing and belief.probabilities[place] >= self.min_probability
+            return bool(elsewhere and waited_s >= self.settle_s) or waited_s >= self.search_s
         sure = belief.probabilities.max() >= self.min_probability and waited_s >= self.settle_s
         return bool(sure) or waited_s >= self.locate_timeout_s
 
@@ -228,7 +238,7 @@ def shortest_route(
 
 
 def _likeliest(probabilities: Array, state: ShortestPathPlannerState) -> tuple[int, int]:
-    """Where the robot most probably is, and how often it did not come to the medoid there."""
+    """Where the robot most probably is, and how often it was lost as it set out from there."""
     missed = np.zeros(len(probabilities), np.int64)
     own = state.failed_links[:, 0] == state.failed_links[:, 1]
     missed[state.failed_links[own, 0]] = state.failures[own]
@@ -236,11 +246,21 @@ def _likeliest(probabilities: Array, state: ShortestPathPlannerState) -> tuple[i
     return place, int(missed[place])
 
 
-def _remember(state: ShortestPathPlannerState, reached: int) -> None:
-    """That the route failed behind so many of its views: on which link."""
+def _failing(state: ShortestPathPlannerState, reached: int, lost: bool) -> Ints:
+    """The link on which a route fails behind so many of its views; lost before the first, its place with itself."""
+    if lost and not reached:
+        return state.places[[0, 0]]
     leg = int(np.searchsorted(state.views, reached, side="right"))
-    pair = state.places[[max(leg - 1, 0), min(leg, len(state.places) - 1)]]
-    same = (np.sort(state.failed_links, axis=1) == np.sort(pair)).all(axis=1)
+    return state.places[[max(leg - 1, 0), min(leg, len(state.places) - 1)]]
+
+
+def _same(state: ShortestPathPlannerState, pair: Ints) -> Bools:
+    """Which of the failed links it is, in whichever direction."""
+    return np.asarray((np.sort(state.failed_links, axis=1) == np.sort(pair)).all(axis=1))
+
+
+def _remember(state: ShortestPathPlannerState, pair: Ints) -> None:
+    same = _same(state, pair)
     if same.any():
         state.failures = state.failures + same
     else:

@@ -38,6 +38,15 @@ def test_where_a_medoid_is_of_another_pass_the_way_begins_and_ends_with_it() -> 
     assert ways(looks, place, [1, 3, 2])[(0, 1)] == [1, 6, 7, 8, 3]
 
 
+def test_a_way_enters_another_pass_where_it_shares_enough_matches_with_the_medoid() -> None:
+    # As above; view 6 looks most like medoid 1, view 5 shares more with it, and neither 7 nor 8 shares enough with 3.
+    looks, place = [0, 0.1, 50, 10, 50, 0.3, 0.2, 10.4, 10.2], [0, 0, 2, 1, 2, 0, 0, 1, 1]
+    shared = {(1, 5): 30, (5, 1): 20, (1, 6): 40, (6, 1): 19, (3, 7): 12, (7, 3): 13, (3, 8): 11, (8, 3): 99}
+    distances, tour, medoids = between_looks(looks), np.ones(9, np.int64), np.array([1, 3, 2])
+    found = driven_ways(distances, np.array(place), tour, medoids, lambda *views: shared.get(views, 50), 20)
+    assert found[(0, 1)].tolist() == [1, 5, 6, 7, 3]
+
+
 def test_of_several_passes_the_one_counts_that_comes_nearest_to_both_medoids() -> None:
     # 0 to 1 is driven at 0.5 and 10.5, then (from elsewhere) at 0 and 10, the medoids, and back again at 10.1 and 0.1.
     looks, place = [0.5, 10.5, 50, 0.0, 10.0, 50, 10.1, 0.1], [0, 1, 2, 0, 1, 2, 1, 0]

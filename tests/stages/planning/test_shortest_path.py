@@ -184,7 +184,7 @@ def test_where_no_other_way_is_left_it_tries_some_times_and_then_gives_up_and_st
 
 
 def test_a_medoid_that_was_not_seen_makes_its_place_less_likely_and_the_way_from_there_begin_behind_it():
-    stage, state = ShortestPathPlanner(goal=3, settle_s=0.0), ShortestPathPlannerState()
+    stage, state = ShortestPathPlanner(goal=3, settle_s=0.0, search_s=0.0), ShortestPathPlannerState()
     drive(stage, state, 1)
     out = drive(stage, state, 1, "lost", at=0)
     assert state.failed_links.tolist() == [[1, 1]]
@@ -202,6 +202,40 @@ def test_a_medoid_that_was_not_seen_makes_its_place_less_likely_and_the_way_from
     assert found.route.places.tolist() == [2, 3]  # 0.3 against half of 0.5
 
 
+def test_lost_again_as_it_sets_out_it_looks_around_before_it_goes_by_the_same_place():
+    stage, state = ShortestPathPlanner(goal=3, settle_s=0.2, search_s=2.0), ShortestPathPlannerState()
+    planned = [drive(stage, state, 1).path is not None for _ in range(2)]
+    planned += [drive(stage, state, 1, "lost", at=0).path is not None for _ in range(2)]
+    assert planned == [False, True, False, True]  # the second begins behind the medoid
+    again = [drive(stage, state, 1, "lost", at=0) for _ in range(11)]
+    assert [out.path is not None for out in again] == 10 * [False] + [True]
+    assert again[9].route.state == "locating"
+    assert state.failed_links.tolist() == [[1, 1]]  # no link has failed: it may not be there at all
+    assert state.failures.tolist() == [2]
+
+
+def test_sure_of_another_place_it_looks_around_no_longer():
+    stage, state = ShortestPathPlanner(goal=3, settle_s=0.2, search_s=2.0), ShortestPathPlannerState()
+    for _ in range(2):
+        drive(stage, state, 1)
+    for _ in range(3):
+        drive(stage, state, 1, "lost", at=0)
+    assert drive(stage, state, 4, "lost", at=0, share=0.45).path is None  # likelier, but not sure
+    out = drive(stage, state, 4, "lost", at=0)
+    assert out.path is not None
+    assert out.route.places.tolist()[0] == 4
+
+
+def test_lost_again_on_the_same_link_it_looks_around_too():
+    stage, state = ShortestPathPlanner(goal=4, settle_s=0.0, search_s=1.0), ShortestPathPlannerState()
+    drive(stage, state, 2)
+    assert drive(stage, state, 2, "lost", at=1).path is not None
+    planned = [drive(stage, state, 2, "lost", at=1).path is not None for _ in range(6)]
+    assert planned == 5 * [False] + [True]
+    assert state.failed_links.tolist() == [[2, 4]]
+    assert drive(stage, state, 2, "blocked", at=1).path is not None  # who stands before something need not look around
+
+
 def test_a_medoid_counts_for_nothing_once_a_way_has_been_found_right():
     stage, state = ShortestPathPlanner(goal=3, settle_s=0.0), ShortestPathPlannerState()
     drive(stage, state, 1)
@@ -211,7 +245,7 @@ def test_a_medoid_counts_for_nothing_once_a_way_has_been_found_right():
 
 
 def test_that_it_was_blocked_is_said_though_in_the_end_it_was_lost():
-    stage, state = ShortestPathPlanner(goal=4, settle_s=0.0, max_failures=2), ShortestPathPlannerState()
+    stage, state = ShortestPathPlanner(goal=4, settle_s=0.0, search_s=0.0, max_failures=2), ShortestPathPlannerState()
     drive(stage, state, 2)
     drive(stage, state, 2, "blocked", at=1)
     last = drive(stage, state, 2, "lost", at=1)
@@ -226,7 +260,7 @@ def test_it_arrives_and_stays():
 
 
 def test_after_so_many_ways_it_gives_up_and_says_why():
-    stage, state = ShortestPathPlanner(goal=3, settle_s=0.0, max_routes=2), ShortestPathPlannerState()
+    stage, state = ShortestPathPlanner(goal=3, settle_s=0.0, search_s=0.0, max_routes=2), ShortestPathPlannerState()
     drive(stage, state, 1)
     drive(stage, state, 1, "lost", at=0)
     out = drive(stage, state, 1, "lost", at=0)
