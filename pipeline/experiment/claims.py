@@ -17,8 +17,6 @@ CLAIMS = "claims.yaml"
 BEGIN, END = "<!-- claims: omninav experiments -->", "<!-- end of the claims -->"
 HEAD = ("claim", "where", "experiment", "verdict", "ours")
 UNRUN, UNJUDGED, NOT_HERE = "not run yet", "no experiment", "not testable here"
-EARLIER = ", earlier rule"
-"""Behind a verdict of before scenarios counted: of the scenario of development alone."""
 
 
 @dataclass(frozen=True)
@@ -93,9 +91,7 @@ def _cells(claim: ListedClaim, found: Mapping[str, Sequence[Verdict]], away: str
         return claim.claim, claim.where, f"{claim.experiment}: {claim.statement}", UNRUN, ""
     case = f" ({claim.case})" if claim.case else ""
     link = f"[{claim.experiment}]({away}/{claim.experiment}.md): {verdict.claim}{case}"
-    counted = any(case.scenarios for each in found[claim.experiment] for case in each.cases)
-    words = in_words(verdict.holds) + ("" if counted else EARLIER)
-    return claim.claim, claim.where, link, words, _ours(verdict)
+    return claim.claim, claim.where, link, in_words(verdict.holds), _ours(verdict)
 
 
 def _judged(claim: ListedClaim, found: Mapping[str, Sequence[Verdict]], where: str) -> Verdict | None:
@@ -149,8 +145,7 @@ def _figure(value: float) -> str:
 def _counts(verdicts: Sequence[str]) -> str:
     """How many claims there are, and what they come to."""
     words = [in_words(held) for held in (True, False, None)]
-    earlier = [word + EARLIER for word in words if word + EARLIER in verdicts]
-    judged = [f"{word}: {verdicts.count(word)}" for word in (*words, *earlier, UNRUN)]
+    judged = [f"{word}: {verdicts.count(word)}" for word in (*words, UNRUN)]
     beside = [verdicts.count(kind) for kind in (UNJUDGED, NOT_HERE)]
     return (
         f"{len(verdicts)} claims: {len(verdicts) - sum(beside)} have an experiment ({'; '.join(judged)}), "

@@ -65,9 +65,8 @@ def index_table(folder: Path) -> str:
 
 
 def _scenarios(verdicts: Sequence[Verdict]) -> str:
-    """Over how many scenarios the claims were judged; of a page of before scenarios counted, that it is one."""
-    number = max((case.scenarios for verdict in verdicts for case in verdict.cases), default=0)
-    return str(number) if number else "earlier rule"
+    """Over how many scenarios the claims were judged."""
+    return str(max((case.scenarios for verdict in verdicts for case in verdict.cases), default=0))
 
 
 def read_verdicts(path: Path) -> list[Verdict]:

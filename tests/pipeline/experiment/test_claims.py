@@ -67,15 +67,6 @@ def test_each_claim_stands_with_its_verdict_and_figure(folder: Path) -> None:
     assert text.endswith(f"{claims.END}\n\nafter\n")
 
 
-def test_a_verdict_of_before_scenarios_counted_says_so(folder: Path) -> None:
-    former = Case("first", 3.0, 9.0, "the limit", -6.0, (-7.0, -5.0), True, 7, 7)
-    (folder / "one.verdicts.json").write_text(json.dumps([Verdict("it holds", "Error (cm)", "", (former,)).plain()]))
-    assert written(folder, GOOD) == 0
-    text = (folder.parent / "papers.md").read_text()
-    assert "| holds, earlier rule | Error (cm): 3, beside 9" in text
-    assert "(holds: 0; does not hold: 0; undecided: 0; holds, earlier rule: 1; not run yet: 0)" in text
-
-
 @pytest.mark.parametrize(
     ("ours", "shown"),
     [(0.125, "0.12"), (9.96, "9.96"), (10.06, "10.1"), (99.46, "99.5"), (100.4, "100"), (-12.5, "-12.5")],

@@ -57,11 +57,6 @@ def test_the_table_says_over_how_many_scenarios_claims_were_judged(tmp_path: Pat
     readme = (tmp_path / "README.md").read_text()
     assert readme.endswith(f"{row}{END}\n\nwhat follows\n")
     assert "former" not in readme
-    earlier = judged.plain()
-    for case in earlier["cases"]:
-        del case["scenarios"]
-    (tmp_path / "one.verdicts.json").write_text(json.dumps([earlier]))
-    assert "| earlier rule |" in index_table(tmp_path)
 
 
 def test_what_is_no_page_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
