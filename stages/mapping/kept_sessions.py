@@ -25,16 +25,18 @@ class KeepSessions(Stage):
     """Keeps each view, the odometry since the one before, and the pose that was believed.
 
     A map of views holds what its drives taught, and no more the drives themselves; with them it can be straightened
-    (`StraightenSessions`) and learned again. Views of a robot that stands still are left out.
+    (`StraightenSessions`) and learned again. Views of a robot that stands still are left out. A known map that was
+    saved without its drives, as one of stated poses is, would be forgotten where it is learned again: with one none are
+    kept. Manifest fact `map_straightened` says so.
     """
 
     min_move_m: Annotated[float, Bounds(ge=0)] = 0.01
     """Way between two views that are kept."""
 
     class Out(Outputs):
-        """All drives so far, those of a known map among them."""
+        """All drives so far, those of a known map among them; absent where that has none."""
 
-        sessions: Sessions
+        sessions: Sessions | None = None
 
     def step(
         self,
@@ -49,6 +51,9 @@ class KeepSessions(Stage):
         if kept is None:
             earlier = None if known is None else known.sessions
             if earlier is None or earlier.views.shape[1:] != view.rows.shape:
+                if known is not None and len(known):
+                    ctx.fact("map_straightened", "no: the map that it went on with was saved without its drives")
+                    return self.Out()
                 earlier = Sessions.empty(view)
             kept = replace(earlier, ticks=np.zeros(len(earlier), np.int64))  # the known map's own stay as they are
         begins = ctx.tick.first_of_log or motion is None

@@ -37,7 +37,9 @@ def keep(
     ctx = Context("sessions")
     ctx.tick = Tick(tick, tick, first_of_log=first)
     state = believed(1.0) if state is None else state
-    return (stage or KeepSessions()).step(ctx, view(tick), motion, state, sessions, known).sessions
+    kept = (stage or KeepSessions()).step(ctx, view(tick), motion, state, sessions, known).sessions
+    assert kept is not None
+    return kept
 
 
 def test_a_view_has_the_odometry_since_the_one_before_and_none_where_a_drive_begins() -> None:
@@ -91,3 +93,13 @@ def test_drives_of_a_known_map_come_first_and_are_of_no_tick() -> None:
     assert known.sessions is not None
     assert known.sessions.ticks.tolist() == [4, 5]
     assert len(keep(None, 2, None, first=True, known=ViewMixtures.empty())) == 1
+
+
+def test_a_known_map_without_drives_keeps_none_so_that_it_is_not_forgotten() -> None:
+    known = ViewMixtures.empty()
+    known.add_view(view(1).values, "Coefficients")
+    ctx = Context("sessions")
+    ctx.tick = Tick(2, 2, first_of_log=True)
+    out = KeepSessions().step(ctx, view(2), None, believed(1.0), None, known)
+    assert out.sessions is None
+    assert ctx.facts["map_straightened"] == "no: the map that it went on with was saved without its drives"
