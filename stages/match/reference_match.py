@@ -32,7 +32,7 @@ class ReferenceMatch(ABC):
     """Headings at which each reference is compared, evenly spaced over the circle."""
     word_power: Annotated[float, Bounds(ge=0)] = 0.0
     """Exponent of the similarity by visual words (`candidates=words`); 0: words only choose candidates. At 0.25 the
-    most similar image is nearer, yet a filter tracks worse (docs/experiments/words.md)."""
+    most similar image is nearer on average, yet a filter tracks worse (docs/experiments/words.md)."""
 
     class Out(Outputs):
         """Similarities of view and references, and what they say of the place; the latter absent in a small map."""
