@@ -51,7 +51,7 @@ def camera_of(world: WorldConfig) -> Camera:
 
 
 def shutter_times(sensor: Sensor, at: float) -> F64:
-    """Moments (s) of the sub-exposures of a image taken at a time: they lie evenly around it."""
+    """Moments (s) of the sub-exposures of an image taken at a time: they lie evenly around it."""
     if sensor.shutter == 0.0:
         return np.array([at])
     parts: F64 = at + sensor.shutter * ((np.arange(sensor.sub_exposures) + 0.5) / sensor.sub_exposures - 0.5)

@@ -2,9 +2,9 @@
 
 Every body is an upright box, turned by any angle, that stands on the floor or hangs (walls, shelves, posters, people).
 Rays come in wedges of like azimuth. For a wedge, the cells of a grid over the floor are walked outwards once, and the
-boxes in them are found_box, nearest first, until what was met hides the rest up to the ceiling; then each ray is tested
-against these few. So a image costs what is seen, not what the world holds. Each pixel is computed by one thread
-from its own numbers alone, so that threads cannot change a image.
+boxes in them are found, nearest first, until what was met hides the rest up to the ceiling; then each ray is tested
+against these few. So an image costs what is seen, not what the world holds. Each pixel is computed by one thread
+from its own numbers alone, so that threads cannot change an image.
 """
 
 import math
@@ -30,7 +30,7 @@ U32 = npt.NDArray[np.uint32]
 FACES = 6
 """Faces of a box, in its own frame: -x, +x, -y, +y, bottom, top."""
 CHUNKS = 32
-"""Portions of a image that threads take in turn; each has its own list of candidates."""
+"""Portions of an image that threads take in turn; each has its own list of candidates."""
 FAST_MATH = {"contract", "arcp", "reassoc", "nsz"}
 """Floating-point optimisations; the image does not depend on the number of threads."""
 MAX_OCCLUDERS = 24
@@ -337,7 +337,7 @@ def _boxes_in_wedge(
     distance: along that axis every slab of cells is crossed by all rays of the wedge at once. A body that both edges
     meet is met by all rays between, being convex; once the walk is past it, it hides what is lower than the line over
     its top. When that line reaches the ceiling, nothing more can be seen.
-    Returns how many were found_box, how far it went, and whether along x.
+    Returns how many were found, how far it went, and whether along x.
     """
     cos_a, sin_a, cos_b, sin_b = math.cos(low), math.sin(low), math.cos(high), math.sin(high)
     along_x = abs(cos_a + cos_b) >= abs(sin_a + sin_b)
