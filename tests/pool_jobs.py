@@ -40,11 +40,14 @@ def die_once(given: Mapping[str, Any], send: Send) -> None:
 
 
 def take(given: Mapping[str, Any], send: Send) -> None:
-    """Takes memory (MB) and time (s), and leaves its process's number in a file."""
+    """Leaves its process's number in a file, then takes memory (MB) and time (s)."""
+    mark = Path(given["mark"])
+    unfinished = mark.with_suffix(".unfinished")
+    unfinished.write_text(str(os.getpid()))
+    unfinished.rename(mark)
     taken = bytearray(given["megabytes"] * 1_000_000)
     for page in range(0, len(taken), 4096):
         taken[page] = 1
-    Path(given["mark"]).write_text(str(os.getpid()))
     time.sleep(given["seconds"])
 
 
