@@ -59,3 +59,8 @@ def threads(given: Mapping[str, Any], send: Send) -> list[int]:
 
     pools = [int(each["num_threads"]) for each in threadpoolctl.threadpool_info()]
     return [cv2.getNumThreads(), numba.get_num_threads(), *pools]
+
+
+def process(given: Mapping[str, Any], send: Send) -> int:
+    """The number of the process that runs it."""
+    return os.getpid()

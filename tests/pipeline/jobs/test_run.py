@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
+from omninav.pipeline.jobs import perform, run
 from omninav.pipeline.jobs.executors import EngineSettings, read_engine
 from omninav.pipeline.jobs.job import Job
 from omninav.pipeline.jobs.run import Workers
@@ -79,6 +80,39 @@ def test_jobs_end_soon_after_whoever_started_them(tmp_path: Path, how: signal.Si
     client.send_signal(how)
     client.wait()
     wait_for(lambda: not lives(job_process))
+
+
+def test_a_job_ends_whose_client_gives_no_sign_of_life(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(perform, "LEASE_S", 1.0)
+    lease = tmp_path / ".client"
+    lease.write_text("token")
+    endless = job("take", tmp_path, megabytes=1, seconds=60, mark=str(tmp_path / "mark"))
+    ended = perform.perform(endless.text(0, lease, "token", None))
+    assert ended["error"] == "stopped, because whoever started it has ended"
+    wait_for(lambda: not lives(int((tmp_path / "mark").read_text())))
+
+
+def test_a_job_goes_on_as_long_as_its_client_gives_signs_of_life(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(perform, "LEASE_S", 1.0)
+    monkeypatch.setattr(run, "RENEW_S", 0.2)
+    slow = job("take", tmp_path, megabytes=1, seconds=3, mark=str(tmp_path / "mark"))
+    with Workers(EngineSettings(workers=1), tmp_path) as workers:
+        assert workers.run([slow])["take"].error is None
+
+
+def test_a_process_takes_one_job_after_another_unless_it_keeps_too_much(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def processes(*names: str) -> list[int]:
+        with Workers(EngineSettings(workers=1), tmp_path) as workers:
+            outcomes = workers.run([job(name, tmp_path) for name in names])
+        return [int(outcomes[name].value) for name in names]
+
+    first, second = processes("process a", "process b")
+    assert first == second
+    monkeypatch.setattr(perform, "MAX_LEFT", 1_000_000)
+    first, second = processes("process c", "process d")
+    assert first != second
 
 
 def test_a_job_uses_one_thread(tmp_path: Path):

@@ -130,6 +130,13 @@ def test_a_known_place_is_looked_after_and_a_kidnapped_robot_is_found(index: Ref
         assert len(among) <= len(around) + 20
 
 
+@pytest.mark.parametrize("turned", range(4))
+def test_a_kidnapped_robot_is_found_at_any_heading_within_two_images(index: ReferenceIndex, turned: int) -> None:
+    view = np.roll(MAP.features[3000], turned, axis=0)  # looked up at every other heading, the others at the next image
+    near = particles_at(100.0)
+    assert 3000 in np.concatenate([chosen(selected(index, view, near=near, turn=turn)) for turn in (6, 7)])
+
+
 def test_a_belief_spread_over_the_map_is_as_none(index: ReferenceIndex) -> None:
     view = MAP.features[1234]
     assert np.array_equal(chosen(selected(index, view, near=particles_at(500.0, 200.0))), chosen(selected(index, view)))

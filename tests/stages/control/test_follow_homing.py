@@ -166,6 +166,27 @@ def test_a_target_close_before_a_wall_can_be_reached() -> None:
     assert drive(vector(0.0, metres=0.2), progress(last=True), scan((-60.0, 60.0, 0.7))).command.speed > 0.0
 
 
+def test_it_docks_at_a_wall_closer_than_it_stops_on_the_way() -> None:
+    wall = scan((-25.0, 25.0, 0.38))  # 0.1 m free ahead of a robot of 0.25 m, which stops at 0.15 m
+    assert drive(vector(0.0, metres=0.08), progress(last=True), wall).command.speed > 0.0
+
+
+def test_it_stops_before_what_stands_straight_ahead_while_it_turns_to_a_free_direction() -> None:
+    post = scan((-2.0, 2.0, 0.38))
+    out = drive(vector(0.6, metres=2.0), progress(), post)
+    assert out.status.state == "driving"
+    assert out.command.turning > 0.0
+    assert out.command.speed == 0.0
+
+
+def test_time_in_which_the_target_is_lost_does_not_count_as_stalled() -> None:
+    robot = Robot(stalled_after_s=2.0)
+    for _ in range(30):
+        robot.drive(vector(state="lost", why="none"), progress(), scan())
+    said = [robot.drive(vector(), progress(), scan()).status.state for _ in range(13)]
+    assert said == ["driving"] * 10 + ["blocked"] * 3
+
+
 def test_through_a_door_that_is_hardly_wide_enough_it_goes_slowly() -> None:
     azimuths = scan().azimuths()
     beside = np.abs(np.sin(azimuths)) > 0.05

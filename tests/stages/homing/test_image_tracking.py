@@ -70,3 +70,17 @@ def test_a_lost_point_is_found_again_by_its_intensities_and_another_is_not():
     assert there.all()
     np.testing.assert_allclose(found, place, atol=1.0)
     assert not find_again(image, strength, place, np.zeros_like(seen), 8.0, 4, 0.2, 0.01)[1].any()
+
+
+@pytest.mark.parametrize(("column", "expected"), [(2, 357.0), (357, 2.0)])
+def test_a_lost_point_is_found_again_across_the_edge_of_the_circle(column: int, expected: float):
+    image = panorama()
+    place = best_nearby(trackability(image), image, np.array([[120.0, 40.0]]), 5)
+    for _ in range(5):
+        place = best_nearby(trackability(image), image, place, 5)
+    image = panorama(column - int(place[0, 0]))
+    there = np.array([[float(column), place[0, 1]]])
+    searched = np.array([[expected, place[0, 1]]])
+    found, kept = find_again(image, trackability(image), searched, histograms(image, there, 4), 8.0, 4, 0.1, 0.01)
+    assert kept.all()
+    np.testing.assert_allclose(found, there, atol=1.0)

@@ -18,7 +18,9 @@ from omninav.stages.geometry.appearance.feature_matching import mutual_nearest
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.homing.feature_tracker import FeatureTracker, FeatureTrackerState
 from omninav.stages.homing.homing_vector import HomingVectorFromMap
+from omninav.stages.homing.image_tracking import histograms
 from omninav.stages.homing.local_mapping import LocalMapping, LocalMappingState
+from omninav.stages.homing.working_image import working_image
 from omninav.stages.values.correspondences import Correspondences
 from omninav.stages.values.homing import HomingTarget, HomingVector, LocalMap
 from omninav.stages.values.image import Image, Panorama
@@ -198,6 +200,20 @@ def test_tracks_tell_where_lost_features_should_be_and_which_of_the_targets_they
     moved = np.hypot(*(tracks.points - before.points)[gone].T)
     assert gone.sum() >= 5
     assert np.nanmedian(moved) < 25.0  # pixels: a step of the drive away from where it was seen last
+
+
+def test_a_tracked_feature_is_known_by_how_it_looked_last() -> None:
+    # "each time a feature is successfully tracked, this histogram is updated" (section 7.2.2)
+    homing, poses = Homing(), drive(13)
+    for k, pose in enumerate(poses[:4]):
+        homing.at(pose, matches=k == 0)
+    last = homing.tracked.points.copy(), homing.tracked.alive.copy()
+    seen = working_image(look("mirror", poses[3][2], *poses[3][:2]), CAMERA, homing.tracker.max_pixels)
+    homing.at(poses[4], matches=False)
+    still = last[1] & (homing.tracks.kinds == 1)
+    assert still.sum() >= 15
+    looks = histograms(seen, last[0][still], homing.tracker.patch_radius_px)
+    np.testing.assert_array_equal(homing.tracked.histograms[still], looks)
 
 
 def test_a_map_is_made_anew_where_more_is_matched() -> None:

@@ -53,6 +53,12 @@ def test_a_path_is_gone_view_by_view_to_its_last() -> None:
     assert out.target is None
 
 
+def test_a_view_that_lies_behind_before_half_of_the_way_is_gone_is_not_passed() -> None:
+    path = Path()
+    path.step()
+    assert path.step(vector(0, 0.55, direction=3.0)).target.name == "a"
+
+
 @pytest.mark.parametrize(
     "there",
     [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.monitor.confidence_monitor import ConfidenceMonitor, ConfidenceMonitorState
+from omninav.stages.monitor.confidence_monitor import MIN_NOVELTY, ConfidenceMonitor, ConfidenceMonitorState
 from omninav.stages.monitor.wrong_pose_agreement import LearnWrongPoseAgreement
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.confidence import WrongPoseAgreement
@@ -84,3 +84,37 @@ def test_chance_in_a_map_of_one_image_is_the_least():
     assert math.isclose(
         LearnWrongPoseAgreement(min_share=0.1).step(Context("chance"), lone, SCALE).when_wrong.share, 0.1
     )
+
+
+def test_images_are_forgotten_as_new_ones_come_and_hardly_while_the_robot_stands():
+    monitor, recent, belief = (
+        ConfidenceMonitor(memory=20.0),
+        ConfidenceMonitorState(),
+        Particles(np.zeros((5, 3)), np.full(5, 0.2)),
+    )
+    values = np.zeros((len(LINE), 36), np.float32)
+    values[0, 0] = 0.9
+
+    def weight_of_first(images: int, step: float) -> float:
+        for _ in range(images):
+            motion = Motion(step, 0.0, 0.0) if len(recent.places) else None
+            monitor.step(
+                Context("monitor"), recent, belief, belief.estimate(), LINE, SCALE, WrongPoseAgreement(0.02),
+                Similarities(values), motion,
+            )  # fmt: skip
+        return float(recent.weights[0])
+
+    assert weight_of_first(1, 0.0) == 1.0
+    assert weight_of_first(50, 0.0) == pytest.approx(math.exp(-50 * MIN_NOVELTY / 20.0))
+    assert weight_of_first(20, 5.0) == pytest.approx(math.exp(-(50 * MIN_NOVELTY + 20) / 20.0))
+
+
+def test_images_taken_close_by_do_not_tell_how_often_a_wrong_place_looks_right():
+    # Two pairs of images 20 cm apart, 10 m from each other; all look alike, each pair a little more. That an image's
+    # best match is its own neighbour tells nothing of a robot that is elsewhere: without it, each pair looks like the
+    # other one, so that wrong places agree.
+    one = np.random.default_rng(3).dirichlet(np.ones(20), 8).astype(np.float32)
+    other = 0.9 * one + np.float32(0.1) * np.random.default_rng(4).dirichlet(np.ones(20), 8).astype(np.float32)
+    poses = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [10.0, 0.0, 0.0], [10.2, 0.0, 0.0]])
+    pairs = ReferenceGraph(poses, np.stack([one, one, other, other]), "histograms", LINE.edges, "truth")
+    assert LearnWrongPoseAgreement().step(Context("chance"), pairs, LengthScale(0.3)).when_wrong.share == 0.5

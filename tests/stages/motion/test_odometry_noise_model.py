@@ -5,7 +5,7 @@ import math
 import pytest
 
 from omninav.stages.motion.odometry_noise import OdometryNoiseModel
-from omninav.stages.values.pose import Motion
+from omninav.stages.values.pose import BridgedMotion, GuessedMotion, Motion
 
 NO_FLOOR = OdometryNoiseModel(rotation_floor=0.0, translation_floor=0.0)
 
@@ -35,3 +35,16 @@ def test_a_robot_that_stands_still_keeps_the_floor_of_uncertainty():
 def test_wheel_jitter_sideways_is_no_turn():
     sideways = NO_FLOOR.model(Motion(0.0, 1e-6, 0.0))
     assert sideways.sigmas[0] < 1e-4
+
+
+def test_seconds_that_odometry_says_nothing_of_add_a_turn_and_a_way_each_by_its_own_rate():
+    model = OdometryNoiseModel(rotation_floor=0.0, translation_floor=0.0, unmeasured_turn=0.3, unmeasured_speed=0.7)
+    first, translation, second = model.model(BridgedMotion(0.0, 0.0, 0.0, 2.0)).sigmas
+    assert math.hypot(first, second) == pytest.approx(0.6)
+    assert translation == pytest.approx(1.4)
+
+
+def test_a_guessed_motion_adds_its_own_uncertainty():
+    first, translation, second = NO_FLOOR.model(GuessedMotion(0.0, 0.0, 0.0, sigma_m=0.4, sigma_turn=0.2)).sigmas
+    assert math.hypot(first, second) == pytest.approx(0.2)
+    assert translation == pytest.approx(0.4)

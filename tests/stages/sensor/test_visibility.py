@@ -259,6 +259,20 @@ def test_references_that_were_not_compared_count_nowhere_and_sampled_ones_count_
     assert np.allclose(twice.likelihood.values, found.values, atol=1e-6)
 
 
+def test_the_mean_of_the_database_counts_a_sampled_reference_as_all_that_it_stands_for():
+    areas, far = visibility_areas(REFERENCES, ROOM, axes_of(1)), np.array([[50.0, 50.0, 0.0]])
+    found = weighed(
+        Visibility(power=1.0),
+        np.array([[1.0], [0.4], [0.2]]),
+        far,
+        areas,
+        candidates=np.array([3, 8, 20]),
+        sampling_weight=np.array([1.0, 4.0, 15.0]),
+    ).likelihood
+    assert found.mean_likelihood == pytest.approx((1.0 + 4 * 0.4 + 15 * 0.2) / 20)
+    assert found.values == pytest.approx(found.mean_likelihood)
+
+
 def test_images_of_a_standing_robot_are_little_evidence_with_an_independence_distance():
     assert evidence_novelty(0.1, 0.0, 0.05) == 1.0
     assert evidence_novelty(None, 0.5, 0.05) == 1.0

@@ -1,0 +1,24 @@
+"""Poses at the images' times."""
+
+import numpy as np
+
+from omninav.stages.recordings.stamps import poses_near
+
+SECOND = 10**9
+TIMES = 1_700_000_000 * SECOND + np.array([0, 1, 4]) * SECOND
+POSES = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [4.0, 0.0, 0.0]])
+
+
+def known(seconds: list[float], max_gap_s: float) -> list[float | None]:
+    stamps = TIMES[0] + (np.array(seconds) * SECOND).astype(np.int64)
+    found = poses_near(TIMES, POSES, stamps, max_gap_s)[:, 0]
+    return [None if np.isnan(x) else round(float(x), 9) for x in found]
+
+
+def test_a_pose_counts_where_the_nearer_of_its_neighbours_is_near_enough() -> None:
+    assert known([0.2, 0.8, 1.2, 3.8], 0.3) == [0.2, 0.8, 1.2, 3.8]
+    assert known([0.4, 0.6, 2.5, 1.4, 3.6], 0.3) == [None] * 5
+
+
+def test_before_the_first_and_after_the_last_pose_nothing_is_known() -> None:
+    assert known([-0.1, 0.0, 4.0, 4.1], 0.3) == [None, 0.0, 4.0, None]
