@@ -15,7 +15,7 @@ VALUES = {
 QUANTITIES = {
     "position_error_m": Quantity(better="lower"),
     "loss_rate": Quantity(better="lower"),
-    "converged_after_frames": Quantity(title="Converged after", better="lower", absent="never"),
+    "converged_after_frames": Quantity(title="Converged", before="after", better="lower", absent="never"),
     "frames": Quantity(),
 }
 HEADLINES = ("after_convergence.position_error_m.median", "loss_rate", "converged_after_frames")

@@ -16,9 +16,9 @@ from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.graph.value import Value
 from omninav.pipeline.report.notebook_table import notebook_table
 from omninav.pipeline.report.progress import Progress
-from omninav.pipeline.report.terminal_tables import results_table
+from omninav.pipeline.report.terminal_tables import key_table
 from omninav.pipeline.run.execution import execute
-from omninav.pipeline.run.metrics_files import MANIFEST, read_metrics
+from omninav.pipeline.run.metrics_files import MANIFEST, read_metrics, read_timing
 from omninav.pipeline.run.plan import load_stages
 from omninav.pipeline.run.run_folder import CONFIG, recorded_name, start
 from omninav.pipeline.tables import read_table
@@ -135,20 +135,24 @@ class Run:
         return f"Run({str(self.folder)!r}: {self.manifest.get('variant')}, {self.status})"
 
     def __str__(self) -> str:
-        """Its results as a table."""
+        """The figures that one looks for first."""
         import io
 
         from rich.console import Console
 
         text = io.StringIO()
-        Console(file=text, width=100, force_jupyter=False).print(results_table(self._described()))
+        Console(file=text, width=100, force_jupyter=False).print(key_table(self._described(), read_timing(self.folder)))
         return text.getvalue()
 
     def _repr_html_(self) -> str:
         head = (
             f"<p><b>{escape(self.folder.name)}</b> {escape(self.status)}, <code>{escape(str(self.folder))}</code></p>"
         )
-        return head + (notebook_table(self._described()) if (self.folder / "metrics.json").is_file() else "")
+        return head + (
+            notebook_table(self._described(), read_timing(self.folder))
+            if (self.folder / "metrics.json").is_file()
+            else ""
+        )
 
 
 @plain_errors()

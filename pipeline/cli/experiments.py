@@ -1,18 +1,22 @@
 """Experiments on the command line: which words are for their conditions, and how these are composed."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
 from omninav.pipeline.experiment.runner import ExperimentRun, plan_experiment
+from omninav.pipeline.experiment.verdicts import Verdict, in_words
 from omninav.pipeline.graph.problems import ProblemsFound
 
 from .composition import complete, read_words
 from .composition_cache import compose
 from .overrides import invalid_overrides, with_unlisted_parameters
-from .terminal import shown
+from .terminal import show, shown
+
+if TYPE_CHECKING:
+    from rich.table import Table as TerminalTable
 
 OF_THE_EXPERIMENT = ("experiment", "profile", "runs", "cache", "engine", "hydra")
 
@@ -29,8 +33,25 @@ def run_experiment(config: Any, arguments: Sequence[str]) -> int:
     """Run every condition and repetition of an experiment's file, and write its page. 1 where a job failed."""
     run = planned_experiment(config, arguments)
     well = run.run()
+    verdicts = run.verdicts()
+    if verdicts:
+        show(verdict_table(verdicts))
     print(f"page: {shown(run.folder / (run.experiment.name + '.html'))}", flush=True)
     return 0 if well else 1
+
+
+def verdict_table(verdicts: Sequence[Verdict]) -> "TerminalTable":
+    """A line for each claim: its verdict, the claim, and how many of its cases hold where it has several."""
+    from rich.table import Table as TerminalTable
+    from rich.text import Text
+
+    table = TerminalTable.grid(padding=(0, 3, 0, 0))
+    for verdict in verdicts:
+        word = in_words(verdict.holds)
+        holding = sum(case.holds is True for case in verdict.cases)
+        cases = f" ({holding} of {len(verdict.cases)} cases hold)" if len(verdict.cases) > 1 else ""
+        table.add_row(Text(word, "bold red" if verdict.holds is False else ""), Text(f"{verdict.claim}{cases}"))
+    return table
 
 
 def resolved_but_for_the_experiment(config: Any) -> dict[str, Any]:

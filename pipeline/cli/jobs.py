@@ -24,7 +24,7 @@ from omninav.pipeline.run.resume import resume
 from omninav.pipeline.run.run_folder import start, was_started
 
 from .composition import complete
-from .terminal import show, shown
+from .terminal import show, show_report, show_results, shown, terminal_width
 
 OUTCOMES = "OMNINAV_OUTCOMES"
 """Names the file in which jobs, also those in other processes, leave their exit codes and their sweep's page."""
@@ -139,8 +139,6 @@ def _run(
 ) -> float | None:
     """Run a configuration. Returns its `objective`, None where none is named."""
     from omninav.pipeline.report.progress import Progress
-    from omninav.pipeline.report.terminal_tables import results_table
-    from omninav.pipeline.report.warning_lines import warning_lines
 
     settings = complete(config)
     if sweep is not None and settings.get("plots") == "auto":
@@ -156,10 +154,9 @@ def _run(
             run = start(planned, argv, folder, _hydra_files(config))
             metrics = execute(run, planned, progress)
     if sweep is None:
-        show(results_table(metrics))
-        for sentence in warning_lines(run.manifest):
-            print(f"warning: {sentence}", file=sys.stderr, flush=True)
-    print(f"report: {shown(run.folder / 'report.html')}", flush=True)
+        show_results(run.folder, metrics, run.manifest)
+    else:
+        show_report(run.folder)
     return objective_of(metrics, settings["objective"]) if settings.get("objective") else None
 
 
@@ -224,6 +221,19 @@ def write_page(sweep: Path) -> Path:
 
     with locked(sweep / ".page.lock"):
         return write_sweep_page(sweep, sorted(_sweep_rows(sweep), key=lambda row: int(row["job"])))
+
+
+def show_sweep(folder: Path) -> None:
+    """Print a sweep's means, what is the same in all of it, and where its page is."""
+    from omninav.pipeline.report.sweep_table import overview_of
+    from omninav.pipeline.report.terminal_tables import sweep_table
+
+    sweep = overview_of(sorted(_sweep_rows(folder), key=lambda row: int(row["job"])))
+    if sweep.heads:
+        show(sweep_table(sweep, terminal_width()))
+    if sweep.same:
+        print(f"the same in all jobs: {', '.join(sweep.same)}")
+    print(f"sweep: {shown(folder / 'sweep.html')}", flush=True)
 
 
 def _sweep_rows(sweep: Path) -> Iterator[dict[str, Any]]:

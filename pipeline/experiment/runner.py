@@ -34,7 +34,8 @@ from .conditions import (
 from .page import PageContent, made_with, write_page
 from .repetition import finished
 from .shared_inputs import Recording, artifacts_of, recordings_of
-from .specification import Experiment, read_experiment
+from .specification import FULL, Experiment, read_experiment
+from .verdicts import Verdict, judge
 
 STATE = "experiment.json"
 """In an experiment's folder: with what it was started, and how far it is."""
@@ -80,6 +81,10 @@ class ExperimentRun:
         self._write_state("complete" if well else "failed")
         self.write_page()
         return well
+
+    def verdicts(self) -> list[Verdict]:
+        """What each claim comes to as things stand."""
+        return judge(self.experiment, results_by_condition(self.conditions))
 
     def write_page(self) -> Path:
         """The page as things stand."""
@@ -218,7 +223,7 @@ def plan_experiment(
 
     `overrides`: what was typed for all of its conditions.
     """
-    profile = str(config.get("profile") or "paper")
+    profile = str(config.get("profile") or FULL)
     experiment = read_experiment(config["experiment"], profile)
     file = yaml.safe_dump(dict(config["experiment"]), sort_keys=False, allow_unicode=True, width=120)
     engine = read_engine(config.get("engine"))

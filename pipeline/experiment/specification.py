@@ -221,6 +221,10 @@ class Condition:
         return all(self.labels.get(factor) == str(label) for factor, label in labels.items())
 
 
+FULL = "full"
+"""The profile that an experiment's file describes by itself."""
+
+
 def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
     """The experiment that a file describes, at the scale of a profile. Raises `ProblemsFound` with all problems.
 
@@ -230,8 +234,8 @@ def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
     profiles, problems = convert(plain.get("profiles") or {}, dict[str, dict | None], "profiles")  # type: ignore[type-arg]
     if problems:
         raise ProblemsFound(problems)
-    if profile not in {"paper", *profiles}:
-        hint = suggest(profile, {"paper", *map(str, profiles)}, "profiles", prefix="profile=")
+    if profile not in {FULL, *profiles}:
+        hint = suggest(profile, {FULL, *map(str, profiles)}, "profiles", prefix="profile=")
         raise ProblemsFound([Problem("profile", f"this experiment has no profile '{profile}'", hint)])
     scaled = dict(plain)
     for key, value in (profiles.get(profile) or {}).items():

@@ -17,7 +17,17 @@ class Quantity(Value):
     better: Literal["lower", "higher"] | None = None
     """Which numbers are better; None where neither is, so that a comparison marks none as best."""
     absent: str = "–"
-    """What stands in its place where it is None (`never`)."""
+    """Shown where it is None. A word (`never`) is a finding, and shown as off; a dash is none, and left out."""
+    zero: str | None = None
+    """Shown where it stands by itself and is 0 (`at once`); None: the number."""
+    before: str = ""
+    """Word before the number (`after` 12 frames)."""
+    least: float | None = None
+    """Lowest figure that is as it should be, before it is scaled to its unit; what is below is shown as off."""
+    most: float | None = None
+    """Highest figure that is as it should be, before it is scaled to its unit; what is above is shown as off."""
+    setting: bool = False
+    """Whether it is no result but what another was measured with: no table shows it, only metrics.json."""
     context: bool = False
     """Whether it says how large a run was (frames, length): an experiment's page states it for each condition."""
 
@@ -45,8 +55,8 @@ class Metrics(Value):
     """By path (`success.at_end`), or by name for all entries of that name (`position_error_m`). The title of a path is
     shown as it stands, that of a name with its groups (`Position error, after convergence`). Tables keep this order."""
     headlines: tuple[str, ...] = ()
-    """Paths of what one looks for first, with the statistic of a distribution: tiles of a report, columns of a sweep.
-    Those that are not among the values are passed over."""
+    """Paths of what one looks for first, with the statistic of a distribution: what a run prints, tiles of a report,
+    columns of a sweep. Those that are not among the values are passed over."""
     details: tuple[str, ...] = ()
     """Paths of entries or whole groups that only the run's own page shows, no comparison and no terminal."""
 

@@ -1,28 +1,18 @@
 """A run's results as an HTML table, for notebooks."""
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from html import escape
+from typing import Any
 
 from omninav.pipeline.graph.results import Metrics
 
-from .results import results
+from .key_figures import key_figures
 
 
-def notebook_table(metrics: Metrics) -> str:
-    """What the terminal shows: quantities under each condition, then single numbers."""
-    found = results(metrics, details=False)
-    rows = [_row("th", ["", *found.columns])]
-    for quantity in found.quantities:
-        name = f"{quantity.name} ({quantity.unit})" if quantity.unit else quantity.name
-        rows += [_row("td", [f"{name}, {row.condition}", *row.cells]) for row in quantity.rows]
-    width = max(1, len(found.columns))
-    for single in found.singles:
-        value = f"{single.value} {single.unit}".strip()
-        rows.append(_row("td", [single.name, value, *[""] * (width - 1)]))
+def notebook_table(metrics: Metrics, timing: Mapping[str, Any]) -> str:
+    """What the terminal shows: the figures that one looks for first."""
+    rows = [
+        f'<tr><td style="text-align:left">{escape(figure.name)}</td><td>{escape(figure.text)}</td></tr>'
+        for figure in key_figures(metrics, timing)
+    ]
     return f"<table>{''.join(rows)}</table>"
-
-
-def _row(kind: str, cells: Iterable[str]) -> str:
-    first, *others = cells
-    inside = "".join(f"<{kind}>{escape(cell)}</{kind}>" for cell in others)
-    return f'<tr><{kind} style="text-align:left">{escape(first)}</{kind}>{inside}</tr>'

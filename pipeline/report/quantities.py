@@ -1,5 +1,6 @@
 """Metrics as people read them: titles and units as their stages state them or as the entries' names say."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -73,6 +74,28 @@ class Entry:
         scale = SCALES.get(self.unit)
         return digits(value if scale is None else scale * value)
 
+    def in_words(self, value: Any) -> tuple[str, str]:
+        """The value as it stands by itself, and its unit: (`0.19`, `m`), (`after 1`, `frame`), (`at once`, '')."""
+        if value == 0 and self.quantity.zero is not None:
+            return self.quantity.zero, ""
+        if value is None or isinstance(value, str):
+            return self.text(value), ""
+        unit = self.unit.removesuffix("s") if value == 1 and len(self.unit) > 2 else self.unit
+        return " ".join(part for part in (self.quantity.before, self.text(value)) if part), unit
+
+    def has_figure(self, value: Any) -> bool:
+        """Whether there is anything to show: a value, or a word for its absence."""
+        return value is not None or self.quantity.absent != Quantity().absent
+
+    def is_off(self, value: Any) -> bool:
+        """Whether a value, or its absence, is not as it should be."""
+        if value is None:
+            return self.has_figure(value)
+        if not isinstance(value, int | float):
+            return False
+        least, most = self.quantity.least, self.quantity.most
+        return (least is not None and value < least) or (most is not None and value > most)
+
 
 @dataclass(frozen=True)
 class Number:
@@ -96,7 +119,8 @@ class Number:
     @property
     def head(self) -> str:
         """Name and unit: the head of a row or column."""
-        return f"{self.name} ({self.unit})" if self.unit else self.name
+        name = f"{self.name} {self.entry.quantity.before}".rstrip()
+        return f"{name} ({self.unit})" if self.unit else name
 
     @property
     def better(self) -> Literal["lower", "higher"] | None:
@@ -110,11 +134,11 @@ class Number:
 
 
 def entries(metrics: Metrics) -> list[Entry]:
-    """All entries but those of single logs: described ones in their order, then by name; groups after what is in none.
+    """All results but those of single logs: described ones in their order, then by name; groups after what is in none.
 
     Those of a group follow the same order.
     """
-    return list(_entries(metrics, metrics.values, ()))
+    return [entry for entry in _entries(metrics, metrics.values, ()) if not entry.quantity.setting]
 
 
 def _entries(metrics: Metrics, values: Mapping[str, Any], groups: tuple[str, ...]) -> Iterator[Entry]:
@@ -191,6 +215,11 @@ def unit(name: str) -> str:
     return next((shown_as for end, shown_as in UNITS.items() if name.endswith(end)), "")
 
 
+def with_unit(value: str, unit: str) -> str:
+    """`0.19 m`, `0.95°`, `at once`."""
+    return f"{value}{'' if unit == '°' else ' '}{unit}".rstrip()
+
+
 def title(name: str) -> str:
     """`position_error_m` -> `Position error`."""
     text = words(next((name.removesuffix(end) for end in UNITS if name.endswith(end) and end != "_rate"), name))
@@ -203,9 +232,12 @@ def words(name: str) -> str:
 
 
 def digits(number: float) -> str:
-    """Three significant digits or so, never scientific notation for what people measure: 0.073, 1.52, 12.4, 3500."""
+    """Three significant digits or so, never scientific: 0.073, 1.52, 12.4, 3500, 0.00012; below 1e-6 it is 0."""
     if isinstance(number, int) or number == 0:
         return f"{number:.0f}" if abs(number) < 10_000 else f"{number:,.0f}".replace(",", "\u2009")
     size = abs(number)
-    places = 0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else 3
-    return f"{number:.{places}f}" if size >= 0.0005 else f"{number:.1e}"
+    if size < 1e-6:
+        return "0"
+    small = 1 - math.floor(math.log10(size)) if size < 0.0005 else 3
+    places = 0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else small
+    return f"{number:.{places}f}"

@@ -19,7 +19,7 @@ class ResultRow:
 
 @dataclass(frozen=True)
 class Measured:
-    """A quantity with a row for each condition under which it was measured."""
+    """A quantity with a row for each condition under which it was measured; a single condition is part of the name."""
 
     name: str
     unit: str
@@ -46,19 +46,23 @@ class Results:
 
 def results(metrics: Metrics, details: bool = True) -> Results:
     """The metrics as rows, without their details where these are not asked for."""
-    found = [entry for entry in entries(metrics) if details or not is_detail(entry.path, metrics)]
+    every = entries(metrics)
+    found = [e for e in every if e.has_figure(e.value) and (details or not is_detail(e.path, metrics))]
     columns = tuple(s for s in STATISTICS if any(entry.statistics and s in entry.statistics for entry in found))
     spread_out = {entry.groups for entry in found if entry.statistics}  # groups that hold distributions
     by_name: dict[str, list[Entry]] = {}
     for entry in found:
-        by_name.setdefault(entry.name, []).append(entry)
+        own_title = entry.groups and not entry.where
+        by_name.setdefault(entry.path if own_title else entry.name, []).append(entry)
     quantities, singles = [], []
     for several in by_name.values():
         if any(entry.statistics for entry in several) or (
             len(several) > 1 and all(entry.groups in spread_out for entry in several)
         ):
             rows = tuple(_row(entry, columns) for entry in several)
-            quantities.append(Measured(several[0].title, several[0].unit, rows))
+            where = several[0].where if len(several) == 1 else ""
+            name = ", ".join(part for part in (several[0].title, where) if part)
+            quantities.append(Measured(name, several[0].unit, rows))
         else:
             singles += [_single(entry) for entry in several]
     return Results(columns, tuple(quantities), tuple(dict.fromkeys(singles)))  # two stages may have measured the same
@@ -75,4 +79,4 @@ def _single(entry: Entry) -> Single:
     where, name = entry.where, entry.title
     if where:
         name = f"{where[:1].upper()}{where[1:]}: {name[:1].lower()}{name[1:]}"
-    return Single(name, entry.text(entry.value), "" if entry.value is None else entry.unit)
+    return Single(name, *entry.in_words(entry.value))

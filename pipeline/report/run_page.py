@@ -13,14 +13,14 @@ from omninav.pipeline.graph.results import Figure, Metrics, Slide, Table
 
 from .chart import BEGINNING
 from .drawn_graph import DrawnGraph
+from .key_figures import key_figures
 from .parameter_table import parameter_rows
-from .quantities import digits, head_of, headlines, numbers, per_log, title, unit
+from .quantities import digits, head_of, headlines, per_log, title, unit
 from .rendering import render
 from .results import results
 from .warning_lines import skipped, warning_lines
 
 LIFETIMES = {"before": "before the loop", "tick": "every tick", "after": "after the loop"}
-Rows = list[dict[str, Any]]
 
 
 def write_report(
@@ -52,7 +52,7 @@ def write_report(
         "report.html",
         title=(shown_as or folder).resolve().name,
         manifest=manifest,
-        tiles=_tiles(metrics, timing),
+        tiles=key_figures(metrics, timing),
         results=results(metrics),
         logs=_log_table(metrics),
         warnings=warning_lines(manifest),
@@ -117,20 +117,6 @@ def _slides(slides: Sequence[Slide]) -> str:
 def _fact(name: str, value: Any) -> tuple[str, str]:
     of = unit(name)
     return title(name), f"{_cell(value)} {of}" if of and isinstance(value, int | float) else _cell(value)
-
-
-def _tiles(metrics: Metrics, timing: Mapping[str, Any]) -> Rows:
-    """What one looks for first."""
-    known = numbers(metrics)
-    tiles = [
-        {"name": found.name, "value": found.text, "unit": "" if found.value is None else found.unit}
-        for found in (known[path] for path in headlines([metrics]) if path in known)
-    ]
-    if timing.get("ticks_per_second"):
-        cached = ", features from the cache" if timing.get("cached") else ""
-        rate = digits(float(timing["ticks_per_second"]))
-        tiles.append({"name": f"Frames per second{cached}", "value": rate, "unit": ""})
-    return tiles
 
 
 def _log_table(metrics: Metrics) -> dict[str, Any] | None:

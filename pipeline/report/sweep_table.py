@@ -10,7 +10,7 @@ import numpy as np
 
 from omninav.pipeline.tables import write_table
 
-from .quantities import Number, numbers
+from .quantities import Number, head_of, headlines, numbers
 
 SEED = "seed"
 """The setting over which means are taken."""
@@ -23,6 +23,34 @@ class Mean:
     mean: float
     low: float | None
     high: float | None
+
+
+@dataclass(frozen=True)
+class Row:
+    """A condition as people read it: a text for each setting that varies and for each figure."""
+
+    settings: tuple[str, ...]
+    jobs: int
+    cells: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Overview:
+    """A sweep as people read it."""
+
+    settings: tuple[str, ...]
+    """Names of the settings that vary, but the seed."""
+    seeds: bool
+    """Whether the seed varies."""
+    constant: tuple[str, ...]
+    """What is set for all jobs alike, as it was typed."""
+    paths: tuple[str, ...]
+    """The figures that one looks for first, but those that are the same in all jobs."""
+    heads: tuple[str, ...]
+    """Their names and units."""
+    same: tuple[str, ...]
+    """Name, unit and value of those that are the same in all jobs."""
+    conditions: tuple[Row, ...]
 
 
 @dataclass(frozen=True)
@@ -49,6 +77,47 @@ def conditions(rows: Sequence[Mapping[str, Any]]) -> list[Condition]:
         if row["metrics"] is not None:
             jobs.append(numbers(row["metrics"]))
     return [Condition(dict(settings), len(jobs), _means(jobs)) for settings, jobs in found.items()]
+
+
+def overview_of(rows: Sequence[Mapping[str, Any]]) -> Overview:
+    """A sweep as people read it, of rows as on the page."""
+    typed = [settings_of(str(row["manifest"].get("overrides", ""))) for row in rows]
+    values = {name: {one.get(name) for one in typed} for name in dict.fromkeys(name for one in typed for name in one)}
+    varied = tuple(name for name, those in values.items() if len(those) > 1)
+    settings = tuple(name for name in varied if name != SEED)
+    runs = [row["metrics"] for row in rows if row["metrics"] is not None]
+    measured = [numbers(run) for run in runs]
+    every = [path for path in headlines(runs) if any(path in run for run in measured)]
+    same = [p for p in every if len(measured) > 1 and len({run[p].text if p in run else "" for run in measured}) == 1]
+    paths = tuple(path for path in every if path not in same)
+    return Overview(
+        settings,
+        SEED in varied,
+        tuple(f"{name}={typed[0][name]}" for name in values if name not in varied),
+        paths,
+        tuple(head_of(path, measured) for path in paths),
+        tuple(f"{head_of(path, measured)} {measured[0][path].text}" for path in same),
+        tuple(
+            Row(
+                tuple(each.settings.get(name, "") for name in settings),
+                each.jobs,
+                tuple(_shown(each.means.get(path), path, measured) for path in paths),
+            )
+            for each in conditions(rows)
+        ),
+    )
+
+
+def _shown(mean: Mean | None, path: str, runs: Sequence[Mapping[str, Number]]) -> str:
+    if mean is None:
+        return ""
+    entry = next(run[path] for run in runs if path in run).entry
+    if mean.low is None or mean.high is None:
+        return entry.text(mean.mean)
+    low, high = mean.mean - mean.low, mean.high - mean.mean
+    if math.isclose(low, high, rel_tol=1e-9, abs_tol=1e-12):
+        return f"{entry.text(mean.mean)} ± {entry.text(high)}"
+    return f"{entry.text(mean.mean)} ({entry.text(mean.low)} to {entry.text(mean.high)})"
 
 
 def _means(jobs: Sequence[Mapping[str, Number]]) -> dict[str, Mean]:

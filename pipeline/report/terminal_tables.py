@@ -6,18 +6,34 @@ from typing import TYPE_CHECKING, Any
 
 from omninav.pipeline.graph.results import Metrics
 
-from .quantities import best_of, head_of, is_detail, numbers
+from .key_figures import key_figures
+from .quantities import best_of, head_of, is_detail, numbers, with_unit
 from .results import results
+from .sweep_table import Overview
 
 if TYPE_CHECKING:
     from rich.table import Table as TerminalTable
 
 MAX_HEAD_LENGTH = 24
-"""Of a run's name at the head of a column, in characters."""
+"""Longest run's name at the head of a column, in characters."""
+
+COLUMN_EDGE = 3
+"""Columns of the terminal that a table's column takes beside its text."""
+
+
+def key_table(metrics: Metrics, timing: Mapping[str, Any]) -> "TerminalTable":
+    """The figures that one looks for first, a line each with its unit; what is off in colour, where there is any."""
+    from rich.table import Table as TerminalTable
+    from rich.text import Text
+
+    table = TerminalTable.grid(padding=(0, 3))
+    for figure in key_figures(metrics, timing):
+        table.add_row(Text(figure.name), Text(figure.text, "bold red" if figure.off else ""))
+    return table
 
 
 def results_table(metrics: Metrics) -> "TerminalTable":
-    """A run's figures with units, without their details."""
+    """All of a run's figures with units, without their details."""
     from rich.table import Table as TerminalTable
 
     found = results(metrics, details=False)
@@ -27,12 +43,38 @@ def results_table(metrics: Metrics) -> "TerminalTable":
         table.add_column(column, justify="right")
     for quantity in found.quantities:
         name = f"{quantity.name} ({quantity.unit})" if quantity.unit else quantity.name
+        if len(quantity.rows) == 1:
+            table.add_row(name, *quantity.rows[0].cells, style="bold cyan" if quantity.rows[0].plain else "")
+            continue
+        table.add_section()
         table.add_row(f"[bold]{name}[/bold]")
         for row in quantity.rows:
             table.add_row(f"  {row.condition}", *row.cells, style="bold cyan" if row.plain else "")
         table.add_section()
     for single in found.singles:
-        table.add_row(single.name, f"{single.value} {single.unit}".strip())
+        table.add_row(single.name, with_unit(single.value, single.unit))
+    return table
+
+
+def sweep_table(sweep: Overview, width: int) -> "TerminalTable":
+    """Means over the seeds of each condition, with their 95 % intervals: as many figures as fit in `width` columns."""
+    from rich.table import Table as TerminalTable
+
+    table = TerminalTable(title="Means over seeds" if sweep.seeds else None, title_justify="left", header_style="bold")
+    rows = sweep.conditions
+    for number, name in enumerate(sweep.settings):
+        table.add_column(name, overflow="fold")
+        width -= max(len(name), *(len(row.settings[number]) for row in rows)) + COLUMN_EDGE
+    fitting = 0
+    for number, head in enumerate(sweep.heads):
+        cells = max(len(row.cells[number]) for row in rows)
+        width -= max(cells, *map(len, head.split())) + COLUMN_EDGE
+        if width < COLUMN_EDGE and number:
+            break
+        table.add_column(head, justify="right")
+        fitting += 1
+    for row in rows:
+        table.add_row(*row.settings, *row.cells[:fitting])
     return table
 
 

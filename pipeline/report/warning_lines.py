@@ -1,9 +1,13 @@
-"""What whoever reads a run's results should know first: what its stages warn of, and what was skipped."""
+"""Warnings of a run: what its stages warn of, and what data was skipped."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .quantities import words
+
+PARTICULARS = re.compile(r"^\w+: |\S*[\d/]\S*|\S+\.\w+\S*")
+"""Parts of a sentence that say where something was found: the name in front, numbers, files."""
 
 
 def skipped(manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -25,3 +29,11 @@ def warning_lines(manifest: Mapping[str, Any]) -> list[str]:
             kind, which = row["kind"].rpartition(".")[2], "" if row["count"] == 1 else "first: "
             lines.append(f"{kind}: {row['count']} ({which}{row['first']})")
     return lines
+
+
+def grouped(lines: Sequence[str]) -> list[str]:
+    """One line for those that say the same of different files, places or numbers: the first, and how many there are."""
+    found: dict[str, list[str]] = {}
+    for line in lines:
+        found.setdefault(" ".join(PARTICULARS.sub("", line).split()), []).append(line)
+    return [one if not more else f"{one} (and {len(more)} like it)" for one, *more in found.values()]

@@ -43,6 +43,12 @@ def read_metrics(folder: Path) -> Metrics:
         raise _damaged(description) from None
 
 
+def read_timing(folder: Path) -> dict[str, Any]:
+    """How long a run's stages took; nothing where that is not known."""
+    file = folder / "timing.json"
+    return _read(file) if file.is_file() else {}
+
+
 def _read(file: Path) -> dict[str, Any]:
     with suppress(Damaged):
         files = read_json(file.parent / MANIFEST).get("files")

@@ -13,7 +13,7 @@ from omninav.stages.values.drive import Array, Drive, known
 QUANTITIES = {
     "confidence.confident_share": Quantity(title="Frames with a confident estimate", unit="%", better="higher"),
     "confidence.first_confident_frame": Quantity(title="First confident frame", better="lower", absent="never"),
-    "confidence.probability": Quantity(title="Confidence, median", unit="%", better="higher"),
+    "confidence.probability": Quantity(title="Confidence, median", unit="%", better="higher", least=0.5),
     "confidence.doubtful_share": Quantity(title="Frames with a confidence below a half", unit="%", better="lower"),
     "confidence.spread_m": Quantity(title="Spread of the belief, median", better="lower"),
     "confidence.weight": Quantity(title="Belief in the estimate, median", unit="%", better="higher"),
@@ -58,7 +58,15 @@ class Confidence(Stage):
         if drive.has_truth or not known(drive.estimate).any():
             return self.Out()
         values = confidence_of(drive.last_log, self.min_weight, self.max_sigma_m)
-        shown = ("confident_share", "probability", "spread_m", "similarity")
+        shown = (
+            "probability",
+            "doubtful_share",
+            "confident_share",
+            "spread_m",
+            "step_off_odometry_m",
+            "turn_off_odometry_deg",
+            "similarity",
+        )
         headlines = tuple(f"confidence.{name}" for name in shown if name in values)
         return self.Out(metrics=Metrics({"confidence": values}, QUANTITIES, headlines or ("confidence.path_m",)))
 

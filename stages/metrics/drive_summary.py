@@ -11,7 +11,7 @@ MIN_SPEED = 0.03
 """m/s, below which a robot makes no way: more than the noise of its wheels."""
 
 QUANTITIES = {
-    "drive.collisions": Quantity(title="Collisions", better="lower"),
+    "drive.collisions": Quantity(title="Collisions", better="lower", most=0.0),
     "drive.distance_m": Quantity(title="Distance driven", context=True),
     "drive.stopped_share": Quantity(title="Time in which it stood or turned on the spot", unit="%", better="lower"),
     "drive.duration_s": Quantity(title="Duration", context=True),
@@ -42,7 +42,8 @@ class DriveSummary(Stage):
         stopped = stopped_share(drive)
         if stopped is not None:
             values["stopped_share"] = stopped
-        return self.Out(metrics=Metrics({"frames": len(drive), "drive": values}, QUANTITIES, ("drive.collisions",)))
+        headlines = ("drive.collisions", "drive.distance_m", "drive.duration_s", "drive.stopped_share")
+        return self.Out(metrics=Metrics({"frames": len(drive), "drive": values}, QUANTITIES, headlines))
 
 
 def stopped_share(drive: Drive) -> float | None:

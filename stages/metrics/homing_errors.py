@@ -18,13 +18,17 @@ CARRIED_M = 0.5
 QUANTITIES = {
     "homing.end_error_m": Quantity(title="Distance to the target at the end", better="lower"),
     "homing.end_turn_deg": Quantity(title="Heading error at the end", better="lower"),
-    "homing.reached": Quantity(title="Target reached", unit="%", better="higher"),
+    "homing.reached": Quantity(title="Target reached", unit="%", better="higher", least=1.0),
     "homing.arrived": Quantity(title="Said that it had arrived", unit="%", better="higher"),
     "homing.time_s": Quantity(title="Time until it arrived", better="lower", absent="never"),
     "homing.lost_rate": Quantity(title="Target lost", better="lower"),
     "homing.direction_error_deg": Quantity(title="Error of the homing direction", better="lower"),
     "homing.start_m": Quantity(title="Distance to the target at the start", context=True),
 }
+HEADLINES = tuple(
+    f"homing.{name}"
+    for name in ("reached", "end_error_m", "end_turn_deg", "time_s", "direction_error_deg.median", "lost_rate")
+)
 
 
 class HomingErrors(Stage):
@@ -93,8 +97,7 @@ class HomingErrors(Stage):
                 "inliers": after[first].inliers,
             },
         }
-        headlines = ("homing.end_error_m", "homing.reached")
-        return self.Out(metrics=Metrics({"homing": values}, QUANTITIES, headlines, details=("homing.end",)))
+        return self.Out(metrics=Metrics({"homing": values}, QUANTITIES, HEADLINES, details=("homing.end",)))
 
 
 def _errors_deg(vector: HomingVector, target: np.ndarray) -> tuple[float, float]:

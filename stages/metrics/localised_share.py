@@ -19,8 +19,8 @@ QUANTITIES = {
         for name, (metres, degrees) in THRESHOLDS.items()
     },
     "relocalisation.times_lost": Quantity(title="Times lost", better="lower"),
-    "relocalisation.frames": Quantity(title="Frames until found again, median", better="lower", absent="–"),
-    "relocalisation.metres": Quantity(title="Metres until found again, median", unit="m", better="lower", absent="–"),
+    "relocalisation.frames": Quantity(title="Images until found again, median", better="lower"),
+    "relocalisation.metres": Quantity(title="Metres until found again, median", unit="m", better="lower"),
     "relocalisation.never": Quantity(title="Times not found again", better="lower"),
 }
 

@@ -15,9 +15,9 @@ from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.topological_map import TopologicalMap
 
 QUANTITIES = {
-    "navigation.reached_rate": Quantity(title="Goal reached", better="higher"),
+    "navigation.reached_rate": Quantity(title="Goal reached", better="higher", least=1.0),
     "navigation.collision_free_rate": Quantity(title="Goal reached without a collision", better="higher"),
-    "navigation.collisions": Quantity(title="Collisions", better="lower"),
+    "navigation.collisions": Quantity(title="Collisions", better="lower", most=0.0),
     "navigation.end_error_m": Quantity(title="Distance to the goal at the end", better="lower"),
     "navigation.reached_error_m": Quantity(title="Distance to the goal, where reached", better="lower"),
     "navigation.path_length_ratio": Quantity(title="Path length / shortest path", better="lower"),
@@ -26,7 +26,15 @@ QUANTITIES = {
     "navigation.path_length_m": Quantity(title="Path length"),
     "navigation.shortest_m": Quantity(title="Shortest path", context=True),
     "navigation.routes": Quantity(title="Routes planned", better="lower"),
+    "navigation.goal": Quantity(setting=True),
+    "navigation.state": Quantity(title="Route at the end"),
+    "navigation.reason": Quantity(title="Why it gave up"),
+    "navigation.reached": Quantity(setting=True),
 }
+HEADLINES = tuple(
+    f"navigation.{name}"
+    for name in ("reached_rate", "end_error_m", "collisions", "time_s", "path_length_ratio", "routes", "reason")
+)
 
 
 class Navigation(Stage):
@@ -95,8 +103,7 @@ class Navigation(Stage):
             if reached and shortest:
                 found["time_per_metre_s"] = found["time_s"] / shortest
                 found["path_length_ratio"] = driven / shortest
-        headlines = ("navigation.reached_rate", "navigation.path_length_ratio")
-        return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, headlines))
+        return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, HEADLINES))
 
 
 def shortest_metres(map: TopologicalMap, start: npt.ArrayLike, goal: int) -> float | None:

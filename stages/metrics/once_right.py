@@ -9,8 +9,10 @@ from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, positi
 from omninav.stages.values.drive import Drive, known
 
 QUANTITIES = {
-    "once_right.after_frames": Quantity(title="Frames until right for the first time", better="lower", absent="never"),
-    "once_right.right_rate": Quantity(title="Right from then on", better="higher"),
+    "once_right.after_frames": Quantity(
+        title="Images until right for the first time", unit="", better="lower", absent="never"
+    ),
+    "once_right.right_rate": Quantity(title="Right once it was right for the first time", better="higher"),
 }
 
 

@@ -12,12 +12,13 @@ from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.topological_map import TopologicalMap
 
 QUANTITIES = {
-    "localisation.accuracy": Quantity(unit="%", better="higher"),
-    "localisation.adjacent_accuracy": Quantity(title="Accuracy, adjacent places included", unit="%", better="higher"),
-    "localisation.place_distance_m": Quantity(title="Distance of the believed place, median", better="lower"),
-    "localisation.nearest_place_distance_m": Quantity(title="Distance of the nearest place, median"),
+    "localisation.accuracy": Quantity(title="Right place", unit="%", better="higher"),
+    "localisation.adjacent_accuracy": Quantity(title="Right or an adjacent place", unit="%", better="higher"),
+    "localisation.place_distance_m": Quantity(title="Distance to the believed place, median", better="lower"),
+    "localisation.nearest_place_distance_m": Quantity(title="Distance to the nearest place, median"),
     "localisation.images": Quantity(title="Images localised", context=True),
 }
+HEADLINES = tuple(f"localisation.{name}" for name in ("accuracy", "adjacent_accuracy", "place_distance_m", "images"))
 
 
 class PlaceAccuracy(Stage):
@@ -79,7 +80,7 @@ class PlaceAccuracy(Stage):
             "place_distance_m": float(np.median(metres_off)),
             "nearest_place_distance_m": float(np.median(least)),
         }
-        return self.Out(metrics=Metrics({"localisation": found}, QUANTITIES, ("localisation.accuracy",)))
+        return self.Out(metrics=Metrics({"localisation": found}, QUANTITIES, HEADLINES))
 
 
 def _after(hits: np.ndarray, after: np.ndarray, updates: int) -> list[float | None]:

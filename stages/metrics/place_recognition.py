@@ -14,15 +14,6 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Answers, Similarities
 from omninav.stages.values.visual_words import PlaceWords
 
-QUANTITIES = {
-    "place_recognition.recall_at_1": Quantity(title="Recall@1", unit="%", better="higher"),
-    "place_recognition.recall_at_5": Quantity(title="Recall@5", unit="%", better="higher"),
-    "place_recognition.recall_at_10": Quantity(title="Recall@10", unit="%", better="higher"),
-    "place_recognition.queries": Quantity(title="Queries", context=True),
-    "place_recognition.distance_m": Quantity(title="Distance of a right reference"),
-}
-
-
 RANKS = (1, 5, 10)
 """Numbers of references of which one must be right."""
 
@@ -89,8 +80,23 @@ class PlaceRecognition(Stage):
         found = recalls(*given, self.distance_m)
         rows = [recalls(*given, distance) for distance in self.distances_m]
         found["at_distances"] = {name: [row[name] for row in rows] for name in rows[0]} if rows else {}
-        headlines = ("place_recognition.recall_at_1", "place_recognition.recall_at_5")
-        return self.Out(metrics=Metrics({"place_recognition": found}, QUANTITIES, headlines), table=_tabled(rows))
+        headlines = ("place_recognition.recall_at_1",)
+        metrics = Metrics({"place_recognition": found}, quantities(self.distance_m), headlines)
+        return self.Out(metrics=metrics, table=_tabled(rows))
+
+
+def quantities(distance_m: float) -> dict[str, Quantity]:
+    """How the figures are read, of references within a distance (m)."""
+    recalled = {
+        f"place_recognition.recall_at_{rank}": Quantity(
+            title=f"Recall@{rank} within {distance_m:g} m", unit="%", better="higher"
+        )
+        for rank in RANKS
+    }
+    return recalled | {
+        "place_recognition.queries": Quantity(title="Images that have a reference close by", context=True),
+        "place_recognition.distance_m": Quantity(setting=True),
+    }
 
 
 def recalls(

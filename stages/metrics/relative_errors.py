@@ -10,13 +10,17 @@ from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.drive import Array, Drive, known
 
-QUANTITIES = {
-    "absolute_trajectory_error_m": Quantity(title="Absolute trajectory error (ATE), aligned", better="lower"),
-    "unaligned_trajectory_error_m": Quantity(title="Absolute trajectory error (ATE), not aligned", better="lower"),
-    "relative_position_error_m": Quantity(title="Relative pose error (RPE), position", better="lower"),
-    "relative_heading_error_deg": Quantity(title="Relative pose error (RPE), heading", better="lower"),
-    "relative_error_distance_m": Quantity(title="Distance of relative pose errors"),
-}
+
+def quantities(distance_m: float) -> dict[str, Quantity]:
+    """How the figures are read; relative errors are those over `distance_m`."""
+    relative = f"Relative pose error (RPE) over {distance_m:g} m"
+    return {
+        "absolute_trajectory_error_m": Quantity(title="Absolute trajectory error (ATE), aligned", better="lower"),
+        "unaligned_trajectory_error_m": Quantity(title="Absolute trajectory error (ATE), not aligned", better="lower"),
+        "relative_position_error_m": Quantity(title=f"{relative}, position", better="lower"),
+        "relative_heading_error_deg": Quantity(title=f"{relative}, heading", better="lower"),
+        "relative_error_distance_m": Quantity(setting=True),
+    }
 
 
 class RelativeErrors(Stage):
@@ -44,7 +48,9 @@ class RelativeErrors(Stage):
         drive: Drive,
     ) -> Out:
         """The whole run at once."""
-        return self.Out(metrics=Metrics(trajectory_metrics(drive.last_log, self.distance_m), QUANTITIES))
+        return self.Out(
+            metrics=Metrics(trajectory_metrics(drive.last_log, self.distance_m), quantities(self.distance_m))
+        )
 
 
 def trajectory_metrics(drive: Drive, distance_m: float) -> dict[str, Any]:

@@ -5,17 +5,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, Outputs, Stage
 from omninav.stages.geometry.plane.smoothing import smoothed, smoothed_with_lag
 from omninav.stages.values.drive import Array, Drive, known
 
-from .trajectory_errors import pose_errors
-
-QUANTITIES = {
-    "smoothed.position_error_m": Quantity(title="Position error, smoothed", better="lower"),
-    "smoothed.heading_error_deg": Quantity(title="Heading error, smoothed", better="lower"),
-    "smoothed.loss_rate": Quantity(title="Frames lost, smoothed", better="lower"),
-}
+from .trajectory_errors import pose_errors, quantities
 
 
 class SmoothTrajectory(Stage):
@@ -54,7 +48,7 @@ class SmoothTrajectory(Stage):
         if not len(last):
             return self.Out(drive=smooth)
         values: dict[str, Any] = {"smoothed": pose_errors(last.estimate, last.truth, self.lost_m)}
-        return self.Out(drive=smooth, metrics=Metrics(values, QUANTITIES))
+        return self.Out(drive=smooth, metrics=Metrics(values, quantities(self.lost_m)))
 
     def _smoothed(self, log: Drive) -> Array:
         trust = np.where(np.isfinite(log.confidence), log.confidence, 1.0)

@@ -10,14 +10,6 @@ from omninav.stages.geometry.plane.pose_errors import first_settled, heading_err
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.drive import Drive, known
 
-QUANTITIES = {
-    "success.within_rate": Quantity(title="Frames within the success radius", better="higher"),
-    "success.at_end": Quantity(title="Final pose correct", unit="%", better="higher"),
-    "success.unimodal_after_frames": Quantity(title="Frames until unimodal", better="lower", absent="never"),
-    "success.kidnapped_at": Quantity(title="Kidnapped before frame"),
-    "success.recovered_after_frames": Quantity(title="Frames until recovered", better="lower", absent="never"),
-}
-
 
 class SuccessRate(Stage):
     """Measures the share of frames in which the estimate is close to the truth, and how soon it is after a kidnapping.
@@ -53,7 +45,22 @@ class SuccessRate(Stage):
         last = drive.last_log
         if not last.has_truth:
             return self.Out()
-        return self.Out(metrics=Metrics({"success": self._of(last)}, QUANTITIES, ("success.at_end",)))
+        found = {"success": self._of(last)}
+        return self.Out(metrics=Metrics(found, self._quantities(), ("success.recovered_after_frames",)))
+
+    def _quantities(self) -> dict[str, Quantity]:
+        within = f"within {self.within_m:g} m and {self.within_deg:g}°"
+        return {
+            "success.within_rate": Quantity(title=f"Frames {within}", better="higher"),
+            "success.at_end": Quantity(title=f"Last pose {within}", unit="%", better="higher"),
+            "success.unimodal_after_frames": Quantity(
+                title="Images until one hypothesis is left", unit="", better="lower", absent="never"
+            ),
+            "success.kidnapped_at": Quantity(title="Kidnapped before frame"),
+            "success.recovered_after_frames": Quantity(
+                title="Images until found again after the kidnapping", unit="", better="lower", absent="never"
+            ),
+        }
 
     def _of(self, drive: Drive) -> dict[str, Any]:
         scored = known(drive.truth)

@@ -10,15 +10,30 @@ from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive, known
 
-QUANTITIES = {
-    "position_error_m": Quantity(better="lower"),
-    "heading_error_deg": Quantity(better="lower"),
-    "loss_rate": Quantity(better="lower"),
-    "converged_after_frames": Quantity(title="Converged after", better="lower", absent="never"),
-    "frames": Quantity(context=True),
-    "driven_m": Quantity(title="Distance driven", context=True),
-    "odometry_alone.final_error_m": Quantity(title="Odometry drift at the end", better="lower"),
-}
+HEADLINES = (
+    "position_error_m.median",
+    "position_error_m.p90",
+    "heading_error_deg.median",
+    "loss_rate",
+    "converged_after_frames",
+)
+MOST_LOST = 0.05
+"""Share of lost frames above which a page shows it as off: more than the few that a start at an unknown pose takes."""
+
+
+def quantities(lost_m: float) -> dict[str, Quantity]:
+    """How the figures are read; a robot counts as lost above an error of `lost_m`."""
+    return {
+        "position_error_m": Quantity(better="lower"),
+        "heading_error_deg": Quantity(better="lower"),
+        "loss_rate": Quantity(title=f"Lost, by more than {lost_m:g} m", better="lower", most=MOST_LOST),
+        "converged_after_frames": Quantity(
+            title="Converged", better="lower", absent="never", zero="at once", before="after"
+        ),
+        "frames": Quantity(context=True),
+        "driven_m": Quantity(title="Distance driven", context=True),
+        "odometry_alone.final_error_m": Quantity(title="Odometry drift at the end", better="lower"),
+    }
 
 
 class TrajectoryErrors(Stage):
@@ -59,7 +74,7 @@ class TrajectoryErrors(Stage):
         if len(per_log) > 1:
             values["logs"] = per_log
         details = ("mean_pose", "odometry_alone.after_convergence")
-        return self.Out(metrics=Metrics(values, QUANTITIES, headlines(values), details))
+        return self.Out(metrics=Metrics(values, quantities(self.lost_m), HEADLINES, details))
 
 
 def drive_metrics(drive: Drive, lost_m: float, settle_steps: int | None = None) -> dict[str, Any]:
@@ -90,13 +105,6 @@ def drive_metrics(drive: Drive, lost_m: float, settle_steps: int | None = None) 
         result["odometry_alone"] = _errors_over(windows, odometry[scored], truth, lost_m)
         result["odometry_alone"]["final_error_m"] = float(position_errors(odometry[scored], truth)[-1])
     return result
-
-
-def headlines(values: Mapping[str, Any]) -> tuple[str, ...]:
-    """Errors after convergence where the estimate converged, else over all frames; then how often it was lost."""
-    window = "after_convergence." if values.get("after_convergence") else ""
-    errors = ("position_error_m.median", "position_error_m.p90", "heading_error_deg.median")
-    return (*(window + path for path in errors), "loss_rate", "converged_after_frames")
 
 
 def _errors_over(windows: Mapping[str, int | None], poses: Array, truth: Array, lost_m: float) -> dict[str, Any]:

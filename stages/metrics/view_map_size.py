@@ -16,7 +16,7 @@ Array = npt.NDArray[np.float64]
 QUANTITIES = {
     "map.references": Quantity(title="References in the map", context=True),
     "map.size_bytes": Quantity(title="Map size", better="lower"),
-    "map.pose_source": Quantity(title="Poses of the map are from"),
+    "map.pose_source": Quantity(setting=True),
     "map.reference_size_bytes": Quantity(title="Size of a reference", better="lower"),
     "map.visited_area_m2": Quantity(title="Visited area", unit="m²"),
     "map.references_per_m2": Quantity(title="References per m²"),

@@ -242,8 +242,8 @@ def results(folder: Path) -> dict[str, bytes]:
 
 
 def test_a_page_with_verdicts_and_what_repetitions_share_computed_once(dice: Finished):
-    folder = dice.place / "runs/dice_paper"
-    assert "page: runs/dice_paper/dice.html" in dice.said
+    folder = dice.place / "runs/dice_full"
+    assert "page: runs/dice_full/dice.html" in dice.said
     better, published, best = json.loads((folder / "verdicts.json").read_text())
     assert better["holds"] is None  # six seeds of one drive say nothing of another
     assert better["paper"] == "better"
@@ -264,14 +264,14 @@ def test_a_page_with_verdicts_and_what_repetitions_share_computed_once(dice: Fin
 
 def test_a_finished_experiment_is_found_and_its_folder_can_be_resumed(dice: Finished):
     before = dice.computed()
-    assert dice.go("resume", "runs/dice_paper", "my_stages").split("\n")[1:] == dice.said.split("\n")
+    assert dice.go("resume", "runs/dice_full", "my_stages").split("\n")[1:] == dice.said.split("\n")
     assert dice.computed() == before
 
 
 def test_repetitions_that_share_nothing_give_the_same(dice: Finished):
     before = dice.computed()
     dice.go(*MINE, TT1, "+experiment.shared=false", "runs=alone", "cache=null")
-    alone, shared = results(dice.place / "alone/dice_paper"), results(dice.place / "runs/dice_paper")
+    alone, shared = results(dice.place / "alone/dice_full"), results(dice.place / "runs/dice_full")
     assert len(alone) == 2 * 6
     assert alone.items() <= shared.items()
     assert dice.computed() - before == 2 * 6 * 20
@@ -284,7 +284,7 @@ def test_series_within_runs_drives_as_repetitions_and_times_of_stages(omninav, p
         in said
     )
     omninav("--config-dir", "mine", "+experiment=laps", check=True)
-    folder = place / "runs/laps_paper"
+    folder = place / "runs/laps_full"
     fall, half, lucky = json.loads((folder / "verdicts.json").read_text())
     assert fall["holds"] is True
     assert [case["repetitions"] for case in fall["cases"]] == [12, 12, 12]
@@ -311,24 +311,24 @@ def test_a_closed_loop_drives_for_itself(omninav, tmp_path: Path):
     (tmp_path / "mine/experiment").mkdir(parents=True)
     (tmp_path / "mine/experiment/about.yaml").write_text(CLOSED_LOOP)
     omninav("--config-dir", "mine", "+experiment=about", "cache=null", check=True)
-    folder = tmp_path / "runs/about_paper"
+    folder = tmp_path / "runs/about_full"
     assert len(results(folder)) == 2
     assert not (folder / "recordings").exists()
 
 
 def test_a_killed_experiment_goes_on_where_it_was(dice: Finished):
     process = start(dice.place, *MINE, TT1, "nodes.noisy.wait_s=0.02", "runs=killed")
-    folder = dice.place / "killed/dice_paper"
+    folder = dice.place / "killed/dice_full"
     while len(results(folder)) < 5:
         assert process.poll() is None
         time.sleep(0.05)
     kill(process)
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("seed_*.json")}
     assert 5 <= len(before) < 12
-    dice.go("resume", "killed/dice_paper", "my_stages")
+    dice.go("resume", "killed/dice_full", "my_stages")
     assert {path: path.stat().st_mtime_ns for path in before} == before
     assert len(results(folder)) == 12
-    assert results(folder).items() <= results(dice.place / "runs/dice_paper").items()
+    assert results(folder).items() <= results(dice.place / "runs/dice_full").items()
 
 
 def test_a_failing_job_is_named_on_the_page_and_the_others_finish(omninav, place: Path):
@@ -382,7 +382,7 @@ def test_a_profile_that_is_not_there_is_answered_with_those_that_are(omninav, pl
 def test_check_checks_every_condition_and_runs_none(omninav, place: Path):
     said = omninav("check", *MINE, check=True).stdout.splitlines()
     assert said[:2] == [
-        "dice, profile paper: nothing wrong with it",
+        "dice, profile full: nothing wrong with it",
         "4 conditions (2 method, 2 tour), each with 6 repetitions",
     ]
     assert "24 runs in all" in said[2]
@@ -428,6 +428,6 @@ def test_results_are_the_same_bytes_wherever_they_were_computed(dice: Finished, 
     runs = dice.place / request.node.callspec.id.replace(" ", "_")
     with engine as words:
         dice.go(*MINE, *words, f"runs={runs}", "cache=null")
-    here, there = dice.place / "runs/dice_paper", runs / "dice_paper"
+    here, there = dice.place / "runs/dice_full", runs / "dice_full"
     assert (there / "verdicts.json").read_bytes() == (here / "verdicts.json").read_bytes()
     assert results(there) == results(here)

@@ -124,7 +124,7 @@ def test_a_variant_declares_the_inputs_that_its_graph_reads(path: Path):
 
 
 @pytest.mark.parametrize("path", sorted((CONF / "experiment").glob("*/*.yaml")), ids=lambda path: path.stem)
-@pytest.mark.parametrize("profile", ["paper", "quick"])
+@pytest.mark.parametrize("profile", ["full", "quick"])
 def test_every_experiment_can_be_read(path: Path, profile: str):
     option = path.relative_to(CONF / "experiment").with_suffix("")
     config = resolved_but_for_the_experiment(compose([f"+experiment={option}"]))

@@ -47,14 +47,14 @@ def typed(found, condition):
 
 @each
 def test_the_page_shows_how_far_odometry_alone_would_have_gone_wrong(name):
-    found = experiment(name, "paper")
+    found = experiment(name, "full")
     paths = [path for measure in found.measures.values() for path in measure.path]
     assert any(path.endswith("odometry_alone.final_error_m") for path in paths)
 
 
 @pytest.mark.parametrize("name", ["particle_cml/slip", "particle_cml/kidnap", "omniview_cml/figure_6"])
 def test_it_is_a_claim_that_odometry_alone_ends_two_metres_off(name):
-    claims = [claim for claim in experiment(name, "paper").claims if claim.measure == "odometry_end"]
+    claims = [claim for claim in experiment(name, "full").claims if claim.measure == "odometry_end"]
     assert [claim.at_least for claim in claims] == [2.0]
 
 
@@ -66,7 +66,7 @@ def with_each_level(conditions):
 
 @pytest.mark.parametrize("name", ALL)
 def test_a_condition_of_each_level_of_each_factor_can_be_built(name):
-    found = experiment(name, "paper")
+    found = experiment(name, "full")
     for condition in with_each_level(found.conditions()):
         planned = plan(complete(compose(typed(found, condition))))
         if name in NAMES:
@@ -75,7 +75,7 @@ def test_a_condition_of_each_level_of_each_factor_can_be_built(name):
 
 @pytest.mark.parametrize("name", ALL)
 def test_nothing_is_claimed_that_too_few_scenarios_leave_undecided(name):
-    found = experiment(name, "paper")
+    found = experiment(name, "full")
     assert not found.claims or len(found.scenarios) >= MIN_SCENARIOS
 
 

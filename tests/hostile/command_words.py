@@ -68,7 +68,7 @@ def experiment(folder: Path, files: Files) -> Any:
     plain = read_yaml(folder / "experiment.yaml")
     if not isinstance(plain, dict):
         raise BadInput("no mapping")
-    read_experiment({key: value for key, value in plain.items() if key not in ("defaults", "set")}, "paper")
+    read_experiment({key: value for key, value in plain.items() if key not in ("defaults", "set")}, "full")
 
 
 def _check(folder: Path, typed: Sequence[str]) -> None:

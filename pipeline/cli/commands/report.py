@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from omninav.pipeline.cli.jobs import show_sweep
 from omninav.pipeline.cli.terminal import show, shown
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.report.terminal_tables import results_table
@@ -16,8 +17,7 @@ def command(arguments: list[str]) -> int:
     if plots:
         _redraw(folder, plots[-1])
     if (folder / "sweep.html").is_file():
-        print((folder / "sweep_means.csv").read_text(encoding="utf-8"), end="")
-        print(f"sweep: {folder / 'sweep.html'}")
+        show_sweep(folder)
         return 0
     if not (folder / "report.html").is_file():
         if not folder.is_dir():

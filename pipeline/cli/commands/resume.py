@@ -6,7 +6,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from omninav.pipeline.cli.terminal import show, shown
+from omninav.pipeline.cli.terminal import show_results
 from omninav.pipeline.cli.words import refuse_unreadable
 from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.files import Damaged, read_json
@@ -14,7 +14,6 @@ from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.graph.problems import BadInput, one_line
 from omninav.pipeline.graph.registry import only_listed
 from omninav.pipeline.report.progress import Progress
-from omninav.pipeline.report.terminal_tables import results_table
 from omninav.pipeline.run.resume import resume
 
 
@@ -54,8 +53,7 @@ def _resume_run(given: str, here: Path) -> int:
         os.chdir(here)  # a run goes on where it was started
     if run.complete:
         print(f"{given} was complete: there was nothing to go on with. Its results:")
-    show(results_table(metrics))
-    print(f"report: {shown(run.folder / 'report.html')}")
+    show_results(run.folder, metrics, run.manifest)
     return 0
 
 

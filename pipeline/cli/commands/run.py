@@ -17,7 +17,7 @@ from omegaconf import OmegaConf
 from omninav.pipeline.cli.composition import composed, offer_plugins
 from omninav.pipeline.cli.experiments import condition_words, run_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
-from omninav.pipeline.cli.jobs import OUTCOMES, run_job
+from omninav.pipeline.cli.jobs import OUTCOMES, run_job, show_sweep
 from omninav.pipeline.cli.launcher import is_of_engine
 from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
 from omninav.pipeline.cli.terminal import shown
@@ -74,7 +74,7 @@ def _handed_over(hydra: Hydra, flags: Namespace, words: list[str], job: Callable
                 hydra.run("config", job, [*words, "hydra.mode=RUN"])
             ends = _ends(outcomes)
         for page in {page for _, _, page in ends if page}:
-            print(f"sweep: {shown(Path(page))}", flush=True)
+            show_sweep(Path(page).parent)
             optimum = (
                 Path(page).parent / "optimization_results.yaml"
             )  # by Hydra's sweepers for Optuna, Ax and Nevergrad

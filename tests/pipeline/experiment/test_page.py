@@ -35,5 +35,5 @@ def test_a_sentence_about_reference_runs_leaves_the_development_world_out() -> N
         )
         for scenario, e in (("world 1", 1.0), ("world 2", 2.0), ("development", 9.0))
     ]
-    content = PageContent(read_experiment(file, "paper"), "paper", [], [], [runs], [], "")
+    content = PageContent(read_experiment(file, "full"), "full", [], [], [runs], [], "")
     assert reference_text(content, 0) == "Without: one 1.5."

@@ -27,7 +27,7 @@ def drawn(methods: int, along: tuple[float, ...] = (1.0,), **page: object) -> li
         "curves": [{"title": LONG, "x_label": "step", "path": "along"}],
         "page": page,
     }
-    experiment = read_experiment(file, "paper")
+    experiment = read_experiment(file, "full")
     results = {}
     for condition in experiment.conditions():
         level = along[int(condition.labels["method"][-1]) % len(along)]

@@ -18,7 +18,7 @@ FILE = {
 
 def test_conditions_are_all_combinations_but_those_left_out():
     file = FILE | {"without": [{"method": "b", "data": "first"}]}
-    found = read_experiment(file, "paper").conditions()
+    found = read_experiment(file, "full").conditions()
     assert [condition.overrides for condition in found] == ["x=1 y=1", "x=1 y=2", "x=2 y=2"]
 
 
@@ -40,10 +40,10 @@ def test_a_profile_changes_mappings_key_by_key_and_null_takes_a_label_out():
 )
 def test_a_file_that_contradicts_itself_is_refused(change: dict[str, object], problem: str):
     with pytest.raises(ProblemsFound, match=problem):
-        read_experiment(FILE | change, "paper")
+        read_experiment(FILE | change, "full")
 
 
-def faults(change: dict[str, object], profile: str = "paper") -> list[str]:
+def faults(change: dict[str, object], profile: str = "full") -> list[str]:
     """What is said of a file with these entries: where, and what is wrong."""
     try:
         read_experiment(FILE | change, profile)
@@ -137,10 +137,10 @@ def test_what_is_not_a_mean_is_not_compared_with_conditions():
 
 
 def test_every_seed_runs_in_every_scenario_and_that_of_development_stands_beside():
-    alone = read_experiment(FILE | {"repetitions": 3}, "paper")
+    alone = read_experiment(FILE | {"repetitions": 3}, "full")
     assert (alone.runs_of_a_condition, alone.all_scenarios) == (3, {"": ""})
     two = read_experiment(
-        FILE | {"repetitions": 3, "scenarios": {"i": "z=1", "ii": "z=2"}, "development": "z=0"}, "paper"
+        FILE | {"repetitions": 3, "scenarios": {"i": "z=1", "ii": "z=2"}, "development": "z=0"}, "full"
     )
     assert two.runs_of_a_condition == 6
     assert list(two.all_scenarios.items()) == [("i", "z=1"), ("ii", "z=2"), ("development", "z=0")]
@@ -156,19 +156,19 @@ def test_null_takes_a_measure_or_a_scenario_out():
     found = read_experiment(file, "quick")
     assert (list(found.measures), list(found.scenarios)) == (["error"], ["i"])
     assert (found.development, found.notes) == ("z=0", ("few",))
-    assert list(read_experiment(file, "paper").measures) == ["error", "time"]
+    assert list(read_experiment(file, "full").measures) == ["error", "time"]
 
 
 def test_a_profile_may_bring_a_mapping_that_the_file_does_not_have():
     file = FILE | {"profiles": {"quick": {"scenarios": {"i": "z=1"}}}}
     assert read_experiment(file, "quick").scenarios == {"i": "z=1"}
     assert faults(file, "quikc") == ["profile: this experiment has no profile 'quikc'"]
-    assert faults(file | {"scenarios": ["i"]}, "paper")
+    assert faults(file | {"scenarios": ["i"]}, "full")
 
 
 def test_the_paper_s_figure_of_a_condition_lies_under_its_row_and_column():
     file = FILE | {"published": {"error": {"first": {"a": 3, "b": 1.5}, "second": {"a": "none"}}}}
-    found = read_experiment(file, "paper")
+    found = read_experiment(file, "full")
     figures = [found.published_figure("error", condition.labels) for condition in found.conditions()]
     assert figures == [3.0, None, 1.5, None]
     assert found.published_figure("time", found.conditions()[0].labels) is None
@@ -198,12 +198,12 @@ RESULT = {
 )
 def test_a_measure_is_read_from_metrics_timing_or_facts(measure: dict[str, object], figure: float | None):
     measures = {"error": {"title": "Error", **measure}}
-    assert figure_of(read_experiment(FILE | {"measures": measures}, "paper").measures["error"], RESULT) == figure
+    assert figure_of(read_experiment(FILE | {"measures": measures}, "full").measures["error"], RESULT) == figure
 
 
 def test_what_a_file_leaves_out():
     file = FILE | {"curves": [CURVE], "reference_runs": [RUN | {"over": "data"}], "claims": [CLAIM]}
-    found = read_experiment(file, "paper")
+    found = read_experiment(file, "full")
     error, (curve,), (run,), (claim,) = found.measures["error"], found.curves, found.reference_runs, found.claims
     assert (found.repetitions, found.shared, found.cores) == (50, True, None)
     assert (error.scale, error.digits, error.aggregate, error.window, error.pooled) == (

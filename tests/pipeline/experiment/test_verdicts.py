@@ -50,7 +50,7 @@ def judged(claim: dict[str, object], seeds: int = 1, over_runs: str = "mean", **
         }
         for name, values in errors.items()
     }
-    (verdict,) = judge(read_experiment(file, "paper"), results)
+    (verdict,) = judge(read_experiment(file, "full"), results)
     return verdict
 
 
@@ -208,10 +208,10 @@ def test_a_pooled_deviation_is_over_all_frames_of_all_repetitions_and_nothing_is
             for seed, run in enumerate(runs)
         }
     }
-    found = pooled(read_experiment(file, "paper"), results, "sigma", {"method": "a"})
+    found = pooled(read_experiment(file, "full"), results, "sigma", {"method": "a"})
     assert found == pytest.approx(100 * np.concatenate(runs).std())
     with pytest.raises(ProblemsFound, match="pooled"):
-        read_experiment(file | {"claims": [{"statement": "small", "measure": "sigma", "at_most": 1.0}]}, "paper")
+        read_experiment(file | {"claims": [{"statement": "small", "measure": "sigma", "at_most": 1.0}]}, "full")
 
 
 def test_a_case_says_what_was_compared():
@@ -305,7 +305,7 @@ def swept(claim: dict[str, object], figures: dict[tuple[str, str], float]) -> li
         }
         for (method, day), figure in figures.items()
     }
-    (verdict,) = judge(read_experiment(file, "paper"), results)
+    (verdict,) = judge(read_experiment(file, "full"), results)
     assert (verdict.claim, verdict.measure, verdict.paper) == ("s", "Error", "Table 1")
     assert verdict_of(verdict.plain()) == verdict
     return list(verdict.cases)
@@ -385,7 +385,7 @@ def test_frames_are_pooled_of_runs_that_have_all_three_figures():
     whole = {"error": {"mean": 1.0, "std": 2.0}, "frames": 4}
     measures = {"sigma": {"title": "Sigma", "path": ["late", "error"], "pooled": True}}
     file = {"name": "t", "title": "T", "about": "", "variant": "v", "sweep": {"method": {"a": ""}}}
-    experiment = read_experiment(file | {"measures": measures, "page": {"rows": [], "columns": "method"}}, "paper")
+    experiment = read_experiment(file | {"measures": measures, "page": {"rows": [], "columns": "method"}}, "full")
     runs = [whole, {"error": {"mean": 9.0, "std": None}, "frames": 4}, {"frames": 4}]
     results = {
         key_of({"method": "a"}): {("", n): {"metrics": run, "timing": {}, "facts": {}} for n, run in enumerate(runs)}

@@ -7,7 +7,17 @@ from omninav.pipeline.report.quantities import digits, numbers, title, unit
 
 @pytest.mark.parametrize(
     ("number", "text"),
-    [(0.0731, "0.073"), (1.523, "1.52"), (12.34, "12.3"), (3500.2, "3500"), (0, "0"), (0.0, "0"), (0.00012, "1.2e-04")],
+    [
+        (0.0731, "0.073"),
+        (1.523, "1.52"),
+        (12.34, "12.3"),
+        (3500.2, "3500"),
+        (0, "0"),
+        (0.0, "0"),
+        (0.00012, "0.00012"),
+        (3.3e-14, "0"),
+        (-2e-9, "0"),
+    ],
 )
 def test_numbers_have_the_digits_they_carry(number, text):
     assert digits(number) == text
@@ -28,6 +38,7 @@ def test_titles_and_units_follow_from_the_ends_of_names():
         ("precision", 0.5, Quantity(title="Precision of loops", unit="%"), "Precision of loops (%)", "50.0"),
         ("after_frames", None, Quantity(absent="never"), "After (frames)", "never"),
         ("after_frames", None, Quantity(), "After (frames)", "–"),
+        ("after_frames", 0, Quantity(title="Found", before="after", zero="at once"), "Found after (frames)", "0"),
     ],
 )
 def test_a_description_takes_precedence_over_the_name(name, value, quantity, head, text):
@@ -49,3 +60,7 @@ def test_a_title_given_for_a_path_is_shown_without_its_groups():
 def test_described_entries_come_first_in_their_order():
     metrics = Metrics({"a": 1, "b": 2, "c": 3, "d": 4}, {"c": Quantity(), "b": Quantity()})
     assert list(numbers(metrics)) == ["c", "b", "a", "d"]
+
+
+def test_what_a_figure_was_measured_with_is_no_result():
+    assert list(numbers(Metrics({"a": 1, "radius_m": 2.0}, {"radius_m": Quantity(setting=True)}))) == ["a"]

@@ -136,7 +136,7 @@ def test_tables_of_stages_are_shown(tmp_path):
 
 def test_a_run_that_never_converged_says_never(tmp_path):
     metrics = measured(converged_after_frames=None, after_convergence=None)
-    assert "Converged after never" in text_of(report(tmp_path, metrics=metrics))
+    assert "Converged never" in text_of(report(tmp_path, metrics=metrics))
 
 
 def test_several_logs_have_a_line_each(tmp_path):

@@ -4,7 +4,14 @@ from rich.console import Console
 from sample_metrics import measured
 
 from omninav.pipeline import Metrics, Quantity
-from omninav.pipeline.report.terminal_tables import compare_table, differing_settings, results_table
+from omninav.pipeline.report.sweep_table import overview_of
+from omninav.pipeline.report.terminal_tables import (
+    compare_table,
+    differing_settings,
+    key_table,
+    results_table,
+    sweep_table,
+)
 
 
 def printed(table) -> str:
@@ -19,6 +26,60 @@ def test_results_have_units_and_no_details():
         assert expected in table
     assert "odometry alone" not in table
     assert "Frames" in printed(results_table(Metrics({"frames": 3})))
+
+
+def test_each_figure_of_a_run_is_one_line_with_what_is_off_in_colour():
+    described = {"lost_rate": Quantity(title="Lost [at all]", most=0.0), "error_m": Quantity()}
+    metrics = Metrics({"lost_rate": 0.5, "error_m": 0.2}, described, ("error_m", "lost_rate"))
+    for width in (80, 120):
+        said = io.StringIO()
+        Console(width=width, file=said, color_system="standard", force_terminal=True).print(key_table(metrics, {}))
+        error, lost = said.getvalue().splitlines()
+        assert error.split() == ["Error", "0.200", "m"]
+        assert "Lost [at all]" in lost
+        assert "\x1b[1;31m50.0 %" in lost
+        assert "\x1b[" not in error
+    assert "\x1b" not in printed(key_table(metrics, {}))
+
+
+def test_no_two_rows_of_the_results_have_one_name_and_none_is_empty():
+    described = {
+        "error_m": Quantity(title="Error"),
+        "found_again": Quantity(),
+        "smoothed.loss_rate": Quantity(title="Lost, smoothed"),
+    }
+    spread = {"mean": 0.2, "max": 3.0}
+    values = {"error_m": spread, "loss_rate": 0.1, "found_again": None}
+    values |= {"smoothed": {"error_m": spread, "loss_rate": 0.2}, "rotation": {"error_deg": spread}}
+    lines = [line for line in printed(results_table(Metrics(values, described))).splitlines() if line[:1] == "│"]
+    names = [line.split("│")[1].strip() for line in lines]
+    assert sorted(names) == sorted({*names})
+    assert names == ["Error (m)", "all frames", "smoothed", "Error, rotation (°)", "Loss rate", "Lost, smoothed"]
+    assert all(any(cell.strip() for cell in line.split("│")[2:]) for line in lines if "Error (m)" not in line)
+
+
+def test_a_sweep_shows_what_varies_and_as_many_figures_as_fit():
+    rows = [
+        {
+            "job": str(n),
+            "folder": ".",
+            "manifest": {"overrides": f"variant=a ++nodes.x.gain={n // 2} seed={n % 2}"},
+            "metrics": Metrics(
+                {f"figure_{i}_m": 0.1 * n + i for i in range(9)}, headlines=tuple(f"figure_{i}_m" for i in range(9))
+            ),
+        }
+        for n in range(4)
+    ]
+    sweep = overview_of(rows)
+    assert (sweep.settings, sweep.seeds, sweep.constant) == (("nodes.x.gain",), True, ("variant=a",))
+    for width in (80, 120):
+        said = io.StringIO()
+        Console(width=width, file=said).print(sweep_table(sweep, width))
+        lines = said.getvalue().splitlines()
+        assert max(map(len, lines)) <= width
+        assert "0.050 (0 to 0.685)" in said.getvalue()
+        assert sum(line.startswith("│") for line in lines) == 2
+        assert "variant" not in said.getvalue()
 
 
 def test_a_comparison_marks_the_best_and_shows_differing_settings():

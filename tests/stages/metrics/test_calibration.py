@@ -6,6 +6,7 @@ from scipy.stats import chi2, mannwhitneyu
 from small_run import collected
 
 from omninav.pipeline import Context, Tick
+from omninav.pipeline.report.key_figures import key_figures
 from omninav.stages.geometry.probability.calibration import (
     area_under_roc,
     expected_calibration_error,
@@ -148,3 +149,13 @@ def test_an_estimate_at_both_tolerances_is_right() -> None:
     drive = collected([Tick(0, 0), Tick(1, 1)], [Pose(0.0, 0.0, 0.0)] * 2, estimates=estimates, confidences=told)
     found = Calibration(within_deg=90.0).step(Context("calibration"), drive).metrics.values["calibration"]
     assert found["right_share"] == 0.5
+
+
+@pytest.mark.parametrize(("sigma", "first"), [(0.3, ()), (0.1, ("calibration.ellipse_95",))])
+def test_ellipses_are_among_the_first_figures_where_they_are_too_small(sigma, first):
+    drive = made([0.9] * 400, sigma)
+    metrics = Calibration().step(Context("c"), drive.at(np.arange(400) < 300)).metrics
+    assert metrics.headlines == (*first, "calibration.expected_error")
+    shown = {figure.name: figure for figure in key_figures(metrics, {})}
+    assert all(shown["95 % ellipse holds"].off for _ in first)
+    assert metrics.quantities["calibration.right_share"].title == "Frames within 0.5 m and 10°"

@@ -3,6 +3,7 @@ import pytest
 from small_run import collected, small_run
 
 from omninav.pipeline import Context, Tick
+from omninav.pipeline.report.key_figures import key_figures
 from omninav.stages.metrics.trajectory_errors import TrajectoryErrors
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.pose import Motion, Pose
@@ -153,15 +154,22 @@ def test_windows_say_how_many_frames_they_have_and_odometry_is_measured_over_the
     assert found["mean_pose"]["after_convergence"]["position_error_m"]["mean"] == 1.0
 
 
-def test_the_first_figures_are_those_after_convergence_where_there_are_such():
-    def first(off: float) -> tuple[str, ...]:
-        drive = collected([Tick(i, i, 0, i) for i in range(12)], [Pose(0, 0, 0)] * 12, None, [at(off)] * 12)
-        return TrajectoryErrors().step(Context("errors"), drive).metrics.headlines
+def test_the_first_figures_say_how_far_off_whether_lost_and_when_it_converged():
+    def first(*off: float) -> list[tuple[str, str, bool]]:
+        drive = collected([Tick(i, i, 0, i) for i in range(12)], [Pose(0, 0, 0)] * 12, None, [*map(at, off)])
+        metrics = TrajectoryErrors(lost_m=2.0).step(Context("errors"), drive).metrics
+        return [(figure.name, figure.text, figure.off) for figure in key_figures(metrics, {})]
 
-    found, lost = first(0.5), first(5.0)
-    assert found[0] == "after_convergence.position_error_m.median"
-    assert lost[0] == "position_error_m.median"
-    assert found[-2:] == lost[-2:] == ("loss_rate", "converged_after_frames")
+    assert first(*[0.5] * 12) == [
+        ("Position error, median", "0.500 m", False),
+        ("Position error, p90", "0.500 m", False),
+        ("Heading error, median", "0°", False),
+        ("Lost, by more than 2 m", "0 %", False),
+        ("Converged", "at once", False),
+    ]
+    assert first(*[5.0] * 12)[3:] == [("Lost, by more than 2 m", "100 %", True), ("Converged", "never", True)]
+    assert first(5.0, *[0.5] * 11)[4] == ("Converged", "after 1 frame", False)
+    assert first(5.0, 5.0, *[0.5] * 10)[4] == ("Converged", "after 2 frames", False)
 
 
 def test_one_log_has_no_list_of_logs_and_a_run_without_truth_says_so():

@@ -1,0 +1,54 @@
+import pytest
+from sample_metrics import measured
+
+from omninav.pipeline import Metrics, Quantity
+from omninav.pipeline.report.key_figures import MAX_FIGURES, key_figures
+
+
+def shown(metrics: Metrics, timing: dict | None = None) -> list[tuple[str, str]]:
+    return [(figure.name, figure.text) for figure in key_figures(metrics, timing or {})]
+
+
+def test_headlines_stand_first_and_the_speed_last():
+    assert shown(measured(), {"ticks_per_second": 24.71}) == [
+        ("Position error, median, after convergence", "0.050 m"),
+        ("Loss rate", "12.5 %"),
+        ("Converged", "after 12 frames"),
+        ("Speed", "24.7 frames/s"),
+    ]
+    assert shown(measured(), {"ticks_per_second": 100.2, "cached": ["features"]})[-1] == (
+        "Speed, features from the cache",
+        "100 frames/s",
+    )
+
+
+@pytest.mark.parametrize(
+    ("value", "text", "off"),
+    [(0, "at once", False), (1, "after 1 frame", False), (12, "after 12 frames", True), (None, "never", True)],
+)
+def test_a_figure_that_is_not_as_it_should_be_is_off(value, text, off):
+    described = {"after_frames": Quantity(title="Found", before="after", zero="at once", absent="never", most=10)}
+    (figure,) = key_figures(Metrics({"after_frames": value}, described, ("after_frames",)), {})
+    assert (figure.name, figure.text, figure.off) == ("Found", text, off)
+
+
+def test_a_share_is_off_below_its_least():
+    described = {"held": Quantity(title="95 % ellipse holds", unit="%", least=0.85)}
+    found = [key_figures(Metrics({"held": share}, described, ("held",)), {})[0].off for share in (0.84, 0.85, 1.0)]
+    assert found == [True, False, False]
+
+
+def test_what_has_no_figure_has_no_line():
+    assert shown(Metrics({"a": None, "b": 3}, headlines=("a", "b", "c"))) == [("B", "3")]
+
+
+def test_where_nothing_is_said_to_come_first_each_entry_has_one_line():
+    spread = {"mean": 0.2, "median": 0.1, "max": 3.0}
+    several = {f"count_{number}": number for number in range(20)}
+    found = shown(
+        Metrics({"error_m": spread, "hidden": {"a": 1}} | several, details=("hidden",)), {"ticks_per_second": 9}
+    )
+    assert len(found) == MAX_FIGURES
+    assert found[-1] == ("Speed", "9.00 frames/s")
+    assert ("Error, median", "0.100 m") in shown(Metrics({"error_m": spread}))
+    assert "A, hidden" not in dict(found)

@@ -1,0 +1,17 @@
+from omninav.pipeline.report.warning_lines import grouped, warning_lines
+
+
+def test_what_is_said_of_several_files_is_one_line_with_a_count():
+    said = ["map: No odometry in tour.mcap: made", "No odometry in logs/drive 2.mcap: made", "The disk is full"]
+    assert grouped(said) == ["map: No odometry in tour.mcap: made (and 1 like it)", "The disk is full"]
+    assert grouped([f"frame {n}: too dark" for n in range(3)]) == ["frame 0: too dark (and 2 like it)"]
+
+
+def test_different_causes_stay_apart():
+    said = ["tour.mcap: images are mirrored", "tour.mcap: images are blank"]
+    assert grouped(said) == said
+
+
+def test_skipped_data_is_a_warning_where_a_first_case_is_known():
+    dropped = {"source.undecodable_image": {"count": 3, "first": "frame 7"}, "source.seen": 5}
+    assert warning_lines({"warnings": ["a"], "dropped": dropped}) == ["a", "undecodable image: 3 (first: frame 7)"]
