@@ -10,7 +10,7 @@ import numpy as np
 
 from omninav.pipeline.tables import write_table
 
-from .quantities import Number, head_of, headlines, numbers
+from .quantities import Number, head_of, headlines, numbers, with_unit
 
 SEED = "seed"
 """The setting over which means are taken."""
@@ -49,7 +49,7 @@ class Overview:
     heads: tuple[str, ...]
     """Their names and units."""
     same: tuple[str, ...]
-    """Name, unit and value of those that are the same in all jobs."""
+    """Those that are the same in all jobs, each with its name and unit."""
     conditions: tuple[Row, ...]
 
 
@@ -96,7 +96,7 @@ def overview_of(rows: Sequence[Mapping[str, Any]]) -> Overview:
         tuple(f"{name}={typed[0][name]}" for name in values if name not in varied),
         paths,
         tuple(head_of(path, measured) for path in paths),
-        tuple(f"{head_of(path, measured)} {measured[0][path].text}" for path in same),
+        tuple(_stated(next(run[path] for run in measured if path in run)) for path in same),
         tuple(
             Row(
                 tuple(each.settings.get(name, "") for name in settings),
@@ -106,6 +106,10 @@ def overview_of(rows: Sequence[Mapping[str, Any]]) -> Overview:
             for each in conditions(rows)
         ),
     )
+
+
+def _stated(number: Number) -> str:
+    return f"{number.name}: {with_unit(*number.entry.in_words(number.value))}"
 
 
 def _shown(mean: Mean | None, path: str, runs: Sequence[Mapping[str, Number]]) -> str:

@@ -309,6 +309,10 @@ def test_resume_of_what_is_no_run_or_has_ended_says_so(omninav, demo: Path):
     assert "not a run folder" in ended.stderr
     said = omninav("resume", str(demo), check=True).stdout
     assert "was complete" in said
+    rows = [re.split("  +", line) for line in said.splitlines() if re.search("\\S  +\\S", line)]
+    assert 6 <= len(rows) <= 10  # the figures that one looks for first, one line each
+    assert dict(row[:2] for row in rows)["Converged"].split()[0] in ("at", "after")
+    assert len({name for name, *_ in rows}) == len(rows)
     assert "report.html" in said
 
 

@@ -34,7 +34,7 @@ def test_what_is_the_same_in_all_jobs_is_said_once(tmp_path):
         for n, metrics in enumerate((measured(loss_rate=0.5), measured()))
     ]
     page = write_sweep_page(tmp_path, rows).read_text()
-    assert "all jobs: Position error, median, after convergence (m) 0.050, Converged after (frames) 12<" in page
+    assert "all jobs: Position error, median, after convergence: 0.050 m, Converged: after 12 frames<" in page
     assert set(re.findall("<th>([^<]*)</th>", page)) == {"job", "jobs", "Loss rate (%)"}
 
 
