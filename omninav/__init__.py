@@ -30,10 +30,9 @@ if TYPE_CHECKING:
         Value,
     )
     from .pipeline.api.configuration import Configuration, check, compose
-    from .pipeline.api.run import Run, open_run, run
+    from .pipeline.api.run import Run, load_map, open_run, run
     from .pipeline.api.session import Session, Step, open, resume
     from .pipeline.api.sweep import Sweep, open_sweep, sweep
-    from .pipeline.engine.artifact import read_artifact as load_map
     from .pipeline.engine.call import StageFailed
 
 __all__ = [
@@ -74,10 +73,9 @@ __all__ = [
 _PLACES = {
     "testing": "testing",
     "Configuration check compose": "pipeline.api.configuration",
-    "Run open_run run": "pipeline.api.run",
+    "Run load_map open_run run": "pipeline.api.run",
     "Session Step open resume": "pipeline.api.session",
     "Sweep open_sweep sweep": "pipeline.api.sweep",
-    "load_map": "pipeline.engine.artifact",
     "StageFailed": "pipeline.engine.call",
 }
 """Where names are defined; the others are the framework's own, for authors of stages."""
@@ -88,7 +86,7 @@ def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'omninav' has no attribute '{name}'; it has: {', '.join(__all__)}")
     module = importlib.import_module(f"omninav.{_PLACE_OF.get(name, 'pipeline')}")
-    thing = module if name == "testing" else getattr(module, "read_artifact" if name == "load_map" else name)
+    thing = module if name == "testing" else getattr(module, name)
     globals()[name] = thing
     return thing
 

@@ -25,6 +25,7 @@ from omninav.pipeline.tables import read_table
 
 from .configuration import Configuration, configured
 from .plain_errors import plain_errors
+from .read_only import read_only
 
 
 class Figures(dict[str, Any]):
@@ -116,7 +117,7 @@ class Run:
         if name.startswith("_") or not file.is_file():
             files = [path.stem for path in file.parent.glob("*.omap")]
             raise AttributeError(f"{self.__dict__.get('folder')}: there is no {name}; {suggest(name, files, 'files')}")
-        return read_artifact(file)
+        return load_map(file)
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *(path.stem for path in self.folder.glob("*.omap"))]
@@ -179,3 +180,13 @@ def run(
 def open_run(folder: str | os.PathLike[str] = "runs/latest") -> Run:
     """A run that has ended, or is still running, by its folder."""
     return Run(folder)
+
+
+def load_map(file: str | os.PathLike[str]) -> Value:
+    """The value in an `.omap` file, checked; its arrays are read-only (`np.array(…)` copies one).
+
+    A large array is read, and checked, where it is needed. Raises `BadInput` naming the file where it is missing, cut
+    or changed, and where its content is no sound value.
+    """
+    loaded: Value = read_only(read_artifact(Path(file)))
+    return loaded

@@ -1,9 +1,10 @@
 """Sessions: a graph that is pushed one frame at a time, by the engine that runs logs."""
 
 import os
+import threading
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -21,6 +22,7 @@ from omninav.pipeline.run.run_folder import RunFolder, start
 
 from .configuration import Configuration, configured
 from .plain_errors import plain_errors
+from .read_only import read_only
 from .run import Run
 
 PUSHED = "source=pushed"
@@ -35,22 +37,29 @@ class Step(Mapping[str, Any]):
     """What the stages gave for a frame; None where one gave nothing.
 
     `out["match.similarities"]` is the output of a node, and `out.estimate` the one of that name, whichever node has it.
+    Arrays are read-only, since the session goes on with them: `np.array(…)` copies one.
     """
 
     def __init__(self, values: Mapping[str, Any], names: Mapping[str, str]) -> None:
         self._values, self._names = {origin: values.get(origin) for origin in names.values()}, names
+        self._given: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:
         if name not in self._names:
             raise KeyError(f"there is no output '{name}'; {suggest(name, self._names, 'outputs')}")
-        return self._values[self._names[name]]
+        return self._output(self._names[name])
 
     def __getattr__(self, name: str) -> Any:
         names = self.__dict__.get("_names", {})
         if name not in names:
             short = [known for known in names if "." not in known]
             raise AttributeError(f"there is no output '{name}'; {suggest(name, short, 'outputs')}")
-        return self._values[names[name]]
+        return self._output(names[name])
+
+    def _output(self, origin: str) -> Any:
+        if origin not in self._given:
+            self._given[origin] = read_only(self._values[origin])
+        return self._given[origin]
 
     def __repr__(self) -> str:
         return f"Step({', '.join(sorted(name for name in self._names if '.' not in name))})"
@@ -69,7 +78,8 @@ class Session(AbstractContextManager["Session"]):
     """A run whose frames come one at a time. It is a run like any other: folder, checkpoints, metrics and report.
 
     `with` closes it at the end of its block; without `with`, call `close`. What was interrupted goes on with `resume`,
-    from the last `save`, or from the last of the checkpoints that are written every few seconds.
+    from the last `save`, or from the last of the checkpoints that are written every few seconds. It belongs to the
+    process that opened it, and is used by one thread at a time.
     """
 
     def __init__(self, run: RunFolder, planned: Plan) -> None:
@@ -81,6 +91,8 @@ class Session(AbstractContextManager["Session"]):
         self._engine: Engine = self._stack.enter_context(running(run, planned))
         self._given = self._engine.calls[source.name].times
         self._over: str | None = None
+        self._process, self._used = os.getpid(), threading.Lock()
+        self._user: int | None = None
         self._warned: set[str] = set()
 
     @property
@@ -99,18 +111,39 @@ class Session(AbstractContextManager["Session"]):
         Raises `BadInput` where the source refuses the frame: it is then as if it had not come. Raises `StageFailed`
         where a stage raised; after that the session can only be resumed.
         """
+        with self._alone():
+            self._refuse_over()
+            push(self._source, frame)
+            given = len(self._given)
+            try:
+                self._engine.tick()
+            except BaseException:
+                if len(self._given) > given:  # the source took it, so some stages have run and others not
+                    self._over = "a stage failed; omninav.resume goes on from the last checkpoint"
+                raise
+            self._say_warnings()
+            return Step(self._engine.values, self._names)
+
+    @contextmanager
+    def _alone(self, wait: bool = False) -> Iterator[None]:
+        """Keep other threads out for as long as the block runs; one that comes meanwhile waits, or is refused.
+
+        Raises `BadInput` then, and for a process that was forked from the session's.
+        """
+        if os.getpid() != self._process:
+            raise BadInput(f"{self.folder}: process {self._process} has this session; open another one in this process")
+        if not self._used.acquire(blocking=wait and self._user != threading.get_ident()):
+            raise BadInput(f"{self.folder}: the session is in the middle of a step; use it from one thread at a time")
+        self._user = threading.get_ident()
+        try:
+            yield
+        finally:
+            self._user = None
+            self._used.release()
+
+    def _refuse_over(self) -> None:
         if self._over is not None:
             raise BadInput(f"{self.folder}: {self._over}")
-        push(self._source, frame)
-        given = len(self._given)
-        try:
-            self._engine.tick()
-        except BaseException:
-            if len(self._given) > given:  # the source took it, so some stages have run and others not
-                self._over = "a stage failed; omninav.resume goes on from the last checkpoint"
-            raise
-        self._say_warnings()
-        return Step(self._engine.values, self._names)
 
     def _say_warnings(self) -> None:
         """Say each warning of a stage when it is first given: its caller waits for no report."""
@@ -122,9 +155,9 @@ class Session(AbstractContextManager["Session"]):
 
     def save(self) -> Path:
         """Write a checkpoint, from which `resume` goes on; gives the run's folder."""
-        if self._over is not None:
-            raise BadInput(f"{self.folder}: {self._over}")
-        self._engine.save()
+        with self._alone():
+            self._refuse_over()
+            self._engine.save()
         return self.folder
 
     def close(self) -> Run:
@@ -135,11 +168,14 @@ class Session(AbstractContextManager["Session"]):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if error is None and self._over is not None:
-            error = BadInput(self._over)
-        self._over = "the session is closed; omninav.resume goes on with one that was interrupted"
-        self._stack.__exit__(type(error) if error is not None else None, error, trace)
-        self._stack = ExitStack()
+        if os.getpid() != self._process and error is not None:
+            return  # a process that was forked ends, and the session is not its own
+        with self._alone(wait=True):
+            if error is None and self._over is not None:
+                error = BadInput(self._over)
+            self._over = "the session is closed; omninav.resume goes on with one that was interrupted"
+            self._stack.__exit__(type(error) if error is not None else None, error, trace)
+            self._stack = ExitStack()
 
 
 def outputs_by_name(graph: Graph) -> dict[str, str]:

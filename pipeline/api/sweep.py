@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from omninav.pipeline.cli.commands.run import command
-from omninav.pipeline.cli.words import word_of
+from omninav.pipeline.cli.overrides import MAX_JOBS
+from omninav.pipeline.cli.words import number_of, word_of
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.tables import read_table
 
@@ -70,7 +71,7 @@ def sweep(*words: str, folder: str | os.PathLike[str] | None = None, progress: b
     A job that fails stands in the table as failed, and the others go on. Raises `BadInput` where none could begin.
     """
     fixed = {name: value for name, value in settings.items() if not isinstance(value, list | tuple | range)}
-    swept = [f"{name}={','.join(map(word_of, settings[name]))}" for name in settings if name not in fixed]
+    swept = [f"{name}={_values(name, values)}" for name, values in settings.items() if name not in fixed]
     place = Path(folder or Path("runs") / f"{datetime.now():%Y-%m-%d_%H-%M-%S}_sweep")
     before = sys.argv
     try:
@@ -82,6 +83,15 @@ def sweep(*words: str, folder: str | os.PathLike[str] | None = None, progress: b
     finally:
         sys.argv = before  # it is what the manifests of jobs say
     return Sweep(place)
+
+
+def _values(name: str, values: list[Any] | tuple[Any, ...] | range) -> str:
+    number = number_of(values)
+    if not 1 <= number <= MAX_JOBS:
+        raise BadInput(f"{name}: a sweep of {number:,} values, expected 1 to {MAX_JOBS:,}")
+    if isinstance(values, range):
+        return f"range({values.start},{values.stop},{values.step})"
+    return ",".join(map(word_of, values))
 
 
 def open_sweep(folder: str | os.PathLike[str]) -> Sweep:

@@ -15,7 +15,14 @@ def words_of(words: tuple[str, ...], settings: Mapping[str, Any]) -> list[str]:
     typed = [_checked(word) for word in words]
     if typed and typed[0].isidentifier():
         typed[0] = f"variant={typed[0]}"
-    return [*typed, *(f"{name}={word_of(value)}" for name, value in settings.items())]
+    return [*typed, *(_setting(name, value) for name, value in settings.items())]
+
+
+def _setting(name: str, value: Any) -> str:
+    try:
+        return f"{name}={word_of(value)}"
+    except BadInput as refused:
+        raise BadInput(f"{name}: {refused}") from None
 
 
 def _checked(word: Any) -> str:

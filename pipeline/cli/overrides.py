@@ -23,7 +23,7 @@ from .composition_cache import compose
 from .hydra_session import SETTABLE, not_settable
 
 MAX_JOBS = 100_000
-"""Of a sweep."""
+"""Jobs of a sweep, and values of each setting that varies."""
 WITHIN_GRAPH = ("nodes.", "wires.", "artifacts.", "saves.")
 
 

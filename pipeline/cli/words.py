@@ -2,7 +2,7 @@
 
 import re
 from argparse import Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -12,7 +12,9 @@ MAX_WORD = 10_000
 """Characters of a word."""
 MAX_NESTING = 20
 """Brackets within each other in a word."""
-_LONG_NUMBER = re.compile(r"(?<![\w.])[-+]?\d{100,}")
+MAX_DIGITS = 100
+"""Digits of a whole number."""
+_LONG_NUMBER = re.compile(rf"(?<![\w.])[-+]?\d{{{MAX_DIGITS},}}")
 NOT_TAKEN = ("experimental_rerun", "config_path", "config_name", "shell_completion")
 """Flags of Hydra that would read pickles, replace omninav's own configuration or write to a shell's start files."""
 
@@ -55,7 +57,7 @@ def _unreadable(word: str) -> str:
     elif _depth(word) > MAX_NESTING:
         what = f"it has more than {MAX_NESTING} brackets within each other"
     elif _LONG_NUMBER.search(word):
-        what = "it holds a number of more than 100 digits"
+        what = f"it holds a number of more than {MAX_DIGITS} digits"
     return what
 
 
@@ -67,22 +69,38 @@ def _depth(word: str) -> int:
     return deepest
 
 
-def word_of(value: Any) -> str:
-    """A value as it stands behind `name=`, quoted where it is a text with odd characters."""
+def word_of(value: Any, depth: int = 0) -> str:
+    """A value as it stands behind `name=`, quoted where it is a text with odd characters.
+
+    `depth`: how many lists it lies within. Raises `BadInput` for what no word can hold, before it is written out.
+    """
     if value is None or isinstance(value, bool):
         return "null" if value is None else str(value).lower()
     if isinstance(value, int | float):
+        if isinstance(value, int) and abs(value) >= 10**MAX_DIGITS:
+            raise BadInput(f"a whole number of more than {MAX_DIGITS} digits cannot be a setting")
         return repr(value)
     if hasattr(value, "item") and getattr(value, "ndim", None) == 0:  # a number of numpy
-        return word_of(value.item())
+        return word_of(value.item(), depth)
     if isinstance(value, str | Path):
         text = str(value)
         return text if text and all(c.isalnum() or c in "_./-" for c in text) else _quoted(text)
-    if isinstance(value, Mapping):
-        return "{" + ",".join(f"{name}:{word_of(item)}" for name, item in value.items()) + "}"
-    if isinstance(value, list | tuple | range):
-        return "[" + ",".join(map(word_of, value)) + "]"
+    if isinstance(value, Mapping | list | tuple | range):
+        if number_of(value) > MAX_WORD or depth >= MAX_NESTING:
+            what = f"of {number_of(value):,} items" if depth < MAX_NESTING else f"within {MAX_NESTING} others"
+            least = f"expected at most {MAX_WORD:,}, and {MAX_NESTING} within each other"
+            raise BadInput(f"a {type(value).__name__} {what} cannot be a setting; {least}")
+        if isinstance(value, Mapping):
+            return "{" + ",".join(f"{name}:{word_of(item, depth + 1)}" for name, item in value.items()) + "}"
+        return "[" + ",".join(word_of(item, depth + 1) for item in value) + "]"
     raise BadInput(f"a {type(value).__name__} cannot be a setting; give a number, a text, a path, or a list of them")
+
+
+def number_of(values: Sized) -> int:
+    """How many values there are, of a range of any length too."""
+    if isinstance(values, range):
+        return max(0, -((values.start - values.stop) // values.step))
+    return len(values)
 
 
 def _quoted(text: str) -> str:

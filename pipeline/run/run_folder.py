@@ -104,8 +104,11 @@ def start(
     config = planned.config
     refuse_missing(config)
     inputs = input_digests(planned)
-    root, named = Path(str(config.get("runs", "runs"))), f"{datetime.now():%Y-%m-%d_%H-%M-%S}_{planned.variant}"
-    beginning = root / f".{named}.{os.getpid()}.part" if folder is None else folder
+    root, named = (
+        Path(str(config.get("runs", "runs"))).absolute(),
+        f"{datetime.now():%Y-%m-%d_%H-%M-%S}_{planned.variant}",
+    )
+    beginning = root / f".{named}.{os.getpid()}.part" if folder is None else folder.absolute()
     beginning.mkdir(parents=True, exist_ok=True)
     run = RunFolder(beginning)
     config_file = config_text(planned)

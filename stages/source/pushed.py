@@ -1,6 +1,8 @@
 """The source of a program's own loop: one tick for every image that is pushed."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from typing import NamedTuple
 
 import cv2
@@ -17,7 +19,7 @@ from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.recordings.messages import is_blank
 from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.values.command import Command
-from omninav.stages.values.encoded_image import Undecodable, decode_image
+from omninav.stages.values.encoded_image import MAX_FILE_BYTES, MAX_PIXELS, Undecodable, decode_image
 from omninav.stages.values.image import Image, Pixels
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.scan import Scan
@@ -31,6 +33,8 @@ MAX_STAMP_NS = 1 << 62
 """A stamp lies within 146 years of 1970."""
 MAX_NUMBER = 1e8
 """Of a pose, metres or radians: more than any map's coordinates."""
+MAX_READINGS = 100_000
+"""Of a ring of ranges."""
 MAX_MOTION_M = 1000.0
 """Between two images: more than any robot drives unseen. A drive that begins elsewhere is a `new_log`."""
 
@@ -98,11 +102,11 @@ class PushedSource(Source):
         """Take a frame for the next tick. Raises `BadInput` where something of it cannot be used.
 
         `image`: pixels, (rows, columns, 3) uint8 blue-green-red as OpenCV reads them or (rows, columns) grey, or the
-        bytes of a JPEG or PNG file; it is copied. `motion`: (forward m, left m, counter-clockwise rad) since the image
-        before, or `odometry`: the robot's pose (x m, y m, heading rad) in the odometry's own frame, from which motion
-        follows. `stamp`: nanoseconds; None: a tenth of a second after the image before. `truth`: the true pose in the
-        map frame, for metrics only. `scan`: range readings, for variants that keep clear of obstacles. `new_log`: the
-        robot has been put elsewhere, or another drive begins: there is no motion from the image before.
+        bytes of a JPEG or PNG file. What is given is copied. `motion`: (forward m, left m, counter-clockwise rad) since
+        the image before, or `odometry`: the robot's pose (x m, y m, heading rad) in the odometry's own frame, from
+        which motion follows. `stamp`: nanoseconds; None: a tenth of a second after the image before. `truth`: the true
+        pose in the map frame, for metrics only. `scan`: range readings, for variants that keep clear of obstacles.
+        `new_log`: the robot has been put elsewhere, or another drive begins: there is no motion from the image before.
         """
         pixels = _pixels(image)
         if stamp is not None and (isinstance(stamp, bool) or not isinstance(stamp, int | np.integer)):
@@ -111,7 +115,7 @@ class PushedSource(Source):
             raise BadInput(f"step: stamp={cut(stamp)}, expected nanoseconds within {MAX_STAMP_NS} of 1970")
         if not isinstance(new_log, bool | np.bool_):
             raise BadInput(f"step: new_log={cut(new_log)}, expected True or False")
-        _refuse_unsound_scan(scan)
+        scan = _sound_scan(scan)
         rows = {"motion": motion, "odometry": odometry, "truth": truth}
         found = {name: None if row is None else _row(name, row) for name, row in rows.items()}
         self._frame = PushedFrame(Image(pixels), None if stamp is None else int(stamp), found, scan, bool(new_log))
@@ -183,6 +187,9 @@ class PushedSource(Source):
 
 def _pixels(image: Pixels | bytes) -> Pixels:
     if isinstance(image, bytes | bytearray | memoryview):
+        size = memoryview(image).nbytes
+        if size > MAX_FILE_BYTES:
+            raise BadInput(f"step: image has {size:,} bytes, expected at most {MAX_FILE_BYTES:,}")
         try:
             image = decode_image(bytes(image))
         except Undecodable as error:
@@ -192,23 +199,32 @@ def _pixels(image: Pixels | bytes) -> Pixels:
         raise BadInput(f"step: image is {kind}, expected uint8 of (rows, columns, 3), or the bytes of an image file")
     if image.ndim < 2 or not image.size:
         raise BadInput(f"step: image has the shape {image.shape}, expected (rows, columns, 3)")
-    image = np.array(image if image.ndim == 3 else cv2.cvtColor(image, cv2.COLOR_GRAY2BGR))  # the caller's may change
+    if image.shape[0] * image.shape[1] > MAX_PIXELS:
+        size_in_words = f"{image.shape[1]:,} x {image.shape[0]:,}"
+        raise BadInput(f"step: image has {size_in_words} pixels, expected at most {MAX_PIXELS:,}")
+    own: Pixels = np.array(image, order="C")  # the caller's may change
+    image = own if own.ndim == 3 else np.asarray(cv2.cvtColor(own, cv2.COLOR_GRAY2BGR), np.uint8)
     if is_blank(image):
         raise BadInput("step: the image is blank; leave this frame out")
     return image
 
 
-def _refuse_unsound_scan(scan: Scan | None) -> None:
-    wrong = None if scan is None else wrong_output(scan, Scan, optional=True)
+def _sound_scan(scan: Scan | None) -> Scan | None:
+    if scan is None:
+        return None
+    if isinstance(scan, Scan) and np.size(scan.ranges) > MAX_READINGS:
+        raise BadInput(f"step: scan has {np.size(scan.ranges):,} readings, expected at most {MAX_READINGS:,}")
+    wrong = wrong_output(scan, Scan, optional=False)
     if wrong is not None:
         raise BadInput(f"step: scan {wrong}")
+    return replace(scan, ranges=np.array(scan.ranges))
 
 
 def _row(name: str, given: Sequence[float]) -> Row:
-    try:
-        row = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        row = np.empty(0)
+    row = np.empty(0)
+    with suppress(TypeError, ValueError, OverflowError, LookupError):  # no three numbers; a large array is not copied
+        if len(given) == 3 and np.ndim(given[0]) == 0 and not isinstance(given, str | bytes | Mapping):
+            row = np.array([float(number) for number in given])
     if row.shape != (3,) or not (np.abs(row) <= MAX_NUMBER).all():  # NaN too
         raise BadInput(f"step: {name}={cut(given)}, expected three finite numbers (m, m, rad) within {MAX_NUMBER:g}")
     return row

@@ -1,5 +1,8 @@
 """Frames that a program pushes one at a time lead to what a run over their log gives."""
 
+import math
+import os
+import threading
 import warnings
 from pathlib import Path
 
@@ -10,7 +13,9 @@ from conftest import DRIVE, TOUR
 import omninav
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.recordings.opening import open_recording
+from omninav.stages.values.scan import Scan
 
+LONE = np.zeros((1, 1, 3), np.uint8)
 SAME = ("trajectory.tum", "metrics.json", "frames.csv", "map.omap")
 """Of result.mcap as well, where no floor plan lies beside the log."""
 
@@ -93,6 +98,23 @@ def test_a_frame_that_is_refused_is_as_if_it_had_not_come(recording, camera, bat
             ({**second, "motion": (1, 2)}, "expected three finite numbers"),
             ({**second, "motion": (1e300, 0, 0)}, "expected three finite numbers"),
             ({**second, "motion": (1e4, 0, 0)}, "10000 m since the image before"),
+            ({**second, "motion": (math.nan, 0, 0)}, "expected three finite numbers"),
+            ({**second, "motion": (number for number in range(3))}, "expected three finite numbers"),
+            ({**second, "motion": {0: 1, 1: 2, 2: 3}}, "expected three finite numbers"),
+            ({**second, "motion": "123"}, "expected three finite numbers"),
+            ({**second, "motion": ()}, "expected three finite numbers"),
+            ({**second, "motion": np.broadcast_to(0.0, (3, 10**12))}, "expected three finite numbers"),
+            ({**second, "odometry": np.broadcast_to(0.0, 10**12)}, "expected three finite numbers"),
+            (
+                {**second, "image": np.broadcast_to(LONE, (10**6, 10**6, 3))},
+                "1,000,000 x 1,000,000 pixels, expected at",
+            ),
+            (
+                {**second, "image": np.broadcast_to(LONE[..., 0], (30_000, 30_000))},
+                "pixels, expected at most 33,554,432",
+            ),
+            ({**second, "image": bytes(100_000_001)}, "100,000,001 bytes, expected at most 100,000,000"),
+            ({**second, "scan": Scan(np.broadcast_to(1.0, 10**12), 0.0, 0.1, 0.0, 1.0)}, "expected at most 100,000"),
             ({**second, "truth": "abc"}, "expected three finite numbers"),
             ({**second, "stamp": 2**63}, "of 1970"),
             ({**second, "stamp": "x" * 10_000}, "expected whole nanoseconds"),
@@ -176,3 +198,107 @@ def test_a_variant_that_drives_gives_its_caller_the_command(recording, camera, t
         for k in range(3):
             out = session.step(image=recording.image(k), motion=(0.1, 0.0, 0.0), stamp=recording.stamps[k])
     assert abs(out.command.speed) + abs(out.command.turning) > 0.0  # its target lies behind it
+
+
+@pytest.fixture
+def session(batch, camera, tmp_path):
+    return omninav.open("omniview_mcl", map=batch.folder / "map.omap", camera=camera, folder=tmp_path / "run")
+
+
+def test_what_leaves_a_step_or_a_map_cannot_change_the_run(recording, batch, session):
+    for frame in frames_of(recording):
+        out = session.step(**frame)
+        for array in (out.belief.poses, out.belief.weights, out["match.similarities"].values, out.image.pixels):
+            with pytest.raises(ValueError, match="read-only"):
+                array += 1
+    assert same_files(batch, session.close()) == []
+    for map in (batch.map, omninav.load_map(batch.folder / "map.omap")):
+        with pytest.raises(ValueError, match="read-only"):
+            map.poses[0] = 0.0
+
+
+def test_a_map_that_a_step_gives_stays_as_it_is_given(recording, camera, tmp_path):
+    with omninav.open("omniview_cml", camera=camera, folder=tmp_path / "run") as session:
+        given = [session.step(**frame)["mapping.map"] for frame in frames_of(recording)]
+    sizes = [len(map) for map in given]
+    assert sizes[-1] > sizes[0]
+    assert [len(map) for map in given] == sizes
+    with pytest.raises(ValueError, match="read-only"):
+        given[-1].means[...] = 0.0
+
+
+def test_images_in_any_order_of_memory_and_arrays_that_the_caller_reuses_give_the_same(recording, batch, session):
+    buffer, pose = np.empty_like(recording.image(0)), np.empty(3)
+    for frame in frames_of(recording):
+        turned = np.ascontiguousarray(frame["image"].transpose(1, 0, 2)).transpose(1, 0, 2)  # columns first
+        assert not turned.flags.c_contiguous
+        buffer[...], pose[...] = turned, frame["odometry"]
+        given = turned if frame["stamp"] % 2 else buffer
+        session.step(**{**frame, "image": given, "odometry": pose, "stamp": np.int64(frame["stamp"])})
+        buffer[...], pose[...] = 0, 0.0
+    assert same_files(batch, session.close()) == []
+
+
+def test_a_second_thread_is_refused_during_a_step_and_may_close_after_it(recording, batch, session):
+    frames = list(frames_of(recording))
+    session.step(**frames[0])
+    tick, inside, go_on, refused = session._engine.tick, threading.Event(), threading.Event(), []
+
+    def slow() -> bool:
+        inside.set()
+        assert go_on.wait(60)
+        return bool(tick())
+
+    session._engine.tick = slow
+    first = threading.Thread(target=lambda: session.step(**frames[1]))
+    first.start()
+    assert inside.wait(60)
+    for act in (lambda: session.step(**frames[2]), session.save):
+        with pytest.raises(omninav.BadInput, match="in the middle of a step; use it from one thread at a time"):
+            act()
+    session._engine.tick = tick
+    closing = threading.Thread(target=lambda: refused.append(session.close().status))
+    closing.start()
+    go_on.set()
+    first.join()
+    closing.join()
+    assert refused == ["complete"]
+
+
+def test_a_forked_process_is_refused_and_leaves_the_session_as_it_is(recording, batch, session):
+    frames = list(frames_of(recording))
+    said, told = os.pipe()
+    with session:
+        for frame in frames[:5]:
+            session.step(**frame)
+        child = os.fork()
+        if child == 0:
+            try:
+                with session:
+                    session.step(**frames[5])
+            except omninav.BadInput as error:
+                os.write(told, str(error).encode())
+            finally:
+                os._exit(0)
+        os.waitpid(child, 0)
+        assert f"process {os.getpid()} has this session; open another one" in os.read(said, 4096).decode()
+        for frame in frames[5:]:
+            session.step(**frame)
+    assert same_files(batch, omninav.open_run(session.folder)) == []
+
+
+def test_a_program_may_change_its_folder_between_steps(recording, batch, camera, tmp_path, monkeypatch):
+    settings = {"map": batch.folder / "map.omap", "camera": camera}
+    for folder, place in (("own", Path("own")), (None, Path("runs"))):
+        here, elsewhere = tmp_path / f"here {place}", tmp_path / f"elsewhere {place}"
+        here.mkdir()
+        elsewhere.mkdir()
+        monkeypatch.chdir(here)
+        session = omninav.open("omniview_mcl", folder=folder, runs="runs", cache="cache", **settings)
+        for frame in frames_of(recording):
+            monkeypatch.chdir(elsewhere)
+            session.step(**frame)
+        made = session.close()
+        assert made.folder.is_relative_to(here / place)
+        assert same_files(batch, made) == []
+        assert not list(elsewhere.iterdir())

@@ -58,3 +58,16 @@ def test_what_is_wrong_is_an_exception_and_no_exit():
         omninav.compose("plain_matching", map="missing.omap", log="missing.mcap")
     with pytest.raises(omninav.BadInput, match="command line"):
         omninav.compose("+experiment=omniview_mcl/table_1")
+
+
+def test_what_is_too_large_for_a_word_is_refused_before_it_is_written_out():
+    itself: list = []
+    itself.append(itself)
+    for value, what in (
+        (range(10**12), "seed: a range of 1,000,000,000,000 items cannot be a setting; expected at most 10,000"),
+        (itself, "seed: a list within 20 others cannot be a setting"),
+        (10**5000, "seed: a whole number of more than 100 digits cannot be a setting"),
+        ((number for number in range(3)), "seed: a generator cannot be a setting"),
+    ):
+        with pytest.raises(omninav.BadInput, match=what):
+            omninav.compose("plain_matching", seed=value)

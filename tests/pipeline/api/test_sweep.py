@@ -40,3 +40,16 @@ def test_a_sweep_is_opened_reported_and_compared_by_its_folder(sweep, capsys):
 def test_what_is_no_sweep_is_said(tmp_path):
     with pytest.raises(omninav.BadInput, match="not a sweep's folder"):
         omninav.open_sweep(tmp_path)
+
+
+def test_a_sweep_of_too_many_values_or_none_is_refused_before_they_are_listed():
+    for values, what in (
+        (range(10**12), "seed: a sweep of 1,000,000,000,000 values, expected 1 to 100,000"),
+        ([0] * 100_001, "seed: a sweep of 100,001 values"),
+        ([], "seed: a sweep of 0 values"),
+        (range(3, 3), "seed: a sweep of 0 values"),
+    ):
+        with pytest.raises(omninav.BadInput, match=what):
+            omninav.sweep("plain_matching", seed=values, progress=False)
+    with pytest.raises(omninav.BadInput, match="a sweep of 10,000,000 jobs, expected at most 100,000"):
+        omninav.sweep("plain_matching", seed=range(10_000), checkpoint_s=range(1, 1001), progress=False)
