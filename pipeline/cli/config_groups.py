@@ -28,8 +28,9 @@ def refuse_null_groups(words: Sequence[str]) -> None:
     for word in words:
         name, _, value = word.partition("=")
         if value == "null" and name.isidentifier() and is_group(name):
-            hint = f"to take the node out, type '~nodes.{name}' '~wires.{name}'"
-            raise ProblemsFound([Problem(name, "a stage cannot be swapped for nothing", hint)])
+            heads = [file.read_text("utf-8").partition("\n")[0] for file in group_files(name)]
+            what = f"'~nodes.{name}' '~wires.{name}'" if f"# @package nodes.{name}" in heads else f"'~{name}'"
+            raise ProblemsFound([Problem(name, "it cannot be swapped for nothing", f"to take it out, type {what}")])
 
 
 def settings_left_open() -> list[str]:

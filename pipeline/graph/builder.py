@@ -37,7 +37,8 @@ def build(
 
 
 WIRE_OPTIONS = ("from", "delay", "initial", "hold", "collect", "optional")
-"""What a wire may say. One that is `optional` is left out where the graph has not both its ends."""
+"""What a wire may say. One that is `optional` is left out where the graph has not both its ends, and so is a node that
+needs it."""
 
 
 class _Builder:
@@ -48,10 +49,12 @@ class _Builder:
         self.problems: list[Problem] = []
         self.nodes: dict[str, Node] = {}
         self.broken: set[str] = set()
+        self.left_out: set[str] = set()
         self.wires: list[Wire] = []
 
     def build(self) -> Graph:
         self._read_nodes()
+        self._leave_out()
         self._read_wires()
         self._check_missing()
         graph = Graph(self.nodes, self.wires, self.artifacts)
@@ -121,6 +124,25 @@ class _Builder:
 
     # wires
 
+    def _leave_out(self) -> None:
+        """Leave out nodes with a needed input whose optional wire comes from nowhere, and so on behind them."""
+        wires = self.config.get("wires")
+        while wires and isinstance(wires, Mapping):
+            lacking = {name for name, node in self.nodes.items() if self._lacks(node, wires.get(name))}
+            if not lacking:
+                break
+            self.left_out |= lacking
+            for name in lacking:
+                del self.nodes[name]
+
+    def _lacks(self, node: Node, wires: Any) -> bool:
+        """Whether an input that a node needs is wired, optionally, to what the graph has not."""
+        return isinstance(wires, Mapping) and any(
+            _is_optional(spec) and not self._given(spec)
+            for name, spec in wires.items()
+            if (port := node.signature.inputs.get(str(name))) is not None and not port.optional
+        )
+
     def _read_wires(self) -> None:
         wires = self.config.get("wires") or {}
         if not isinstance(wires, Mapping):
@@ -131,7 +153,7 @@ class _Builder:
             )
             return
         for name, ports in wires.items():
-            if ports is None:
+            if ports is None or name in self.left_out:
                 continue
             if not isinstance(ports, Mapping):
                 self._problem(
@@ -140,7 +162,7 @@ class _Builder:
                     f"write wires: {{{name}: {{port: node.port}}}}",
                 )
             elif name not in self.nodes:
-                if name not in self.broken:
+                if name not in self.broken and not all(map(_is_optional, ports.values())):
                     near = nearest(str(name), self.nodes, 0.7)
                     hint = f"did you mean 'wires.{near}'? " if near else ""
                     hint += f"if the node was taken out, type '~wires.{name}' too"
@@ -153,7 +175,7 @@ class _Builder:
     def _read_wire(self, node: Node, port_name: str, spec: Any) -> None:
         where = f"wires.{node.name}.{port_name}"
         port = node.signature.inputs.get(port_name)
-        if isinstance(spec, Mapping) and spec.get("optional") is True and (port is None or not self._given(spec)):
+        if _is_optional(spec) and (port is None or not self._given(spec)):
             return
         if port is None:
             hint = suggest(port_name, node.signature.inputs, "input ports", prefix=f"wires.{node.name}.")
@@ -282,7 +304,7 @@ class _Builder:
             for name, ports in (wires.items() if isinstance(wires, Mapping) else ())
             if isinstance(ports, Mapping)
             for port, spec in ports.items()
-            if spec is not None and not (isinstance(spec, Mapping) and spec.get("optional") is True)
+            if spec is not None and not _is_optional(spec)
         } | {(wire.to_node, wire.to_port) for wire in self.wires}
         for node in self.nodes.values():
             for port in node.signature.inputs.values():
@@ -350,10 +372,14 @@ class _Builder:
             self._problem(wire.where, f"the nodes wait for each other: {path}", hint)
             return Graph(self.nodes, self.wires, self.artifacts)
         self._order_in_place(order, lifetimes)
-        listed = list(self.nodes)
+        listed = {name: number for number, name in enumerate(self.nodes)}
 
-        def early(name: str) -> tuple[int, bool, int]:
-            return LIFETIMES.index(lifetimes[name]), not self.nodes[name].signature.is_source, listed.index(name)
+        def early(name: str) -> tuple[int, bool, int, int]:
+            first = min(
+                listed[later] for later in (name, *nx.descendants(order, name))
+            )  # what waits for it is early too
+            own = self.nodes[name].signature
+            return LIFETIMES.index(lifetimes[name]), not own.is_source, first, listed[name]
 
         running = nx.lexicographical_topological_sort(order, key=early)
         nodes = {name: dataclasses.replace(self.nodes[name], lifetime=lifetimes[name]) for name in running}
@@ -416,3 +442,7 @@ def stages_that_give(kind: Any) -> list[str]:
 def _unset(name: str, target: str, cls: type[Stage], read: Signature) -> Node:
     """A stand-in with default parameters for a node whose parameters are wrong, so that its wires are checked too."""
     return Node(name, target, cls(), read, {})
+
+
+def _is_optional(spec: Any) -> bool:
+    return isinstance(spec, Mapping) and spec.get("optional") is True

@@ -19,7 +19,7 @@ from omninav.stages.recordings.pose_messages import (
     ros_pose,
     transform,
 )
-from omninav.stages.values.belief import Belief, GaussianMixture, Particles, PoseEstimate
+from omninav.stages.values.belief import GaussianMixture, Particles, PoseEstimate
 from omninav.stages.values.command import Command
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.ros_messages import RosMessages
@@ -83,7 +83,7 @@ class Publish(Stage):
         self,
         ctx: Context,
         tick: Tick,
-        belief: Belief | None = None,
+        estimate: PoseEstimate | None = None,
         odometry: Pose | None = None,
         command: Command | None = None,
     ) -> Out:
@@ -92,8 +92,8 @@ class Publish(Stage):
             return self.Out()
         if self.command is not None and (command is not None or self._watchdog is not None):
             self._drive(tick.stamp, command or Command(0.0, 0.0))
-        if belief is not None:
-            self._publish_estimate(tick.stamp, belief.estimate(), odometry)
+        if estimate is not None:
+            self._publish_estimate(tick.stamp, estimate, odometry)
         self._transport.status.published(tick.stamp)
         return self.Out()
 

@@ -140,7 +140,7 @@ class ResultMessages(Stage):
         if confidence is not None:
             out.add("/estimate/confidence", "std_msgs/msg/Float64", {"data": confidence.probability})
         if belief is not None:
-            self._show_belief(out, belief)
+            self._show_belief(out, belief, estimate)
         if similarities is not None and map is not None:
             _show_similarities(out, similarities, map)
         if panorama is not None:
@@ -198,7 +198,7 @@ class ResultMessages(Stage):
             fields = path_message(shown.stamps, shown.path, tick.stamp)
             out.add("/estimate/path", "nav_msgs/msg/Path", fields)
 
-    def _show_belief(self, out: "_Messages", belief: Belief) -> None:
+    def _show_belief(self, out: "_Messages", belief: Belief, estimate: PoseEstimate | None) -> None:
         if isinstance(belief, Particles):
             poses = thin(belief, self.particles).poses
         elif isinstance(belief, GaussianMixture):
@@ -211,8 +211,10 @@ class ResultMessages(Stage):
             likely = likely[belief.probabilities[likely] > 0.01]
             poses, weights = belief.poses[likely], belief.probabilities[likely]
             out.markers("/belief/markers", [weighted_points(out.stamp, "belief", PINK, 0.35, poses[:, :2], weights)])
+        elif estimate is not None:
+            poses = np.array([pose_row(estimate.pose)])
         else:
-            poses = np.array([pose_row(belief.estimate().pose)])
+            return
         fields = {"header": header(out.stamp), "poses": pose_messages(poses)}
         out.add("/belief", "geometry_msgs/msg/PoseArray", fields)
 

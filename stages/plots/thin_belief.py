@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Outputs, Stage
-from omninav.stages.values.belief import Belief, GaussianMixture, Particles
+from omninav.stages.values.belief import Belief, GaussianMixture, Particles, PoseEstimate
 
 Array = npt.NDArray[np.float64]
 
@@ -14,24 +14,26 @@ Array = npt.NDArray[np.float64]
 class ThinBelief(Stage):
     """Thins a belief to few equally weighted particles that stand for it, without chance.
 
-    Of a mixture, as many of its heaviest Gaussians. Other beliefs become the one pose of their estimate.
+    Of a mixture, as many of its heaviest Gaussians. Any other belief becomes the one pose of its estimate.
     """
 
     particles: Annotated[int, Bounds(ge=1)] = 300
     """Largest number of particles or Gaussians."""
 
     class Out(Outputs):
-        """`belief`: particles or Gaussians, map frame."""
+        """`belief`: particles or Gaussians, map frame; absent where another belief has no estimate."""
 
-        belief: Particles | GaussianMixture
+        belief: Particles | GaussianMixture | None = None
 
-    def step(self, ctx: Context, belief: Belief) -> Out:
+    def step(self, ctx: Context, belief: Belief, estimate: PoseEstimate | None = None) -> Out:
         """One belief, thinned."""
         if isinstance(belief, Particles):
             return self.Out(belief=thin(belief, self.particles))
         if isinstance(belief, GaussianMixture):
             return self.Out(belief=heaviest(belief, self.particles))
-        pose = belief.estimate().pose
+        if estimate is None:
+            return self.Out()
+        pose = estimate.pose
         return self.Out(belief=Particles(np.array([[pose.x, pose.y, pose.heading]]), np.ones(1)))
 
 

@@ -105,6 +105,7 @@ def test_a_log_of_ones_own_without_a_map_says_what_to_type(omninav, tmp_path: Pa
         (("tour=tour.mcap",), "tour is given, but no log\n      type log=…"),
         (("tour=tour.mcap", "map=m.omap", "log=d.mcap"), "leave one of them away"),
         (("match=null",), "'~nodes.match' '~wires.match'"),
+        (("evaluation=null",), "to take it out, type '~evaluation'"),
         (("check", "tour=nowhere.mcap", "log=nowhere.mcap"), "nowhere.mcap"),
         (("stages", "matsch"), "did you mean 'omninav stages match'?"),
         (("stages", "match.selektive"), "did you mean 'omninav stages match.selective'?"),

@@ -112,6 +112,20 @@ def test_every_variant_builds(path: Path):
     assert planned.graph.nodes
 
 
+def test_every_variant_builds_without_what_it_is_measured_by():
+    measured = [path.stem for path in sorted((CONF / "variant").glob("*.yaml")) if "drive" in nodes_of(path.stem)]
+    assert len(measured) > 20
+    for variant in measured:
+        left = nodes_of(variant, "~evaluation")
+        assert left < nodes_of(variant), variant
+        assert "drive" not in left, variant
+        assert ("estimate" in left) == ("fusion" in left), variant
+
+
+def nodes_of(variant: str, *words: str) -> set[str]:
+    return set(plan(complete(compose([f"variant={variant}", *words]))).graph.nodes)
+
+
 @pytest.mark.parametrize("path", sorted((CONF / "variant").glob("*.yaml")), ids=lambda path: path.stem)
 def test_a_variant_declares_the_inputs_that_its_graph_reads(path: Path):
     config = compose([f"variant={path.stem}"])

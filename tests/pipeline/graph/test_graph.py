@@ -125,6 +125,30 @@ def test_a_missing_artifact_is_a_problem_and_a_fitting_one_is_none():
     assert "is of type Word" in only({"s": "Scale"}, {"s": {"number": "artifacts.map"}}, {"map": toys.Word}).what
 
 
+def test_a_node_that_needs_an_optional_wire_from_nowhere_is_left_out_and_so_are_those_behind_it():
+    nowhere = {"from": "measured.number", "optional": True}
+    behind = {"number": {"from": "first.number", "optional": True}}
+    nodes = {"c": "Constant", "first": "Scale", "second": "Scale", "sum": "Add"}
+    wires = {"first": {"number": nowhere}, "second": behind, "sum": {"number": "c.number", "other": nowhere}}
+    graph = build(config(nodes, wires))
+    assert list(graph.nodes) == ["c", "sum"]
+    assert [wire.where for wire in graph.wires] == ["wires.sum.number"]
+    whole = build(config({**nodes, "measured": "Constant"}, wires))
+    assert set(whole.nodes) == {*nodes, "measured"}
+    assert len(whole.wires) == 4
+
+
+def test_a_needed_wire_from_a_node_that_was_left_out_is_a_problem():
+    wires = {"first": {"number": {"from": "nowhere.number", "optional": True}}, "second": {"number": "first.number"}}
+    assert only({"first": "Scale", "second": "Scale"}, wires).where == "wires.second.number"
+
+
+def test_optional_wires_may_feed_a_node_that_is_not_there():
+    wire = {"from": "c.number", "optional": True}
+    assert not build(config({"c": "Constant"}, {"plot": {"number": wire}})).wires
+    assert only({"c": "Constant"}, {"plot": {"number": wire, "other": "c.number"}}).where == "wires.plot"
+
+
 def test_a_delay_without_a_first_value_is_a_problem():
     problem = only(LOOP, {"sum": {"number": "source.number", "other": {"from": "sum.number", "delay": 1}}})
     assert "needs a first value" in problem.what

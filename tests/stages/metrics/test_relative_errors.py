@@ -6,9 +6,9 @@ from scipy.optimize import minimize
 from small_run import collected, eight, small_run
 
 from omninav.pipeline import Context, Tick
+from omninav.stages.fusion.pose_estimate import BeliefEstimate
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.metrics.map_size import MapSize
-from omninav.stages.metrics.pose_estimate import BeliefEstimate
 from omninav.stages.metrics.relative_errors import (
     RelativeErrors,
     absolute_trajectory_errors,

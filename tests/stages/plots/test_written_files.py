@@ -124,5 +124,6 @@ def test_thinning_keeps_a_particle_as_often_as_its_weight_says():
 
 
 def test_a_belief_of_another_kind_is_shown_by_its_pose():
-    out = ThinBelief().step(Context("thin"), SinglePose(Pose(1.0, 2.0, 0.5)))
+    belief = SinglePose(Pose(1.0, 2.0, 0.5))
+    out = ThinBelief().step(Context("thin"), belief, belief.estimate())
     assert out.belief.poses.tolist() == [[1.0, 2.0, 0.5]]

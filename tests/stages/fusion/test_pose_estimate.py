@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context
-from omninav.stages.metrics.pose_estimate import BeliefEstimate
+from omninav.stages.fusion.pose_estimate import BeliefEstimate
 from omninav.stages.values.belief import GaussianMixture
 
 BELIEF = GaussianMixture(
