@@ -43,11 +43,11 @@ def _figure(number: Number) -> KeyFigure:
 
 
 def _plain(known: Mapping[str, Number], metrics: Metrics) -> list[Number]:
-    """Figures of no group's details, one for each entry."""
+    """Figures that are no details, one for each entry."""
     found: dict[str, Number] = {}
     for path, number in known.items():
         spread = number.entry.statistics
-        if is_detail(path, metrics) or number.is_context:
+        if is_detail(path, metrics):
             continue
         if spread is None or path.rpartition(".")[2] == next((s for s in STANDS_FOR_ALL if s in spread), None):
             found[number.entry.path] = number

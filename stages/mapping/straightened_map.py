@@ -16,8 +16,8 @@ from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.maps import ReferenceGraph
 
 QUANTITIES = {
-    "straightened.closures": Quantity(title="Places that the tour came back to", context=True),
-    "straightened.rejected": Quantity(title="Of these contradicted by the others", context=True),
+    "straightened.closures": Quantity(title="Loop closures found", context=True),
+    "straightened.rejected": Quantity(title="Loop closures rejected, as the others contradict them", context=True),
     "straightened.moved_median_m": Quantity(title="References moved by, median", context=True),
     "straightened.moved_max_m": Quantity(title="References moved by, largest", context=True),
 }

@@ -22,9 +22,9 @@ Bools = npt.NDArray[np.bool_]
 
 QUANTITIES = {
     "straightened.sessions": Quantity(title="Drives that the map was learned from", context=True),
-    "straightened.joined": Quantity(title="Of these joined by places that look alike", context=True),
-    "straightened.closures": Quantity(title="Places that the drives came back to", context=True),
-    "straightened.rejected": Quantity(title="Of these contradicted by the others", context=True),
+    "straightened.joined": Quantity(title="Drives joined by places that look alike", context=True),
+    "straightened.closures": Quantity(title="Loop closures found", context=True),
+    "straightened.rejected": Quantity(title="Loop closures rejected, as the others contradict them", context=True),
     "straightened.moved_rms_m": Quantity(title="Views moved by, root mean square", context=True),
     "straightened.moved_max_m": Quantity(title="Views moved by, largest", context=True),
 }

@@ -17,8 +17,8 @@ Array = npt.NDArray[np.float64]
 MIN_WEIGHT = 0.1
 """Of a closure, below which the others have contradicted it."""
 QUANTITIES = {
-    "straightened.closures": Quantity(title="Views of places that the tour came back to", context=True),
-    "straightened.rejected": Quantity(title="Of these contradicted by the others", context=True),
+    "straightened.closures": Quantity(title="Loop closures found", context=True),
+    "straightened.rejected": Quantity(title="Loop closures rejected, as the others contradict them", context=True),
     "straightened.moved_rms_m": Quantity(title="Views moved by, root mean square", context=True),
     "straightened.moved_max_m": Quantity(title="Views moved by, largest", context=True),
 }

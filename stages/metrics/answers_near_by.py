@@ -12,11 +12,11 @@ from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.similarity import Answers
 
 QUANTITIES = {
-    "answers.nearby_rate": Quantity(title="Answers taken near by", better="higher"),
-    "answers.first_nearby_rate": Quantity(title="First answers taken near by", better="higher"),
-    "answers.background_rate": Quantity(title="Images of the map taken near by"),
-    "answers.first_similarity": Quantity(title="Similarity of the first answer"),
-    "answers.last_similarity": Quantity(title="Similarity of the last answer"),
+    "answers.nearby_rate": Quantity(title="Retrieved images taken nearby", better="higher"),
+    "answers.first_nearby_rate": Quantity(title="First retrieved image taken nearby", better="higher"),
+    "answers.background_rate": Quantity(title="All images of the map taken nearby"),
+    "answers.first_similarity": Quantity(title="Similarity of the first retrieved image"),
+    "answers.last_similarity": Quantity(title="Similarity of the last retrieved image"),
 }
 
 

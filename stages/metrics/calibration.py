@@ -22,14 +22,14 @@ other (in a drive, those some metres apart) right ellipses hold 17 or more with 
 MOST_MISCALIBRATED = 0.1
 """Calibration error of a confidence above which it is shown as off: as much as one of the ten bins is wide."""
 QUANTITIES = {
-    "calibration.lost_auroc": Quantity(title="Confidence tells lost frames (AUROC)", better="higher"),
-    "calibration.wrong_auroc": Quantity(title="Confidence tells wrong frames (AUROC)", better="higher"),
+    "calibration.lost_auroc": Quantity(title="Lost frames told by a low confidence (AUROC)", better="higher"),
+    "calibration.wrong_auroc": Quantity(title="Wrong frames told by a low confidence (AUROC)", better="higher"),
     "calibration.expected_error": Quantity(
         title="Calibration error of the confidence (ECE)", unit="%", better="lower", most=MOST_MISCALIBRATED
     ),
     "calibration.ellipse_50": Quantity(title="50 % ellipse holds", unit="%"),
     "calibration.ellipse_95": Quantity(title="95 % ellipse holds", unit="%", least=LEAST_IN_ELLIPSE),
-    "calibration.nees": Quantity(title="Squared error over covariance (NEES; 2 is right)"),
+    "calibration.nees": Quantity(title="Squared error over covariance (NEES, 2 is right)"),
 }
 
 
@@ -78,10 +78,11 @@ class Calibration(Stage):
             held = ConfidenceReliability(*found, self.within_m, self.within_deg)
         if not values:
             return self.Out()
-        within = Quantity(
-            title=f"Frames within {self.within_m:g} m and {self.within_deg:g}°", unit="%", better="higher"
-        )
-        quantities = QUANTITIES | {"calibration.right_share": within}
+        quantities = QUANTITIES | {
+            "calibration.right_share": Quantity(
+                title=f"Frames within {self.within_m:g} m and {self.within_deg:g}°", unit="%", better="higher"
+            )
+        }
         too_small = values.get("ellipse_95", 1.0) < LEAST_IN_ELLIPSE
         headlines = (*(("calibration.ellipse_95",) if too_small else ()), "calibration.expected_error")
         return self.Out(metrics=Metrics({"calibration": values}, quantities, headlines), reliability=held)

@@ -20,7 +20,9 @@ QUANTITIES = {
     "comparison.other_rooms_left_out": Quantity(title="Pairs of two rooms left out by colours", unit="%"),
     "comparison.own_room_left_out": Quantity(title="Pairs of one room left out by colours", unit="%"),
     "comparison.two_lights.passed_rate": Quantity(title="Pairs of one place in two lights that pass the colours"),
-    "comparison.two_lights.change": Quantity(title="Change of colours with the light, of that between two rooms"),
+    "comparison.two_lights.change": Quantity(
+        title="Change of colours with the light, relative to that between two rooms"
+    ),
     "comparison.rank_correlation": Quantity(title="Rank correlation of visual distance and metres"),
 }
 

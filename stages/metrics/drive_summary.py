@@ -13,7 +13,7 @@ MIN_SPEED = 0.03
 QUANTITIES = {
     "drive.collisions": Quantity(title="Collisions", better="lower", most=0.0),
     "drive.distance_m": Quantity(title="Distance driven", context=True),
-    "drive.stopped_share": Quantity(title="Time in which it stood or turned on the spot", unit="%", better="lower"),
+    "drive.stopped_share": Quantity(title="Time standing or turning on the spot", unit="%", better="lower"),
     "drive.duration_s": Quantity(title="Duration", context=True),
 }
 

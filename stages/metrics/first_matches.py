@@ -45,7 +45,7 @@ QUANTITIES = {
     "matches.all.first_right": Quantity(title="Matches right before the first wrong one, median", better="higher"),
     "matches.all.found_again": Quantity(title="Features found again", unit="%", better="higher"),
     "matches.all.right": Quantity(title="Matches right, median", better="higher"),
-    "matches.all.by_chance": Quantity(title="Wrong partners that pass as right", unit="%"),
+    "matches.all.by_chance": Quantity(title="Matches with wrong images that pass as right", unit="%"),
     "matches.all.pairs": Quantity(title="Pairs of images", context=True),
 }
 

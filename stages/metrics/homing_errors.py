@@ -19,9 +19,9 @@ QUANTITIES = {
     "homing.end_error_m": Quantity(title="Distance to the target at the end", better="lower"),
     "homing.end_turn_deg": Quantity(title="Heading error at the end", better="lower"),
     "homing.reached": Quantity(title="Target reached", unit="%", better="higher", least=1.0),
-    "homing.arrived": Quantity(title="Said that it had arrived", unit="%", better="higher"),
-    "homing.time_s": Quantity(title="Time until it arrived", better="lower", absent="never"),
-    "homing.lost_rate": Quantity(title="Target lost", better="lower"),
+    "homing.arrived": Quantity(title="Arrival reported", unit="%", better="higher"),
+    "homing.time_s": Quantity(title="Time until arrival", better="lower", absent="never"),
+    "homing.lost_rate": Quantity(title="Images in which the target was lost", better="lower"),
     "homing.direction_error_deg": Quantity(title="Error of the homing direction", better="lower"),
     "homing.start_m": Quantity(title="Distance to the target at the start", context=True),
 }

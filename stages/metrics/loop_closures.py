@@ -19,11 +19,11 @@ QUANTITIES = {
     "loops.loop_closures.precision": Quantity(title="Loop closures, precision", unit="%", better="higher"),
     "loops.loop_closures.recall": Quantity(title="Loop closures, recall", unit="%", better="higher"),
     "loops.loop_closures.average_precision": Quantity(
-        title="Loop closures, area under precision-recall, Σ Pₙ (Rₙ - Rₙ₋₁)", unit="%", better="higher"
+        title="Loop closures, average precision", unit="%", better="higher"
     ),
     "precision": Quantity(unit="%", better="higher"),
     "recall": Quantity(unit="%", better="higher"),
-    "wrong": Quantity(title="Accepted wrongly", better="lower"),
+    "wrong": Quantity(title="Loop closures accepted wrongly", better="lower"),
     "map.places": Quantity(title="Places in the map", context=True),
     "map.size_bytes": Quantity(title="Map size", better="lower"),
     "map.place_size_bytes": Quantity(title="Size of a place", better="lower"),

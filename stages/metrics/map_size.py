@@ -5,6 +5,7 @@ from omninav.stages.values.maps import ReferenceGraph
 
 QUANTITIES = {
     "map.references": Quantity(title="References in the map", context=True),
+    "map.edges": Quantity(title="Edges of the map"),
     "map.size_bytes": Quantity(title="Map size", better="lower"),
     "map.pose_source": Quantity(setting=True),
     "map.reference_size_bytes": Quantity(title="Size of a reference", better="lower"),

@@ -6,7 +6,9 @@ from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.grid import FreeSpace
 
-QUANTITIES = {"mean_at_first.from_middle_m": Quantity(title="Mean of the first belief, from the middle of the place")}
+QUANTITIES = {
+    "mean_at_first.from_middle_m": Quantity(title="Mean of the first belief, distance from the middle of the floor")
+}
 
 
 class MeanAtFirst(Stage):

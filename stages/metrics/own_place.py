@@ -15,9 +15,9 @@ QUANTITIES = {
     "own_place.similarity": Quantity(title="Similarity to the view of the same place", better="higher"),
     "own_place.similarity_nearby": Quantity(title="Similarity to views taken nearby", better="higher"),
     "own_place.similarity_elsewhere": Quantity(title="Similarity to views of other places"),
-    "own_place.lost": Quantity(title="Similarity lost, of what there is to lose", better="lower"),
+    "own_place.lost": Quantity(title="Similarity lost at the same place", better="lower"),
     "own_place.lost_nearby": Quantity(title="Similarity lost nearby", better="lower"),
-    "own_place.told_rate": Quantity(title="Told from all other places", better="higher"),
+    "own_place.told_rate": Quantity(title="More similar to its own place than to all others", better="higher"),
 }
 
 

@@ -12,7 +12,9 @@ Array = npt.NDArray[np.float64]
 COLOURS = 3
 """Entries of a segment's descriptor before its profile's coefficients."""
 QUANTITIES = {
-    "profiles.least_ratio": Quantity(title="Variance kept, cosine over principal, of the worst number", better="higher")
+    "profiles.least_ratio": Quantity(
+        title="Least variance kept by cosines, of what principal components keep", better="higher"
+    )
 }
 
 

@@ -13,12 +13,15 @@ from omninav.stages.values.drive import Array, Drive, known
 
 def quantities(distance_m: float) -> dict[str, Quantity]:
     """How the figures are read; relative errors are those over `distance_m`."""
-    relative = f"Relative pose error (RPE) over {distance_m:g} m"
     return {
         "absolute_trajectory_error_m": Quantity(title="Absolute trajectory error (ATE), aligned", better="lower"),
         "unaligned_trajectory_error_m": Quantity(title="Absolute trajectory error (ATE), not aligned", better="lower"),
-        "relative_position_error_m": Quantity(title=f"{relative}, position", better="lower"),
-        "relative_heading_error_deg": Quantity(title=f"{relative}, heading", better="lower"),
+        "relative_position_error_m": Quantity(
+            title=f"Relative pose error (RPE) over {distance_m:g} m, position", better="lower"
+        ),
+        "relative_heading_error_deg": Quantity(
+            title=f"Relative pose error (RPE) over {distance_m:g} m, heading", better="lower"
+        ),
         "relative_error_distance_m": Quantity(setting=True),
     }
 

@@ -10,7 +10,7 @@ from omninav.stages.geometry.probability.gaussians import density
 from omninav.stages.geometry.probability.particles import weighted_moments
 from omninav.stages.values.belief import GaussianMixture, Particles
 
-QUANTITIES = {"resampling.ratio": Quantity(title="Spread of the particles after resampling, over that before")}
+QUANTITIES = {"resampling.ratio": Quantity(title="Spread of the particles, after resampling / before")}
 
 
 class ResamplingSpread(Stage):

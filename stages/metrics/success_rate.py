@@ -49,10 +49,13 @@ class SuccessRate(Stage):
         return self.Out(metrics=Metrics(found, self._quantities(), ("success.recovered_after_frames",)))
 
     def _quantities(self) -> dict[str, Quantity]:
-        within = f"within {self.within_m:g} m and {self.within_deg:g}°"
         return {
-            "success.within_rate": Quantity(title=f"Frames {within}", better="higher"),
-            "success.at_end": Quantity(title=f"Last pose {within}", unit="%", better="higher"),
+            "success.within_rate": Quantity(
+                title=f"Frames within {self.within_m:g} m and {self.within_deg:g}°", better="higher"
+            ),
+            "success.at_end": Quantity(
+                title=f"Last pose within {self.within_m:g} m and {self.within_deg:g}°", unit="%", better="higher"
+            ),
             "success.unimodal_after_frames": Quantity(
                 title="Images until one hypothesis is left", unit="", better="lower", absent="never"
             ),
