@@ -22,7 +22,7 @@ from typing import Any
 
 import omninav
 
-SEEING_PANORAMAS = ("plain_matching", "omniview_mcl", "omninav", "retrieval_mcl", "particle_cml_baseline")
+SEEING_PANORAMAS = ("omninav", "omniview_mcl", "retrieval_mcl", "particle_cml_baseline", "plain_matching")
 """They learn a map and describe panoramas, whose light can be changed between tour and drive."""
 MAPPED = (*SEEING_PANORAMAS, "topological_localisation")
 LEARNING = ("omniview_cml", "particle_cml")
@@ -132,8 +132,9 @@ def tables(figures: Figures, seeds: int) -> str:
     """Markdown: of each data set a row per variant and a column per light."""
     lines = [BEGIN]
     for on in dict.fromkeys(key.split(", ")[0] for by_set in figures.values() for key in by_set):
-        lines += [f"| {on} | {' | '.join(LIGHTS)} |", f"|---{'|---:' * len(LIGHTS)}|"]
-        for variant, by_set in figures.items():
+        lines += [f"| {on}: median / 90 % (m) | {' | '.join(LIGHTS)} |", f"|---{'|---:' * len(LIGHTS)}|"]
+        for variant in (name for name in (*MAPPED, *LEARNING) if name in figures):
+            by_set = figures[variant]
             shown = [cell(by_set[key]) if (key := f"{on}, {light}") in by_set else "" for light in LIGHTS]
             lines += [f"| `{variant}` | {' | '.join(shown)} |"] if any(shown) else []
         lines.append("")

@@ -22,7 +22,8 @@ def variants_page() -> dict[str, str]:
     lines = ["# Variants", "", "A variant is a graph of stages in a file of `conf/variant`."]
     pictures = {}
     with hydra_started():
-        for file in group_files("variant"):
+        default = f"{compose('config').variant}.yaml"
+        for file in sorted(group_files("variant"), key=lambda file: (file.name != default, file.name)):
             name = file.name.removesuffix(".yaml")
             lines += _described(name, file.read_text(encoding="utf-8"))
             config = compose("config", overrides=[f"variant={name}", *NEEDED.get(name, [])])

@@ -11,7 +11,7 @@ from typing import Any
 from omninav.pipeline.cli.commands.run import command
 from omninav.pipeline.cli.overrides import MAX_JOBS
 from omninav.pipeline.cli.words import number_of, word_of
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput, counted
 from omninav.pipeline.tables import read_table
 
 from .plain_errors import plain_errors
@@ -55,7 +55,7 @@ class Sweep:
         return self.folder / "sweep.html"
 
     def __repr__(self) -> str:
-        return f"Sweep({str(self.folder)!r}: {len(self.runs)} jobs)"
+        return f"Sweep({str(self.folder)!r}: {counted(len(self.runs), 'job')})"
 
     def _repr_html_(self) -> str:
         means = self.means

@@ -108,8 +108,17 @@ def as_bad_input(error: BaseException) -> BadInput | None:
 def format_problems(problems: Iterable[Problem]) -> str:
     """All problems as text, one under the other, with their number at the head."""
     problems = list(problems)
-    head = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
-    return "\n".join([f"{head}:", *(f"  {line}" for problem in problems for line in str(problem).split("\n"))])
+    return "\n".join(
+        [
+            f"{counted(len(problems), 'problem')}:",
+            *(f"  {line}" for problem in problems for line in str(problem).split("\n")),
+        ]
+    )
+
+
+def counted(number: int, noun: str) -> str:
+    """A number of things: `1 image`, `1,200 images`."""
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
 def nearest(name: str, options: Iterable[str], least: float = 0.5) -> str | None:

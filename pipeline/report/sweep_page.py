@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from omninav.pipeline.files import write_whole
+from omninav.pipeline.graph.problems import counted
 
 from .quantities import best_of, numbers
 from .rendering import render
@@ -45,7 +46,8 @@ def write_sweep_page(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     page = render(
         "sweep.html",
         title=folder.resolve().name,
-        counts=f"{len(lines)} jobs: " + ", ".join(f"{number} {status}" for status, number in sorted(counts.items())),
+        counts=f"{counted(len(lines), 'job')}: "
+        + ", ".join(f"{number} {status}" for status, number in sorted(counts.items())),
         sweep=seen,
         names=names,
         rows=lines,

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import broken
 from omninav.stages.values.drive import Array, Drive
 from omninav.stages.values.floor_plan import FloorPlan
@@ -45,7 +46,7 @@ class DriveOverPlan(Stage):
                 name="drive_over_plan",
                 title="Path driven",
                 caption=f"The true path of {len(path)} ticks over the floor plan, which the robot does not know. "
-                f"It touched something {int(drive.collisions.max())} times (orange crosses). "
+                f"It touched something {counted(int(drive.collisions.max()), 'time')} (orange crosses). "
                 f"Dashed: odometry alone.{_caption_of_map(map, planned)}",
                 content=_draw(path, dead_reckoning, path[contacts], plan, map, planned),
                 media_type="image/svg+xml",

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import Chart, Colour, Layer, stacked
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive
@@ -46,7 +47,9 @@ class ErrorOverTime(Stage):
 def _summary(drive: Drive, several: bool) -> str:
     settled, odometry = _settled(drive), drive.odometry_alone()
     which = f"Log {drive.log[0]}: " if several else ""
-    words = "never converged" if settled is None else f"converged after {settled} frames (green line)"
+    words = "converged at once" if settled == 0 else "never converged"
+    if settled:
+        words = f"converged after {counted(settled, 'frame')} (green line)"
     beside = "" if odometry is None else f", odometry alone {_last(odometry, drive):.2f} m"
     text = f"{which}{words}; at the end the estimate is {_last(drive.estimate, drive):.2f} m off{beside}."
     return text[:1].upper() + text[1:]

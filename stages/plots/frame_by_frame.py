@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.graph.results import Slide
 from omninav.pipeline.report.chart import Chart, Layer, broken
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
@@ -85,7 +87,7 @@ class FrameByFrame(Stage):
                 photographs.append(("best match in the map", picture))
             label = f"frame {int(last.frames[n])} · {last.seconds[n]:.1f} s"
             slides.append(Slide(label, layer.svg, tuple(photographs), tuple(_facts(last, n, belief, spot))))
-        words = [f"{len(slides)} of {len(last)} frames."]
+        words = [shown_frames(last.frames[rows].tolist(), len(last))]
         if beliefs is not None:
             chart.name("belief", "pink", "dot")
             chart.name("estimate", "blue", "line")
@@ -105,6 +107,16 @@ class FrameByFrame(Stage):
                 slides=tuple(slides),
             )
         )
+
+
+def shown_frames(shown: Sequence[int], frames: int) -> str:
+    """Which of so many frames can be stepped to: `Every second frame is shown.`"""
+    steps = {after - before for before, after in pairwise(shown)}
+    if len(steps) != 1:
+        return f"{len(shown)} of {counted(frames, 'frame')} can be stepped to."
+    (step,) = steps
+    nth = {1: "", 2: "second "}.get(step, f"{step}th ")
+    return f"Every {nth}frame is shown."
 
 
 def _what_images_show(snapshot: EncodedPanorama | None) -> list[str]:

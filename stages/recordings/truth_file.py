@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline.graph.problems import cut
+from omninav.pipeline.graph.problems import counted, cut
 from omninav.pipeline.graph.small_files import read_small
 
 from .plausibility import MotionLimits, believed
@@ -53,13 +53,13 @@ def truth_from(
             f"{file}: none of the images of {recording.name} has a pose in it: its times are {_span(stamps)}, "
             f"the images' {_span(shifted)}; clocks that differ: nodes.source.truth_clock_offset_s=SECONDS"
         )
-    for kind, number, what in (
-        ("impossible_motion", len(stamps) - len(likely), "poses are not believed (nodes.source.limits)"),
-        ("no_truth", int(np.isnan(truth[:, 0]).sum()), f"images have no pose within {max_gap_s:g} s"),
+    for kind, number, noun, what in (
+        ("impossible_motion", len(stamps) - len(likely), "pose", "not believed (nodes.source.limits)"),
+        ("no_truth", int(np.isnan(truth[:, 0]).sum()), "image", f"without a pose within {max_gap_s:g} s"),
     ):
         if number:
             recording.dropped[kind] += number
-            recording.details.setdefault(kind, f"{file}: {number} {what}")
+            recording.details.setdefault(kind, f"{file}: {counted(number, noun)} {what}")
     return truth
 
 

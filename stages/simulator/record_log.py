@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput, counted
 from omninav.stages.recordings.camera_yaml import write_camera
 
 from .config import Kidnapping, WorldConfig
@@ -72,6 +72,6 @@ class RecordLog(Stage):
         ):
             ctx.fact(name, value)
         if collisions:
-            print(f"{path}: the robot touched obstacles {collisions} times")
-        print(f"{path}: {images} images; floor plan, camera.yaml and {grid} beside it")
+            print(f"{path}: the robot touched obstacles {counted(collisions, 'time')}")
+        print(f"{path}: {counted(images, 'image')}; floor plan, camera.yaml and {grid} beside it")
         return self.Out()

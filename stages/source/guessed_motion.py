@@ -103,7 +103,7 @@ def settled_speed(ctx: Context, name: str, camera: Camera | None, speed: float |
     readers = list(dict.fromkeys([*ctx.readers.get("motion", []), *maps]))
     if speed is None and readers:
         raise UnreadableRecording(
-            f"{name}: it has neither odometry nor positions of all images, needed by {_listed(readers)}; type "
+            f"{name} has neither odometry nor a position for every image, needed by {_listed(readers)}; type "
             "speed=0.5 to guess it (m/s, turns are seen in the images), or take a variant that needs none: "
             "topological_localisation"
         )
@@ -113,12 +113,12 @@ def settled_speed(ctx: Context, name: str, camera: Camera | None, speed: float |
             "positions; type speed=0.5 (m/s)"
         )
     if speed is None:
-        ctx.warn(f"{name} has no odometry: its path is drawn as if driven at {NOMINAL_SPEED:g} m/s (speed=… sets it)")
+        ctx.warn(f"No odometry in {name}: its path is drawn as if driven at {NOMINAL_SPEED:g} m/s (speed=… sets it)")
         return NOMINAL_SPEED
     path = f", and {_listed(maps)} places its references along that path" if maps else ""
     around = camera is None or _table(camera) is not None
     turns = "seen in the images" if around else "not known, as its camera does not see the full circle"
-    ctx.warn(f"{name} has no odometry: {speed:g} m/s are guessed, turns are {turns}{path}")
+    ctx.warn(f"No odometry in {name}: guessed from a speed of {speed:g} m/s; turns are {turns}{path}")
     return speed
 
 

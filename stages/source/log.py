@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Source, State, Tick
 from omninav.pipeline.files import digest_file, digest_text, user_path
+from omninav.pipeline.graph.problems import counted
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.decode_ahead import AHEAD
 from omninav.stages.recordings.live_record import LiveRecording
@@ -130,11 +131,11 @@ class LogSource(Source):
         for part in self._parts:
             recording, truth = part.recording, part.truth
             if part.kind == "synthetic":
-                ctx.warn(f"{recording.name} has no odometry: it was made of its true positions, with noise")
+                ctx.warn(f"No odometry in {recording.name}: made from its true positions, with noise")
             elif part.kind == "measured" and recording.odometry is not None and truth is not None:
                 steps, metres = frozen_steps(recording.odometry, truth)
                 if steps:
-                    still = f"odometry stands still at {steps} images, while ground truth moves {metres:.1f} m"
+                    still = f"odometry stands still at {counted(steps, 'image')}, ground truth moves {metres:.1f} m"
                     ctx.warn(f"{recording.name}: {still}")
             elif part.kind == "guessed":
                 self._speed = self._settled_speed(ctx, part)

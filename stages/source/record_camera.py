@@ -6,6 +6,7 @@ from typing import Annotated
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
 from omninav.pipeline.files import user_path
+from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.live.camera_device import MESSAGE, TOPIC, CameraDevice, device_camera, image_message
 from omninav.stages.recordings.camera_yaml import write_camera
@@ -46,7 +47,7 @@ class RecordCamera(Stage):
             written = self._record(ctx, device, path)
         finally:
             device.close()
-        print(f"{path}: {written} images; log={path} reads it")
+        print(f"{path}: {counted(written, 'image')}; log={path} reads it")
         return self.Out()
 
     def _record(self, ctx: Context, device: CameraDevice, path: Path) -> int:

@@ -14,7 +14,7 @@ from omninav.pipeline.experiment.runner import ExperimentRun
 from omninav.pipeline.experiment.specification import DEVELOPMENT
 from omninav.pipeline.graph.graph import LIFETIMES
 from omninav.pipeline.graph.ground_truth import truth_readers
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput, counted
 from omninav.pipeline.run.inputs import refuse_missing
 from omninav.pipeline.run.plan import input_digests, plan
 
@@ -39,9 +39,10 @@ def command(arguments: list[str]) -> int:
         engine.set_up_source()
     graph = planned.graph
     before, tick, after = (len(graph.of_lifetime(kind)) for kind in LIFETIMES)
-    print(f"{planned.variant}: nothing wrong with it. {len(graph.nodes)} nodes, {len(graph.wires)} wires")
-    print(f"{before} stages run before the loop, {tick} every tick, {after} after it")
-    print(f"ground truth is read by: {', '.join(truth_readers(graph)) or 'nobody'}")
+    sizes = f"{counted(len(graph.nodes), 'node')}, {counted(len(graph.wires), 'wire')}"
+    print(f"{planned.variant}: nothing wrong with it. {sizes}")
+    print(f"{counted(before, 'stage')} before the loop, {tick} in every tick, {after} after it")
+    print(f"ground truth is read by: {', '.join(truth_readers(graph)) or 'no stage'}")
     return 0
 
 
@@ -72,12 +73,11 @@ def _check_experiment(run: ExperimentRun) -> int:
     print(f"{experiment.name}, profile {run.profile}: nothing wrong with it")
     over = f" in each of {len(experiment.scenarios)} scenarios" if experiment.scenarios else ""
     over += f", and in that of {DEVELOPMENT}" if experiment.development else ""
-    repetitions = f"{experiment.repetitions} repetition{'s' if experiment.repetitions > 1 else ''}"
-    conditions = len(experiment.conditions())
-    print(f"{conditions} conditions ({factors}), each with {repetitions}{over}")
+    conditions = counted(len(experiment.conditions()), "condition")
+    print(f"{conditions} ({factors}), each with {counted(experiment.repetitions, 'repetition')}{over}")
     references = len(run.all_runs) - len(run.conditions)
-    print(f"{runs} runs in all" + (f", {references} of them reference runs" if references else ""))
+    print(f"{counted(runs, 'run')} in all" + (f", {references} of them reference runs" if references else ""))
     print(f"claims to be judged: {len(experiment.claims)}")
     readers = sorted({name for each in run.conditions if each.planned for name in truth_readers(each.planned.graph)})
-    print(f"ground truth is read by: {', '.join(readers) or 'nobody'}")
+    print(f"ground truth is read by: {', '.join(readers) or 'no stage'}")
     return 0

@@ -24,11 +24,13 @@ def command(arguments: list[str]) -> int:
         if word not in summaries:
             raise BadInput(f"variants: there is no variant {word}; {suggest(word, summaries, 'variants')}")
     with hydra_started():
-        inputs = {name: _inputs(name) for name in arguments or summaries}
+        default = str(compose("config").variant)
+        names = arguments or sorted(summaries, key=lambda name: (name != default, name))
+        inputs = {name: _inputs(name) for name in names}
     uses = Counter((setting, given.meaning) for taken in inputs.values() for setting, given in taken.items())
     shared = {setting: meaning for (setting, meaning), number in reversed(uses.most_common()) if number > 1}
     for name, taken in inputs.items():
-        print(f"{name:{INDENT}} {summaries[name]}")
+        print(f"{name:{INDENT}} {'the default: ' if name == default else ''}{summaries[name]}")
         named = [setting for setting, given in taken.items() if shared.get(setting) == given.meaning]
         if named:
             print(f"{'':{INDENT}}   {', '.join(f'{setting}=' for setting in named)}")

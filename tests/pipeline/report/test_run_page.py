@@ -53,7 +53,7 @@ class Wellformed(HTMLParser):
         assert self.open.pop() == tag
 
 
-def report(tmp_path, metrics=None, manifest=MANIFEST, figures=(PICTURE,), tables=()):
+def report(tmp_path, metrics=None, manifest=MANIFEST, figures=(PICTURE,), tables=(), graph=None):
     manifest = {"cwd": str(tmp_path), **manifest}
     folder = tmp_path / "runs" / "a run"
     folder.mkdir(parents=True, exist_ok=True)
@@ -66,6 +66,7 @@ def report(tmp_path, metrics=None, manifest=MANIFEST, figures=(PICTURE,), tables
         figures,
         tables,
         "seed: 3\nname: <x>\n",
+        graph,
     )
     return path.read_text()
 
@@ -213,3 +214,16 @@ def test_parameters_stand_beside_their_defaults_with_what_they_mean(tmp_path):
         ("robust", "False", "False", False),
     ]
     assert rows[0].meaning == "Readings that are averaged."
+    said = text_of(report(tmp_path, graph=SimpleNamespace(nodes={"smooth": node})))
+    assert "Parameters (1 of 2 is not the default)" in said
+    changed, every = said.partition("Parameters (")[2].split("All 2")
+    assert "nodes.smooth.window 9 5 Readings" in changed
+    assert "robust" not in changed
+    assert "nodes.smooth.robust False False" in every
+
+
+def test_a_figure_that_is_not_as_it_should_be_is_a_tile_in_another_colour(tmp_path):
+    described = {"held": Quantity(title="95 % ellipse holds", unit="%", least=0.85)}
+    for share, style in ((0.36, "tile off"), (0.95, "tile")):
+        page = report(tmp_path, metrics=Metrics({"held": share}, described, ("held",)))
+        assert f'<div class="{style}"><b>{100 * share:.1f} <small>%</small></b><span>95 % ellipse holds' in page

@@ -45,3 +45,21 @@ def test_a_sweeps_best_job_is_marked(tmp_path):
     ]
     page = write_sweep_page(tmp_path, rows).read_text()
     assert re.findall(r'<td class="best">([^<]*)</td>', page) == ["12.5"]
+
+
+def test_a_sweeps_page_shows_what_varies_in_columns_of_its_own(tmp_path):
+    rows = [
+        {
+            "job": str(n),
+            "folder": tmp_path / str(n),
+            "manifest": {"status": "complete", "overrides": f"variant=a ++nodes.x.gain={n} seed=3"},
+            "metrics": measured(loss_rate=3.3e-14 * n),
+        }
+        for n in range(2)
+    ]
+    page = write_sweep_page(tmp_path, rows).read_text()
+    assert '<th class="text">nodes.x.gain</th>' in page
+    assert '<td class="text"><code>1</code></td>' in page
+    assert "Set for all jobs: <code>variant=a seed=3</code>" in page
+    assert "++" not in page.partition("<body>")[2].partition("<script>")[0]
+    assert "e-14" not in page
