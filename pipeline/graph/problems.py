@@ -117,7 +117,7 @@ def format_problems(problems: Iterable[Problem]) -> str:
 
 
 def counted(number: int, noun: str) -> str:
-    """A number of things: `1 image`, `1,200 images`."""
+    """A number of things: `1 frame`, `1,200 frames`."""
     return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 

@@ -60,7 +60,7 @@ class ViewMapSize(Stage):
             "visited_area_m2": area,
             "references_per_m2": len(map) / area if area else None,
         }
-        return self.Out(metrics=Metrics({"map": figures}, QUANTITIES))
+        return self.Out(metrics=Metrics({"map": figures}, QUANTITIES, ("map.references", "map.size_bytes")))
 
 
 def stored_bytes(map: ViewMixtures) -> int:

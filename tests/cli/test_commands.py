@@ -215,6 +215,7 @@ def test_stages_lists_roles_in_lines_and_one_stage_with_ports_parameters_and_sou
 
 def test_variants_and_doctor_answer(omninav):
     said = omninav("variants", check=True).stdout
+    assert re.match(r"omninav +the default: ", said)
     assert "omniview_mcl " in said
     assert "Gross & Koenig 2004" in said
     assert "0 unusable" in omninav("doctor", check=True).stdout
