@@ -30,7 +30,8 @@ if TYPE_CHECKING:
         Value,
     )
     from .pipeline.api.configuration import Configuration, check, compose
-    from .pipeline.api.run import Run, load_map, open_run, run
+    from .pipeline.api.run import Run, open_run, run
+    from .pipeline.api.run import load_artifact as load_map
     from .pipeline.api.session import Session, Step, open, resume
     from .pipeline.api.sweep import Sweep, open_sweep, sweep
     from .pipeline.engine.call import StageFailed
@@ -86,7 +87,7 @@ def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'omninav' has no attribute '{name}'; it has: {', '.join(__all__)}")
     module = importlib.import_module(f"omninav.{_PLACE_OF.get(name, 'pipeline')}")
-    thing = module if name == "testing" else getattr(module, name)
+    thing = module if name == "testing" else getattr(module, "load_artifact" if name == "load_map" else name)
     globals()[name] = thing
     return thing
 

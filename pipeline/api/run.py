@@ -117,7 +117,7 @@ class Run:
         if name.startswith("_") or not file.is_file():
             files = [path.stem for path in file.parent.glob("*.omap")]
             raise AttributeError(f"{self.__dict__.get('folder')}: there is no {name}; {suggest(name, files, 'files')}")
-        return load_map(file)
+        return load_artifact(file)
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *(path.stem for path in self.folder.glob("*.omap"))]
@@ -182,7 +182,7 @@ def open_run(folder: str | os.PathLike[str] = "runs/latest") -> Run:
     return Run(folder)
 
 
-def load_map(file: str | os.PathLike[str]) -> Value:
+def load_artifact(file: str | os.PathLike[str]) -> Value:
     """The value in an `.omap` file, checked; its arrays are read-only (`np.array(…)` copies one).
 
     A large array is read, and checked, where it is needed. Raises `BadInput` naming the file where it is missing, cut
