@@ -375,9 +375,11 @@ class _Builder:
         listed = {name: number for number, name in enumerate(self.nodes)}
 
         def early(name: str) -> tuple[int, bool, int, int]:
-            first = min(
-                listed[later] for later in (name, *nx.descendants(order, name))
-            )  # what waits for it is early too
+            first = listed[name]
+            if lifetimes[name] == "tick":  # in time for the first listed of those that wait for it
+                first = min(
+                    listed[later] for later in (name, *nx.descendants(order, name)) if lifetimes[later] == "tick"
+                )
             own = self.nodes[name].signature
             return LIFETIMES.index(lifetimes[name]), not own.is_source, first, listed[name]
 
