@@ -16,7 +16,7 @@ from omninav.pipeline.files import digest_file, user_path
 from omninav.pipeline.graph.problems import BadInput, shown
 from omninav.pipeline.graph.small_files import read_small
 from omninav.stages.camera.model import Camera
-from omninav.stages.values.encoded_image import MAX_FILE_BYTES, Undecodable, decode_image
+from omninav.stages.values.encoded_image import EXIF_BYTES, MAX_FILE_BYTES, Undecodable, decode_image, orientation_of
 from omninav.stages.values.image import Pixels
 
 from .camera_yaml import camera_from, read_camera
@@ -38,6 +38,7 @@ MAX_STARS = 8
 class ImageFolder:
     """A described folder of images as a `Recording`. It may have positions (as truth), and has no odometry.
 
+    Images are turned as the EXIF orientation of JPEG files says (`turned`).
     Counted in `dropped`: `missing_image`, `impossible_motion`, `no_position`, `no_time`, `duplicate_frame`,
     `backward_stamp`, `lone_stamp`, and when images are read `undecodable_image`, `blank_image`, `wrong_size`.
     Raises `UnreadableRecording` for a file or column that is not there, and where nothing usable remains.
@@ -67,6 +68,8 @@ class ImageFolder:
                 self._drop("impossible_motion", what)
         keep = self._usable(paths, times, truth)
         self._paths_kept = [paths[row] for row in keep]
+        self.turned = sum(map(_is_turned, self._paths_kept))
+        """How many of its images are turned as their EXIF orientation says."""
         self._images = DecodeAhead(lambda frame: partial(_image_at, self._paths_kept[frame]))
         self.stamps: Stamps = np.array([times[row] for row in keep], dtype=np.int64)
         self.truth: Array | None = None if truth is None else truth[keep]
@@ -221,7 +224,12 @@ class ImageFolder:
 
 
 def _image_at(path: Path) -> Pixels:
-    return decode_image(read_small(path, MAX_FILE_BYTES))
+    return decode_image(read_small(path, MAX_FILE_BYTES), upright=True)
+
+
+def _is_turned(path: Path) -> bool:
+    with path.open("rb") as file:
+        return orientation_of(file.read(2 * EXIF_BYTES)) in range(2, 9)
 
 
 def _is_file(path: Path) -> bool:

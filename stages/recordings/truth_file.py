@@ -1,7 +1,9 @@
 """Ground truth from a file beside a log: a trajectory in TUM format, or a CSV table."""
 
+import math
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -29,22 +31,37 @@ COLUMNS = {
 }
 """What the columns of a CSV table may be called, in small letters, without units."""
 UNITS = {"time": ("ns", "us", "ms", "s"), "x": ("m", "cm", "mm"), "y": ("m", "cm", "mm"), "heading": ("rad", "deg")}
-DEFAULT_UNITS = {"time": "s", "x": "m", "y": "m", "heading": "rad"}
+DEFAULT_UNITS = {"time": "s", "x": "m", "y": "m"}
+MAX_TILT_DEG, MAX_TILTED = 60.0, 0.05
+"""Tilt that no robot on a floor or a hillside has (degrees), and the share of a file's orientations that may have it.
+With w first, headings become tilts, so that a drive in all directions has it in half of them."""
+NO_ROTATION = "whose quaternion is shorter than 0.5 or longer than 2"
+Rows = tuple[list[int | None], Array, int, list[str]]
+"""Of a file: times (ns), poses (N, 3), how many of them are impossible, and doubts."""
 TANGENT_S = 1.0
 """Standard deviation of the window over which a table without headings is read for the track's direction."""
 
 
+class Trajectory(NamedTuple):
+    """Ascending stamps (ns) and poses (N, 3) of a file; how many rows were `impossible`; and `doubts`, in sentences."""
+
+    stamps: Stamps
+    poses: Array
+    impossible: int
+    doubts: list[str]
+
+
 def truth_from(
     recording: Recording, file: Path, clock_offset_s: float, max_gap_s: float, limits: MotionLimits
-) -> Array:
-    """The true poses (N, 3) that a file holds of a recording's images, interpolated at their times.
+) -> tuple[Array, list[str]]:
+    """The true poses (N, 3) that a file holds of a recording's images, interpolated at their times; and doubts.
 
     An image taken at t is looked up at t + `clock_offset_s`; it has no truth where the file's nearest pose is more than
-    `max_gap_s` from that (a row of NaN), which is counted as `no_truth`, and poses to which no robot gets as
-    `impossible_motion`. Raises `UnreadableRecording` for a file that holds no trajectory, and where no image has a
-    true pose.
+    `max_gap_s` from that (a row of NaN), which is counted as `no_truth`, poses to which no robot gets as
+    `impossible_motion`, and orientations whose quaternion is no rotation as `impossible_pose`. Raises
+    `UnreadableRecording` for a file that holds no trajectory, and where no image has a true pose.
     """
-    stamps, poses = read_trajectory(file)
+    stamps, poses, impossible, doubts = read_trajectory(file)
     likely = believed(stamps, poses, limits).rows
     shifted = recording.stamps + round(clock_offset_s * 1e9)
     truth = poses_near(stamps[likely], poses[likely], shifted, max_gap_s) if len(likely) > 1 else None
@@ -54,35 +71,37 @@ def truth_from(
             f"the images' {_span(shifted)}; clocks that differ: nodes.source.truth_clock_offset_s=SECONDS"
         )
     for kind, number, noun, what in (
+        ("impossible_pose", impossible, "orientation", NO_ROTATION),
         ("impossible_motion", len(stamps) - len(likely), "pose", "not believed (nodes.source.limits)"),
         ("no_truth", int(np.isnan(truth[:, 0]).sum()), "image", f"without a pose within {max_gap_s:g} s"),
     ):
         if number:
             recording.dropped[kind] += number
             recording.details.setdefault(kind, f"{file}: {counted(number, noun)} {what}")
-    return truth
+    return truth, doubts
 
 
-def read_trajectory(file: Path) -> tuple[Stamps, Array]:
-    """Ascending stamps (ns) and poses (N, 3) of a trajectory. Raises `UnreadableRecording` or another `BadInput`."""
+def read_trajectory(file: Path) -> Trajectory:
+    """The trajectory in a file. Raises `UnreadableRecording` or another `BadInput`."""
     head = read_small(file, MAX_TABLE_BYTES)[:4096].decode("utf-8-sig", errors="replace")
     lines = [line for line in head.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     if lines and "," not in lines[0] and len(lines[0].split()) == 8:
-        times, poses = _tum(file)
+        times, poses, impossible, doubts = _tum(file)
     else:
-        times, poses = _csv(file)
+        times, poses, impossible, doubts = _csv(file)
     known = [row for row, time in enumerate(times) if time is not None and np.isfinite(poses[row, :2]).all()]
     kept, _, _ = ascending([times[row] or 0 for row in known])
     rows = [known[number] for number in kept]
     stamps, poses = np.array([times[row] for row in rows], np.int64), poses[rows]
     if len(rows) < 2:
-        raise UnreadableRecording(f"{file}: fewer than two rows with a time and a position")
+        without = f"; {counted(impossible, 'orientation')} {NO_ROTATION}" if impossible else ""
+        raise UnreadableRecording(f"{file}: fewer than two rows with a time and a pose{without}")
     if np.isnan(poses[:, 2]).any():
         poses[:, 2] = track_directions((stamps - stamps[0]) / 1e9, poses[:, :2], TANGENT_S)
-    return stamps, poses
+    return Trajectory(stamps, poses, impossible, [f"{file}: {doubt}" for doubt in doubts])
 
 
-def _tum(file: Path) -> tuple[list[int | None], Array]:
+def _tum(file: Path) -> Rows:
     """Rows of `timestamp x y z qx qy qz qw`, with lines of comments."""
     content = read_small(file, MAX_TABLE_BYTES).decode("utf-8-sig", errors="replace").splitlines()
     lines = {n: line.split() for n, line in enumerate(content, 1) if line.strip() and not line.lstrip().startswith("#")}
@@ -93,7 +112,7 @@ def _tum(file: Path) -> tuple[list[int | None], Array]:
     return _poses(table, {"time": 0, "x": 1, "y": 2, "qx": 4, "qy": 5, "qz": 6, "qw": 7}, DEFAULT_UNITS)
 
 
-def _csv(file: Path) -> tuple[list[int | None], Array]:
+def _csv(file: Path) -> Rows:
     """A table with a header: time, x, y and, where it has one, a heading or a quaternion."""
     table = read_table(file)
     found: dict[str, int] = {}
@@ -119,16 +138,32 @@ def _csv(file: Path) -> tuple[list[int | None], Array]:
     return _poses(table, found, units)
 
 
-def _poses(table: CsvTable, columns: dict[str, int], units: dict[str, str]) -> tuple[list[int | None], Array]:
+def _poses(table: CsvTable, columns: dict[str, int], units: dict[str, str]) -> Rows:
     times = table.nanoseconds(Time(columns["time"], units["time"]))  # type: ignore[arg-type]
     x, y = (table.numbers(Length(columns[axis], units[axis])) for axis in ("x", "y"))  # type: ignore[arg-type]
-    heading = np.full(len(x), np.nan)
+    heading, impossible = np.full(len(x), np.nan), 0
+    doubts: list[str] = []
     if "heading" in columns:
-        heading = table.numbers(Angle(columns["heading"], units["heading"]))  # type: ignore[arg-type]
+        heading = table.numbers(Angle(columns["heading"], units.get("heading", "rad")))  # type: ignore[arg-type]
+        most = float(np.abs(heading).max(where=np.isfinite(heading), initial=0.0))
+        if "heading" not in units and most > 2 * math.pi:
+            name = table.names[columns["heading"]]
+            doubts.append(
+                f"headings of up to {most:.3g} are read as radians; degrees are a column {cut(name + '_deg')}"
+            )
     elif all(part in columns for part in ("qx", "qy", "qz", "qw")):
         qx, qy, qz, qw = (table.numbers(Length(columns[part], "m")) for part in ("qx", "qy", "qz", "qw"))
         heading = np.arctan2(2 * (qw * qz + qx * qy), qw * qw + qx * qx - qy * qy - qz * qz)
-    return times, np.column_stack([x, y, heading])
+        squares = qx * qx + qy * qy + qz * qz + qw * qw
+        wrong = (squares < 0.25) | (squares > 4.0)  # as of the messages of a topic
+        impossible = int(wrong.sum())
+        x = np.where(wrong, np.nan, x)
+        upright = (squares - 2 * (qx * qx + qy * qy))[squares > 0] / squares[squares > 0]  # cosine of the tilt
+        tilted = float((upright < math.cos(math.radians(MAX_TILT_DEG))).mean()) if len(upright) else 0.0
+        if tilted > MAX_TILTED:
+            how = f"{tilted:.0%} of its orientations are tilted by more than {MAX_TILT_DEG:g} degrees"
+            doubts.append(f"{how}: a robot lies on its side, or a camera's frame; is w the first of their quaternions?")
+    return times, np.column_stack([x, y, heading]), impossible, doubts
 
 
 def _span(stamps: Stamps) -> str:

@@ -15,6 +15,7 @@ from omninav.pipeline.files import digest_file, digest_text, user_path
 from omninav.pipeline.graph.problems import counted
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.recordings.decode_ahead import AHEAD
+from omninav.stages.recordings.image_folder import ImageFolder
 from omninav.stages.recordings.live_record import LiveRecording
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.plausibility import MotionLimits
@@ -128,6 +129,11 @@ class LogSource(Source):
         ctx.fact("odometry", ", ".join(dict.fromkeys(part.kind for part in self._parts)))
         for sentence in (sentence for recording in self._opened for sentence in recording.assumed):
             ctx.warn(f"assumed: {sentence}")
+        for sentence in dict.fromkeys(self._doubts):
+            ctx.warn(sentence)
+        turned = sum(recording.turned for recording in self._opened if isinstance(recording, ImageFolder))
+        if turned:
+            ctx.fact("turned_images", f"{turned}, as their EXIF orientation says")
         for part in self._parts:
             recording, truth = part.recording, part.truth
             if part.kind == "synthetic":
@@ -277,10 +283,14 @@ class LogSource(Source):
         recordings = self._recordings()
         selection = Selection(self.first, self.stop, self.stride, self.cuts, self.rate_hz, self.new_log_after_s)
         self._parts: list[LogPart] = []
+        self._doubts: list[str] = []
         for recording in recordings:
             truth, file = recording.truth, self._truth_file
             if file is not None:
-                truth = truth_from(recording, file, self.truth_clock_offset_s, self.truth_max_gap_s, self.limits)
+                truth, doubts = truth_from(
+                    recording, file, self.truth_clock_offset_s, self.truth_max_gap_s, self.limits
+                )
+                self._doubts += doubts
             self._parts += parts_of(recording, truth, selection, guess=self.speed_m_s is not None)
         self._compass = VisualCompass()
         self._opened = recordings

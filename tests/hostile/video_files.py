@@ -62,11 +62,11 @@ def frames_of(folder: Path, files: Files) -> Any:
 
 def truth_of(folder: Path, files: Files) -> Any:
     """The poses of a file, and those of the images of a recording."""
-    stamps, poses = read_trajectory(folder / "truth.txt")
+    stamps, poses, *_ = read_trajectory(folder / "truth.txt")
     if not (np.diff(stamps) > 0).all():
         raise Wrong("stamps do not ascend")
     recording = _Images(np.arange(1, FRAMES) * 1_100_000_000)
-    truth = truth_from(recording, folder / "truth.txt", 0.0, 1.0, MotionLimits())  # type: ignore[arg-type]
+    truth, _ = truth_from(recording, folder / "truth.txt", 0.0, 1.0, MotionLimits())  # type: ignore[arg-type]
     if np.isinf(truth).any() or (np.isnan(truth).any() and not recording.dropped):
         raise Wrong(f"poses that are none, and nothing was counted: {truth}")
     return poses

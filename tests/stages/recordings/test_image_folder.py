@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 from conftest import DATA, needs_data
 
+from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.positions import track_directions
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.recordings.tables import Angle, Length, Time, read_table
+from omninav.stages.source.log import LogSource, LogSourceState
+from omninav.stages.values.encoded_image import decode_image, orientation_of
 
 DESCRIPTION = """
 frames:
@@ -292,3 +295,38 @@ def test_a_folder_of_images_alone_is_taken_in_the_order_of_its_numbers(tmp_path:
     slow = open_recording(str(tmp_path))
     assert slow.stamps.tolist() == [0, 10**9, 2 * 10**9]
     assert "1 image per second (rate=" in " ".join(slow.assumed)
+
+
+def as_held(picture: np.ndarray, orientation: int) -> bytes:
+    """A JPEG of a picture whose EXIF states an orientation."""
+    _, data = cv2.imencode(".jpg", picture)
+    entry = b"\x12\x01\x03\x00\x01\x00\x00\x00" + bytes([orientation]) + b"\x00\x00\x00"
+    exif = b"Exif\0\0II*\x00\x08\x00\x00\x00\x01\x00" + entry + b"\x00\x00\x00\x00"
+    return data.tobytes()[:2] + b"\xff\xe1" + (len(exif) + 2).to_bytes(2, "big") + exif + data.tobytes()[2:]
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_an_image_is_turned_as_its_exif_says(orientation: int) -> None:
+    data = as_held(np.random.default_rng(0).integers(0, 256, (16, 40, 3), dtype=np.uint8), orientation)
+    peer = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)  # OpenCV's own turning
+    np.testing.assert_array_equal(decode_image(data, upright=True), peer)
+    assert orientation_of(data) == orientation
+
+
+@pytest.mark.parametrize("end", range(0, 60, 3))
+def test_an_orientation_that_is_cut_off_is_none(end: int) -> None:
+    data = as_held(np.zeros((8, 8, 3), np.uint8), 6)
+    assert orientation_of(data[:end]) in (1, 6)
+    assert orientation_of(data.replace(b"\x08\x00\x00\x00\x01", b"\xff\xff\xff\xff\x01")) == 1
+
+
+def test_a_folder_of_images_of_a_turned_camera_is_upright_and_said(tmp_path: Path) -> None:
+    picture = cv2.GaussianBlur(np.random.default_rng(1).integers(0, 256, (40, 80, 3), dtype=np.uint8), (0, 0), 5)
+    picture = cv2.normalize(picture, None, 0, 255, cv2.NORM_MINMAX)
+    for name, pixels, orientation in (("0", picture, 1), ("1", picture[::-1, ::-1], 3), ("2", picture, 1)):
+        (tmp_path / f"{name}.jpg").write_bytes(as_held(pixels, orientation))
+    source, ctx = LogSource(log=str(tmp_path), camera="equirectangular", rate_hz=1.0, speed_m_s=0.5), Context("source")
+    source.setup(ctx)
+    first, second = (source.step(ctx, LogSourceState(next=number)).image.pixels for number in (0, 1))
+    assert np.abs(first.astype(float) - second).mean() < 3.0
+    assert ctx.facts["turned_images"] == "1, as their EXIF orientation says"

@@ -46,7 +46,7 @@ def test_tables_are_read_by_the_names_and_units_of_their_columns(tmp_path: Path,
             t=at, ns=round(at * 1e9), ms=at * 1e3, x=x, y=y, h=h, x_mm=x * 1e3, y_mm=y * 1e3, deg=math.degrees(h),
             qw=math.cos(h / 2), qz=math.sin(h / 2)))  # fmt: skip
     (tmp_path / "truth.csv").write_text("\n".join(rows))
-    stamps, poses = read_trajectory(tmp_path / "truth.csv")
+    stamps, poses, *_ = read_trajectory(tmp_path / "truth.csv")
     np.testing.assert_allclose(stamps, np.array(SECONDS) * 1e9, atol=1)
     np.testing.assert_allclose(poses, [pose_at(at) for at in SECONDS], atol=1e-9)
 
@@ -148,3 +148,55 @@ def test_a_transform_that_is_not_there_is_said_with_those_that_are(tmp_path: Pat
         open_recording(path, Topics(truth="/truth:world:base"))
     with pytest.raises(UnreadableRecording, match="/odom carries nav_msgs/msg/Odometry, not transforms"):
         open_recording(path, Topics(truth="/odom:map:base"))
+
+
+def test_orientations_that_are_no_rotation_are_counted_and_left_out(tmp_path: Path) -> None:
+    file, rows = tmp_path / "truth.tum", tum(tmp_path / "truth.tum", START / 1e9).read_text().splitlines()
+    for number in (20, 21, 50):
+        rows[number] = " ".join([*rows[number].split()[:4], "0 0 0 0"])
+    file.write_text("\n".join(rows))
+    ctx = Context("source")
+    outs(LogSource(log=str(write_mcap(tmp_path / "log.mcap")), truth=str(file)), ctx)
+    assert ctx.counts["impossible_pose"] == 3
+    file.write_text("\n".join(f"{n} {n} 0 0 0 0 0 0" for n in range(9)))
+    with pytest.raises(UnreadableRecording, match="9 orientations whose quaternion is shorter than"):
+        read_trajectory(file)
+
+
+@pytest.mark.parametrize(
+    ("row", "doubted"),
+    [
+        ("{t} {t} 0 0 0 0 {s} {c}", False),  # x y z w
+        ("{t} {t} 0 0 {c} 0 0 {s}", True),  # w x y z
+        ("{t} {t} 0 0 0.7071 0 0 0.7071", True),  # a camera that looks along its own z
+        ("{t} {t} 0 0 0.1 0 0 0.99", False),  # a hillside
+    ],
+)
+def test_a_robot_that_would_lie_on_its_side_is_said(tmp_path: Path, row: str, doubted: bool) -> None:
+    turns = {t: 0.3 * t / 2 for t in range(21)}  # all around the circle
+    lines = [row.format(t=t, s=f"{math.sin(half):.6f}", c=f"{math.cos(half):.6f}") for t, half in turns.items()]
+    (tmp_path / "truth.tum").write_text("\n".join(lines))
+    doubts = read_trajectory(tmp_path / "truth.tum").doubts
+    assert [("is w the first" in doubt) for doubt in doubts] == [True] * doubted
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "doubted"),
+    [("yaw", (0.0, 90.0, 290.0), True), ("yaw", (0.0, 3.0, 6.2), False), ("yaw_rad", (0.0, 3.0, 9.0), False)],
+)
+def test_headings_beyond_a_turn_without_a_unit_are_said_with_what_to_write(
+    tmp_path: Path, column: str, values: tuple[float, ...], doubted: bool
+) -> None:
+    rows = "\n".join(f"{n},{n},0,{value}" for n, value in enumerate(values))
+    (tmp_path / "truth.csv").write_text(f"time,x,y,{column}\n{rows}\n")
+    doubts = read_trajectory(tmp_path / "truth.csv").doubts
+    assert len(doubts) == doubted
+    assert all("up to 290 are read as radians; degrees are a column 'yaw_deg'" in doubt for doubt in doubts)
+
+
+def test_a_doubt_about_true_poses_is_a_warning_of_the_run(tmp_path: Path) -> None:
+    rows = "\n".join(f"{START / 1e9 + at},{pose_at(at)[0]},{pose_at(at)[1]},{20 * at}" for at in SECONDS)
+    (tmp_path / "truth.csv").write_text(f"time,x,y,yaw\n{rows}\n")
+    ctx = Context("source")
+    outs(LogSource(log=str(write_mcap(tmp_path / "log.mcap")), truth=str(tmp_path / "truth.csv")), ctx)
+    assert sum("read as radians" in sentence for sentence in ctx.warnings) == 1
