@@ -33,7 +33,7 @@ class StallMonitorState(State):
 
 
 class StallMonitor(Stage):
-    """Says that the way is blocked where the robot has driven for long and come no closer to its target.
+    """Reports a blocked way when the robot has driven for some time without getting closer to its target.
 
     What stands in the direct way may be a closed door, around which there is no way. The robot is no longer blocked as
     soon as it has another target, or after `detour_s`, so that it tries again if nobody plans again. The time in which

@@ -24,7 +24,7 @@ class WallAvoiderState(State):
 
 
 class WallAvoider(Stage):
-    """Wanders: straight on where there is room, towards the roomier side where not, on the spot where there is none.
+    """Drives straight on where there is room, else turns towards the side that has more, on the spot before a wall.
 
     It reads the ring of ranges alone. Its speed lets it stop within what is free ahead. A range counts as free where
     there was no echo twice. A robot that turns away keeps its side until there is room again.

@@ -13,7 +13,7 @@ from .vertical_segments import FindVerticalSegments
 
 
 class ColumnsAlone(Stage):
-    """Invariant column segments and no patches: what the second kind of features costs and does by itself.
+    """Describes a view by invariant column segments alone, without patches, to measure what these contribute.
 
     Goedemé et al. 2007, sections 3.3 and 3.4. Raises BadInput for an image without a camera.
     """

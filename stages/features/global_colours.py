@@ -12,7 +12,7 @@ from .prepared_image import prepared_image
 
 
 class GlobalColours(Stage):
-    """Colour correlations of a whole view, which light does not change: different views can be told apart quickly.
+    """Describes a whole view by colour correlations that light does not change, to tell different views apart quickly.
 
     Goedemé et al. 2007, section 4.2.1: the moments of equation 1 (erratum 25 in docs/papers.md) over all of a panorama,
     or over the ring of a mirror image. Raises BadInput for an image without a camera.

@@ -70,7 +70,7 @@ def encoder_input(
 
 
 class OnnxEncoder(Stage):
-    """Describes each part of a panorama by the vector that a network gives for it, brought to length 1.
+    """Describes each part of a panorama by the output vector of a neural network (ONNX), scaled to length 1.
 
     The network is an ONNX file with its weights in it, one input of four dimensions (images) and an output of one
     vector for each image. It runs on the CPU in one thread, so that the same images give the same bytes. Needs

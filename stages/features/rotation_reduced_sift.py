@@ -21,7 +21,7 @@ SEAM = 48
 
 
 class RotationReducedSift(Stage):
-    """SIFT with an orientation that a robot on a floor need not measure, and the colours of each patch.
+    """SIFT keypoints with a known orientation, as a robot on a floor stays upright, and the colours of each patch.
 
     Goedemé et al. 2007, section 3.2 (after Ledwich & Williams): OpenCV's detector and descriptor, turned outwards along
     the radius in a mirror image and up the column in a panorama or strip. Features closer to a mirror's edges than

@@ -13,7 +13,7 @@ from omninav.stages.values.topological_map import TopologicalMap
 
 
 class PlacePrior(Stage):
-    """A belief over places at the first image of each log.
+    """Gives the belief over places at the first image of each log.
 
     Goedemé et al. 2007, section 5.1. Raises BadInput where `truth` is asked for and there is none, or where the map has
     no place.

@@ -8,7 +8,7 @@ from omninav.stages.values.belief import Belief, PoseEstimate
 
 
 class BeliefEstimate(Stage):
-    """The belief's heaviest mode as one pose, with the mean of the whole belief beside it.
+    """Gives the belief's heaviest mode as one pose, with the mean of the whole belief beside it.
 
     A split belief's mean lies where the robot is not, so the mode is what is measured and acted upon. Map frame,
     metres, radians.

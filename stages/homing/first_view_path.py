@@ -15,7 +15,7 @@ class FirstViewPathState(State):
 
 
 class FirstViewPath(Stage):
-    """A path of one view, the first of the log, for a robot that has been carried away from there.
+    """Gives a path of one view, the log's first, for a robot that is carried away and has to return.
 
     The path is given once; its reader holds it: `{from: first_view.path, hold: true}`.
     """

@@ -12,7 +12,7 @@ class FirstViewTargetState(State):
 
 
 class FirstViewTarget(Stage):
-    """The log's first view as a target that has another number at each tick.
+    """Gives the log's first view as a new target at each tick.
 
     For a new target homing makes a new local map, so that its vector is that of two views alone (Goedemé et al. 2007,
     section 7.1).

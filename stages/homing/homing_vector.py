@@ -8,7 +8,7 @@ from omninav.stages.values.homing import HomingVector, LocalMap
 
 
 class HomingVectorFromMap(Stage):
-    """From the robot to the target view: where to go and how far to turn, by the poses of both in the local map.
+    """Computes direction and turn from the robot to the target view, from the poses of both in the local map.
 
     Goedemé et al. 2007, section 7.2.4. Of a lost target it is what was known last, moved on by odometry.
     """

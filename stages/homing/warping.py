@@ -23,7 +23,7 @@ class WarpingVectorState(State):
 
 
 class WarpingVector(Stage):
-    """From the robot to the target view by warping whole columns of one image to those of the other.
+    """Computes the way from the robot to the target view by warping whole columns of one image to those of the other.
 
     Möller, Krzykawski & Gerstmayr 2010: for every direction and turn, how well do the columns of one view match those
     of the other, each at the place and magnification in which a robot that has moved so would see it, at a distance of

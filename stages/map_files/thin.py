@@ -11,7 +11,7 @@ from .saved import read_saved, target, write_saved
 
 
 class ThinMap(Stage):
-    """Writes a map with fewer references, none closer to another than `spacing`.
+    """Writes a map with fewer references, at least `spacing` apart.
 
     In their order each reference takes the place of those around it, and their edges. Of a topological map, path images
     are left out, and no places. Raises BadInput where the file is no such map.

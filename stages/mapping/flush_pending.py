@@ -7,7 +7,7 @@ from omninav.stages.values.map_update import MapUpdates
 
 
 class FlushPending(Stage):
-    """Gives, after the last log, the updates that still wait.
+    """Gives the updates that still wait after the last log.
 
     No tick tells that it is the last, so this stage runs after the loop: `ticks` is collected for that only. A second
     node of the map's class (`final_map`) applies the updates, and its map is saved.

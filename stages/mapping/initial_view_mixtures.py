@@ -5,7 +5,7 @@ from omninav.stages.values.view_mixtures import ViewMixtures
 
 
 class InitialViewMixtures(Stage):
-    """The map to begin with: the known one, where there is one (`map=FILE`), else one with no view in it."""
+    """Gives the map to begin with: a saved one (`map=FILE`), or an empty one."""
 
     class Out(Outputs):
         """The map to learn on."""

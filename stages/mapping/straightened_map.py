@@ -24,7 +24,7 @@ QUANTITIES = {
 
 
 class StraightenMap(Stage):
-    """Moves the references of a map whose poses are odometry so that what looks like one place is one place.
+    """Corrects the references' poses in a map made by odometry so that loop closures become consistent.
 
     References that look alike although the drive lies between them close a loop; a pose graph of odometry and closures
     gives the poses, with Cauchy's loss on closures, since some are wrong. The first reference stays. Poses that are

@@ -33,7 +33,7 @@ MIN_WEIGHT = 0.1
 
 
 class StraightenSessions(Stage):
-    """Learns a map again from all drives, once poses are known that make one place of what looks like one place.
+    """Learns a map again from all drives, with poses corrected so that loop closures become consistent.
 
     Views that look alike although the robot drove on between them, and views of different drives that look alike,
     close loops; a pose graph of odometry and closures gives all poses, with Cauchy's loss on closures, since some are

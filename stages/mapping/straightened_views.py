@@ -25,7 +25,7 @@ QUANTITIES = {
 
 
 class StraightenViews(Stage):
-    """Moves the poses of a tour's views, where they are odometry, so that what looks like one place is one place.
+    """Corrects the poses of a tour's views, where they are odometry, so that loop closures become consistent.
 
     Two views of different times, or of different tours, that are as alike as two that follow each other close a loop. A
     pose graph of odometry and closures gives the poses, with Cauchy's loss on closures, since some are wrong. Places

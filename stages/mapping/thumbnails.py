@@ -67,7 +67,7 @@ class CollectThumbnails(Stage):
 
 
 class TourSnapshot(Stage):
-    """Encodes a thumbnail of every image of a tour, of a mirror's or a fisheye's image the disc only.
+    """Encodes a thumbnail of every image of a tour; of a mirror's or a fisheye's image only the disc.
 
     Which of them a topological map keeps is known at its end only.
     """

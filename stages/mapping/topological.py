@@ -21,7 +21,7 @@ Ints = npt.NDArray[np.int64]
 
 
 class TopologicalMapping(Stage):
-    """Places with their medoids, and links with path images between places that were driven through in turn.
+    """Makes a topological map: places with their medoids, and links with path images between successive places.
 
     Goedemé et al. 2007, sections 4.1 and 6. Of each view those patches are kept that were found again in most of the
     views around it, and the heaviest vertical segments. On the way from place to place path images are kept, each with

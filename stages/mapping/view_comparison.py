@@ -41,7 +41,7 @@ class View(NamedTuple):
 
 
 class ViewComparison(Stage):
-    """Visual distances between all views of a tour, and of a known map that is to grow by it.
+    """Computes visual distances between all views of a tour, and to those of a known map that it extends.
 
     Goedemé et al. 2007, section 4.2 (equations 3 and 4; erratum 27 in docs/papers.md): local features are only compared
     where the global colours leave it open. A known map takes part with the features that it keeps of its views. Poses

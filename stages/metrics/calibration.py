@@ -34,7 +34,7 @@ QUANTITIES = {
 
 
 class Calibration(Stage):
-    """Measures whether the confidence holds, and whether the belief's ellipses do.
+    """Measures whether the stated confidence and the covariance ellipses agree with ground truth.
 
     Of the last log, under `calibration`. Where a monitor states a confidence: `expected_error`, the mean distance
     between stated probability and observed share over ten bins (expected calibration error, ECE); `wrong_auroc`, the

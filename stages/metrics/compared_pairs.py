@@ -28,7 +28,7 @@ QUANTITIES = {
 
 
 class ComparedPairs(Stage):
-    """Measures on every two views of a tour what Goedemé et al. 2007, section 4.2, say of their comparison.
+    """Tests claims about comparing views (Goedemé et al. 2007, section 4.2) on every pair of a tour's views.
 
     Under `comparison`: `passed_rate`, the share of pairs whose global colours are close enough for their local features
     to be compared; `other_rooms_left_out` and `own_room_left_out`, the shares of pairs of two rooms, and of one, that

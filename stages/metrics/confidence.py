@@ -31,7 +31,7 @@ MAX_SIGMA_M = 1.0
 
 
 class Confidence(Stage):
-    """Measures a run without ground truth: how sure it was, and whether what it says fits together.
+    """Measures a run without ground truth: how sure it was, and whether its estimates agree with odometry.
 
     Under `confidence`, of the last log. An estimate is confident where it holds at least `min_weight` of the belief
     and its position's largest standard deviation is at most `max_sigma_m`; that says how sure the method is, not that

@@ -19,7 +19,7 @@ QUANTITIES = {
 
 
 class DriveSummary(Stage):
-    """Measures how long and how far a robot drove by itself, and in a simulated world how often it touched something.
+    """Measures how long and how far a robot drove by itself, and in a simulated world its collisions.
 
     `stopped_share`: of the time from its first move to its last, in which it made no way. Of a real robot nobody
     tallies contacts, and the distance is that of its odometry.

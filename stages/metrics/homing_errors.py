@@ -32,7 +32,7 @@ HEADLINES = tuple(
 
 
 class HomingErrors(Stage):
-    """Measures where a robot ends that returns to its first pose, and the errors of its homing vectors.
+    """Measures how close a robot comes to its first pose by homing, and the errors of its homing vectors.
 
     It begins where the robot was put down last, or where it drove to that is furthest away. Under `homing`: `start_m`,
     how far away that is; `arrived`, whether it said so (1 or 0); `reached`, whether it was within `within_m` of

@@ -26,7 +26,7 @@ QUANTITIES = {
 
 
 class LocalisedShare(Stage):
-    """Measures shares of frames within the field's thresholds, and what it takes a lost robot to find itself.
+    """Measures the share of frames within the usual error thresholds, and how long a lost robot takes to recover.
 
     Of the last log. `localised`: the share of frames within 0.25 m and 2 degrees (`fine`), 0.5 m and 5 degrees
     (`medium`), 5 m and 10 degrees (`coarse`), as the benchmarks of visual localisation count (Sattler et al. 2018,

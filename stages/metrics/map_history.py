@@ -25,7 +25,7 @@ QUANTITIES = {
 
 
 class MapHistory(Stage):
-    """Counts how many references came and went, and measures the odometry drift while the first of them were learned.
+    """Counts references added and removed, and measures the odometry drift while the first of them were learned.
 
     A reference comes in the frame in which it was seen, however much later it is learned, and goes in the frame in
     which it is removed; `references` and `components` are those the map has after a frame. What is learned once the

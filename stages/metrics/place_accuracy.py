@@ -22,7 +22,7 @@ HEADLINES = tuple(f"localisation.{name}" for name in ("accuracy", "adjacent_accu
 
 
 class PlaceAccuracy(Stage):
-    """Measures how often the most probable place is the one whose medoid was taken closest to the truth.
+    """Measures how often the most probable place is the one truly nearest to the robot.
 
     Goedemé et al. 2007, section 8.3. Under `localisation`, over all logs: `accuracy`, the share of all images;
     `adjacent_accuracy`: the believed place is the closest or one of its neighbours; `accuracy_after`: of the first,

@@ -21,7 +21,7 @@ QUANTITIES = {
 
 
 class WrongPlaces(Stage):
-    """Measures how long references keep a place at which they were learned and never were: after a kidnapping, mostly.
+    """Measures how long references stay at wrong places, such as those learned right after a kidnapping.
 
     A reference counts whose heaviest component lies far from the true position of the frame in which it was seen, at
     its coming. Of its weight, the share at places that far off is followed to the end. Under `wrong_places`:

@@ -14,7 +14,7 @@ Array = npt.NDArray[np.float64]
 
 
 class PlaceTransitions(Stage):
-    """A robot goes to near places rather than far ones: a Gaussian of the links between them.
+    """Predicts the place: near ones are more probable than far ones, by a Gaussian over the links between them.
 
     Goedemé et al. 2007, section 5.2, equation 13: P(x_t | x_t-1) falls as exp(-dist^2 / sigma^2), dist the least number
     of links on the way, 0 where there is no way, normalised for each place that the robot comes from, since places have

@@ -10,7 +10,7 @@ from omninav.stages.values.local_features import LocalFeatures
 
 
 class LostFeatures(Stage):
-    """Drops a random share of the features, different ones at every tick, as occlusion and light do.
+    """Drops a random share of the features, different ones at every tick, to imitate occlusion and light.
 
     Where a view has columns, the same share of them.
     """

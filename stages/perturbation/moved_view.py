@@ -34,7 +34,7 @@ def moved_view(
 
 
 class MovedView(Stage):
-    """Shows windows shifted, turned in their plane, enlarged, sheared, or in part: what retrieval is said not to mind.
+    """Shows windows shifted, rotated, enlarged, sheared or cut, to which retrieval should be invariant.
 
     Wolf, Burgard & Burkhardt 2005, section IV: features are invariant to translation, rotation and, with kernels of
     several sizes, to scale up to two, and robust against distortion; equation 5 finds a view of a part of a scene in an

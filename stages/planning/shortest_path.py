@@ -47,7 +47,7 @@ class ShortestPathPlannerState(State):
 
 
 class ShortestPathPlanner(Stage):
-    """The shortest route from the most probable place to the goal, as the images along it.
+    """Plans the shortest route from the most probable place to the goal, as the images along it.
 
     Goedemé et al. 2007, section 6 (Dijkstra's algorithm): the medoid of the place where the robot is believed to be,
     the path images of each link, and the medoids between them; the robot stops at the goal's medoid.

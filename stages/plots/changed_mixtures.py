@@ -7,7 +7,7 @@ from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent, ViewMixt
 
 
 class ChangedMixtures(Stage):
-    """Keeps, of every view whose mixture a tick changed, all components as they are after it."""
+    """Keeps all components of every view whose mixture changed in a tick."""
 
     class Out(Outputs):
         """`mixtures`: absent where the tick changed nothing."""

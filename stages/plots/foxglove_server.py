@@ -15,7 +15,7 @@ PORT = 8765
 
 
 class FoxgloveServer(Stage):
-    """Sends every tick's messages to whoever watches: in Foxglove, open connection, ws://localhost:8765.
+    """Sends every tick's messages to Foxglove: open connection, ws://localhost:8765.
 
     The topics are those of `result.mcap` (see `ResultMessages`), and `foxglove_layout.json` of any run shows them. Who
     connects late gets the last message of each topic. Nothing that a run writes depends on it. A later run of the same

@@ -33,7 +33,7 @@ MAX_DOTS = 150
 
 
 class FrameByFrame(Stage):
-    """Shows up to 60 frames of the last log, at even steps: what the robot saw, and where it believed to be.
+    """Shows up to 60 frames of the last log, at even steps: the image, its best match and the belief.
 
     The reference (or place) of the map that looked most like the image is ringed; with `thumbnails` its image stands
     below the robot's, turned as the robot is turned against it. Of a map that is learned on the way the image is one of

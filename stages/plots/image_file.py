@@ -27,7 +27,7 @@ class ImageAt(Stage):
 
 
 class ImageFile(Stage):
-    """Writes the first image that it gets as `image.png` into the run's folder, pixel by pixel."""
+    """Writes the first image as `image.png` into the run's folder, without loss."""
 
     class Out(Outputs):
         pass

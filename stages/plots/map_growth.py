@@ -16,7 +16,7 @@ BINS = 80
 
 
 class MapGrowth(Stage):
-    """Plots references and components over the frames of all logs, and how many references came and went."""
+    """Plots references and components over the frames of all logs, with references added and removed."""
 
     on_request = True
 

@@ -22,7 +22,7 @@ COLUMNS = 900
 
 
 class PlaceBeliefOverTime(Stage):
-    """Plots the belief in every place over time, as dark as it is probable, with the place that was truly nearest.
+    """Plots the belief in every place over time, darker where more probable, with the truly nearest place.
 
     Of the last log. Below it: the belief's share of its maximum, of the truly nearest place, and of
     that together with its neighbours.

@@ -8,7 +8,7 @@ from omninav.stages.values.confidence import ConfidenceReliability
 
 
 class ReliabilityDiagram(Stage):
-    """Plots the share of estimates that were within the tolerance over the confidence that was stated for them."""
+    """Plots the share of right estimates over the confidence stated for them."""
 
     class Out(Outputs):
         """`figure`: absent where there is no confidence, or no ground truth."""

@@ -68,7 +68,7 @@ class ResultMessagesState(State):
 
 
 class ResultMessages(Stage):
-    """Makes the messages of `result.mcap`, tick by tick; what a graph does not have is left out.
+    """Makes the messages of `result.mcap` of each tick, from the inputs that are wired.
 
     | topic | message | holds |
     |---|---|---|

@@ -16,7 +16,7 @@ from .homing_snapshot import EncodedHomingView
 
 
 class FirstThumbnail(Stage):
-    """Keeps the first image of a run, to which a kidnapped robot goes back, as the only thumbnail."""
+    """Keeps the first image of a run, to which a kidnapped robot returns, as the only thumbnail."""
 
     class Out(Outputs):
         """`thumbnails`: absent where nothing was seen."""

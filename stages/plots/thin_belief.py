@@ -12,7 +12,7 @@ Array = npt.NDArray[np.float64]
 
 
 class ThinBelief(Stage):
-    """Thins a belief to few equally weighted particles that stand for it, without chance.
+    """Thins a belief to a few equally weighted particles, chosen without random numbers.
 
     Of a mixture, as many of its heaviest Gaussians. Any other belief becomes the one pose of its estimate.
     """

@@ -19,7 +19,7 @@ class OutsideEstimatorState(State):
 
 
 class OutsideEstimator(Stage):
-    """Simulates an estimator that states the robot's pose every few metres, with errors, and at times a wrong one.
+    """Simulates an external estimator: a noisy pose every few metres, sometimes a wrong one.
 
     Gross, Koenig & Müller 2005, sections 1 and 2.1: "state hypotheses from other sources of information" are fused as
     motion and views are. Errors are drawn from Gaussians around the true pose; a wrong statement lies `wrong_m` away

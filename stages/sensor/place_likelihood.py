@@ -15,7 +15,7 @@ Array = npt.NDArray[np.float64]
 
 
 class PlaceLikelihood(Stage):
-    """A falling function of the visual distance between the present view and each place's.
+    """Computes the likelihood of each place: it falls with the visual distance of its view to the present one.
 
     Goedemé et al. 2007, section 5.3, equation 14: P(z | x) falls as exp(-diss^2 / sigma^2). Beside the way of the tour,
     or where things have changed, every distance is many sigma, and by a Gaussian all are as unlikely as a place that

@@ -19,7 +19,7 @@ class PoseFixesState(State):
 
 
 class PoseFixes(Stage):
-    """Gives the robot's true pose now and then, as a Gaussian: a manual position calibration.
+    """Gives the robot's true pose at times, as a Gaussian, as a person who corrects its position would.
 
     "While building the map for the first time, supplementary localization information could be given to achieve a
     higher initial precision" (Gross, Koenig & Mueller 2005, section 3). It is one more hypothesis for the fusion, and

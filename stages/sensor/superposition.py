@@ -37,7 +37,7 @@ def superpose(
 
 
 class Superposition(Stage):
-    """Superposes the mixtures of the map's views similar to the current one, weighted by similarity.
+    """Adds up the mixtures of the map's views that resemble the current one, weighted by similarity.
 
     p(x|y) is the sum over views j and components k of lambda_j w_jk times a Gaussian (Porta & Kroese 2004, equation 5;
     Gross, Koenig & Mueller 2005, section 2.2). The components' own weights w_jk are not normalised (erratum 13).

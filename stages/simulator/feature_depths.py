@@ -17,7 +17,7 @@ from .world import World
 
 
 class FeatureDepths(Stage):
-    """Distances from the camera to the surfaces that features show, by a ray along each bearing, without people."""
+    """Measures the distance to the surface at each feature, by a ray along its bearing; people are left out."""
 
     log: str | tuple[str, ...] | None = None
     """A recorded log: then nothing is known of the place and the output is absent."""

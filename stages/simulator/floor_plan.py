@@ -14,7 +14,7 @@ from .world import World, outline
 
 
 class WorldPlan(Stage):
-    """The floor plan of a simulated world on a day, for plots."""
+    """Gives the floor plan of a simulated world on a day, for plots."""
 
     world: WorldConfig | None = DEMO
     """The simulated world; null: a real one, of which there is no plan."""
@@ -32,7 +32,7 @@ class WorldPlan(Stage):
 
 
 class DrivenPlan(Stage):
-    """The floor plan of the place where logs were recorded, for plots: the grid beside the first log that has one.
+    """Gives the floor plan of recorded logs, for plots: the grid beside the first log that has one.
 
     Beside `drive.mcap` that is `drive.grid/map.yaml`, as `omninav simulate` writes it, or else `map.yaml`, in the
     format of ROS map_server and in the frame of the true poses. Without a log it is the simulated world's plan on the

@@ -15,7 +15,7 @@ from .world import World
 
 
 class OtherDay(Stage):
-    """The image that is taken from where the robot truly is, on another day: in its light, and without people.
+    """Renders the image at the robot's true pose on another day, in that day's light and without people.
 
     For what is said to stay the same as the light changes: of no two drives are images taken from the same places.
     Noise is drawn anew for each image.

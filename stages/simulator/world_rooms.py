@@ -10,7 +10,7 @@ from .demo import DEMO
 
 
 class WorldRooms(Stage):
-    """The named rooms of a simulated world, which can be goals of a robot."""
+    """Gives the named rooms of a simulated world, which can be goals of a robot."""
 
     log: str | tuple[str, ...] | None = None
     """A recorded log: then nothing is known of the place and the output is absent."""

@@ -61,7 +61,7 @@ class ClosedLoopState(State):
 
 
 class ClosedLoop(Source):
-    """A robot in a simulated world that drives as the last command says; every tick it looks, measures and feels.
+    """Simulates a robot that obeys the last command; every tick gives image, odometry, ranges and contacts.
 
     It starts at rest. The command of the tick before holds until this tick; without one it brakes. `motion` is what its
     wheels say, absent at the first tick. Noise is drawn from the run's seed, goods and textures from the world's.

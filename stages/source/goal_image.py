@@ -19,7 +19,7 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".tif", ".tiff", ".webp")
 
 
 class GoalImage(Stage):
-    """The image that a goal names, with the camera that it was taken with: the robot's own.
+    """Gives the goal's image, with the robot's own camera as the one that took it.
 
     Raises BadInput where no goal is named, where there is no such file, where it is no image, and where it has another
     size than the robot's camera takes: before anything runs, as far as can be.

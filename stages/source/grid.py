@@ -28,7 +28,7 @@ FROM_TOUR = "from_tour"
 
 
 class PlaceGrid(Stage):
-    """The occupancy grid of a place, and the free space that a robot reaches.
+    """Gives the occupancy grid of a place, and the free space that a robot reaches.
 
     Free space is what keeps clear of anything occupied and, with `map` wired, is connected to its references; that of a
     stand-in for a grid (see `along_path`) is all of it. Raises BadInput where there is a log and no grid.

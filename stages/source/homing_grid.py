@@ -42,7 +42,7 @@ class Views(Protocol):
 
 
 class HomingGrid(Source):
-    """The view at a target first, then views from a grid of points around it.
+    """Renders the view at a target first, then views from a grid of points around it.
 
     Goedemé et al. 2007, section 8.4.1. In a simulated world they are rendered where a robot has room and from where
     nothing between hides the target's spot, each with a heading drawn at random; people are not there. In a recorded

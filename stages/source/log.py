@@ -54,7 +54,7 @@ class LogSourceState(State):
 
 
 class LogSource(Source):
-    """Recorded drives, one after another: a tick for every image that can be used.
+    """Plays recorded drives one after another: a tick for every image that can be used.
 
     Poses are metres and radians; stamps are header stamps. `motion` is the SE(2) increment of the odometry between the
     images' own times, absent at the first image of each log; where images are left out it spans the gap.

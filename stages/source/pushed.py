@@ -62,7 +62,7 @@ class PushedSourceState(State):
 
 
 class PushedSource(Source):
-    """Images that a program pushes, with whatever else it knows of each: a tick for every one.
+    """Takes images that a program pushes, each with what it knows of motion and pose: a tick for every one.
 
     It gives what `LogSource` gives of a recording, so that both lead to the same results. Poses are metres and radians.
     """

@@ -17,7 +17,7 @@ class TwoViewsState(State):
 
 
 class TwoViews(Source):
-    """Pairs of views of points all around a camera, some of them paired wrongly: one random problem per tick.
+    """Makes pairs of views of random points around a camera, some paired wrongly: one problem per tick.
 
     The baseline is 1. Points are distributed uniformly over a part of the sphere around view 1.
     """

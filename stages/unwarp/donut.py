@@ -125,7 +125,7 @@ def with_ring(camera: Donut, image: Image, found: DonutUnwrapState, ctx: Context
 
 
 class DonutUnwarp(Stage):
-    """Panorama from an uncalibrated mirror image, by centre and radii, found in the image where not given.
+    """Unwarps an uncalibrated mirror image by centre and radii, which are found in the image where not given.
 
     Rows are equal steps of radius, the outer circle on top; elevations are not known. What is found in the first
     image of a log that shows a ring is kept for all of it (State). Raises BadInput where the camera is another one.

@@ -10,7 +10,7 @@ from .table import PanoramaTable
 
 
 class UnwarpPanorama(Stage):
-    """Panorama by the model of the recording's camera: rows are equal steps of elevation over all that it sees.
+    """Unwarps an image by its camera's model; rows are equal steps of elevation over all that it sees.
 
     Raises BadInput where the camera does not see the full circle, or is a donut whose ring has yet to be found
     (`unwarp=donut` finds it).

@@ -50,7 +50,7 @@ class WindowTable(NamedTuple):
 
 
 class PerspectiveWindow(Stage):
-    """Perspective windows cut from an omnidirectional image, or the image of an ordinary camera as it is.
+    """Cuts perspective windows from an omnidirectional image; passes an ordinary camera's image on as it is.
 
     Wolf, Burgard & Burkhardt 2005, section VI: their robot has ordinary cameras. What the camera does not see is black
     in a window, and counted. An ordinary camera's image is only resized, and shows what it shows. Raises BadInput for a
