@@ -52,7 +52,7 @@ class KeepSessions(Stage):
             earlier = None if known is None else known.sessions
             if earlier is None or earlier.views.shape[1:] != view.rows.shape:
                 if known is not None and len(known):
-                    ctx.fact("map_straightened", "no: the map that it went on with was saved without its drives")
+                    ctx.fact("map_straightened", "no: the map it continued was saved without its drives")
                     return self.Out()
                 earlier = Sessions.empty(view)
             kept = replace(earlier, ticks=np.zeros(len(earlier), np.int64))  # the known map's own stay as they are

@@ -69,7 +69,9 @@ class StraightenMap(Stage):
             self.min_excess, self.min_gap * unit, self.samples,
         )  # fmt: skip
         if not len(closures.pairs):
-            ctx.fact("map_straightened", "no: the tour came back to no place, so nothing tells how odometry bent it")
+            ctx.fact(
+                "map_straightened", "no: no loop closure was found in the tour, so odometry's drift cannot be corrected"
+            )
             return self.Out(map=map)
         spread = self.closure_sigma * unit, math.radians(self.closure_sigma_deg)
         poses, weights = straightened_drives(map.poses, np.zeros(len(map), np.int64), closures, *spread)

@@ -115,7 +115,9 @@ class StraightenSessions(Stage):
         return self.Out(updates=relearn, metrics=Metrics({"straightened": values}, QUANTITIES) if last else None)
 
     def _as_it_is(self, ctx: Context, sessions: Sessions, updates: MapUpdates | None, last: bool) -> Out:
-        ctx.fact("map_straightened", "no: the drives came back to no place, so nothing tells how odometry bent them")
+        ctx.fact(
+            "map_straightened", "no: no loop closure was found in the drives, so odometry's drift cannot be corrected"
+        )
         items, open_from = ((), None) if updates is None else (updates.items, updates.open_from)
         return self.Out(updates=MapUpdates(items, open_from, sessions=sessions) if last else updates)
 

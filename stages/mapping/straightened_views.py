@@ -55,7 +55,9 @@ class StraightenViews(Stage):
         ways = np.hypot(*(views.poses[follows + 1] - views.poses[follows])[:, :2].T)
         unit = float(np.median(ways)) if len(ways) else 0.0
         if not len(found.pairs) or not unit:
-            ctx.fact("map_straightened", "no: the tour came back to no place, so nothing tells how odometry bent it")
+            ctx.fact(
+                "map_straightened", "no: no loop closure was found in the tour, so odometry's drift cannot be corrected"
+            )
             return self.Out(views=views)
         drives = np.unique(views.tours, return_inverse=True)[1].astype(np.int64)
         start, joined = placed_drives(views.poses, drives, found, self.min_gap * unit)

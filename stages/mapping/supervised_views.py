@@ -45,7 +45,7 @@ class SupervisedViews(Stage):
         covariance = np.diag([self.sigma_m**2, self.sigma_m**2, math.radians(self.sigma_deg) ** 2])
         for view, pose in zip(views, truth, strict=True):
             if view is None or pose is None:
-                ctx.count("view_without_pose", detail="mapping: images without truth are not mapped")
+                ctx.count("view_without_pose", detail="without ground truth no pose is known (mapping)")
                 continue
             values = view.values if projection is None else projection.components @ view.values
             row = map.add_view(values, type(view).__name__)

@@ -89,7 +89,7 @@ class UnimodalQueue(Stage):
             pending.last, pending.seen, pending.motions = single, [], []
         elif pending.last is None or not self.reconstruct or len(pending.seen) >= self.max_waiting:
             self._drop_path(ctx, pending)
-            ctx.count("view_not_learned", detail="map_update: views outside unimodal states are not learned")
+            ctx.count("view_not_learned", detail="the belief had several modes (map_update)")
         else:
             pending.seen.append(MapUpdate(view, state, now, reconstructed=True))
         ready = sum(1 for update in pending.queue if update.index <= now - self.length)
@@ -138,6 +138,6 @@ class UnimodalQueue(Stage):
             ctx.count(
                 "view_not_learned",
                 len(pending.seen),
-                detail="map_update: views outside unimodal states are not learned",
+                detail="the belief had several modes (map_update)",
             )
         pending.last, pending.seen, pending.motions = None, [], []

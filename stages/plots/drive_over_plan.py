@@ -46,7 +46,7 @@ class DriveOverPlan(Stage):
                 name="drive_over_plan",
                 title="Path driven",
                 caption=f"The true path of {len(path)} ticks over the floor plan, which the robot does not know. "
-                f"It touched something {counted(int(drive.collisions.max()), 'time')} (orange crosses). "
+                f"It collided {counted(int(drive.collisions.max()), 'time')} (orange crosses). "
                 f"Dashed: odometry alone.{_caption_of_map(map, planned)}",
                 content=_draw(path, dead_reckoning, path[contacts], plan, map, planned),
                 media_type="image/svg+xml",

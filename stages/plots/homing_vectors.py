@@ -40,9 +40,9 @@ class ShowHomingVectors(Stage):
             figure=Figure(
                 name="homing_vectors",
                 title="Homing vectors",
-                caption=f"From {len(degrees)} views towards the one target: from {int(found.sum())} it was found, "
-                f"and from half of all the vector is less than {median:.1f} degrees off. Crosses: not found. "
-                "Rings: each 2 m.",
+                caption=f"From {len(degrees)} views to one target; {int(found.sum())} of them have a homing vector. "
+                f"Median error of the direction: {median:.1f}° (a view without a vector counts as 180°). Crosses: no "
+                "vector. Rings: every 2 m.",
                 content=_draw(field, plan),
                 order=8,
             )

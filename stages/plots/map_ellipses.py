@@ -53,8 +53,8 @@ class MapEllipses(Stage):
             figure=Figure(
                 name="map_ellipses",
                 title="The map",
-                caption=f"{size} Each place is an ellipse of {self.sigmas:g} sigma, the fainter the "
-                f"less it weighs. The line is the {'true path' if true else 'estimate'}. "
+                caption=f"{size} Each place is an ellipse of {self.sigmas:g} sigma, fainter where it "
+                f"weighs less. The line is the {'true path' if true else 'estimate'}. "
                 f"The first pose was taken from {SOURCE_WORDS[map.pose_source]}.",
                 content=_draw(map, paths, plan if true else None, self.sigmas, true),
                 media_type="image/svg+xml",

@@ -50,10 +50,11 @@ class MapGrowth(Stage):
             figure=Figure(
                 name="map_growth",
                 title="Map size over time",
-                caption=f"{came.sum()} references came, {went.sum()} went{f' ({counted})' if counted else ''}; "
-                f"{found[-1].views} with {found[-1].components} components were left. Below, how many came and went "
-                f"per {_width(len(drive))} frames, by when they were learned, which is later than seen. Dotted "
-                "lines: a new log begins.",
+                caption=f"{came.sum()} references were added, {went.sum()} removed"
+                f"{f' ({counted})' if counted else ''}; "
+                f"{found[-1].views} with {found[-1].components} components are left. Below: how many were added and "
+                f"removed per {_width(len(drive))} frames, at the time of learning, which is after they were seen. "
+                "Dotted lines: a new log begins.",
                 content=_draw(
                     len(drive),
                     starts,

@@ -62,9 +62,9 @@ class PlaceBeliefOverTime(Stage):
             figure=Figure(
                 name="place_belief",
                 title="Belief over places",
-                caption=f"Above: {len(map)} places, by number, as opaque as they were believed.{truly}"
-                f"{right} Below: how probable the most probable place was, and how probable the truly nearest, alone "
-                "and with the places linked to it.",
+                caption=f"Above: the probability of each of {len(map)} places, darker where it is higher.{truly}"
+                f"{right} Below: the probability of the most probable place, and of the truly nearest one, alone and "
+                "with the places linked to it.",
                 content=_draw(last.seconds, shares, nearest, map),
                 media_type="image/svg+xml",
                 order=28,

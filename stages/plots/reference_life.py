@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Figure, Outputs, Stage
+from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.floor_plan import FloorPlan
@@ -74,9 +75,9 @@ class ReferenceLife(Stage):
             figure=Figure(
                 name="reference_life",
                 title="History of a reference",
-                caption=f"Reference {name} came in frame {snapshots[0][0]} and changed in {len(snapshots)} frames; "
-                f"{ended}. {len(lives)} place(s) were held for it, each with its colour in both plots"
-                f"{'; grey: those beyond the heaviest six' if len(lives) > len(COLOURS) else ''}. "
+                caption=f"Reference {name} was added in frame {snapshots[0][0]} and changed in "
+                f"{counted(len(snapshots), 'frame')}; {ended}. It was kept at {counted(len(lives), 'place')}, each in "
+                f"one colour in both plots{'; grey: all but the heaviest six' if len(lives) > len(COLOURS) else ''}. "
                 "Right: larger dots weigh more, circles are last places, crosses the true positions at these frames "
                 "(a map that learns with delay changes a little after the view was seen).",
                 content=_draw(lives, path, np.array(seen), plan, gone),

@@ -30,9 +30,9 @@ class ReliabilityDiagram(Stage):
         figure = Figure(
             name="reliability",
             title="Reliability diagram of the confidence",
-            caption="Frames by the probability that was stated for an estimate within "
-            f"{reliability.within_m:g} m and {reliability.within_deg:g} degrees, and how many were. Below the dashed "
-            "line it was too sure.",
+            caption="Share of the estimates that were within "
+            f"{reliability.within_m:g} m and {reliability.within_deg:g}°, over the probability that was stated for it. "
+            "Below the dashed line the confidence was too high.",
             content=chart.svg(),
             media_type="image/svg+xml",
             order=12,

@@ -77,9 +77,9 @@ class RetrievalStrip(Stage):
             figure=Figure(
                 name="retrieval_strip",
                 title="Retrieved references",
-                caption="Query images of the drive, and below each the most similar references, the best "
-                "first: the similarity, and where it is known how far the robot truly was from where it would be if "
-                f"the reference were right (green: within {NEAR_M:g} m and {NEAR_DEG:g}°)."
+                caption="Query images of the drive, and below each the most similar references, best first, with their "
+                "similarity and, where the truth is known, the error of the pose that each means (green: within "
+                f"{NEAR_M:g} m and {NEAR_DEG:g}°)."
                 + ("" if illustrated else " Without thumbnails of the references their poses are shown."),
                 content=_draw(chosen, map, thumbnails, illustrated),
                 media_type="image/jpeg",

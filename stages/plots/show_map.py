@@ -97,7 +97,7 @@ def described(file: Path, map: AnyMap) -> Iterator[tuple[str, Any]]:
         some = poses[np.unique(np.linspace(0, len(poses) - 1, min(len(poses), SAMPLE)).astype(np.int64)), :2]
         tree: Any = KDTree(poses[:, :2])
         gaps = tree.query(some, k=2)[0][:, 1]
-        yield "spacing", f"{np.median(gaps):.3f} m to the nearest other (median), {gaps.max():.2f} m at most"
+        yield "spacing", f"{np.median(gaps):.2f} m to the nearest other (median), {gaps.max():.2f} m at most"
     facts = read_header(file)["facts"]
     stages = facts.get("stages")
     for node in ("unwarp", "features") if isinstance(stages, dict) else ():

@@ -58,8 +58,8 @@ class SimilarityHeatMap(Stage):
             figure=Figure(
                 name="similarity_heat_map",
                 title="Similarity to the map's views",
-                caption="Above: each reference's best similarity over all headings (grey: not compared, because "
-                "the robot was not thought to be near), the most similar one ringed, the true pose in black. "
+                caption="Above: each reference's best similarity over all headings (grey: not compared, as "
+                "the belief was far from it), the most similar one ringed, the true pose in black. "
                 "Below: the most similar reference's similarity over the robot's heading against its own; "
                 "the dashed line is the true heading.",
                 content=_draw(panels, map),

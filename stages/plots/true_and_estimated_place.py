@@ -64,10 +64,10 @@ class TrueAndEstimatedPlace(Stage):
             figure=Figure(
                 name="believed_places",
                 title="True and estimated place",
-                caption=f"From each image of the true path a line to the place that was believed most, faint where "
-                f"by less than a half: the truly nearest (green, {counted[RIGHT]:.0f} % of the images), one that is "
-                f"linked with it (blue, {counted[BESIDE]:.0f} %), another (orange, {counted[WRONG]:.0f} %). Where the "
-                "drive leaves the tour's path no place is near.",
+                caption="A line from each image of the true path to the most probable place, faint where its "
+                f"probability is below a half: the truly nearest place (green, {counted[RIGHT]:.0f} % of the images), "
+                f"one linked with it (blue, {counted[BESIDE]:.0f} %), another (orange, {counted[WRONG]:.0f} %). "
+                "Off the tour's path no place is near.",
                 content=_draw(path, believed, np.array(shares), kinds, map, plan),
                 media_type="image/svg+xml",
                 order=12,

@@ -75,8 +75,8 @@ class ShowVisibilityAreas(Stage):
                 name="visibility_areas",
                 title="Visibility areas",
                 caption=f"{len(chosen)} of {len(map)} references: a circle where the image was taken, a cross at "
-                f"{ways}, coloured the free cells from which it is visible. Last: of how many views' points each "
-                f"free cell sees; {100 * share:.0f} % of them see one at least.{made}",
+                f"{ways}, in colour the free cells from which it is visible. Last: how many views' points each "
+                f"free cell sees; {100 * share:.0f} % of the cells see at least one.{made}",
                 content=_draw(map, areas, grid, chosen, counts, driven),
                 order=20,
             )

@@ -74,8 +74,11 @@ class PlaceGrid(Stage):
                 raise BadInput("grid: from_tour needs a map with references; give tour=FILE, or grid=FOLDER/map.yaml")
             unit = self.length_scale_m if length_scale is None else length_scale.metres
             grid = along_path(map.poses, map.edges, self.path_half_width * unit, self.resolution_m)
-            ctx.fact("grid", "a stand-in made from the tour's free path: walls are where it ends, not where they are")
-            ctx.count("grid_is_a_stand_in", detail="grid: made from the tour's free path; a map_server file is better")
+            ctx.fact(
+                "grid",
+                "a stand-in made from the tour's path: free along it, walls around it, wherever the real ones are",
+            )
+            ctx.count("grid_is_a_stand_in", detail="grid: made from the tour's path; a map_server file is better")
         elif file is not None:
             grid = self._read(file)
             ctx.fact("grid", file.name)

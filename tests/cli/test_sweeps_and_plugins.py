@@ -154,7 +154,7 @@ def test_an_optimiser_whose_jobs_all_fail_says_so_in_a_line(omninav, shared_cach
     optuna = ("hydra/sweeper=optuna", "hydra/sweeper/sampler=grid", "hydra.sweeper.n_trials=1")
     ended = omninav("-m", *words, *optuna, "seed=choice(1)", "objective=position_error_m.median")
     assert ended.returncode == 1
-    assert "no job ended well: there is nothing to choose the best from" in ended.stderr
+    assert "every job failed: there is no best one" in ended.stderr
     assert "Traceback" not in ended.stderr
 
 

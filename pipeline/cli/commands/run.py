@@ -94,7 +94,7 @@ def _sweep(hydra: Hydra, job: Callable[[Any], float | None], words: Sequence[str
         ends = _ends(outcomes)
         if not ends or any(code == "0" for code, _, _ in ends):
             raise
-        print("no job ended well: there is nothing to choose the best from", file=sys.stderr, flush=True)
+        print("every job failed: there is no best one", file=sys.stderr, flush=True)
 
 
 def _ends(outcomes: Path) -> list[tuple[str, str, str]]:

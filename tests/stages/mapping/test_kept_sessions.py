@@ -102,4 +102,4 @@ def test_a_known_map_without_drives_keeps_none_so_that_it_is_not_forgotten() -> 
     ctx.tick = Tick(2, 2, first_of_log=True)
     out = KeepSessions().step(ctx, view(2), None, believed(1.0), None, known)
     assert out.sessions is None
-    assert ctx.facts["map_straightened"] == "no: the map that it went on with was saved without its drives"
+    assert ctx.facts["map_straightened"] == "no: the map it continued was saved without its drives"

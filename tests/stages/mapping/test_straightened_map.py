@@ -91,7 +91,7 @@ def test_views_of_one_direction_and_places_that_are_too_near_along_the_drive_clo
     assert "all around" in ctx.facts["map_straightened"]
     ctx = Context("straightened")
     assert StraightenMap(min_gap=500.0).step(ctx, map, []).map is map
-    assert "came back to no place" in ctx.facts["map_straightened"]
+    assert "no loop closure was found" in ctx.facts["map_straightened"]
 
 
 def test_the_way_along_the_drive_is_what_keeps_neighbours_apart():
