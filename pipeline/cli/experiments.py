@@ -7,7 +7,7 @@ from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
 from omninav.pipeline.experiment.runner import ExperimentRun, plan_experiment
-from omninav.pipeline.experiment.verdicts import Verdict, in_words
+from omninav.pipeline.experiment.verdicts import MIN_SCENARIOS, Verdict, in_words
 from omninav.pipeline.graph.problems import ProblemsFound
 
 from .composition import complete, read_words
@@ -36,12 +36,14 @@ def run_experiment(config: Any, arguments: Sequence[str]) -> int:
     verdicts = run.verdicts()
     if verdicts:
         show(verdict_table(verdicts))
+        if any(v.holds is None and any(case.scenarios < MIN_SCENARIOS for case in v.cases) for v in verdicts):
+            print(f"undecided: a verdict needs {MIN_SCENARIOS} scenarios")
     print(f"page: {shown(run.folder / (run.experiment.name + '.html'))}", flush=True)
     return 0 if well else 1
 
 
 def verdict_table(verdicts: Sequence[Verdict]) -> "TerminalTable":
-    """A line for each claim: its verdict, the claim, and how many of its cases hold where it has several."""
+    """A line for each claim: its verdict, the claim, and how many of its cases hold where not all do."""
     from rich.table import Table as TerminalTable
     from rich.text import Text
 
@@ -49,7 +51,7 @@ def verdict_table(verdicts: Sequence[Verdict]) -> "TerminalTable":
     for verdict in verdicts:
         word = in_words(verdict.holds)
         holding = sum(case.holds is True for case in verdict.cases)
-        cases = f" ({holding} of {len(verdict.cases)} cases hold)" if len(verdict.cases) > 1 else ""
+        cases = f" ({holding} of {len(verdict.cases)} cases hold)" if 0 < holding < len(verdict.cases) else ""
         table.add_row(Text(word, "bold red" if verdict.holds is False else ""), Text(f"{verdict.claim}{cases}"))
     return table
 

@@ -59,6 +59,8 @@ class Metrics(Value):
     columns of a sweep. Those that are not among the values are passed over."""
     details: tuple[str, ...] = ()
     """Paths of entries or whole groups that only the run's own page shows, no comparison and no terminal."""
+    foremost: bool = False
+    """Whether they say if the run did what it was for: their headlines stand before those of other stages."""
 
 
 def merged(parts: Iterable[Metrics]) -> Metrics:
@@ -70,7 +72,7 @@ def merged(parts: Iterable[Metrics]) -> Metrics:
     for part in parts:
         _merge(values, part.values)
         quantities |= part.quantities
-        headlines += part.headlines
+        headlines = part.headlines + headlines if part.foremost else headlines + part.headlines
         details += part.details
     return Metrics(values, quantities, tuple(dict.fromkeys(headlines)), tuple(dict.fromkeys(details)))
 

@@ -97,7 +97,9 @@ class HomingErrors(Stage):
                 "inliers": after[first].inliers,
             },
         }
-        return self.Out(metrics=Metrics({"homing": values}, QUANTITIES, HEADLINES, details=("homing.end",)))
+        return self.Out(
+            metrics=Metrics({"homing": values}, QUANTITIES, HEADLINES, details=("homing.end",), foremost=True)
+        )
 
 
 def _errors_deg(vector: HomingVector, target: np.ndarray) -> tuple[float, float]:

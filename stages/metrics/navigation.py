@@ -103,7 +103,7 @@ class Navigation(Stage):
             if reached and shortest:
                 found["time_per_metre_s"] = found["time_s"] / shortest
                 found["path_length_ratio"] = driven / shortest
-        return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, HEADLINES))
+        return self.Out(metrics=Metrics({"navigation": found}, QUANTITIES, HEADLINES, foremost=True))
 
 
 def shortest_metres(map: TopologicalMap, start: npt.ArrayLike, goal: int) -> float | None:

@@ -11,3 +11,12 @@ def test_metrics_of_several_stages_are_merged_group_by_group():
     assert both.headlines == ("group.a", "c")
     assert both.details == ("group",)
     assert one.values == {"group": {"a": 1, "b": 1}}
+
+
+def test_what_a_run_was_for_is_said_first():
+    driven, reached = (
+        Metrics({"m": 1}, headlines=("m",)),
+        Metrics({"reached": 1}, headlines=("reached",), foremost=True),
+    )
+    assert merged([driven, reached]).headlines == ("reached", "m")
+    assert merged([reached, driven]).headlines == ("reached", "m")
