@@ -78,6 +78,8 @@ class PoseTopic:
             f"{where}: {metres:.3g} m from its neighbour {seconds:.3g} s away; "
             f"believed are {limits.speed:g} m/s and {limits.turn:.3g} rad/s (nodes.source.limits)"
         )
+        if 2 * len(rows) > len(poses):
+            detail += "; most are like this: check the unit (m, rad)"
         for _ in rows:
             feed.drop(kind, detail)
 

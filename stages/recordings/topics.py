@@ -27,6 +27,8 @@ from .transforms import TransformTopic
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
+SET_BACK_S = 10.0
+"""Records of one topic that lie in a file earlier than what comes before them by so much tell of a clock set back."""
 IMAGE_TOPICS = ("/camera/image/compressed", "/camera/image")
 
 
@@ -106,8 +108,23 @@ def record_topics(name: str, feed: Feed, options: OpenOptions, files: Sequence[P
         files=[*files, *camera_files],
         scans=_scans(name, feed, topics.scan, found),
     )
+    if len(files) == 1 and (sentence := set_back(found[image_topic])):
+        recording.assumed = (f"{name}: {sentence}",)
     _check_size(recording, fetch_image)
     return recording
+
+
+def set_back(records: Sequence[Record]) -> str:
+    """What to say of a clock that was set back while a file was recorded, by the order of its records; else ""."""
+    times = np.array([record.log_time for record in records], dtype=np.int64)
+    steps = np.diff(times)
+    if not len(steps) or steps.min() > -SET_BACK_S * 1e9:
+        return ""
+    at = int(steps.argmin())
+    return (
+        f"the clock was set back by {-steps[at] / 1e9:.0f} s after image {at + 1}; images are taken in the order of "
+        "their stamps"
+    )
 
 
 def find_camera(

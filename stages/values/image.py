@@ -36,6 +36,12 @@ class Panorama(Value):
     elevation_bottom: Annotated[float | None, Elevation] = None
 
 
+class Strip(Value):
+    """A small panorama in grey. `pixels`: (rows, columns) float32, means over equal parts of a `Panorama`."""
+
+    pixels: Annotated[npt.NDArray[np.float32], Shape("rows", "columns")]
+
+
 class Windows(Value):
     """Perspective images taken at once, each in one direction, level or not.
 

@@ -16,10 +16,20 @@ def turn_between(before: Strip, after: Strip) -> float:
     matter. Zeil, Hofmann & Chahl 2003, "Catchment areas of panoramic snapshots in outdoor scenes", JOSA A 20(3),
     section 3 use the same image difference; for what is far away the turn is exact, whatever the robot drove meanwhile.
     """
-    columns = before.shape[1]
-    spectra = [np.fft.rfft(view - view.mean(axis=1, keepdims=True)) for view in (before, after)]
-    likeness = np.fft.irfft((np.conj(spectra[0]) * spectra[1]).sum(axis=0), columns)
-    return angle_of_peak(likeness)
+    return angle_of_peak(_likeness(*(view - view.mean(axis=1, keepdims=True) for view in (before, after))))
+
+
+def turn_and_correlation(before: Strip, after: Strip) -> tuple[float, float]:
+    """The turn as `turn_between` finds it, and the correlation of the two panoramas there: 1 where they are equal."""
+    one, other = (view - view.mean(axis=1, keepdims=True) for view in (before, after))
+    likeness = _likeness(one, other)
+    energy = float(np.sqrt(np.square(one).sum(dtype=np.float64) * np.square(other).sum(dtype=np.float64)))
+    return angle_of_peak(likeness), float(likeness.max()) / energy if energy else 0.0
+
+
+def _likeness(one: Strip, other: Strip) -> npt.NDArray[np.floating]:
+    spectra = [np.fft.rfft(view) for view in (one, other)]
+    return np.fft.irfft((np.conj(spectra[0]) * spectra[1]).sum(axis=0), one.shape[1])
 
 
 def angle_of_peak(values: npt.NDArray[np.floating]) -> float:

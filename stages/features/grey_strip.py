@@ -1,0 +1,35 @@
+"""Makes a panorama a small grey strip."""
+
+from typing import Annotated
+
+import cv2
+import numpy as np
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.values.image import Panorama, Strip, Windows
+
+
+class GreyStrip(Stage):
+    """The mean grey of equal parts of a panorama: enough to see turns, and small enough to be kept over a whole log.
+
+    A stage of its own so that it can be cached with the log's other features.
+    """
+
+    columns: Annotated[int, Bounds(ge=8)] = 90
+    """Columns of the strip (pixels): 4 degrees each."""
+    rows: Annotated[int, Bounds(ge=1)] = 8
+    """Rows of the strip (pixels)."""
+
+    class Out(Outputs):
+        """The strip; absent where the image is not a full circle."""
+
+        strip: Strip | None = None
+
+    def step(self, ctx: Context, panorama: Panorama | Windows) -> Out:
+        """One panorama."""
+        if isinstance(panorama, Windows):
+            return self.Out()
+        grey = cv2.cvtColor(panorama.pixels, cv2.COLOR_BGR2GRAY)
+        size = (self.columns, self.rows)
+        small = cv2.resize(grey.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+        return self.Out(strip=Strip(np.asarray(small, np.float32)))

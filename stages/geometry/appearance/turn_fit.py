@@ -1,0 +1,67 @@
+"""How turns that a camera sees lie to turns that odometry measures: alike, reversed, scaled or late."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+MAX_TURN = math.radians(60.0)
+"""Turns count up to this: one wrong turn must not outweigh the others."""
+MAX_DELAY_S, DELAY_STEPS = 4.0, 0.5
+"""Delays that are tried, and their step as a share of the time between images."""
+
+
+class TurnFit(NamedTuple):
+    """Which sign (1, -1) and delay (s, positive: images are late) of measured turns explain most of what is seen.
+
+    `explained`: the share of the seen turning; `as_is`: the same with neither. `factor`: by how much more the images
+    turn than is measured, as is: the weighted median of the ratios.
+    """
+
+    sign: int
+    delay_s: float
+    explained: float
+    as_is: float
+    factor: float
+
+
+def explained(seen: Array, measured: Array) -> Array:
+    """1 - sum |seen - measured| / sum |seen| over the last axis: 1 where they are equal, 0 where nothing is gained."""
+    rest = np.abs(clipped(seen) - clipped(measured)).sum(axis=-1)
+    share: Array = 1.0 - rest / max(float(np.abs(clipped(seen)).sum()), 1e-9)
+    return share
+
+
+def clipped(turns: Array) -> Array:
+    """Turns up to `MAX_TURN`."""
+    return np.clip(turns, -MAX_TURN, MAX_TURN)
+
+
+def turn_fit(times: Array, headings: Array, seen: Array) -> TurnFit:
+    """Compare the turns (N - 1,) that are seen between images with `headings` (N,), not wrapped, at their times (N,).
+
+    Seen turns that are not known are NaN. Delays shorter than half the time between images cannot be told.
+    """
+    known = np.isfinite(seen)
+    step = DELAY_STEPS * float(np.median(np.diff(times)))
+    most = max(1, int(MAX_DELAY_S / step))
+    delays = step * np.arange(-most, most + 1)
+    turns = np.diff(np.interp(times - delays[:, None], times, headings), axis=1)[:, known]
+    there = seen[known]
+    both = np.stack([explained(there, turns), explained(there, -turns)])
+    sign, at = np.unravel_index(int(both.argmax()), both.shape)
+    as_is = turns[most]
+    return TurnFit(1 - 2 * int(sign), float(delays[at]), float(both.max()), float(both[0, most]), _factor(there, as_is))
+
+
+def _factor(seen: Array, measured: Array) -> float:
+    weights = np.abs(measured)
+    if not weights.sum():
+        return math.inf
+    ratios = seen / np.where(weights > 0.0, measured, 1.0)
+    order = np.argsort(ratios)
+    share = np.cumsum(weights[order])
+    return float(ratios[order][np.searchsorted(share, 0.5 * share[-1])])

@@ -1,0 +1,440 @@
+"""Watches whether images, odometry, clock and map fit each other."""
+
+import math
+from collections.abc import Callable
+from dataclasses import field
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Context, Outputs, Stage, State, Tick
+from omninav.stages.geometry.appearance.segments import similarity_at
+from omninav.stages.geometry.appearance.turn_fit import clipped, explained, turn_fit
+from omninav.stages.geometry.appearance.visual_compass import turn_and_correlation
+from omninav.stages.geometry.plane.se2 import compose, wrap
+from omninav.stages.geometry.plane.track_fit import track_fit
+from omninav.stages.values.conflicts import Conflicts, MapFit
+from omninav.stages.values.features import SegmentFeatures
+from omninav.stages.values.image import Strip
+from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import GuessedMotion, GuessedPose, Motion, Pose
+from omninav.stages.values.requests import Restart
+from omninav.stages.values.similarity import Similarities
+
+from .confidence_monitor import best_place
+
+Array = npt.NDArray[np.float64]
+
+INTERVAL_S = 0.25
+"""Images that come sooner after the last one that was watched are left out (s)."""
+WINDOW = 128
+"""Images that are remembered."""
+EVERY = 8
+"""Images between two judgements; a finding is said once two in a row agree."""
+COLUMNS = 11
+"""Numbers that are remembered of an image."""
+
+
+class Watched(NamedTuple):
+    """The last images, N rows: `times` (s), `odometry` (N, 3) with headings that are not wrapped, best `matches` (N, 3)
+    in the map (NaN without one) and how `similar` they are, and against the image before: the turn `seen` (rad), its
+    `correlation`, and whether the images are `same`."""
+
+    times: Array
+    odometry: Array
+    matches: Array
+    similar: Array
+    seen: Array
+    correlation: Array
+    same: Array
+
+    @classmethod
+    def of(cls, rows: Array) -> "Watched":
+        """From rows (N, 11)."""
+        return cls(rows[:, 0], rows[:, 1:4], rows[:, 4:7], *rows[:, 7:].T)
+
+    def last(self, number: int) -> "Watched":
+        """The last images alone."""
+        return Watched(*(part[-number:] for part in self))
+
+    @property
+    def placed(self) -> tuple[Array, Array]:
+        """Odometry's poses and the best matches, of images that have one: (M, 3), (M, 3)."""
+        known = np.isfinite(self.matches).all(axis=1)
+        return self.odometry[known], self.matches[known]
+
+    @property
+    def metres(self) -> float:
+        """The path that odometry drove."""
+        return float(np.hypot(*np.diff(self.odometry[:, :2], axis=0).T).sum())
+
+    @property
+    def radians(self) -> float:
+        """How much odometry turned, to either side."""
+        return float(np.abs(np.diff(self.odometry[:, 2])).sum())
+
+
+class OfMap(NamedTuple):
+    """What the map says: its appearance length scale (m), and how similar its images are to others' (`MapFit`)."""
+
+    length_scale_m: float = math.inf
+    other_places: float | None = None
+
+    @classmethod
+    def sound(cls, length_scale: LengthScale | None, fit: MapFit | None) -> "OfMap":
+        """What may be compared with odometry: nothing of a map that is wrong by itself."""
+        if length_scale is None or (fit is not None and fit.sentences):
+            return cls()
+        return cls(length_scale.metres, None if fit is None else fit.other_places)
+
+
+class InputConflictsState(State):
+    """`strip` (rows, columns), `stamp` (ns) and `pose` (3,) of the last watched image; `rows` (N, 11) of `Watched`;
+    what was found by the last judgement, and all that was said."""
+
+    strip: npt.NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 0), np.float32))
+    stamp: int = 0
+    pose: Array = field(default_factory=lambda: np.full(3, np.nan))
+    rows: Array = field(default_factory=lambda: np.zeros((0, COLUMNS)))
+    judged: int = 0
+    suspected: str = ""
+    found: tuple[str, ...] = ()
+    sentences: tuple[str, ...] = ()
+
+
+class InputConflicts(Stage):
+    """Says which inputs do not fit each other, without ground truth; it changes nothing.
+
+    Motion seen in the images (turns between panoramas, and whether anything changes) is compared with odometry's, over
+    the last `WINDOW` images; the track of single images' best matches in the map, without any belief, with odometry's
+    track. A finding needs two judgements in a row and is said once, as a warning, with what to check. Where nothing
+    measured the motion, nothing is said of it. Which conflicts are noticed after how many images, where the limits are
+    from, and what cannot be noticed: docs/conflicts.md.
+    """
+
+    class Out(Outputs):
+        """All that was found so far."""
+
+        conflicts: Conflicts
+
+    def step(
+        self,
+        ctx: Context,
+        recent: InputConflictsState,
+        strip: Strip | None = None,
+        odometry: Pose | None = None,
+        motion: Motion | None = None,
+        similarities: Similarities | None = None,
+        features: SegmentFeatures | None = None,
+        map: ReferenceGraph | None = None,
+        length_scale: LengthScale | None = None,
+        map_fit: MapFit | None = None,
+        restart: Restart | None = None,
+    ) -> Out:
+        """One image, or a tick without one."""
+        if (sentence := leap(recent, ctx.tick, odometry)) and "leap" not in recent.found:
+            self._say(ctx, recent, "leap", sentence)
+        if ctx.tick.first_of_log or restart is not None:
+            recent.rows, recent.pose, recent.judged = np.zeros((0, COLUMNS)), np.full(3, np.nan), 0
+            recent.suspected = ""
+        recent.pose = pose_now(recent.pose, odometry, motion)
+        if strip is not None and np.isfinite(recent.pose).all() and self._due(ctx, recent):
+            match = np.full(4, np.nan)
+            if similarities is not None and map is not None and min(similarities.values.shape) > 1:
+                match = matched(similarities, features, map)
+            remember(recent, ctx.tick.stamp, strip.pixels, match)
+            recent.judged += 1
+            if not recent.judged % EVERY:
+                self._judge(ctx, recent, OfMap.sound(length_scale, map_fit))
+        of_map = () if map_fit is None else map_fit.sentences
+        return self.Out(conflicts=Conflicts(of_map + recent.sentences))
+
+    def _due(self, ctx: Context, recent: InputConflictsState) -> bool:
+        return not len(recent.rows) or not 0 <= ctx.tick.stamp - recent.stamp < INTERVAL_S * 1e9
+
+    def _judge(self, ctx: Context, recent: InputConflictsState, map: OfMap) -> None:
+        kind, sentence = judge(Watched.of(recent.rows), map)
+        if kind and kind == recent.suspected and not set(recent.found) - {"leap"}:
+            self._say(ctx, recent, kind, sentence)
+        recent.suspected = kind
+
+    def _say(self, ctx: Context, recent: InputConflictsState, kind: str, sentence: str) -> None:
+        recent.found += (kind,)
+        recent.sentences += (sentence,)
+        ctx.warn(sentence)
+
+
+def leap(recent: InputConflictsState, tick: Tick, odometry: Pose | None) -> str:
+    """Whether the clock leapt since the last image: much time went by, or less than none, yet the robot drove on as
+    between other images, which no pause explains; else ""."""
+    if odometry is None or isinstance(odometry, GuessedPose) or len(recent.rows) < MIN_BEFORE_LEAP:
+        return ""
+    seconds = (tick.stamp - recent.stamp) / 1e9
+    before = Watched.of(recent.rows).last(MIN_BEFORE_LEAP)
+    usual = float(np.median(np.diff(before.times)))
+    if 0.0 <= seconds < max(MIN_LEAP_S, LEAP_INTERVALS * usual):
+        return ""
+    steps = np.hypot(*np.diff(before.odometry[:, :2], axis=0).T)
+    x, y = before.odometry[-1, :2]
+    moved = math.hypot(odometry.x - x, odometry.y - y)
+    if not LEAP_MIN_M < moved <= 2.0 * float(np.median(steps)):
+        return ""
+    return (
+        f"the clock leaps by {seconds - usual:.0f} s at image {tick.index}, while odometry drives {moved:.2f} m, as in "
+        f"the {usual:.2f} s between other images: check the clock of the robot, or of what recorded it"
+    )
+
+
+def pose_now(before: Array, odometry: Pose | None, motion: Motion | None) -> Array:
+    """Odometry's pose (3,) with a heading that is not wrapped; NaN where motion is only guessed, or not known."""
+    if isinstance(odometry, GuessedPose) or isinstance(motion, GuessedMotion):
+        return np.full(3, np.nan)
+    known = bool(np.isfinite(before).all())
+    if odometry is not None:
+        turned = float(wrap(odometry.heading - before[2])) if known else 0.0
+        return np.array((odometry.x, odometry.y, before[2] + turned if known else odometry.heading))
+    if motion is None:
+        return before
+    start = before if known else np.zeros(3)
+    moved = compose(start, np.array((motion.x, motion.y, motion.turn)))
+    return np.array((moved[0], moved[1], start[2] + motion.turn))
+
+
+def matched(similarities: Similarities, features: SegmentFeatures | None, map: ReferenceGraph) -> Array:
+    """The pose (3,) at which the most similar reference says the robot is, and how similar its best segments are: (4,).
+
+    The latter as `CheckMap` compares, whatever the variant compares by; NaN without features.
+    """
+    place = best_place(similarities, map)
+    if features is None or map.kind != features.kind or map.features.shape[1:] != features.values.shape:
+        return np.append(place, np.nan)
+    row = int(similarities.values.max(axis=1).argmax())
+    reference = row if similarities.candidates is None else int(similarities.candidates[row])
+    view = np.asarray(map.features[reference])
+    turn = np.array([place[2] - map.poses[reference, 2]])
+    return np.append(place, similarity_at(view[None], features.values, turn, map.kind))
+
+
+def remember(recent: InputConflictsState, stamp: int, pixels: npt.NDArray[np.float32], match: Array) -> None:
+    """Add a row for an image; `match` (4,) as `matched` gives it."""
+    turn, correlation, same, time = math.nan, math.nan, 0.0, 0.0
+    if recent.strip.shape == pixels.shape and len(recent.rows):
+        turn, correlation = turn_and_correlation(recent.strip, pixels)
+        same = float(np.array_equal(recent.strip, pixels))
+        time = recent.rows[-1, 0] + (stamp - recent.stamp) / 1e9
+    row = np.concatenate([(time,), recent.pose, match, (turn, correlation, same)])
+    recent.rows = np.concatenate([recent.rows, row[None]])[-WINDOW:]
+    recent.strip, recent.stamp = pixels, stamp
+
+
+MIN_BEFORE_LEAP, MIN_LEAP_S, LEAP_INTERVALS, LEAP_MIN_M = 8, 30.0, 20.0, 0.02
+"""Images before a leap of the clock; what a leap is at least (s, and times the usual interval); what a robot that does
+not pause drives (m)."""
+MIN_FROZEN, FROZEN_M, FROZEN_RAD = 8, 1.0, 1.0
+"""Images that are equal to the last bit while odometry drives so far (m) or turns so much (rad) are one image."""
+MIN_BLIND, BLIND_CORRELATION = 16, 0.15
+"""Images that have less in common than this with the ones before show nothing, or noise."""
+SURE_CORRELATION, SURE_TURN = 0.4, math.radians(3.0)
+"""Turns are seen where images correlate so much, and above what parallax looks like (rad)."""
+MIN_SEEN_TURN = math.pi / 2.0
+"""What the images must have turned, to either side, before anything is said of turns (rad)."""
+STILL_M, STILL_RAD = 1e-3, 1e-3
+"""Odometry that stays below these over all images stands (m, rad)."""
+NO_HEADING, WILD_TURNS, MIN_WILD_TURN = 0.05, 3.0, 4.0 * math.pi
+"""Odometry's turning as a share of the seen one: below the first it has no heading, above the second (and so much
+turning, rad) its headings are something else."""
+EXPLAINED, REVERSED_AS_IS, DELAY_GAIN, MIN_DELAY_S = 0.5, 0.0, 0.1, 0.4
+"""Share of the seen turning that must be explained; at most so much as it is where turns are reversed; so much more
+than as it is where images are late, by at least so many seconds."""
+TRACK_SCALES, MIN_PAIRS, SHARE, GAIN = 3.0, 40, 0.45, 0.25
+"""Matches must move so many length scales to say anything, in so many pairs, of which this share agrees on one relation
+of the tracks, and so much less on the right one."""
+REVERSED = (np.array((1.0, 1.0, -1.0)), np.array((1.0, -1.0, -1.0)))
+"""Factors that put right an odometry whose heading has the wrong sign, and one whose left is its right."""
+FOREIGN_SHARE, UNLIKE = 0.12, 0.03
+"""Of a whole window at most this share of pairs agrees on any relation of the tracks: matches are drawn by chance. They
+are less similar than images of different places of the map, by more than the last."""
+CHANGING = 0.97
+"""Images of a robot that drives correlate less with the ones before."""
+MISSCALED_OCTAVES, MISTURNED = 0.6, math.radians(35.0)
+"""A relation of tracks is a wrong one beyond these."""
+
+
+def judge(watched: Watched, map: OfMap) -> tuple[str, str]:
+    """The first conflict that is found, by its kind and in a sentence; ("", "") where there is none."""
+    for kind, finding in JUDGEMENTS.items():
+        sentence = finding(watched, map)
+        if sentence:
+            return kind, sentence
+    return "", ""
+
+
+def frozen(watched: Watched, map: OfMap) -> str:
+    """The camera gives one image again and again."""
+    number = int(np.argmin(watched.same[::-1])) if not watched.same.all() else len(watched.same)
+    run = watched.last(number + 1)
+    if number < MIN_FROZEN or (run.metres < FROZEN_M and run.radians < FROZEN_RAD):
+        return ""
+    return (
+        f"the camera is frozen: its last {number} images are one and the same, while odometry drove {run.metres:.1f} m "
+        f"and turned {math.degrees(run.radians):.0f} degrees; check the camera's driver, and that each image is new"
+    )
+
+
+def blind(watched: Watched, map: OfMap) -> str:
+    """Images that show nothing."""
+    recent = watched.last(MIN_BLIND).correlation
+    if len(recent) < MIN_BLIND or not np.nanmedian(recent) < BLIND_CORRELATION:
+        return ""
+    return (
+        f"images have nothing in common with the ones before (correlation {np.nanmedian(recent):.2f} over {len(recent)}"
+        " images; a camera that moves has above 0.5): noise, an empty view, or bytes that are no image; look at them "
+        "with `omninav camera look log=…`"
+    )
+
+
+def turned(watched: Watched, map: OfMap) -> str:
+    """Turns that are seen against turns that are measured."""
+    seen = sure_turns(watched)
+    sure = np.abs(clipped(seen[np.abs(seen) > SURE_TURN]))
+    turning, number = float(sure.sum()), len(watched.times) - 1
+    if turning < MIN_SEEN_TURN:
+        return ""
+    over = f"over {number} images"
+    images, measured = f"{math.degrees(turning):.0f} degrees", f"{math.degrees(watched.radians):.0f} degrees"
+    if watched.metres < STILL_M and watched.radians < STILL_RAD:
+        return (
+            f"odometry stands still while the images turn by {images} {over}: check that its topic is the robot's own "
+            "(`topics.odometry=…`) and that the wheels' driver runs"
+        )
+    if watched.radians < NO_HEADING * turning:
+        return (
+            f"odometry's heading does not change ({measured} {over}) while the images turn by {images}: check its "
+            "orientation (a quaternion is x, y, z, w)"
+        )
+    fit = turn_fit(watched.times, watched.odometry[:, 2], seen)
+    known = np.isfinite(seen)
+    turns = np.diff(watched.odometry[:, 2])[known]
+    if fit.explained < EXPLAINED:
+        if (wild := float(np.abs(turns).sum())) < max(WILD_TURNS * turning, MIN_WILD_TURN):
+            return ""
+        return (
+            f"odometry turns by {math.degrees(wild):.0f} degrees {over}, the images by {images}, and not together: "
+            "check the unit of its heading (radians)"
+        )
+    correlation = float(np.corrcoef(clipped(seen[known]), clipped(turns))[0, 1])
+    if fit.sign < 0 and fit.as_is < REVERSED_AS_IS:
+        return f"the images turn against odometry's turns (correlation {correlation:.2f} {over}): {whose(watched, map)}"
+    if fit.sign > 0 and abs(fit.delay_s) >= MIN_DELAY_S and fit.explained - fit.as_is > DELAY_GAIN:
+        late = "after" if fit.delay_s > 0 else "before"
+        return (
+            f"the images show turns {abs(fit.delay_s):.1f} s {late} odometry measures them (this explains "
+            f"{100 * fit.explained:.0f} % of their turning {over}, no delay {100 * max(fit.as_is, 0.0):.0f} %): check "
+            "that both are stamped by one clock, images when they are taken"
+        )
+    return ""
+
+
+def turns_fit(watched: Watched) -> bool:
+    """Whether odometry turns as the images do."""
+    seen = sure_turns(watched)
+    known = np.isfinite(seen) & (np.abs(seen) > SURE_TURN)
+    turns = np.diff(watched.odometry[:, 2])[known]
+    return bool(np.abs(seen[known]).sum() > MIN_SEEN_TURN and explained(seen[known], turns) > EXPLAINED)
+
+
+def sure_turns(watched: Watched) -> Array:
+    """Turns (N - 1,) that are seen in images that are like the ones before; else NaN."""
+    return np.where(watched.correlation[1:] > SURE_CORRELATION, watched.seen[1:], np.nan)
+
+
+def whose(watched: Watched, map: OfMap) -> str:
+    """Who is to blame for turns that are reversed: matches of mirrored images fit no track, reversed or not."""
+    odometry, matches = watched.placed
+    fits = [track_fit(odometry * sign, matches, TRACK_SCALES * map.length_scale_m) for sign in REVERSED]
+    if all(fit is not None and fit.pairs >= MIN_PAIRS for fit in fits):
+        share = max(fit.as_is for fit in fits if fit is not None)
+        if share > SHARE:
+            return (
+                f"the best matches in the map fit odometry once its turns are reversed ({100 * share:.0f} % of pairs "
+                "of images), so its heading has the wrong sign (counter-clockwise is positive, x forward, y left)"
+            )
+        return (
+            "the best matches in the map fit odometry in neither sense, so the images are mirrored or upside down: "
+            "check the camera's mounting and driver (in camera.yaml the `sense` of a strip)"
+        )
+    return (
+        "check whether the images are mirrored or upside down (in camera.yaml the `sense` of a strip), and the sign of "
+        "odometry's heading (counter-clockwise is positive)"
+    )
+
+
+def tracked(watched: Watched, map: OfMap) -> str:
+    """The track of best matches against odometry's."""
+    odometry, matches = watched.placed
+    fit = track_fit(odometry, matches, TRACK_SCALES * map.length_scale_m)
+    if fit is None or fit.pairs < MIN_PAIRS or fit.share < SHARE or fit.share - fit.as_is < GAIN:
+        return ""
+    agree = f"{100 * fit.share:.0f} % of {fit.pairs} pairs of images agree, as it is {100 * fit.as_is:.0f} %"
+    if fit.mirrored and not turns_fit(watched):
+        return ""
+    if fit.mirrored == "poses":
+        return (
+            f"the best matches drive through the map as in a mirror ({agree}), while odometry turns as the images do: "
+            "the map's poses are mirrored; check its x, y and heading (counter-clockwise is positive)"
+        )
+    if fit.mirrored:
+        return (
+            f"the places of the best matches fit odometry's once that is mirrored ({agree}): check that left is y and "
+            "positive in odometry, x and y not exchanged, and the map's poses likewise"
+        )
+    if math.log2(fit.scale) > MISSCALED_OCTAVES and np.nanmedian(watched.correlation) > CHANGING:
+        return ""  # the robot stands, and its best match goes back and forth
+    if watched.metres < STILL_M:
+        metres = float(np.hypot(*np.diff(matches[:, :2], axis=0).T).sum())
+        return (
+            f"odometry stands still while the best matches in the map move on by {metres:.1f} m over {len(matches)} "
+            "images: check that its topic is the robot's own (`topics.odometry=…`) and that the wheels' driver runs"
+        )
+    if abs(math.log2(fit.scale)) > MISSCALED_OCTAVES:
+        return (
+            f"odometry is {1.0 / fit.scale:.3g} times as long as the way between the best matches in the map ({agree}):"
+            " check the unit of both (m), and the wheels' diameter"
+        )
+    if abs(fit.angle) > MISTURNED:
+        return (
+            f"the camera looks {math.degrees(fit.angle):+.0f} degrees off from where odometry drives, by the best "
+            f"matches in the map ({agree}): check `yaw` (or `column_of_forward`) in camera.yaml, and that odometry's "
+            "x is forward"
+        )
+    return ""
+
+
+def foreign(watched: Watched, map: OfMap) -> str:
+    """Images of another place, or of a map that was made in another way."""
+    odometry, matches = watched.placed
+    if map.other_places is None or len(matches) < WINDOW:
+        return ""
+    fit = track_fit(odometry, matches, TRACK_SCALES * map.length_scale_m)
+    if fit is None or fit.pairs < WINDOW or fit.share > FOREIGN_SHARE:
+        return ""
+    similar = float(np.nanmedian(watched.similar))
+    if not similar < map.other_places - UNLIKE:
+        return ""
+    return (
+        f"the images fit no place of the map: their best matches are scattered ({100 * fit.share:.0f} % of {fit.pairs} "
+        f"pairs of images fit odometry) and less similar ({similar:.2f}) than the map's own images of different places "
+        f"({map.other_places:.2f}): check that the map is of this building and was made with this camera"
+    )
+
+
+JUDGEMENTS: dict[str, Callable[[Watched, OfMap], str]] = {
+    "frozen": frozen,
+    "blind": blind,
+    "turned": turned,
+    "tracked": tracked,
+    "foreign": foreign,
+}
+"""In the order in which causes hide each other."""

@@ -1,0 +1,127 @@
+"""Checks once whether the poses of a map fit its own images."""
+
+import math
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.stages.geometry.appearance.segments import MAX_DISTANCES, similarities
+from omninav.stages.geometry.appearance.turn_fit import explained
+from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
+from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.values.conflicts import MapFit
+from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.maps import ReferenceGraph
+
+Array = npt.NDArray[np.float64]
+
+MIN_REFERENCES = 20
+"""References without which nothing is said."""
+MAX_COMPARED = 1000
+"""References of a larger map that an image is compared with, evenly spaced, beside its neighbours."""
+NEIGHBOURS = 4
+"""Nearest references whose likeness is looked at."""
+MIN_EXTENT_M, MAX_SPACING_M = 0.01, 50.0
+"""A map that is smaller lies at one place; one whose neighbours are further apart is in another unit."""
+OUTLIER = 1000.0
+"""A reference so many times further from the middle of the map than half of all is lost."""
+MIN_LIKENESS = 0.7
+"""Probability that a neighbour in space is more similar than another reference; 0.5 where poses are shuffled."""
+MIN_TURN = math.radians(10.0)
+"""Turns between neighbours that say in which sense headings are counted (rad), and how many of them are needed."""
+MIN_TURNS, REVERSED_GAIN = 10, 0.5
+
+
+class CheckMap(Stage):
+    """Compares images of a map with each other: neighbours in space ought to look alike, turned as their headings are.
+
+    Says as a warning where all references lie at one place, one is lost, spacings are those of another unit, poses are
+    shuffled, or headings are counted clockwise. Views are compared by their best segments, whatever the variant
+    compares by. Limits: docs/conflicts.md.
+    """
+
+    samples: Annotated[int, Bounds(ge=1)] = 50
+    """Images of the map, evenly spaced, that are compared with the others."""
+    headings: Annotated[int, Bounds(ge=1)] = 36
+    """Headings at which images are compared."""
+
+    class Out(Outputs):
+        """What was found."""
+
+        fit: MapFit
+
+    def step(self, ctx: Context, map: ReferenceGraph, length_scale: LengthScale) -> Out:
+        """Check one map."""
+        if len(map) < MIN_REFERENCES:
+            return self.Out(fit=MapFit(()))
+        sentence, other_places = of_poses(map.poses), None
+        if not sentence and map.features.shape[1] > 1:
+            sentence, other_places = self._of_images(map, length_scale.metres)
+        if sentence:
+            ctx.warn(sentence)
+        return self.Out(fit=MapFit((sentence,) if sentence else (), other_places))
+
+    def _of_images(self, map: ReferenceGraph, length_scale_m: float) -> tuple[str, float | None]:
+        number = len(map)
+        evenly = np.unique(np.linspace(0, number - 1, min(MAX_COMPARED, number)).astype(np.int64))
+        likeness, other_places, turned, headings = [], [], [], []
+        for sample in np.unique(np.linspace(0, number - 1, min(self.samples, number)).astype(np.int64)).tolist():
+            away = np.hypot(*(map.poses - map.poses[sample])[:, :2].T)
+            away[sample] = math.inf
+            near = np.argsort(away, kind="stable")[:NEIGHBOURS]
+            others = np.setdiff1d(evenly, [*near, sample])
+            chosen = np.concatenate([near, others])
+            values = similarities(
+                map.features, np.asarray(map.features[sample]), self.headings, map.kind == "histograms", True,
+                chosen=chosen, max_distance=MAX_DISTANCES[map.kind],
+            )  # fmt: skip
+            best = values.max(axis=1)
+            likeness.append(float((best[: len(near), None] > best[None, len(near) :]).mean()))
+            far = away[others] > length_scale_m
+            if far.any():
+                other_places.append(float(best[len(near) :][far].max()))
+            for row, reference in enumerate(near.tolist()):
+                turned.append(angle_of_peak(values[row]))
+                headings.append(float(wrap(map.poses[sample, 2] - map.poses[reference, 2])))
+        like = float(np.mean(likeness))
+        level = float(np.median(other_places)) if other_places else None
+        if like < MIN_LIKENESS:
+            return (
+                f"the map's poses do not fit its images: a neighbour in space is more similar than another image in "
+                f"{100 * like:.0f} % of the pairs (50 % are chance): check that poses and images are in one order"
+            ), level
+        return of_headings(np.array(turned), np.array(headings)), level
+
+
+def of_poses(poses: Array) -> str:
+    """What the poses (R, 3) of a map say by themselves; "" where nothing is wrong."""
+    extent = float(np.hypot(*np.ptp(poses[:, :2], axis=0)))
+    if extent < MIN_EXTENT_M:
+        return f"all {len(poses)} references of the map lie at one place, within {extent:.3g} m: check its positions"
+    away = np.hypot(*(poses[:, :2] - np.median(poses[:, :2], axis=0)).T)
+    usual, lost = float(np.median(away)), int(away.argmax())
+    if away[lost] > OUTLIER * max(usual, MIN_EXTENT_M):
+        return (
+            f"reference {lost} of the map lies {away[lost] / 1000.0:.3g} km from its middle, half of all within "
+            f"{usual:.3g} m: check its positions"
+        )
+    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
+    if (spacing := float(np.median(steps))) > MAX_SPACING_M:
+        return f"the map's images lie {spacing:.3g} m apart, one after the other: check the unit of its positions (m)"
+    return ""
+
+
+def of_headings(turned: Array, headings: Array) -> str:
+    """Whether neighbours look turned (P,) against each other as their `headings` differ (P,), or the other way."""
+    known = np.abs(headings) > MIN_TURN
+    if known.sum() < MIN_TURNS:
+        return ""
+    alike, reversed = (float(explained(turned[known], sign * headings[known])) for sign in (1.0, -1.0))
+    if reversed - alike < REVERSED_GAIN:
+        return ""
+    return (
+        f"the map's headings turn against its images ({int(known.sum())} pairs of neighbours): its poses are mirrored, "
+        "or headings counted clockwise; counter-clockwise is positive"
+    )

@@ -1,0 +1,271 @@
+"""Logs whose inputs do not fit each other, each made from a sound one: what is wrong, and what must be said of it.
+
+python tests/conflicting_logs.py TOUR DRIVE FOLDER    # runs them all, and prints the table of docs/conflicts.md
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from omninav.pipeline import Context
+from omninav.pipeline.mcap.message import Message
+from omninav.pipeline.mcap.message_types import make_message
+from omninav.pipeline.mcap.reader import LogReader
+from omninav.pipeline.mcap.writer import LogWriter
+from omninav.stages.features.grey_strip import GreyStrip
+from omninav.stages.features.hsv_histogram import HsvHistogram
+from omninav.stages.mapping.appearance_length_scale import AppearanceLengthScale
+from omninav.stages.mapping.reference_graph import LearnReferenceGraph, LearnReferenceGraphState
+from omninav.stages.match.selective import SelectiveMatch
+from omninav.stages.monitor.input_conflicts import InputConflicts, InputConflictsState
+from omninav.stages.monitor.map_check import CheckMap
+from omninav.stages.source.log import LogSource, LogSourceState
+from omninav.stages.unwarp.table import PanoramaTable
+from omninav.stages.values.maps import ReferenceGraph
+
+Array = npt.NDArray[np.float64]
+IMAGE, ODOMETRY, TRUTH = "/camera/image/compressed", "/odom", "/ground_truth/pose"
+SECOND = 1_000_000_000
+PANORAMAS = PanoramaTable(360, 80)
+
+Change = Callable[[Message, float], Message | None]
+"""Takes a message and when it came, in seconds from the first one, and gives what is written in its place."""
+
+
+class Case(NamedTuple):
+    """One thing that is wrong with a drive (`change`), or with the `poses` (R, 3) of the map, and words of what is said
+    of it."""
+
+    change: Change
+    said: str
+    poses: Callable[[Array], Any] | None = None
+
+
+def changed_log(log: Path, path: Path, change: Change) -> Path:
+    """Write a log with all its attachments and messages anew, without truth where it is a drive's."""
+    reader = LogReader(log)
+    messages = list(reader.messages())
+    first = min(message.stamp for message in messages)
+    with LogWriter(path) as writer:
+        for name, data in reader.attachments.items():
+            writer.attach(name, data)
+        for message in messages:
+            made = change(message, (message.stamp - first) / SECOND)
+            if made is not None:
+                header = made.content.header
+                header.stamp.sec, header.stamp.nanosec = divmod(made.stamp, SECOND)
+                writer.write(made.topic, made.msgtype, made.stamp, made.content, made.log_time)
+    return path
+
+
+def odometry(of: Callable[[Array], Any]) -> Change:
+    """Poses (3,) of odometry become others: x, y (m), heading (rad)."""
+
+    def change(message: Message, seconds: float) -> Message:
+        if message.topic != ODOMETRY:
+            return message
+        pose = message.content.pose.pose
+        turned = pose.orientation
+        row = np.array((pose.position.x, pose.position.y, 2.0 * math.atan2(turned.z, turned.w)))
+        pose.position.x, pose.position.y, heading = (float(value) for value in of(row))
+        turned.z, turned.w = math.sin(heading / 2.0), math.cos(heading / 2.0)
+        return message
+
+    return change
+
+
+def images(of: Callable[[npt.NDArray[np.uint8]], npt.NDArray[np.uint8]]) -> Change:
+    """Images (rows, columns, 3) become others."""
+
+    def change(message: Message, seconds: float) -> Message:
+        if message.topic != IMAGE:
+            return message
+        pixels = cv2.imdecode(np.frombuffer(bytes(message.content.data), np.uint8), cv2.IMREAD_COLOR)
+        data = cv2.imencode(".jpg", np.ascontiguousarray(of(pixels)), [cv2.IMWRITE_JPEG_QUALITY, 90])[1]
+        content = make_message(message.msgtype, {"format": "jpeg", "data": data.tobytes()}, message.stamp)
+        return replace(message, content=content)
+
+    return change
+
+
+def stamps(of: Callable[[Message, float], int]) -> Change:
+    """Stamps (ns) become others, and log times with them."""
+
+    def change(message: Message, seconds: float) -> Message:
+        moved = of(message, seconds) - message.stamp
+        return replace(message, stamp=message.stamp + moved, log_time=message.log_time + moved)
+
+    return change
+
+
+def late(by_s: float) -> Change:
+    """Images are stamped so much later than they were taken."""
+    return stamps(lambda message, seconds: message.stamp + round(by_s * SECOND) * (message.topic == IMAGE))
+
+
+def leaping(by_s: int) -> Change:
+    """The clock leaps in the middle of a drive of a minute."""
+    return stamps(lambda message, seconds: message.stamp + by_s * SECOND * (seconds > 25.0))
+
+
+def frozen(after_s: float) -> Change:
+    """The first image after so long is given again and again."""
+    kept: list[bytes] = []
+
+    def change(message: Message, seconds: float) -> Message:
+        if message.topic != IMAGE or seconds < after_s:
+            return message
+        kept.append(bytes(message.content.data))
+        content = make_message(message.msgtype, {"format": "jpeg", "data": kept[0]}, message.stamp)
+        return replace(message, content=content)
+
+    return change
+
+
+def w_first(message: Message, seconds: float) -> Message:
+    """A quaternion w, x, y, z where x, y, z, w is read."""
+    if message.topic == ODOMETRY:
+        turned = message.content.pose.pose.orientation
+        turned.x, turned.y, turned.z, turned.w = turned.w, turned.x, turned.y, turned.z
+    return message
+
+
+def carried(poses: Array) -> Array:
+    """Two of the map's poses lie 1000 km away."""
+    return np.concatenate([poses[:10], poses[10:12] + np.array((1e6, 0.0, 0.0)), poses[12:]])
+
+
+def without_truth(change: Change) -> Change:
+    """The same for a drive, whose truth nobody knows."""
+    return lambda message, seconds: None if message.topic == TRUTH else change(message, seconds)
+
+
+def as_is(message: Message, seconds: float) -> Message:
+    """Nothing is wrong."""
+    return message
+
+
+RANDOM = np.random.default_rng(0)
+CASES: Mapping[str, Case] = {
+    "camera frozen": Case(frozen(10.0), "the camera is frozen"),
+    "images mirrored": Case(images(lambda p: p[:, ::-1]), "the images turn against odometry's turns"),
+    "images upside down": Case(images(lambda p: p[::-1]), "the images turn against odometry's turns"),
+    "images turned by 180°": Case(images(lambda p: p[::-1, ::-1]), "the camera looks"),
+    "camera's yaw off by 90°": Case(
+        images(lambda p: cv2.warpAffine(p, _quarter(p), (p.shape[1], p.shape[0]))), "the camera looks"
+    ),
+    "grey images": Case(
+        images(lambda p: np.full(p.shape, 128, np.uint8) + RANDOM.integers(0, 6, p.shape, np.uint8)),
+        "nothing in common",
+    ),
+    "noise": Case(images(lambda p: RANDOM.integers(0, 256, p.shape, np.uint8)), "nothing in common"),
+    "odometry still": Case(odometry(lambda pose: (0.0, 0.0, 0.0)), "odometry stands still"),
+    "odometry in feet": Case(odometry(lambda pose: pose * (3.28, 3.28, 1.0)), "times as long"),
+    "heading in degrees": Case(odometry(lambda pose: (*pose[:2], math.degrees(pose[2]))), "unit of its heading"),
+    "turns reversed": Case(odometry(lambda pose: pose * (1, 1, -1)), "the images turn against odometry's turns"),
+    "left and right": Case(odometry(lambda pose: pose * (1, -1, -1)), "the images turn against odometry's turns"),
+    "y negative": Case(odometry(lambda pose: pose * (1, -1, 1)), "once that is mirrored"),
+    "x and y swapped": Case(odometry(lambda pose: pose[[1, 0, 2]]), "once that is mirrored"),
+    "odometry x 2": Case(odometry(lambda pose: pose * (2, 2, 1)), "times as long"),
+    "odometry x 0.1": Case(odometry(lambda pose: pose * (0.1, 0.1, 1)), "times as long"),
+    "heading always 0": Case(odometry(lambda pose: pose * (1, 1, 0)), "heading does not change"),
+    "quaternion w first": Case(w_first, "heading does not change"),
+    "heading off by 90°": Case(odometry(lambda pose: pose + np.array((0, 0, math.pi / 2))), "the camera looks"),
+    "heading off by 180°": Case(odometry(lambda pose: pose + np.array((0, 0, math.pi))), "the camera looks"),
+    "images 0.5 s late": Case(late(0.5), "s after odometry measures them"),
+    "images 0.5 s early": Case(late(-0.5), "s before odometry measures them"),
+    "images 3 s late": Case(late(3.0), "s after odometry measures them"),
+    "clock set back by 1000 s": Case(leaping(-1000), "was set back by"),
+    "clock leaps by 600 s": Case(leaping(600), "the clock leaps by 600 s"),
+    "clock of 1970 until it is set": Case(
+        stamps(lambda message, seconds: message.stamp - 1_767_225_600 * SECOND * (seconds < 25.0)),
+        "the clock leaps by 1767225600 s",
+    ),
+    "map in mm": Case(as_is, "m apart, one after the other", lambda poses: poses * (1e3, 1e3, 1)),
+    "map x 2": Case(as_is, "times as long", lambda poses: poses * (2, 2, 1)),
+    "map mirrored": Case(as_is, "headings turn against its images", lambda poses: poses * (1, -1, -1)),
+    "map's y negative": Case(as_is, "once that is mirrored", lambda poses: poses * (1, -1, 1)),
+    "map shuffled": Case(as_is, "do not fit its images", np.random.default_rng(0).permutation),
+    "map: all poses the same": Case(as_is, "at one place", lambda poses: np.tile(poses[0], (len(poses), 1))),
+    "map: two 1000 km apart": Case(as_is, "km from its middle", carried),
+}
+AT_TWO_HERTZ = ("images 0.5 s late", "images 0.5 s early", "images 3 s late")
+"""Cases that are noticed where images come so often."""
+
+
+def _quarter(pixels: npt.NDArray[np.uint8]) -> Any:
+    rows, columns = pixels.shape[:2]
+    return cv2.getRotationMatrix2D(((columns - 1) / 2.0, (rows - 1) / 2.0), 90.0, 1.0)
+
+
+class Found(NamedTuple):
+    """After how many images of a drive what was said; 0: before the first."""
+
+    images: int
+    sentence: str
+
+
+def learned(tour: Path) -> ReferenceGraph:
+    """A map from a tour, as `omninav` learns it."""
+    ctx, learn = Context("map"), LearnReferenceGraph()
+    describe, map, state = HsvHistogram(grey_world="local"), None, LearnReferenceGraphState()
+    describe.setup(ctx)
+    for out in ticks(LogSource(log=str(tour)), ctx):
+        features = describe.step(ctx, panorama=PANORAMAS.panorama(out.image, out.camera)).features
+        map = learn.step(ctx, features, out.odometry, out.truth, map, state).map
+    assert map is not None
+    return map
+
+
+def said(map: ReferenceGraph, drive: Path) -> list[Found]:
+    """What is said of a map and during a drive in it, by the stages that `omninav` takes."""
+    ctx = Context("conflicts")
+    scale = AppearanceLengthScale().step(ctx, map).length_scale
+    fit = CheckMap().step(ctx, map, scale).fit
+    found = [Found(0, sentence) for sentence in ctx.warnings]
+    describe, match, strip = HsvHistogram(grey_world="local"), SelectiveMatch(penalty="three_quarters"), GreyStrip()
+    watch, state = InputConflicts(), InputConflictsState()
+    describe.setup(ctx)
+    for number, out in enumerate(ticks(LogSource(log=str(drive)), ctx), 1):
+        panorama = PANORAMAS.panorama(out.image, out.camera)
+        features = describe.step(ctx, panorama=panorama).features
+        watch.step(
+            ctx, state, strip.step(ctx, panorama).strip, out.odometry, out.motion,
+            match.step(ctx, features, map).similarities, features, map, scale, fit,
+        )  # fmt: skip
+        found += [Found(number, sentence) for sentence in ctx.warnings[len(found) :]]
+    return found
+
+
+def ticks(source: LogSource, ctx: Context) -> Iterator[Any]:
+    """All that a source gives; `ctx` is at each tick."""
+    source.setup(ctx)
+    position = LogSourceState()
+    while (out := source.step(ctx, position)) is not None:
+        ctx.tick = out.tick
+        yield out
+
+
+def found(case: Case, map: ReferenceGraph, drive: Path, folder: Path) -> list[Found]:
+    """What is said of a case: of a sound map and a sound drive, whose truth nobody knows."""
+    log = changed_log(drive, folder / "drive.mcap", without_truth(case.change))
+    poses = map.poses if case.poses is None else np.array(case.poses(map.poses), np.float64)
+    return said(ReferenceGraph(poses, map.features[:], map.kind, map.edges, map.pose_source), log)
+
+
+if __name__ == "__main__":
+    import sys
+    from tempfile import TemporaryDirectory
+
+    sound = learned(Path(sys.argv[1]))
+    for name, case in {"nothing": Case(as_is, ""), **CASES}.items():
+        with TemporaryDirectory() as folder:
+            sentences = found(case, sound, Path(sys.argv[2]), Path(folder))
+        after = ", ".join(str(each.images) for each in sentences)
+        print(f"| {name} | {after} | {'; '.join(each.sentence for each in sentences)} |", flush=True)
