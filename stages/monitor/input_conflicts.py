@@ -242,7 +242,7 @@ MIN_SEEN_TURN = math.pi / 2.0
 """What the images must have turned, to either side, before anything is said of turns (rad)."""
 STILL_M, STILL_RAD = 1e-3, 1e-3
 """Odometry that stays below these over all images stands (m, rad)."""
-NO_HEADING, WILD_TURNS, MIN_WILD_TURN = 0.05, 3.0, 4.0 * math.pi
+NO_HEADING, WILD_TURNS, MIN_WILD_TURN = 0.05, 6.0, 4.0 * math.pi
 """Odometry's turning as a share of the seen one: below the first it has no heading, above the second (and so much
 turning, rad) its headings are something else."""
 EXPLAINED, REVERSED_AS_IS, DELAY_GAIN, MIN_DELAY_S = 0.5, 0.0, 0.1, 0.4
