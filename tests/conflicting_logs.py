@@ -211,19 +211,19 @@ class Found(NamedTuple):
     sentence: str
 
 
-def learned(tour: Path) -> ReferenceGraph:
+def learned(tour: str) -> ReferenceGraph:
     """A map from a tour, as `omninav` learns it."""
     ctx, learn = Context("map"), LearnReferenceGraph()
     describe, map, state = HsvHistogram(grey_world="local"), None, LearnReferenceGraphState()
     describe.setup(ctx)
-    for out in ticks(LogSource(log=str(tour)), ctx):
+    for out in ticks(LogSource(log=tour), ctx):
         features = describe.step(ctx, panorama=PANORAMAS.panorama(out.image, out.camera)).features
         map = learn.step(ctx, features, out.odometry, out.truth, map, state).map
     assert map is not None
     return map
 
 
-def said(map: ReferenceGraph, drive: Path) -> list[Found]:
+def said(map: ReferenceGraph, drive: str) -> list[Found]:
     """What is said of a map and during a drive in it, by the stages that `omninav` takes."""
     ctx = Context("conflicts")
     scale = AppearanceLengthScale().step(ctx, map).length_scale
@@ -232,7 +232,7 @@ def said(map: ReferenceGraph, drive: Path) -> list[Found]:
     describe, match, strip = HsvHistogram(grey_world="local"), SelectiveMatch(penalty="three_quarters"), GreyStrip()
     watch, state = InputConflicts(), InputConflictsState()
     describe.setup(ctx)
-    for number, out in enumerate(ticks(LogSource(log=str(drive)), ctx), 1):
+    for number, out in enumerate(ticks(LogSource(log=drive), ctx), 1):
         panorama = PANORAMAS.panorama(out.image, out.camera)
         features = describe.step(ctx, panorama=panorama).features
         watch.step(
@@ -256,14 +256,14 @@ def found(case: Case, map: ReferenceGraph, drive: Path, folder: Path) -> list[Fo
     """What is said of a case: of a sound map and a sound drive, whose truth nobody knows."""
     log = changed_log(drive, folder / "drive.mcap", without_truth(case.change))
     poses = map.poses if case.poses is None else np.array(case.poses(map.poses), np.float64)
-    return said(ReferenceGraph(poses, map.features[:], map.kind, map.edges, map.pose_source), log)
+    return said(ReferenceGraph(poses, map.features[:], map.kind, map.edges, map.pose_source), str(log))
 
 
 if __name__ == "__main__":
     import sys
     from tempfile import TemporaryDirectory
 
-    sound = learned(Path(sys.argv[1]))
+    sound = learned(sys.argv[1])
     for name, case in {"nothing": Case(as_is, ""), **CASES}.items():
         with TemporaryDirectory() as folder:
             sentences = found(case, sound, Path(sys.argv[2]), Path(folder))
