@@ -12,7 +12,7 @@ from omninav.pipeline import Context, Outputs, Stage, State, Tick
 from omninav.stages.geometry.appearance.segments import similarity_at
 from omninav.stages.geometry.appearance.turn_fit import clipped, explained, turn_fit
 from omninav.stages.geometry.appearance.visual_compass import turn_and_correlation
-from omninav.stages.geometry.plane.se2 import compose, wrap
+from omninav.stages.geometry.plane.se2 import between, compose, wrap
 from omninav.stages.geometry.plane.track_fit import track_fit
 from omninav.stages.values.conflicts import Conflicts, MapFit
 from omninav.stages.values.features import SegmentFeatures
@@ -176,14 +176,15 @@ def leap(recent: InputConflictsState, tick: Tick, odometry: Pose | None) -> str:
     usual = float(np.median(np.diff(before.times)))
     if 0.0 <= seconds < max(MIN_LEAP_S, LEAP_INTERVALS * usual):
         return ""
-    steps = np.hypot(*np.diff(before.odometry[:, :2], axis=0).T)
-    x, y = before.odometry[-1, :2]
-    moved = math.hypot(odometry.x - x, odometry.y - y)
-    if not LEAP_MIN_M < moved <= 2.0 * float(np.median(steps)):
+    step = between(before.odometry[-2], before.odometry[-1])
+    driven = math.hypot(*step[:2])
+    here = np.array((odometry.x, odometry.y, odometry.heading))
+    gap = between(compose(before.odometry[-1], step), here)
+    if driven < LEAP_MIN_M or math.hypot(*gap[:2]) > LEAP_GAP * driven or abs(gap[2]) > LEAP_GAP_RAD:
         return ""
     return (
-        f"the clock leaps by {seconds - usual:.0f} s at image {tick.index}, while odometry drives {moved:.2f} m, as in "
-        f"the {usual:.2f} s between other images: check the clock of the robot, or of what recorded it"
+        f"the clock leaps by {seconds - usual:.0f} s at image {tick.index}, while odometry drives on, {driven:.2f} m as in "
+        f"the {usual:.2f} s before: check the clock of the robot, or of what recorded it"
     )
 
 
@@ -229,9 +230,11 @@ def remember(recent: InputConflictsState, stamp: int, pixels: npt.NDArray[np.flo
     recent.strip, recent.stamp = pixels, stamp
 
 
-MIN_BEFORE_LEAP, MIN_LEAP_S, LEAP_INTERVALS, LEAP_MIN_M = 8, 30.0, 20.0, 0.02
-"""Images before a leap of the clock; what a leap is at least (s, and times the usual interval); what a robot that does
-not pause drives (m)."""
+MIN_BEFORE_LEAP, MIN_LEAP_S, LEAP_INTERVALS = 8, 30.0, 20.0
+"""Images before a leap of the clock, and what it is at least (s, and times the usual interval)."""
+LEAP_MIN_M, LEAP_GAP, LEAP_GAP_RAD = 0.02, 0.5, math.radians(15.0)
+"""A robot that drives on does at least so much between two images (m), and lies at most this share of it and this angle
+(rad) off from where the last step repeated leads: not so where another log begins."""
 MIN_FROZEN, FROZEN_M, FROZEN_RAD = 8, 1.0, 1.0
 """Images that are equal to the last bit while odometry drives so far (m) or turns so much (rad) are one image."""
 MIN_BLIND, BLIND_CORRELATION = 16, 0.15

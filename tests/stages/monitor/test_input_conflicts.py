@@ -1,5 +1,6 @@
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conflicting_logs import (
     AT_TWO_HERTZ,
@@ -16,8 +17,12 @@ from conflicting_logs import (
 from conftest import DATA, DRIVE, TOUR, needs_data
 
 import omninav
+from omninav.pipeline import Context, Tick
 from omninav.pipeline.mcap.message import Message
+from omninav.stages.monitor.input_conflicts import InputConflicts, InputConflictsState
+from omninav.stages.values.image import Strip
 from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
 
 HOUSE = DATA / "photoreal-house"
 
@@ -71,6 +76,19 @@ def test_a_run_says_it_as_a_warning_and_keeps_it(shared_cache: Path, tmp_path: P
     counted = [len(each.sentences) for each in run.values("conflicts.conflicts")]
     assert counted == sorted(counted)
     assert (counted[0], counted[-1]) == (0, 1)
+
+
+def test_a_pause_and_another_log_are_no_leaps_of_the_clock() -> None:
+    ctx, state, watch = Context("conflicts"), InputConflictsState(), InputConflicts()
+    strip = Strip(np.zeros((8, 90), np.float32))
+    poses = [Pose(0.2 * n, 0.0, 0.0) for n in range(20)]
+    paused, begins_again = [*poses, poses[-1]], [*poses, Pose(0.0, 0.0, 0.0)]
+    for path in (paused, begins_again):
+        for number, pose in enumerate(path):
+            seconds = number + 3000 * (number == 20)
+            ctx.tick = Tick(number, seconds * 10**9, 0, number, number in (0, 20 * (path is begins_again)))
+            watch.step(ctx, state, strip, pose)
+    assert not [sentence for sentence in ctx.warnings if "clock" in sentence]
 
 
 def test_without_odometry_nothing_is_said(store: ReferenceGraph, tmp_path: Path) -> None:
