@@ -183,8 +183,8 @@ def leap(recent: InputConflictsState, tick: Tick, odometry: Pose | None) -> str:
     if driven < LEAP_MIN_M or math.hypot(*gap[:2]) > LEAP_GAP * driven or abs(gap[2]) > LEAP_GAP_RAD:
         return ""
     return (
-        f"the clock leaps by {seconds - usual:.0f} s at image {tick.index}, while odometry drives on, {driven:.2f} m as in "
-        f"the {usual:.2f} s before: check the clock of the robot, or of what recorded it"
+        f"the clock leaps by {seconds - usual:.0f} s at image {tick.index}, while odometry drives on, {driven:.2f} m, "
+        f"as in the {usual:.2f} s before: check the clock of the robot, or of what recorded it"
     )
 
 
