@@ -193,7 +193,7 @@ CASES: Mapping[str, Case] = {
     "map's y negative": Case(as_is, "once that is mirrored", lambda poses: poses * (1, -1, 1)),
     "map shuffled": Case(as_is, "do not fit its images", np.random.default_rng(0).permutation),
     "map: all poses the same": Case(as_is, "at one place", lambda poses: np.tile(poses[0], (len(poses), 1))),
-    "map: two 1000 km apart": Case(as_is, "km from its middle", carried),
+    "map: two 1000 km apart": Case(as_is, "m from its middle", carried),
 }
 AT_TWO_HERTZ = ("images 0.5 s late", "images 0.5 s early", "images 3 s late")
 """Cases that are noticed where images come so often."""

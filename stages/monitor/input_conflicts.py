@@ -402,8 +402,9 @@ def tracked(watched: Watched, map: OfMap) -> str:
             "images: check that its topic is the robot's own (`topics.odometry=…`) and that the wheels' driver runs"
         )
     if abs(math.log2(fit.scale)) > MISSCALED_OCTAVES:
+        times = float(f"{1.0 / fit.scale:.3g}")
         return (
-            f"odometry is {1.0 / fit.scale:.3g} times as long as the way between the best matches in the map ({agree}):"
+            f"odometry is {times:g} times as long as the way between the best matches in the map ({agree}):"
             " check the unit of both (m), and the wheels' diameter"
         )
     if abs(fit.angle) > MISTURNED:

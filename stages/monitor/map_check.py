@@ -104,8 +104,8 @@ def of_poses(poses: Array) -> str:
     usual, lost = float(np.median(away)), int(away.argmax())
     if away[lost] > OUTLIER * max(usual, MIN_EXTENT_M):
         return (
-            f"reference {lost} of the map lies {away[lost] / 1000.0:.3g} km from its middle, half of all within "
-            f"{usual:.3g} m: check its positions"
+            f"reference {lost} of the map lies {away[lost]:.0f} m from its middle, half of all within {usual:.3g} m: "
+            "check its positions"
         )
     steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
     if (spacing := float(np.median(steps))) > MAX_SPACING_M:

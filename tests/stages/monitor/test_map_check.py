@@ -21,7 +21,7 @@ def test_poses_that_cannot_be_are_named():
     assert "the map's images lie 500 m apart" in of_poses(LINE * 1000.0)
     far = LINE.copy()
     far[7, 1] = 1e6
-    assert "reference 7 of the map lies 1e+03 km from its middle" in of_poses(far)
+    assert "reference 7 of the map lies 1000000 m from its middle" in of_poses(far)
 
 
 def test_headings_are_judged_by_neighbours_that_turn():
