@@ -31,14 +31,12 @@ Array = npt.NDArray[np.float64]
 POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 POSE_ARRAY = "geometry_msgs/msg/PoseArray"
 TF = "tf2_msgs/msg/TFMessage"
-PARTICLE_CLOUD = "nav2_msgs/msg/ParticleCloud"
-NAV2 = """std_msgs/Header header
-nav2_msgs/Particle[] particles
-===
-MSG: nav2_msgs/Particle
-geometry_msgs/Pose pose
-float64 weight
-"""
+PARTICLE, PARTICLE_CLOUD = "nav2_msgs/msg/Particle", "nav2_msgs/msg/ParticleCloud"
+NAV2 = {
+    PARTICLE: "geometry_msgs/Pose pose\nfloat64 weight\n",
+    PARTICLE_CLOUD: "std_msgs/Header header\nnav2_msgs/Particle[] particles\n",
+}
+"""Definitions of nav2's messages, which do not come with ROS."""
 
 
 class Publish(Stage):
@@ -168,11 +166,12 @@ class PublishBelief(Stage):
         if self.message == "PoseArray":
             return POSE_ARRAY, {"poses": poses}
         types = standard_types()
-        if PARTICLE_CLOUD not in types.fielddefs:  # nav2's messages do not come with ROS
+        if PARTICLE_CLOUD not in types.fielddefs:
             from rosbags.typesys import get_types_from_msg
 
-            types.register(get_types_from_msg(NAV2, PARTICLE_CLOUD))
-        particle = types.types["nav2_msgs/msg/Particle"]
+            for msgtype, definition in NAV2.items():
+                types.register(get_types_from_msg(definition, msgtype))
+        particle = types.types[PARTICLE]
         weighted = [particle(pose, weight) for pose, weight in zip(poses, belief.weights.tolist(), strict=True)]
         return PARTICLE_CLOUD, {"particles": weighted}
 
