@@ -79,7 +79,7 @@ def main() -> None:
     manifest = json.loads((run / "manifest.json").read_text())
     facts, dropped = manifest["facts"], manifest["dropped"]
     overtaken = sum(entry["count"] for kind, entry in dropped.items() if "overtaken" in kind)
-    names = ("rate_hz", "latency_ms_median", "latency_ms_p95")
+    names = ("rate_hz", "latency_ms_median", "latency_ms_p95", "age_ms_median")
     print(json.dumps({"ticks": manifest["ticks"], "overtaken": overtaken} | {name: facts.get(name) for name in names}))
 
 

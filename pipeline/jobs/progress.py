@@ -16,6 +16,9 @@ class Heartbeat:
         """`done` frames of `total` have gone through the graph `name`, as for `Progress`."""
         self.step(done, total)
 
+    def say(self, words: str) -> None:
+        """Of many jobs only the frames are shown."""
+
     def step(self, done: int, total: int | None = None) -> None:
         """The same, of the only graph there is."""
         if done == 1 or done % 25 == 0 or done == total:

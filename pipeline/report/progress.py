@@ -1,11 +1,16 @@
 """How far a run is: one live line in a terminal, JSON lines elsewhere. Both on stderr, so that stdout stays clean."""
 
 import json
+import re
+import shutil
 import sys
 import time
 from collections.abc import Callable
 from types import TracebackType
 from typing import TextIO
+
+SAID_S = 2.5
+"""How long words of a stage stand beside the frames, seconds."""
 
 
 class Progress:
@@ -31,7 +36,9 @@ class Progress:
         self._first = self._done = 0
         self._total: int | None = None
         self._shown: int | None = None
-        self._note = ""
+        self._note = self._said = ""
+        self._said_at = 0.0
+        self._rows = 1
 
     def __enter__(self) -> "Progress":
         return self
@@ -39,6 +46,9 @@ class Progress:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._said and not self._name and self._live:
+            self._paint("")  # what is printed from now on begins a line
+            self._stream.flush()
         self._close()
 
     def begin(self, name: str, done: int, total: int | None = None) -> None:
@@ -62,9 +72,23 @@ class Progress:
             self._close()
 
     def say(self, words: str) -> None:
-        """What takes long and has no frames yet; in a terminal it stands until something else is shown."""
-        self._close()
-        self._stream.write(f"\r\x1b[K{words} …" if self._live else json.dumps({"doing": words}) + "\n")
+        """Show what a stage does or waits for: beside the frames once there are any.
+
+        In a terminal it stands until something else is shown. Elsewhere it is a line, where only its numbers have
+        changed every two seconds at most.
+        """
+        now, new = self._clock(), re.sub(r"[\d.]+", "", words) != re.sub(r"[\d.]+", "", self._said)
+        self._said, self._said_at = words, now
+        if not new and now < self._due:
+            return
+        self._due = now + self._every
+        if self._name:
+            self._now = now
+            self._show(now)
+        elif self._live:
+            self._paint(f"{words} …")
+        else:
+            self._stream.write(json.dumps({"doing": words}) + "\n")
         self._stream.flush()
 
     def _begin(self, name: str, before: int) -> None:
@@ -79,6 +103,7 @@ class Progress:
         if self._name and self._live:
             self._stream.write("\n")
             self._stream.flush()
+            self._rows = 1
         self._name = ""
 
     def _show(self, now: float) -> None:
@@ -86,18 +111,24 @@ class Progress:
         seconds = now - self._started
         rate = (self._done - self._first) / seconds if seconds > 0 and self._done > self._first else None
         left = (self._total - self._done) / rate if self._total is not None and rate else None
+        note = ", ".join(filter(None, (self._note, self._said if now - self._said_at < SAID_S else "")))
         if self._live:
-            line = live_line(self._name, self._done, self._total, rate, left, self._unit, self._note)
-            self._stream.write("\r\x1b[K" + line)
+            self._paint(live_line(self._name, self._done, self._total, rate, left, self._unit, note))
         else:
             state = {"graph": self._name, self._unit: self._done, "of": self._total}
             state |= {
                 f"{self._unit}_per_second": None if rate is None else _rounded(rate),
                 "seconds_left": None if left is None else round(left, 1),
             }
-            state |= {"note": self._note} if self._note else {}
+            state |= {"note": note} if note else {}
             self._stream.write(json.dumps(state) + "\n")
         self._stream.flush()
+
+    def _paint(self, line: str) -> None:
+        """Write over what was painted last, however many rows of the terminal that took."""
+        up = f"\x1b[{self._rows - 1}A" if self._rows > 1 else ""
+        self._stream.write(f"\r{up}\x1b[J{line}")
+        self._rows = 1 + max(len(line) - 1, 0) // max(shutil.get_terminal_size().columns, 1)
 
 
 def _rounded(rate: float) -> float:

@@ -30,6 +30,9 @@ class ProgressDisplay(Protocol):
     def update(self, name: str, done: int, total: int | None = None) -> None:
         """`done` ticks of `total` have gone through the graph `name`."""
 
+    def say(self, words: str) -> None:
+        """A stage of it does or waits for something, in words."""
+
 
 @dataclass(frozen=True)
 class Execution:
@@ -49,7 +52,13 @@ class Execution:
             if self.display is not None:
                 self.display.update(name, done, total)
 
-        return EngineOptions(self.seed, folder, memory, identity, self.checkpoint_s, on_tick, validate=self.validate)
+        def on_doing(words: str) -> None:
+            if self.display is not None:
+                self.display.say(words)
+
+        return EngineOptions(
+            self.seed, folder, memory, identity, self.checkpoint_s, on_tick, on_doing, validate=self.validate
+        )
 
 
 def identity(graph: Graph, seed: int, *more: str) -> str:

@@ -91,9 +91,11 @@ class DdsTransport(Transport):
         return there + (len(writer.get_matched_subscriptions()) if writer is not None else 0)
 
     def offered(self) -> dict[str, str]:
-        """Topics that are published now, with their types."""
+        """Topics that others publish now, with their types."""
         found = {}
         for sample in self._offers.read(N=10_000):
+            if getattr(sample, "participant_key", None) == self._participant.guid:
+                continue
             topic, kind = getattr(sample, "topic_name", None), str(getattr(sample, "type_name", "")).split("::")
             if topic and topic.startswith("rt/") and len(kind) == 4:
                 found[topic[2:]] = f"{kind[0]}/{kind[1]}/{kind[3].removesuffix('_')}"

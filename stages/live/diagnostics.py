@@ -18,6 +18,8 @@ def publish_diagnostics(transport: Transport, topic: str) -> None:
     values = {"rate_hz": f"{status.rate_hz:.2f}", "spread_m": f"{status.spread_m:.3f}"}
     if status.latencies_ms is not None:
         values["latency_ms.median"], values["latency_ms.p95"] = (f"{each:.1f}" for each in status.latencies_ms)
+    if status.age_ms is not None:
+        values["age_ms.median"] = f"{status.age_ms:.1f}"
     values |= {kind: str(number) for kind, number in sorted(status.counts.items())}
     values |= {f"left out: {what}": why for what, why in sorted(status.left_out.items())}
     state = {

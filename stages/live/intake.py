@@ -3,6 +3,7 @@
 import struct
 import time
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -33,8 +34,12 @@ TYPES: dict[Role, str] = {
     "restart": EMPTY,
 }
 """What each role's topic carries; an image's type follows from its topic."""
+SETTINGS = {"image": "topics.image", "odometry": "topics.odometry"}
+"""Where the topic of a role without which there is no tick is set."""
 SILENT_S = 1.0
 """A topic that has been heard and says nothing for so long is a trouble."""
+UNUSED_S = 2.0
+"""Images of which none becomes a tick for so long are a trouble."""
 
 
 class _Pending(NamedTuple):
@@ -73,11 +78,14 @@ class Intake:
         self.unrecorded: list[Arrival] = []
         self._images: list[_Pending] = []
         self._earlier: int | None = None
+        self._since = time.monotonic()
         self._received: dict[str, float] = {}
         self._used_any = self.last_stamp is not None
+        self._last_used, self._counts_at_last = self._since, Counter[str]()
 
     def subscribe(self) -> None:
         """Ask for all topics. Of images, only the newest is kept while nobody takes them."""
+        self._since = time.monotonic()
         for topic, role in self.header.topics.items():
             self.transport.subscribe(topic, type_on(topic, role), newest=role == "image")
         if self.camera is None and self.camera_info is not None:
@@ -102,23 +110,56 @@ class Intake:
         now = time.monotonic()
         mismatched = self.transport.mismatched()
         offered = self.transport.offered()
-        needed = {topic: type_on(topic, role) for topic, role in self.header.topics.items() if self._needs(topic, role)}
+        topics = self.header.topics
+        images = [topic for topic, role in topics.items() if role == "image"]
+        spoken = [topic for topic in images if topic in self._received]
+        image = (spoken or [topic for topic in images if topic in offered] or images)[0]
+        needed = {topic: type_on(topic, role) for topic, role in topics.items() if role == "odometry"}
+        needed[image] = type_on(image, "image")
         if self.camera is None and self.camera_info is not None:
             needed[self.camera_info] = CAMERA_INFO
-        for topic, kind in needed.items():
-            heard = self._received.get(topic)
+        for topic in {*images, *needed}:
+            kind, heard = needed.get(topic, ""), self._received.get(topic)
             trouble = ""
-            if topic in mismatched:
+            if not kind:
+                pass
+            elif topic in mismatched:
                 trouble = f"{topic}: its {mismatched[topic]} (QoS) does not fit"
             elif topic in offered and offered[topic] != kind:
-                trouble = f"{topic} carries {offered[topic]:.80}, not {kind}"
+                trouble = f"{topic} carries {offered[topic]:.80}, not {kind}{self._advice(topic, kind, offered)}"
             elif heard is None:
-                trouble = f"nothing on {topic} yet" + ("" if self.transport.matched(topic) else ", nobody publishes it")
-                trouble += " (a robot without odometry: speed=0.5)" if kind == TYPES["odometry"] else ""
+                trouble = f"nothing on {topic} ({kind}) for {now - self._since:.0f} s"
+                trouble += "" if self.transport.matched(topic) else ", nobody publishes it"
+                trouble += self._advice(topic, kind, offered)
             elif now - heard > max(SILENT_S, self.patience_s):
-                trouble = f"{topic} has been silent for {now - heard:.0f} s"
+                trouble = f"{topic} ({kind}) has been silent for {now - heard:.0f} s"
             self.status.note(topic, trouble)
         self.status.counts = self.dropped()
+        unseen = f"no publisher is seen ({self.transport.place}): is the robot on, and in the same domain and reach?"
+        self.status.note("robot", "" if offered or self._received else unseen)
+        self.status.note("ticks", self._unused(now))
+
+    def _advice(self, topic: str, kind: str, offered: Mapping[str, str]) -> str:
+        """Say what to type where another topic carries what is missing, or the robot has none."""
+        role = self.header.topics.get(topic)
+        kinds = IMAGE_TYPES if role == "image" else (kind,)
+        others = sorted(
+            name for name, carried in offered.items() if carried in kinds and name not in self.header.topics
+        )
+        setting = SETTINGS.get(role or "", "topics.camera_info")
+        advice = [f"{setting}={others[0]:.80}"] if others else []
+        advice += ["speed=0.5 (m/s, a robot without odometry)"] if role == "odometry" else []
+        advice += ["camera=PATH/camera.yaml"] if role is None else []
+        return f"; type {', or '.join(advice)}" if advice else ""
+
+    def _unused(self, now: float) -> str:
+        """Why no image has become a tick though there are some."""
+        unused = self.counts - self._counts_at_last
+        unused.pop("overtaken_image", None)
+        if not unused or now - self._last_used < UNUSED_S:
+            return ""
+        kind, number = unused.most_common(1)[0]
+        return f"no image is used: {kind} {number} times ({self.details.get(kind, kind):.200})"
 
     def dropped(self) -> Counter[str]:
         """What was left out so far, by kind."""
@@ -127,12 +168,6 @@ class Intake:
         images = [topic for topic, role in self.header.topics.items() if role == "image"]
         found["overtaken_image"] += sum(self.transport.overtaken[topic] for topic in images)
         return +found
-
-    def _needs(self, topic: str, role: Role) -> bool:
-        """Whether no tick can be made without a topic: of several of images, the one that is heard, else the first."""
-        images = [name for name, each in self.header.topics.items() if each == "image"]
-        heard = [name for name in images if name in self._received]
-        return role == "odometry" or topic == (heard or images)[0]
 
     def _drop(self, kind: str, detail: str) -> None:
         self.counts[kind] += 1
@@ -229,6 +264,8 @@ class Intake:
         frame, scans = made
         arrivals = [*self.recordable(), *scans, image.arrival]
         self.last_stamp, self._used_any, self._earlier = image.stamp, True, None
+        self._last_used, self._counts_at_last = time.monotonic(), self.counts.copy()
+        self.status.taken(image.stamp, image.arrival.received)
         return Taken(image.stamp, pixels, frame, arrivals)
 
     def recordable(self) -> list[Arrival]:

@@ -82,8 +82,13 @@ class RclpyTransport(Transport):
         return there + (published.get_subscription_count() if published is not None else 0)
 
     def offered(self) -> dict[str, str]:
-        """Topics that are published now, with their types."""
-        return {topic: types[0] for topic, types in self._node.get_topic_names_and_types() if types}
+        """Topics that others publish now, with their types."""
+        found = {}
+        for topic, _ in self._node.get_topic_names_and_types():
+            for end in self._node.get_publishers_info_by_topic(topic):
+                if (end.node_namespace, end.node_name) != (self._node.get_namespace(), self._node.get_name()):
+                    found[topic] = end.topic_type
+        return found
 
     def mismatched(self) -> dict[str, str]:
         """Topics of ours whose other end asks for or offers another QoS."""

@@ -20,7 +20,9 @@ class LiveStatus:
         self.counts: Counter[str] = Counter()
         self.live = False
         self.spread_m = float("nan")
+        self._taken = (0, 0)
         self._latencies: deque[float] = deque(maxlen=WINDOW)
+        self._ages: deque[float] = deque(maxlen=WINDOW)
         self._ended: deque[float] = deque(maxlen=100)
 
     def note(self, what: str, trouble: str) -> None:
@@ -40,18 +42,30 @@ class LiveStatus:
         self._reported |= self.left_out.keys()
         return unsaid
 
+    def taken(self, stamp: int, received: int) -> None:
+        """An image with that stamp (ns) becomes a tick; `received`: when it came, in ns by this computer's clock."""
+        self._taken = stamp, received
+
     def published(self, stamp: int) -> None:
-        """A tick of an image with that stamp (ns) has led to a pose, now."""
-        self._latencies.append((time.time_ns() - stamp) / 1e6)
+        """The tick of an image with that stamp (ns) has led to a pose, now."""
+        now = time.time_ns()
+        if self._taken[0] == stamp:
+            self._latencies.append((now - self._taken[1]) / 1e6)
+        self._ages.append((now - stamp) / 1e6)
         self._ended.append(time.monotonic())
 
     @property
     def latencies_ms(self) -> tuple[float, float] | None:
-        """Image stamp to pose in milliseconds, median and 95th percentile; None before the first."""
+        """From an image's arrival to its pose, ms: median and 95th percentile; None before the first."""
         if not self._latencies:
             return None
         median, high = np.percentile(np.array(self._latencies), [50, 95])
         return float(median), float(high)
+
+    @property
+    def age_ms(self) -> float | None:
+        """From an image's stamp to its pose, ms, median: also what the robot's clock is behind this computer's."""
+        return float(np.median(self._ages)) if self._ages else None
 
     @property
     def rate_hz(self) -> float:
@@ -61,10 +75,10 @@ class LiveStatus:
         return (len(self._ended) - 1) / max(1e-6, self._ended[-1] - self._ended[0])
 
     def line(self) -> str:
-        """In one line."""
-        words = [f"{self.rate_hz:.1f} Hz"]
+        """In one line, what is wrong first."""
+        words = [*sorted(self.troubles.values()), f"{self.rate_hz:.1f} Hz"]
         if self.latencies_ms is not None:
             words.append(f"{self.latencies_ms[0]:.0f} ms from image to pose")
         if np.isfinite(self.spread_m):
             words.append(f"spread {self.spread_m:.2f} m")
-        return ", ".join([*words, *sorted(self.troubles.values())])
+        return "; ".join(words)

@@ -76,6 +76,8 @@ class Transport(ABC):
 
     def __init__(self) -> None:
         self.inbox, self.status = Inbox(), LiveStatus()
+        self.place = ""
+        """Where it listens, for messages: the transport and its domain."""
         self.farewells: list[Callable[[], None]] = []
         """What is still to be sent before the transport is closed."""
 
@@ -99,7 +101,7 @@ class Transport(ABC):
 
     @abstractmethod
     def offered(self) -> dict[str, str]:
-        """Topics that are published now, with their types."""
+        """Topics that others publish now, with their types."""
 
     @abstractmethod
     def mismatched(self) -> dict[str, str]:
@@ -140,6 +142,7 @@ def connect(transport: TransportName, domain: int | None = None) -> Transport:
     number = _domain() if domain is None else domain
     module = importlib.import_module(f"{__package__}.{transport}_transport")
     made: Transport = opened((transport, number), lambda: module.open_transport(number))
+    made.place = f"transport={transport}, ROS_DOMAIN_ID={number}"
     return made
 
 

@@ -90,8 +90,8 @@ class ZenohTransport(Transport):
         return sum(wanted[kind] for own, kind, name, _ in self._endpoints() if name == topic and own != self._id)
 
     def offered(self) -> dict[str, str]:
-        """Topics that are published now, with their types."""
-        return {name: msgtype for _, kind, name, msgtype in self._endpoints() if kind == "MP"}
+        """Topics that others publish now, with their types."""
+        return {name: kind for own, end, name, kind in self._endpoints() if end == "MP" and own != self._id}
 
     def mismatched(self) -> dict[str, str]:
         """Over zenoh every QoS fits."""

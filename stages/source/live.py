@@ -141,7 +141,10 @@ class LiveSource(Source):
                 return self._out(position, taken.stamp, self._intake.camera, taken.pixels, taken.frame)
             if len(self._intake.unrecorded) > 256 and self._record is not None:
                 self._write(self._intake, self._intake.recordable())
+        self._intake.watch()
         self._leave(ctx, self._intake)
+        if not position.ticks:
+            raise BadInput(f"no image became a tick: {self._why_not()}")
         return None
 
     def _again(self, position: LiveSourceState) -> tuple[int, Camera, Pixels, Frame] | None:
@@ -204,11 +207,18 @@ class LiveSource(Source):
             ctx.fact("latency_ms_median", round(status.latencies_ms[0], 1), of_run=True)
             ctx.fact("latency_ms_p95", round(status.latencies_ms[1], 1), of_run=True)
             ctx.fact("rate_hz", round(status.rate_hz, 2), of_run=True)
+        if status.age_ms is not None:
+            ctx.fact("age_ms_median", round(status.age_ms, 1), of_run=True)
         self._write(intake, intake.recordable())
         if self._record is not None:
             self._record.close()
         self._give_signals_back()
         disconnect()
+
+    def _why_not(self) -> str:
+        """What was missing, as the terminal said it meanwhile."""
+        troubles = sorted(self._transport.status.troubles.values())
+        return "; ".join(troubles) or "it was ended before the first image; let it run until the robot has been heard"
 
     def _write(self, intake: Intake, arrivals: list[Any]) -> None:
         if self._path is None or not isinstance(intake.camera, Camera):
