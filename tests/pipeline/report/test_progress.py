@@ -129,3 +129,27 @@ def test_what_takes_longer_than_a_second_is_told_in_seconds_and_long_waits_in_ho
     bar = "─" * 24
     assert live_line("t", 1, 200, 0.02, 9950.0, "maps") == f"t  {bar}  1/200 maps  50.0 s each  2:45:50 left"
     assert live_line("t", 0, 200, None, None, "maps", "1 running") == f"t  {bar}  0/200 maps  1 running"
+
+
+def test_what_a_stage_says_stands_beside_the_frames_for_a_moment():
+    stream, clock = io.StringIO(), Clock()
+    with Progress(stream, clock) as progress:
+        for second in range(6):  # the same words with other numbers are no news
+            progress.say(f"nothing on /odom for {second} s")
+            clock.now += 1.0
+        progress.update("live", 1, None)
+        progress.say("9.5 Hz")
+        clock.now += 5.0
+        progress.update("live", 2, None)
+    lines = [json.loads(line) for line in stream.getvalue().splitlines()]
+    assert [line["doing"] for line in lines[:3]] == [f"nothing on /odom for {second} s" for second in (0, 2, 4)]
+    assert [(line["frames"], line.get("note")) for line in lines[3:]] == [(1, "9.5 Hz"), (2, None)]
+
+
+def test_a_line_that_takes_several_rows_of_the_terminal_is_painted_over(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "20")
+    stream = Terminal()
+    with Progress(stream, Clock()) as progress:
+        progress.say("x" * 30)
+        progress.say("y")
+    assert stream.getvalue() == f"\r\x1b[J{'x' * 30} …\r\x1b[1A\x1b[Jy …\r\x1b[J"

@@ -98,6 +98,10 @@ class OtherEnd:
         """Have it publish CDR on a topic that it has advertised."""
         self.order("publish", topic, data=base64.b64encode(data).decode())
 
+    def next(self, timeout_s: float = WAIT_S) -> dict[str, Any]:
+        """The next thing that it says."""
+        return self._heard.get(timeout=timeout_s)
+
     def wait(self, key: str, timeout_s: float = WAIT_S) -> Any:
         """The next thing that it says with that key."""
         until = time.monotonic() + timeout_s

@@ -34,7 +34,7 @@ BELIEF = Particles(np.array([[3.0, 1.0, np.pi / 2], [2.0, -1.0, 0.0]]), np.array
 MAP = ReferenceGraph(
     np.array([[0.5, 1.5, 0.0], [2.5, 3.5, 0.0]]), np.zeros((2, 1, 1), np.float32), "none", np.array([[0, 1]]), "truth"
 )
-GRID = OccupancyGrid(np.array([[0.0, 1.0, 0.0]]), 0.5, (1.0, -2.0))
+GRID = OccupancyGrid(np.array([[0, 1, 2]], np.uint8), 0.5, (1.0, -2.0))
 SHOWN = {
     "/estimate/path": ("nav_msgs/msg/Path", path_message([STAMP], np.array([[3.0, 1.0, np.pi / 2]]), STAMP)),
     "/estimate/confidence": ("std_msgs/msg/Float64", {"data": 0.875}),
@@ -43,7 +43,7 @@ SHOWN = {
     "/plan": ("nav_msgs/msg/Path", path_message([STAMP] * 2, MAP.poses, STAMP)),
     "/homing": (
         "visualization_msgs/msg/MarkerArray",
-        {"markers": [homing_arrow(STAMP, HomingVector(0.5, 1.0, 0.25, 20))]},
+        {"markers": [homing_arrow(STAMP, HomingVector(1, 0.5, 0.25, 1.0, 1.0, 0.5, 1.5, 20, "new"))]},
     ),
 }
 """Messages of `result.mcap` that are published, by topic: type and fields."""
@@ -63,7 +63,8 @@ class Told:
         self.transport.status.live = True
         self.transport.status.note("/odom", "nothing on /odom")
         kinds = {"publish": Publish, "publish_belief": PublishBelief, "publish_messages": PublishMessages}
-        self.stages = [kinds[name](**{**given, "transport": transport}) for each in options for name, given in each.items()]
+        named = [item for each in options for item in each.items()]
+        self.stages = [kinds[name](**{**given, "transport": transport}) for name, given in named]
         for stage in self.stages:
             stage.setup(Context("publish"))
 
@@ -71,6 +72,8 @@ class Told:
         for stage in self.stages:
             if isinstance(stage, Publish):
                 stage.step(Context("publish"), TICK, estimate=ESTIMATE, odometry=ODOMETRY, command=COMMAND)
+                if stage._watchdog is not None:
+                    stage._watchdog.rest()  # all ticks have one stamp: it would say zero between them
             elif isinstance(stage, PublishBelief):
                 stage.step(Context("publish"), TICK, belief=BELIEF)
             else:

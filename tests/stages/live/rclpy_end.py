@@ -29,6 +29,15 @@ def qos_of(order: dict) -> QoSProfile:
     )
 
 
+def plain(value: object) -> object:
+    """A message as mappings, lists and numbers."""
+    if hasattr(value, "get_fields_and_field_types"):
+        return {name: plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    if isinstance(value, (str, bool, int, float)):
+        return value
+    return [plain(each) for each in value.tolist()] if hasattr(value, "tolist") else [plain(each) for each in value]
+
+
 def fill(message: object, fields: dict) -> object:
     for name, value in fields.items():
         setattr(message, name, fill(getattr(message, name), value) if isinstance(value, dict) else value)
@@ -47,6 +56,9 @@ def main() -> None:
     def hear(topic: str) -> object:
         return lambda data: say(topic=topic, data=base64.b64encode(bytes(data)).decode())
 
+    def tell(topic: str) -> object:
+        return lambda message: say(topic=topic, message=plain(message))
+
     threading.Thread(target=spin, daemon=True).start()
     say(ready=True)
     for line in sys.stdin:
@@ -56,6 +68,8 @@ def main() -> None:
             publishers[topic] = node.create_publisher(type_of(order["type"]), topic, qos_of(order))
         elif order["do"] == "publish":
             publishers[topic].publish(base64.b64decode(order["data"]))
+        elif order["do"] == "subscribe" and order.get("decoded"):
+            node.create_subscription(type_of(order["type"]), topic, tell(topic), qos_of(order))
         elif order["do"] == "subscribe":
             node.create_subscription(type_of(order["type"]), topic, hear(topic), qos_of(order), raw=True)
         elif order["do"] == "matched":

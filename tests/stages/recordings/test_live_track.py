@@ -43,6 +43,15 @@ def test_a_counter_that_was_reset_is_joined_to_where_it_was_and_the_gap_is_known
     assert track.unmeasured_s(round(4.0 * S)) == 0.0
 
 
+def test_over_a_jump_after_a_pause_the_robot_goes_one_step_and_not_as_far_as_it_might_have():
+    track = LiveTrack(MotionLimits(), jumps=False)
+    straight(track, np.arange(0.0, 5.05, 0.1))
+    straight(track, np.arange(8.0, 10.05, 0.1), x0=-100.0)
+    assert track.at(8 * S) == pytest.approx([5.1, 0, 0], abs=1e-6)  # 0.1 s ahead as before, and not 3 s
+    assert track.at(9 * S) == pytest.approx([6.1, 0, 0], abs=1e-6)
+    assert track.unmeasured_s(9 * S) == pytest.approx(3.0)
+
+
 def test_a_clock_that_is_set_back_for_good_begins_anew():
     track = LiveTrack(MotionLimits(), jumps=False)
     straight(track, np.arange(1000.0, 1003.0, 0.1))

@@ -1,8 +1,10 @@
 """The live source over a transport of the test's own; the same over real rclpy is in tests/stages/live."""
 
 import os
+import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +13,8 @@ from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.mcap.message_types import encode_message
 from omninav.pipeline.mcap.reader import LogReader
+from omninav.stages.live import intake
+from omninav.stages.live.status import LiveStatus
 from omninav.stages.live.transport import Arrival, Transport
 from omninav.stages.source import live
 from omninav.stages.source.live import LiveSource, LiveSourceState
@@ -34,7 +38,7 @@ class Loopback(Transport):
         return 1
 
     def offered(self) -> dict[str, str]:
-        return {}
+        return getattr(self, "offers", {})
 
     def mismatched(self) -> dict[str, str]:
         return {}
@@ -54,6 +58,7 @@ def said() -> list[Arrival]:
 @pytest.fixture
 def robot(monkeypatch: pytest.MonkeyPatch) -> Loopback:
     loopback = Loopback()
+    loopback.place = "a test"
     monkeypatch.setattr(live, "connect", lambda transport, domain: loopback)
     monkeypatch.setattr(live, "disconnect", lambda: None)
     return loopback
@@ -223,10 +228,103 @@ def test_while_a_robot_says_nothing_what_is_missing_is_noted(robot: Loopback, tm
     drive.join()
     assert drive.source._intake is not None
     drive.source._intake.watch()
+    image, odometry = "sensor_msgs/msg/CompressedImage", "nav_msgs/msg/Odometry"
     assert robot.status.troubles == {
-        "/odom": "nothing on /odom yet (a robot without odometry: speed=0.5)",
-        "/camera/image/compressed": "nothing on /camera/image/compressed yet",
+        "/odom": f"nothing on /odom ({odometry}) for 0 s; type speed=0.5 (m/s, a robot without odometry)",
+        "/camera/image/compressed": f"nothing on /camera/image/compressed ({image}) for 0 s",
+        "robot": "no publisher is seen (a test): is the robot on, and in the same domain and reach?",
     }
     drive.feed(robot, said())
     drive.source._intake.watch()
     assert not robot.status.troubles
+
+
+def test_what_is_missing_is_looked_for_under_other_names_and_since_when_is_said(
+    robot: Loopback, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    now = [1000.0]
+    monkeypatch.setattr(intake, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    drive = Drive(tmp_path)
+    drive.join()
+    robot.offers = {
+        "/wheels": "nav_msgs/msg/Odometry",
+        "/omni": "sensor_msgs/msg/Image",
+        "/camera/image": "std_msgs/msg/String",
+    }
+    now[0] += 12.0
+    drive.source._intake.watch()
+    assert robot.status.troubles == {
+        "/odom": "nothing on /odom (nav_msgs/msg/Odometry) for 12 s; "
+        "type topics.odometry=/wheels, or speed=0.5 (m/s, a robot without odometry)",
+        "/camera/image": "/camera/image carries std_msgs/msg/String, not sensor_msgs/msg/Image; "
+        "type topics.image=/omni",
+    }
+
+
+def test_images_that_odometry_never_reaches_are_a_trouble(
+    robot: Loopback, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    now = [1000.0]
+    monkeypatch.setattr(intake, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    drive = Drive(tmp_path)
+    drive.join()
+    for arrival in said():
+        if arrival.topic in ("/odom", "/camera/image/compressed"):
+            late = arrival.topic == "/odom"
+            robot.inbox.put(arrival._replace(data=ahead(arrival.data)) if not late else arrival)
+            drive.source._intake.next(0.0)
+    now[0] += 3.0
+    assert drive.source._intake.next(0.0) is None
+    drive.source._intake.watch()
+    assert "no image is used: outside_odometry" in robot.status.troubles["ticks"]
+    assert "odometry says up to" in robot.status.troubles["ticks"]
+
+
+def ahead(data: bytes) -> bytes:
+    """A message whose stamp is of a thousand seconds later."""
+    seconds = int.from_bytes(data[4:8], "little") + 1000
+    return data[:4] + seconds.to_bytes(4, "little") + data[8:]
+
+
+def test_an_image_waits_for_truth_half_as_long_as_for_odometry(
+    robot: Loopback, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    now = [1000.0]
+    monkeypatch.setattr(intake, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    drive = Drive(tmp_path, patience_s=1.0)
+    drive.join()
+    messages = said()
+    image = next(n for n, each in enumerate(messages) if each.topic == "/camera/image/compressed" and n > 100)
+    stamp = intake.stamp_of(messages[image])
+    for arrival in messages[: image + 100]:
+        truth = arrival.topic == "/ground_truth/pose"
+        if arrival.topic == "/odom" or (truth and intake.stamp_of(arrival) < stamp):
+            robot.inbox.put(arrival)
+    robot.inbox.put(messages[image])
+    assert drive.source._intake.next(0.0) is None  # its truth may still come
+    now[0] += 0.45
+    assert drive.source._intake.next(0.0) is None
+    now[0] += 0.1
+    taken = drive.source._intake.next(0.0)
+    assert taken is not None
+    assert (taken.stamp, bool(np.isnan(taken.frame.truth).all())) == (stamp, True)
+
+
+def test_a_run_without_a_tick_is_refused_with_what_was_missing(robot: Loopback, tmp_path: Path):
+    drive = Drive(tmp_path)
+    drive.source._stop.set()
+    with pytest.raises(
+        BadInput,
+        match=r"no image became a tick: no publisher .*; nothing on /camera/image/compressed .*; nothing on /odom",
+    ):
+        drive.source.step(drive.ctx, drive.state)
+
+
+def test_latency_is_measured_from_the_arrival_and_a_clock_that_is_off_shows_as_age():
+    status = LiveStatus()
+    status.taken(5, time.time_ns() - 20_000_000)
+    status.published(5)  # its stamp is of 1970
+    assert status.latencies_ms is not None
+    assert 20.0 <= status.latencies_ms[0] < 2000.0
+    assert status.age_ms is not None
+    assert status.age_ms > 1e12

@@ -1,0 +1,251 @@
+"""Every message that an option of `publish` declares, over every transport, read back by decoders that are not ours."""
+
+import importlib
+import json
+import math
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from omninav.pipeline.cli.composition import complete, composed
+from omninav.stages.live.transport import connect
+
+from . import idl_types
+from .conftest import ROOT, ROS2_PYTHON, WAIT_S, OtherEnd
+
+HERE = Path(__file__).parent
+STAMP = {"sec": 1_700_000_000, "nanosec": 250_000_000}
+INSTALLED = ("geometry_msgs", "nav_msgs", "std_msgs", "diagnostic_msgs")
+"""Packages of messages that have wheels for rclpy."""
+
+
+def options() -> list[dict[str, dict[str, Any]]]:
+    """The nodes of all options of `publish`, with their parameters; the command also without a header."""
+    found = []
+    for file in sorted((ROOT / "conf/publish").glob("*.yaml")):
+        words = ["variant=topological_nav", "goal=kitchen", "world=office", f"publish={file.stem}"]
+        with composed(words) as config:
+            nodes = complete(config)["nodes"]
+        found.append({name: dict(node) for name, node in nodes.items() if name.startswith("publish")})
+    bare = {"pose": None, "tf": None, "command": "/cmd_vel_bare", "command_type": "Twist"}
+    found.append({"publish": bare})
+    return [{name: {k: v for k, v in node.items() if k != "_target_"} for name, node in one.items()} for one in found]
+
+
+def topics_declared(told: list[dict[str, dict[str, Any]]]) -> dict[str, str]:
+    """Topic -> message type of all that these parameters say, and of the diagnostics."""
+    from omninav.stages.live.publish import Publish, PublishBelief, PublishMessages
+
+    from .every_message import SHOWN
+
+    found = {"/diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
+    for one in told:
+        stage = Publish(**one["publish"])
+        named = {stage.pose: "geometry_msgs/msg/PoseWithCovarianceStamped", stage.tf: "tf2_msgs/msg/TFMessage"}
+        named[stage.command] = f"geometry_msgs/msg/{stage.command_type}"
+        if "publish_belief" in one:
+            belief = PublishBelief(**one["publish_belief"])
+            packages = {"PoseArray": "geometry_msgs", "ParticleCloud": "nav2_msgs"}
+            named[belief.topic] = f"{packages[belief.message]}/msg/{belief.message}"
+            shown = PublishMessages(**one["publish_messages"])
+            named |= {shown.grid if name == "/grid" else name: SHOWN[name][0] for name in shown.topics}
+        found |= {topic: kind for topic, kind in named.items() if topic is not None}
+    return found
+
+
+TOLD = options()
+TOPICS = topics_declared(TOLD)
+
+
+def plain(value: Any) -> Any:
+    """A decoded message as mappings, lists and numbers."""
+    if hasattr(value, "__dict__") and not isinstance(value, type):
+        return {name.lstrip("_"): plain(each) for name, each in vars(value).items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [plain(each) for each in value]
+    return value
+
+
+def with_idl(msgtype: str, data: bytes) -> Any:
+    return plain(getattr(idl_types, msgtype.rpartition("/")[2]).deserialize(data))
+
+
+def pose(x: float, y: float, heading: float) -> dict[str, Any]:
+    turned = {"x": 0.0, "y": 0.0, "z": math.sin(heading / 2), "w": math.cos(heading / 2)}
+    return {"position": {"x": x, "y": y, "z": 0.0}, "orientation": turned}
+
+
+def close(found: Any, wanted: Any, where: str = "") -> None:
+    """The fields that are wanted are found; others are not looked at."""
+    if isinstance(wanted, dict):
+        for name, value in wanted.items():
+            close(found[name], value, f"{where}.{name}")
+    elif isinstance(wanted, list):
+        assert len(found) == len(wanted), where
+        for number, value in enumerate(wanted):
+            close(found[number], value, f"{where}[{number}]")
+    elif isinstance(wanted, float):
+        assert found == pytest.approx(wanted, abs=1e-6), where
+    else:
+        assert found == wanted, where
+
+
+HEADER = {"stamp": STAMP, "frame_id": "map"}
+AT = pose(3.0, 1.0, math.pi / 2)
+CLOUD = [AT, pose(2.0, -1.0, 0.0)]
+TWIST = {"linear": {"x": 0.25, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": -0.5}}
+COVARIANCE = [0.04, *[0.0] * 6, 0.09, *[0.0] * 27, 0.01]
+# (3, 1, 90 deg) over the inverse of (1, 2, 180 deg): odometry's origin is at (1, 2), turned by -90 deg
+CORRECTION = {
+    "translation": {"x": 1.0, "y": 2.0, "z": 0.0},
+    "rotation": {"x": 0.0, "y": 0.0, "z": -math.sqrt(0.5), "w": math.sqrt(0.5)},
+}
+AHEAD = {"header": {"stamp": {**STAMP, "sec": STAMP["sec"] + 1}, "frame_id": "map"}, "child_frame_id": "odom"}
+GRID = {
+    "header": HEADER,
+    "info": {"resolution": 0.5, "width": 3, "height": 1, "origin": pose(1.0, -2.0, 0.0)},
+    "data": [0, 100, -1],
+}
+POSES = {
+    "/amcl_pose": {"header": HEADER, "pose": {"pose": AT, "covariance": COVARIANCE}},
+    "/tf": {"transforms": [{**AHEAD, "transform": CORRECTION}]},
+    "/belief": {"header": HEADER, "poses": CLOUD},
+    "/particle_cloud": {
+        "header": HEADER,
+        "particles": [{"pose": CLOUD[0], "weight": 0.75}, {"pose": CLOUD[1], "weight": 0.25}],
+    },
+    "/cmd_vel": {"header": {"stamp": STAMP, "frame_id": "base_link"}, "twist": TWIST},
+    "/cmd_vel_bare": TWIST,
+    "/estimate/path": {"header": HEADER, "poses": [{"header": HEADER, "pose": AT}]},
+    "/estimate/confidence": {"data": 0.875},
+    "/plan": {"header": HEADER, "poses": [{"pose": pose(0.5, 1.5, 0.0)}, {"pose": pose(2.5, 3.5, 0.0)}]},
+    "/grid": GRID,
+    "/homing": {"markers": [{"ns": "homing", "scale": {"x": 1.5}, "pose": {"orientation": {"z": math.sin(0.25)}}}]},
+}
+WANTED = {**POSES, "/estimate/pose": POSES["/amcl_pose"]}
+
+
+def test_nothing_that_is_declared_is_left_out_of_this_test():
+    assert TOPICS.keys() - WANTED.keys() == {"/map", "/diagnostics"}
+    assert WANTED.keys() <= TOPICS.keys()
+
+
+def check(topic: str, found: Any) -> None:
+    """One message, by its topic. `/map` is the grid in AMCL's place, and else the map's markers."""
+    if topic == "/diagnostics":
+        (status,) = found["status"]
+        assert (np.ravel(status["level"])[0], status["name"], status["message"]) == (1, "omninav", "nothing on /odom")
+        assert status["values"][0]["key"] == "rate_hz"
+    elif topic == "/map" and "markers" in found:
+        places = next(each["points"] for each in found["markers"] if len(each["points"]) == 2)
+        close(places, [{"x": 0.5, "y": 1.5}, {"x": 2.5, "y": 3.5}])
+    else:
+        close(found, GRID if topic == "/map" else WANTED[topic], topic)
+
+
+def teller(transport: str, python: str, told: list[dict[str, dict[str, Any]]], **more: str) -> subprocess.Popen[str]:
+    words = [python, str(HERE / "every_message.py"), transport, json.dumps(told)]
+    return subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env={**os.environ, **more})
+
+
+@pytest.fixture(params=[0, 1, 2], ids=["ros2 or amcl 0", "ros2 or amcl 1", "a bare command"])
+def one(request: pytest.FixtureRequest) -> list[dict[str, dict[str, Any]]]:
+    """One option at a time: both say something else on /map."""
+    return [TOLD[request.param]]
+
+
+def hear_all(transport: Any, told: list[dict[str, dict[str, Any]]]) -> dict[str, bytes]:
+    topics = topics_declared(told)
+    for topic, kind in topics.items():
+        transport.subscribe(topic, kind)
+    heard: dict[str, bytes] = {}
+    until = time.monotonic() + WAIT_S
+    while len(heard) < len(topics) and time.monotonic() < until:
+        arrival = transport.take(0.2)
+        if arrival is not None:
+            heard[arrival.topic] = arrival.data
+    assert sorted(heard) == sorted(topics)
+    return heard
+
+
+def test_over_dds(domain: int, one: list[dict[str, dict[str, Any]]]):
+    process = teller("dds", sys.executable, one)
+    try:
+        for topic, data in hear_all(connect("dds"), one).items():
+            check(topic, with_idl(topics_declared(one)[topic], data))
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_over_zenoh(monkeypatch: pytest.MonkeyPatch, one: list[dict[str, dict[str, Any]]]):
+    pytest.importorskip("zenoh")
+    from .test_zenoh_transport import router
+
+    for _ in router.__wrapped__(monkeypatch):  # type: ignore[attr-defined]
+        process = teller("zenoh", sys.executable, one)
+        try:
+            for topic, data in hear_all(connect("zenoh"), one).items():
+                check(topic, with_idl(topics_declared(one)[topic], data))
+        finally:
+            process.kill()
+            process.wait()
+
+
+def with_rclpy(other_end: OtherEnd, topics: dict[str, str]) -> Iterator[tuple[str, Any]]:
+    """Each topic's message as rclpy decodes it."""
+    for topic, kind in topics.items():
+        other_end.order("subscribe", topic, type=kind, decoded=True)
+        while True:
+            said = other_end.next()
+            if said.get("topic") == topic and "message" in said:
+                break
+        yield topic, said["message"]
+
+
+@pytest.mark.parametrize("transport", ["dds", "rclpy"])
+def test_rclpy_reads_what_it_has_types_for(transport: str, other_end: OtherEnd, one: list[dict[str, dict[str, Any]]]):
+    own = transport == "rclpy"
+    libraries = {"PYTHONPATH": f"{ROOT}{os.pathsep}{Path(np.__file__).parents[1]}"} if own else {}
+    process = teller(transport, str(ROS2_PYTHON) if own else sys.executable, one, **libraries)
+    try:
+        assert process.stdout is not None
+        first = process.stdout.readline()
+        if own and not first:
+            pytest.skip(f"{ROS2_PYTHON} and {sys.executable} are not of one Python: their libraries do not go together")
+        output = process.stdout
+        threading.Thread(target=lambda: [None for _ in output], daemon=True).start()
+        left_out = set(json.loads(first)["left_out"])
+        topics = topics_declared(one)
+        readable = {topic: kind for topic, kind in topics.items() if kind.partition("/")[0] in INSTALLED}
+        assert left_out == (topics.keys() - readable.keys() if own else set())
+        for topic, message in with_rclpy(other_end, readable):
+            check(topic, message)
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_in_this_process(monkeypatch: pytest.MonkeyPatch, one: list[dict[str, dict[str, Any]]]):
+    from . import every_message
+    from .conftest import Wire
+
+    class Bytes(Wire):
+        def publish(self, topic, msgtype, data, latched=False):
+            self.sent.append((topic, with_idl(msgtype, data)))
+
+    wire = Bytes()
+    for module in (every_message, importlib.import_module("omninav.stages.live.publish")):
+        monkeypatch.setattr(module, "connect", lambda name, domain=None: wire)
+    every_message.Told("dds", one).tell()
+    assert {topic for topic, _ in wire.sent} == topics_declared(one).keys()
+    for topic, message in wire.sent:
+        check(topic, message)

@@ -1,0 +1,84 @@
+"""What a live run tells: the graph's own estimate, and map -> odom."""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import DRIVE, TOUR
+
+import omninav
+from omninav.pipeline import Context, Tick
+from omninav.pipeline.mcap.reader import LogReader
+from omninav.stages.live import publish
+from omninav.stages.live.publish import Publish
+from omninav.stages.source import live
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.pose import Pose
+
+from .conftest import ROOT, Wire
+from .test_live_map import Recorded
+
+CAMERA = ROOT / "tests/data/camera.yaml"
+
+
+def heading(rotation) -> float:
+    return 2 * math.atan2(rotation.z, rotation.w)
+
+
+def stamp_of(message) -> int:
+    return message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+
+
+@pytest.mark.parametrize("tolerance_s", [0.0, 0.3])
+def test_map_to_odom_is_the_estimate_over_the_odometry_dated_ahead(monkeypatch: pytest.MonkeyPatch, tolerance_s: float):
+    wire = Wire()
+    wire.status.live = True
+    monkeypatch.setattr(publish, "connect", lambda name, domain: wire)
+    stage, ctx = Publish(tf_tolerance_s=tolerance_s), Context("publish")
+    stage.setup(ctx)
+    mean = Pose(7.0, 7.0, 0.0)
+    estimate = PoseEstimate(Pose(3.0, 1.0, math.pi / 2), np.eye(3), 0.8, mean)
+    stage.step(ctx, Tick(0, 5_000_000_000), estimate=estimate, odometry=Pose(1.0, 2.0, math.pi))
+    (transform,) = wire.on("/tf")[0].transforms
+    assert stamp_of(transform) == 5_000_000_000 + round(tolerance_s * 1e9)
+    assert (transform.header.frame_id, transform.child_frame_id) == ("map", "odom")
+    # by hand: a robot at (1, 2) that looks back is at (3, 1) and looks left, so that odometry's x axis lies along -y
+    at = transform.transform
+    assert (at.translation.x, at.translation.y) == pytest.approx((1.0, 2.0))
+    assert heading(at.rotation) == pytest.approx(-math.pi / 2)
+    pose = wire.on("/estimate/pose")[0].pose.pose
+    assert (pose.position.x, pose.position.y) == (3.0, 1.0)
+
+
+@pytest.mark.parametrize("taken", ["mode", "mean"])
+def test_a_robot_publishes_the_pose_that_its_variant_is_measured_by(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, shared_cache: Path, taken: str
+):
+    robot = Recorded()
+    for module in (live, publish):
+        monkeypatch.setattr(module, "connect", lambda name, domain: robot)
+    monkeypatch.setattr(live, "disconnect", lambda: None)
+    settings = ["source=live", "publish=ros2", "log=live", "nodes.source.seconds=8", f"nodes.estimate.taken={taken}"]
+    settings += ["nodes.publish.tf_tolerance_s=0.3", "nodes.prior.number=300"]
+    words = {"camera": CAMERA, "cache": shared_cache, "progress": False, "plots": "none", "tour": TOUR}
+    run = omninav.run("omniview_mcl", *settings, folder=tmp_path / "run", **words)
+    with (run.folder / "frames.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    poses, transforms = robot.on("/estimate/pose"), [one.transforms[0] for one in robot.on("/tf")]
+    assert len(poses) == len(transforms) == len(rows) >= 5
+    told = list(LogReader(DRIVE).messages({"/odom"}))
+    seconds, odom = [each.stamp / 1e9 for each in told], [each.content.pose.pose.position for each in told]
+    apart = []
+    for row, pose, transform in zip(rows, poses, transforms, strict=True):
+        where = [pose.pose.pose.position.x, pose.pose.pose.position.y]
+        assert where == pytest.approx([float(row["estimate_x"]), float(row["estimate_y"])], abs=1e-6)
+        assert stamp_of(transform) == stamp_of(pose) + 300_000_000
+        at, turn = transform.transform.translation, heading(transform.transform.rotation)
+        x, y = (np.interp(stamp_of(pose) / 1e9, seconds, [getattr(each, axis) for each in odom]) for axis in "xy")
+        # whoever looks up map -> odom and then the robot's own odom -> base_link finds the estimate
+        ahead = [at.x + math.cos(turn) * x - math.sin(turn) * y, at.y + math.sin(turn) * x + math.cos(turn) * y]
+        assert ahead == pytest.approx(where, abs=0.01)
+        apart.append(math.dist(where, [float(row["mean_x"]), float(row["mean_y"])]))
+    assert (max(apart) > 0.01) == (taken == "mode")
