@@ -173,6 +173,7 @@ class LiveSource(Source):
             last_stamp=position.stamp if position.ticks else None,
         )
         intake.subscribe()
+        self._watched = time.monotonic()  # endpoints need a moment to find each other
         self._transport.status.live = True
         if self.restart is not None:
             serve_restart(self._transport, self.restart)

@@ -56,7 +56,7 @@ def test_a_localiser_bridges_ten_seconds_without_images_by_odometry(
     run = omninav.run(*words, *settings, folder=tmp_path / "run", cache=shared_cache, progress=False)
 
     said = {status.message for message in robot.on("/diagnostics") for status in message.status}
-    assert any(f"{IMAGE} has been silent for" in words for words in said), said
+    assert any(f"{IMAGE} (sensor_msgs/msg/CompressedImage) has been silent for" in words for words in said), said
     assert "running" in said
     seconds = run.frames["stamp_ns"].to_numpy() / 1e9
     (gap,) = np.flatnonzero(np.diff(seconds) > 1.5)

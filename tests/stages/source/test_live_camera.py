@@ -59,7 +59,10 @@ def test_what_cannot_be_a_live_run_is_refused_before_it_starts(device: str):
     ctx.readers = {"motion": ["motion"]}
     for source, why in (
         (LiveSource(log=f"camera:{device}"), r"log=camera:.*needed by 'motion'; type speed=0\.5"),
-        (LiveSource(topics=Topics(odometry=None)), r"the robot has neither odometry .*needed by 'motion'; type speed=0\.5"),
+        (
+            LiveSource(topics=Topics(odometry=None)),
+            r"the robot has neither odometry .*needed by 'motion'; type speed=0\.5",
+        ),
         (LiveSource(log="camera:/dev/none", speed_m_s=0.5), "there is no camera /dev/none"),
         (LiveSource(log="drive.mcap"), r"log=drive\.mcap: .*omninav log=drive\.mcap"),
     ):
