@@ -218,7 +218,9 @@ def _tiles(content: PageContent, verdicts: Sequence[Verdict]) -> list[dict[str, 
     done = sum(len(run.results) for run in content.conditions)
     total = sum(len(run.seeds) for run in content.conditions)
     holding = sum(verdict.holds is True for verdict in verdicts)
-    claims = [{"value": str(holding), "of": f"of {len(verdicts)}", "name": "claims hold"}]
+    undecided = sum(verdict.holds is None for verdict in verdicts)
+    name = "claims hold" + (f", {undecided} undecided" if undecided else "")
+    claims = [{"value": str(holding), "of": f"of {len(verdicts)}", "name": name}]
     return [
         *(claims if verdicts else []),
         {"value": str(len(content.experiment.conditions())), "of": "", "name": "conditions"},
