@@ -36,8 +36,8 @@ class Progress:
         self._first = self._done = 0
         self._total: int | None = None
         self._shown: int | None = None
-        self._note = self._said = ""
-        self._said_at = 0.0
+        self._note = self._doing = ""
+        self._doing_since = 0.0
         self._rows = 1
 
     def __enter__(self) -> "Progress":
@@ -46,7 +46,7 @@ class Progress:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._said and not self._name and self._live:
+        if self._doing and not self._name and self._live:
             self._paint("")  # what is printed from now on begins a line
             self._stream.flush()
         self._close()
@@ -77,8 +77,8 @@ class Progress:
         In a terminal it stands until something else is shown. Elsewhere it is a line, where only its numbers have
         changed every two seconds at most.
         """
-        now, new = self._clock(), re.sub(r"[\d.]+", "", words) != re.sub(r"[\d.]+", "", self._said)
-        self._said, self._said_at = words, now
+        now, new = self._clock(), re.sub(r"[\d.]+", "", words) != re.sub(r"[\d.]+", "", self._doing)
+        self._doing, self._doing_since = words, now
         if not new and now < self._due:
             return
         self._due = now + self._every
@@ -111,7 +111,7 @@ class Progress:
         seconds = now - self._started
         rate = (self._done - self._first) / seconds if seconds > 0 and self._done > self._first else None
         left = (self._total - self._done) / rate if self._total is not None and rate else None
-        note = ", ".join(filter(None, (self._note, self._said if now - self._said_at < SAID_S else "")))
+        note = ", ".join(filter(None, (self._note, self._doing if now - self._doing_since < SAID_S else "")))
         if self._live:
             self._paint(live_line(self._name, self._done, self._total, rate, left, self._unit, note))
         else:
