@@ -11,6 +11,7 @@ from conflicting_logs import (
     changed_log,
     found,
     learned,
+    odometry,
     said,
     without_truth,
 )
@@ -20,6 +21,7 @@ import omninav
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.mcap.message import Message
 from omninav.stages.monitor.input_conflicts import InputConflicts, InputConflictsState
+from omninav.stages.recordings.opening import open_recording
 from omninav.stages.values.image import Strip
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
@@ -76,6 +78,11 @@ def test_a_run_says_it_as_a_warning_and_keeps_it(shared_cache: Path, tmp_path: P
     counted = [len(each.sentences) for each in run.values("conflicts.conflicts")]
     assert counted == sorted(counted)
     assert (counted[0], counted[-1]) == (0, 1)
+
+
+def test_odometry_that_is_not_believed_says_to_check_its_unit(tmp_path: Path) -> None:
+    log = changed_log(DRIVE, tmp_path / "drive.mcap", odometry(lambda pose: pose * (1e3, 1e3, 1.0)))
+    assert open_recording(str(log)).details["impossible_motion"].endswith("most are like this: check the unit (m, rad)")
 
 
 def test_a_pause_and_another_log_are_no_leaps_of_the_clock() -> None:
