@@ -134,11 +134,11 @@ class InputConflicts(Stage):
         restart: Restart | None = None,
     ) -> Out:
         """One image, or a tick without one."""
-        if (sentence := leap(recent, ctx.tick, odometry)) and "leap" not in recent.found:
-            self._say(ctx, recent, "leap", sentence)
         if ctx.tick.first_of_log or restart is not None:
             recent.rows, recent.pose, recent.judged = np.zeros((0, COLUMNS)), np.full(3, np.nan), 0
             recent.suspected = ""
+        if (sentence := leap(recent, ctx.tick, odometry)) and "leap" not in recent.found:
+            self._say(ctx, recent, "leap", sentence)
         recent.pose = pose_now(recent.pose, odometry, motion)
         if strip is not None and np.isfinite(recent.pose).all() and self._due(ctx, recent):
             match = np.full(4, np.nan)
@@ -234,7 +234,7 @@ MIN_BEFORE_LEAP, MIN_LEAP_S, LEAP_INTERVALS = 8, 30.0, 20.0
 """Images before a leap of the clock, and what it is at least (s, and times the usual interval)."""
 LEAP_MIN_M, LEAP_GAP, LEAP_GAP_RAD = 0.02, 0.5, math.radians(15.0)
 """A robot that drives on does at least so much between two images (m), and lies at most this share of it and this angle
-(rad) off from where the last step repeated leads: not so where another log begins."""
+(rad) off from where the last step repeated leads."""
 MIN_FROZEN, FROZEN_M, FROZEN_RAD = 8, 1.0, 1.0
 """Images that are equal to the last bit while odometry drives so far (m) or turns so much (rad) are one image."""
 MIN_BLIND, BLIND_CORRELATION = 16, 0.15

@@ -29,7 +29,7 @@ from omninav.stages.values.pose import GuessedPose, Motion, Pose
 from .cuts import Cut
 from .frozen_odometry import frozen_steps
 from .guessed_motion import VisualCompass, advance, reckon, settled_speed
-from .log_parts import LogPart, Selection, parts_of, simulated_drives
+from .log_parts import LogPart, Selection, parts_of, pauses, simulated_drives
 from .outputs import DriveOutputs, motion_of, pose_of
 from .synthetic_odometry import add_odometry_noise
 
@@ -129,7 +129,7 @@ class LogSource(Source):
         ctx.fact("odometry", ", ".join(dict.fromkeys(part.kind for part in self._parts)))
         for sentence in (sentence for recording in self._opened for sentence in recording.assumed):
             ctx.warn(f"assumed: {sentence}")
-        for sentence in dict.fromkeys(self._doubts):
+        for sentence in dict.fromkeys([*self._doubts, *pauses(self._parts)]):
             ctx.warn(sentence)
         turned = sum(recording.turned for recording in self._opened if isinstance(recording, ImageFolder))
         if turned:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby, pairwise
 from typing import Literal
 
 import numpy as np
@@ -79,6 +80,21 @@ def parts_of(recording: Recording, truth: Array | None, selection: Selection, gu
         ends = (steps > selection.new_log_after_s * 1e9) & ~crossed(cuts, frames)
     kind = _odometry_kind(recording, truth, guess)
     return [LogPart(recording, part, driven, truth, kind) for part in np.split(frames, np.flatnonzero(ends) + 1)]
+
+
+def pauses(parts: Sequence[LogPart]) -> list[str]:
+    """What to say of pauses in a recording after which another drive begins: a sentence for each recording."""
+    said: list[str] = []
+    for recording, group in groupby(parts, key=lambda part: part.recording):
+        ends = [(int(one.frames[-1]), int(other.frames[0])) for one, other in pairwise(group)]
+        seconds = [float(recording.stamps[begin] - recording.stamps[end]) / 1e9 for end, begin in ends]
+        if seconds and max(seconds) > 0.0:
+            more = f", as after {len(ends) - 1} more" if len(ends) > 1 else ""
+            said.append(
+                f"{recording.name}: no image for {seconds[0] / 3600.0:.1f} h after image {ends[0][0]}{more}: what "
+                "follows counts as another drive; check the clock if the robot did not pause"
+            )
+    return said
 
 
 def _odometry_kind(recording: Recording, truth: Array | None, guess: bool) -> OdometryKind:
