@@ -26,8 +26,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.large_map import RENDERED, Frame, frames, made, views
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.artifact import read_artifact, write_artifact
-from omninav.stages.candidates.index import IndexedCandidates
-from omninav.stages.candidates.inverted_file import InvertedFile, build, faiss_or_none
+from omninav.stages.candidates.index import IndexedCandidates, search_in
+from omninav.stages.candidates.reference_index import BuildReferenceIndex, BuildReferenceIndexState
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.mapping.appearance_length_scale import AppearanceLengthScale
@@ -114,7 +114,7 @@ def opened(folder: Path, references: int, found: dict[str, Any]) -> tuple[Refere
     start = time.perf_counter()
     index = read_artifact(folder / f"{references}.index")
     assert isinstance(index, ReferenceIndex)
-    InvertedFile(faiss_or_none(), index)
+    search_in(index)
     found["open_index_s"] = time.perf_counter() - start
     return map, index
 
@@ -180,7 +180,11 @@ def prepare(folder: Path, references: int) -> None:
     if references > IndexedCandidates.compare_all_up_to and not index.exists():
         map, start = read_artifact(file), time.perf_counter()
         assert isinstance(map, ReferenceGraph)
-        write_artifact(index, build(faiss_or_none(), map, references, 128, lambda done, total: None))
+        stage, ctx = BuildReferenceIndex(), Context("reference_index")
+        stage.setup(ctx)
+        made_index = stage.step(ctx, map, BuildReferenceIndexState()).index
+        assert made_index is not None
+        write_artifact(index, made_index)
         print(f"index of {references} references built in {time.perf_counter() - start:.0f} s", file=sys.stderr)
 
 

@@ -19,8 +19,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.large_map import RENDERED, views
 from omninav.pipeline.engine.artifact import read_artifact
 from omninav.stages.candidates.appearance_vectors import appearance_vectors
-from omninav.stages.candidates.index import IndexedCandidates
-from omninav.stages.candidates.inverted_file import InvertedFile, build, faiss_or_none
+from omninav.stages.candidates.exact_search import ExactSearch, short_vectors
+from omninav.stages.candidates.index import IndexedCandidates, search_in
 from omninav.stages.geometry.appearance.segments import similarities, turned_views
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.reference_index import ReferenceIndex
@@ -45,13 +45,12 @@ def vectors_of(view: np.ndarray) -> np.ndarray:
 
 
 def on_recording(map: ReferenceGraph, drive: ReferenceGraph) -> list[float]:
-    """Shares of images whose best reference is among 10, 50 and 200 from the index."""
-    faiss = faiss_or_none()
-    file = InvertedFile(faiss, build(faiss, map, len(map), 128, lambda done, total: None))
+    """Shares of images whose best reference is among 10, 50, 128 and 200 from the index."""
+    search = ExactSearch(short_vectors(map, len(map), 128))
     hits = []
     for view in drive.features[np.linspace(0, len(drive) - 1, min(len(drive), 200)).astype(int)]:
         best, asked = int(np.argmax(similar(map, view, slice(None)))), vectors_of(view)
-        hits.append([best in file.nearest(asked, number, IndexedCandidates.lists) for number in (10, 50, 200)])
+        hits.append([best in search.nearest(asked, number) for number in (10, 50, 128, 200)])
     return [float(share) for share in np.mean(hits, axis=0)]
 
 
@@ -60,7 +59,7 @@ def in_large_map(folder: Path, references: int) -> dict[int, list[float]]:
     map, index = read_artifact(folder / f"{references}.omap"), read_artifact(folder / f"{references}.index")
     assert isinstance(map, ReferenceGraph)
     assert isinstance(index, ReferenceIndex)
-    drive, file = views(folder, "drive", *RENDERED["drive"]), InvertedFile(faiss_or_none(), index)
+    drive, search = views(folder, "drive", *RENDERED["drive"]), search_in(index)
     asked = [np.asarray(drive.features[n]) for n in np.linspace(0, len(drive) - 1, QUERIES).astype(int)]
     alike, near = (np.empty((QUERIES, references), np.float32) for _ in range(2))
     for start in range(0, references, BLOCK):
@@ -75,7 +74,7 @@ def in_large_map(folder: Path, references: int) -> dict[int, list[float]]:
     for view, own, gap in zip(asked, alike, near, strict=True):
         best, closest = np.argsort(-own, kind="stable")[:BEST], np.argsort(gap, kind="stable")[:BEST]
         for number, rows in shares.items():
-            found = file.nearest(vectors_of(view), number, IndexedCandidates.lists)
+            found = search.nearest(vectors_of(view), number, IndexedCandidates.lists)
             reached = np.sort(own[found])[::-1][:BEST].mean() / own[best].mean()
             rows.append([best[0] in found, np.isin(best, found).mean(), np.isin(closest, found).mean(), reached])
     return {number: np.mean(rows, axis=0).tolist() for number, rows in shares.items()}
@@ -98,7 +97,7 @@ def main() -> int:
         drives = {"simulator": (RENDERED["tour"], RENDERED["drive"])}
         for name, logs in RECORDED.items():
             drives[name] = tuple((log.format(words.recordings),) for log in logs)  # type: ignore[assignment]
-        print("| | references | images | among 10 | among 50 | among 200 |\n|---|---|---|---|---|---|")
+        print("| | references | images | among 10 | among 50 | among 128 | among 200 |\n|---|---|---|---|---|---|---|")
         for name, (tour, drive) in drives.items():
             simulated = name == "simulator"
             map = views(words.folder, "tour" if simulated else f"{name}_tour", *tour)

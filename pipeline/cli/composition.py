@@ -23,7 +23,7 @@ from omninav.pipeline.run.artifact_specification import ArtifactSpecification, r
 from omninav.pipeline.run.inputs import not_taken, read_inputs
 
 from .composition_cache import compose
-from .config_groups import group_files, settings_left_open
+from .config_groups import group_files, settings_left_open, suggest_option
 from .hydra_session import hydra_started
 from .overrides import invalid_overrides, with_unlisted_parameters
 from .words import read_flags
@@ -86,10 +86,10 @@ def complete(config: Any) -> dict[str, Any]:
         specs = read_specifications(plain)
         problems = [*not_taken(plain, settings_left_open()), *_unfit_settings(plain)]
         for name, spec in specs.items():
-            problems += _given_twice(config, name, spec)
+            problems += [*_given_twice(config, name, spec), *_given_alone(name, spec, specs)]
         if problems:
             raise ProblemsFound(problems)
-        graph_of = functools.cache(lambda maker: _graph_of(config, maker, specs[maker]))
+        graph_of = functools.cache(lambda maker: _graph_of(config, maker, specs))
         for name, spec in specs.items():
             own = plain["artifacts"][name]
             maker = spec.together_with or name
@@ -130,13 +130,13 @@ def _is_repeatable(node: Any) -> bool:
         return True
 
 
-def _graph_of(config: Any, name: str, spec: ArtifactSpecification) -> dict[str, Any]:
+def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]) -> dict[str, Any]:
+    spec = specs[name]
     try:
         other = compose([f"variant={spec.variant}"])
     except MissingConfigException:
-        hint = suggest(
-            str(spec.variant), [file.name.removesuffix(".yaml") for file in group_files("variant")], "variants"
-        )
+        variants = [file.name.removesuffix(".yaml") for file in group_files("variant")]
+        hint = suggest_option("variant", str(spec.variant), variants, "variants")
         what = f"there is no variant '{spec.variant}' to make it with"
         raise ProblemsFound([Problem(f"artifacts.{name}.variant", what, hint)]) from None
     OmegaConf.set_struct(other, False)
@@ -149,10 +149,12 @@ def _graph_of(config: Any, name: str, spec: ArtifactSpecification) -> dict[str, 
             hint = suggest(key, settings, "settings")
             raise ProblemsFound([Problem(f"artifacts.{name}.set.{key}", "there is no such setting", hint)])
         other[key] = value
-    for node in filter(lambda node: _is_repeatable(config.nodes[node]), spec.inherit):
-        other.nodes[node] = OmegaConf.to_container(config.nodes[node], resolve=False)
-    for node, changes in spec.nodes.items():
-        other.nodes[node] = OmegaConf.merge(other.nodes.get(node) or {}, changes)
+    for each in (spec, *(other for other in specs.values() if other.together_with == name)):
+        for node in filter(lambda node: _is_repeatable(config.nodes[node]), each.inherit):
+            other.nodes[node] = OmegaConf.to_container(config.nodes[node], resolve=False)
+        for block, changes in ((other.nodes, each.nodes), (other.wires, each.wires)):
+            for node, change in changes.items():
+                block[node] = OmegaConf.merge(block.get(node) or {}, change)
     made = _without_taken_out(OmegaConf.to_container(other, resolve=True))  # type: ignore[arg-type]
     made = dict(without_absent(_without_unset(made)))  # what makes an artifact begins without those it can do without
     return {key: made.get(key) for key in ("nodes", "wires", "saves")}
@@ -176,6 +178,15 @@ def _given_twice(config: Any, name: str, spec: ArtifactSpecification) -> Iterato
             yield Problem(name, f"both a file and {setting}=… to make it from are given", hint)
         elif config.get(setting) is not None and config.get(key) is None and key in config.inputs:
             yield Problem(key, f"{setting} is given, but no {key}", f"type {key}=…")
+
+
+def _given_alone(
+    name: str, spec: ArtifactSpecification, specs: Mapping[str, ArtifactSpecification]
+) -> Iterator[Problem]:
+    if spec.file is not None and spec.together_with is not None and specs[spec.together_with].file is None:
+        other = spec.together_with
+        hint = f"type {other}=FILE.omap too, with which it was saved; or leave {name}=FILE away, and both are made"
+        yield Problem(name, f"it is given as a file, and the {other} that it belongs to is not", hint)
 
 
 def _lacks(config: Any, name: str) -> bool:

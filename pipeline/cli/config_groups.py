@@ -1,11 +1,11 @@
 """The groups of configuration that omninav brings: which option puts which stage into a graph."""
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
-from omninav.pipeline.graph.problems import Problem, ProblemsFound
+from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import Entry
 
 CONF = "omninav.conf"
@@ -16,6 +16,19 @@ def group_files(group: str) -> list[Traversable]:
     folder = files(CONF).joinpath(group)
     found = [file for file in folder.iterdir() if file.name.endswith(".yaml")] if folder.is_dir() else []
     return sorted(found, key=lambda file: file.name)
+
+
+def suggest_option(group: str, option: str, options: Iterable[str], kind: str, prefix: str = "") -> str:
+    """A hint for an option that a group does not have: what took its place, or what is like it."""
+    return _replaced().get(f"{group}={option}") or suggest(option, options, kind, prefix)
+
+
+@functools.cache
+def _replaced() -> dict[str, str]:
+    import yaml
+
+    found: dict[str, str] = yaml.load(files(CONF).joinpath("replaced.yaml").read_text("utf-8"), yaml.CSafeLoader)
+    return found
 
 
 def is_group(name: str) -> bool:

@@ -15,11 +15,12 @@ from hydra.core.override_parser.types import ChoiceSweep, Override, RangeSweep, 
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
-from omninav.pipeline.graph.problems import BadInput, Problem, nearest, shown, suggest
+from omninav.pipeline.graph.problems import BadInput, Problem, nearest, shown
 from omninav.pipeline.graph.registry import UnknownStage, resolve
 from omninav.pipeline.graph.signature import BadStage, signature
 
 from .composition_cache import compose
+from .config_groups import suggest_option
 from .hydra_session import SETTABLE, not_settable
 
 MAX_JOBS = 100_000
@@ -169,7 +170,8 @@ def _unknown_option(word: Override, options: Sequence[str]) -> Iterator[Problem]
     for text in _texts(word):
         option = text.partition("=")[2].strip("'\"")
         if option not in options and not option.startswith("["):
-            yield Problem(group, f"there is no '{option}'", suggest(option, options, "options", prefix=f"{group}="))
+            hint = suggest_option(group, option, options, "options", prefix=f"{group}=")
+            yield Problem(group, f"there is no '{option}'", hint)
 
 
 def _unknown_setting(word: Override, config: Mapping[str, Any], groups: list[str]) -> Iterator[Problem]:

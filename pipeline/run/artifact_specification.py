@@ -24,11 +24,14 @@ class ArtifactSpecification:
     inherit: tuple[str, ...] = ()
     """Nodes of that graph that are this graph's, with their parameters."""
     nodes: dict[str, Any] = field(default_factory=dict)
-    """Changes to nodes of that graph: name -> parameters."""
+    """Changes to nodes of that graph, and nodes that it gains: name -> parameters."""
+    wires: dict[str, Any] = field(default_factory=dict)
+    """Wires that it gains: node -> ports."""
     must_match: tuple[str, ...] = ()
     """Nodes that must be in this graph what they were in the one that made the file."""
     together_with: str | None = None
-    """The artifact whose graph gives this one too, in the same run: it says how that graph is made."""
+    """The artifact whose graph gives this one too, in the same run: it says how that graph is made, and this one what
+    else stands in it (`inherit`, `nodes`, `wires`)."""
     required: bool = True
     """Whether nothing can run without it; else the wires from it are left out where it is neither given nor made."""
     for_plots: bool = False

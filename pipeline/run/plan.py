@@ -171,6 +171,9 @@ def _plan_artifact(name: str, spec: ArtifactSpecification, graph: Graph | None) 
 
 def _how_to_get(name: str, spec: ArtifactSpecification) -> str:
     give = " ".join(f"{setting}=…" for setting in spec.made_from)
+    if spec.together_with is not None:
+        both = f"; or {give} in place of {spec.together_with}=FILE, which makes both" if give else ""
+        return f"type {name}=FILE.omap too, which was saved beside {spec.together_with}=FILE{both}"
     make = f"type {give} to make one with '{spec.variant}', or " if give else "type "
     return f"{make}{name}=FILE.omap to load one"
 

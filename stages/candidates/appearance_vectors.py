@@ -1,11 +1,19 @@
 """Views as vectors whose distance says how similar they are, and the few dimensions in which a map's views differ."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import numpy.typing as npt
 
 from omninav.stages.geometry.appearance.segments import FeatureKind
+from omninav.stages.values.maps import ReferenceGraph
 
 Floats = npt.NDArray[np.float32]
+
+SAMPLE = 1 << 14
+"""References, evenly over the map, from which principal axes are learned."""
+BLOCK = 1 << 13
+"""References that are read at once."""
 
 
 def appearance_vectors(views: Floats, kind: FeatureKind) -> Floats:
@@ -33,3 +41,16 @@ def principal_axes(vectors: Floats, dimensions: int) -> tuple[Floats, Floats]:
     axes = np.zeros((vectors.shape[1], found.shape[1] + found.shape[1] % 2), np.float32)
     axes[:, : found.shape[1]] = found
     return mean.astype(np.float32), axes
+
+
+def sample(map: ReferenceGraph, references: int, number: int = SAMPLE) -> Floats:
+    """Vectors of `number` of the first `references` of a map at even steps."""
+    rows = np.unique(np.linspace(0, references - 1, min(number, references)).astype(np.int64))
+    return appearance_vectors(map.features[rows], map.kind)
+
+
+def blocks(map: ReferenceGraph, first: int, last: int) -> Iterator[tuple[slice, Floats]]:
+    """Vectors of the references `first` to `last` of a map, a block after the other."""
+    for start in range(first, last, BLOCK):
+        rows = slice(start, min(start + BLOCK, last))
+        yield rows, appearance_vectors(map.features[rows], map.kind)

@@ -5,26 +5,24 @@ together anew from them.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.stages.values.maps import ReferenceGraph
-from omninav.stages.values.reference_index import ReferenceIndex
+from omninav.stages.values.reference_index import InvertedLists
 
-from .appearance_vectors import appearance_vectors, principal_axes
+from .appearance_vectors import blocks, principal_axes, sample
 
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 
 SEED = 1
 """Of the training of centroids and codebooks."""
-PCA_SAMPLE, TRAINING_SAMPLE = 1 << 14, 1 << 16
-"""References, evenly over the map, from which principal axes, and centroids and codebooks, are learned."""
-BLOCK = 1 << 13
-"""References that are read at once."""
+TRAINING_SAMPLE = 1 << 16
+"""References, evenly over the map, from which centroids and codebooks are learned."""
 MAX_LISTS = 1 << 15
 PER_TURN = 4
 """One turn of a view alone gives a quarter of what is wanted at most: few turns are like anything in the map."""
@@ -42,9 +40,9 @@ def faiss_or_none() -> Any:
 
 def build(
     faiss: Any, map: ReferenceGraph, references: int, dimensions: int, progress: Callable[[int, int | None], None]
-) -> ReferenceIndex:
+) -> InvertedLists:
     """The index of the first `references` of a map, in `dimensions` at most."""
-    mean, axes = principal_axes(_sample(map, references, PCA_SAMPLE), dimensions)
+    mean, axes = principal_axes(sample(map, references), dimensions)
     short = axes.shape[1]
     number = min(1 << round(math.log2(max(math.sqrt(references), 1.0))), MAX_LISTS)
     lists = faiss.IndexFlatL2(short)
@@ -53,20 +51,20 @@ def build(
     for quantiser in (trained.cp, trained.pq.cp):
         quantiser.seed, quantiser.min_points_per_centroid = SEED, 1
     trained.cp.max_points_per_centroid = 1 << 8
-    trained.train((_sample(map, references, TRAINING_SAMPLE) - mean) @ axes)
+    trained.train((sample(map, references, TRAINING_SAMPLE) - mean) @ axes)
     codebooks = faiss.vector_to_array(trained.pq.centroids).reshape(short // 2, 16, 2)
     found, codes = np.empty(references, np.int32), np.empty((references, trained.code_size), np.uint8)
-    for rows, vectors in _blocks(map, 0, references):
+    for rows, vectors in blocks(map, 0, references):
         encoded = trained.sa_encode((vectors - mean) @ axes)
         found[rows], codes[rows] = _split(encoded, trained.coarse_code_size())
         progress(rows.stop, references)
-    return ReferenceIndex(mean, axes, lists.reconstruct_n(0, number), codebooks.copy(), found, codes)
+    return InvertedLists(mean, axes, lists.reconstruct_n(0, number), codebooks.copy(), found, codes)
 
 
 class InvertedFile:
     """An index made ready to be asked, for a map that may have grown since it was built."""
 
-    def __init__(self, faiss: Any, index: ReferenceIndex) -> None:
+    def __init__(self, faiss: Any, index: InvertedLists) -> None:
         self.index, self._faiss = index, faiss
         number, short = index.centroids.shape
         lists = faiss.IndexFlatL2(short)
@@ -83,7 +81,7 @@ class InvertedFile:
 
     def append(self, map: ReferenceGraph) -> None:
         """Take in the references that a map has more than the index."""
-        for _, vectors in _blocks(map, len(self), len(map)):
+        for _, vectors in blocks(map, len(self), len(map)):
             self._file.add(self._short(vectors))
 
     def nearest(self, vectors: Floats, number: int, lists: int) -> Ints:
@@ -105,17 +103,6 @@ class InvertedFile:
 
     def _short(self, vectors: Floats) -> Floats:
         return np.asarray((vectors - self.index.mean) @ self.index.axes, np.float32)
-
-
-def _sample(map: ReferenceGraph, references: int, number: int) -> Floats:
-    rows = np.unique(np.linspace(0, references - 1, min(number, references)).astype(np.int64))
-    return appearance_vectors(map.features[rows], map.kind)
-
-
-def _blocks(map: ReferenceGraph, first: int, last: int) -> Iterator[tuple[slice, Floats]]:
-    for start in range(first, last, BLOCK):
-        rows = slice(start, min(start + BLOCK, last))
-        yield rows, appearance_vectors(map.features[rows], map.kind)
 
 
 def _split(encoded: npt.NDArray[np.uint8], width: int) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.uint8]]:

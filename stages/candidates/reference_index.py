@@ -6,6 +6,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.reference_index import ReferenceIndex
 
+from .exact_search import short_vectors
 from .inverted_file import build, faiss_or_none
 
 
@@ -18,21 +19,24 @@ class BuildReferenceIndexState(State):
 class BuildReferenceIndex(Stage):
     """Builds an index that finds the references similar to a view, at any heading, without comparing them all.
 
-    Views become short vectors: the square roots of their histograms, on the principal axes of the map. They lie in an
-    inverted file, with four bits for each two dimensions (faiss; Jégou, Douze & Schmid 2011). That of a finished map is
-    kept in the cache. That of a map that grows is built anew when the map has grown by `rebuild_growth`; until then
-    references are appended to it. Needs `pip install 'omninav[index]'`; without it the output is absent.
+    Views become short vectors: the square roots of their histograms, on the principal axes of the map. All are compared
+    with the view's; in a map of more than `exact_up_to` they lie in an inverted file, with four bits for each two
+    dimensions (faiss; Jégou, Douze & Schmid 2011; `pip install 'omninav[index]'`, without which it takes longer). The
+    index of a finished map is kept in the cache. That of a map that grows is built anew when the map has grown by
+    `rebuild_growth`; until then references are appended to it.
     """
 
     dimensions: Annotated[int, Bounds(ge=2)] = 128
     """Numbers that are kept of each reference."""
     min_references: Annotated[int, Bounds(ge=16)] = 1000
     """References that a map needs to have an index."""
+    exact_up_to: Annotated[int, Bounds(ge=0)] = 30_000
+    """References whose short vectors are compared one and all: 10 ms at 36 headings."""
     rebuild_growth: Annotated[float, Bounds(gt=1)] = 2.0
     """Growth of a map, as a factor, at which its index is built anew."""
 
     class Out(Outputs):
-        """The index; absent for a small map, and where faiss is not installed."""
+        """The index; absent for a small map."""
 
         index: ReferenceIndex | None = None
 
@@ -45,17 +49,20 @@ class BuildReferenceIndex(Stage):
         """Give the map's index."""
         if len(map) < self.min_references:
             return self.Out()
-        faiss = faiss_or_none()
-        if faiss is None:
-            ctx.warn(
-                "candidates=index compares references as candidates=near_belief does, because faiss is not installed; "
-                "pip install 'omninav[index]'"
-            )
-            return self.Out()
         if len(map) >= self.rebuild_growth * state.references:
             state.references, self._index = len(map), None
         if self._index is None or map is not self._map:
             ctx.doing("indexing the map's references")
-            self._index = build(faiss, map, state.references, self.dimensions, ctx.progress)
-            self._map = map
+            self._index, self._map = self._built(ctx, map, state.references), map
         return self.Out(index=self._index)
+
+    def _built(self, ctx: Context, map: ReferenceGraph, references: int) -> ReferenceIndex:
+        faiss = faiss_or_none() if references > self.exact_up_to else None
+        if faiss is not None:
+            return build(faiss, map, references, self.dimensions, ctx.progress)
+        if references > self.exact_up_to:
+            ctx.warn(
+                f"all {references} references are looked through at every image, because faiss is not installed; for "
+                "less time type pip install 'omninav[index]'"
+            )
+        return short_vectors(map, references, self.dimensions)

@@ -4,38 +4,36 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context
+from omninav.pipeline import Bounds, Context, Stage
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.values.belief import Particles
+from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.local_features import LocalFeatures
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.visual_words import VisualWords, WordSimilarities
 
-from .background import with_even_background
-from .near_belief import NearBelief
+from .around_belief import AroundBelief
 
 
-class WordCandidates(NearBelief):
+class WordCandidates(AroundBelief, Stage):
     """Selects the references that share most visual words with the view, anywhere in the map and at any heading.
 
     Words are of local features (`local_features`), weighed by how rare they are in the map (Sivic & Zisserman 2003), so
-    they find what colours in another light do not. References near a belief are compared too, as in `near_belief`.
+    they find what colours in another light do not. References near a belief are compared too.
     Small maps are compared whole. References that a map has learned since its words were are compared in any case.
     """
 
-    background_references: Annotated[int, Bounds(ge=0)] = 128
-    """References compared of all others, the same at each image."""
     word_references: Annotated[int, Bounds(ge=1)] = 100
     """References that share most words with the view."""
 
-    class Out(NearBelief.Out):
+    class Out(AroundBelief.Out):
         """The references to compare with the view, and how similar all are by their words."""
 
         word_similarities: WordSimilarities
 
-    def step(  # type: ignore[override]
+    def step(
         self,
         ctx: Context,
         features: LocalFeatures,
@@ -57,10 +55,9 @@ class WordCandidates(NearBelief):
             )
         similar = words.similarities(features.descriptors)
         out = WordSimilarities(similar)
-        if len(map) <= self.compare_all_up_to or not similar.any():
-            return self.Out(candidates=self._near(ctx, map, near, length_scale), word_similarities=out)
-        best = np.argsort(-similar, kind="stable")[: self.word_references]
-        around = np.empty(0, np.int64) if near is None or self.radius <= 0.0 else self._around(map, near, length_scale)
-        chosen = distinct(np.concatenate([best, around, np.arange(len(words), len(map))]))
-        candidates = with_even_background(chosen, len(map), self.background_references)
-        return self.Out(candidates=candidates, word_similarities=out)
+        if len(map) <= self.compare_all_up_to:
+            return self.Out(candidates=Candidates(), word_similarities=out)
+        best = np.argsort(-similar, kind="stable")[: self.word_references if similar.any() else 0]
+        around, since = self.around(map, near, length_scale), np.arange(len(words), len(map))
+        chosen = distinct(np.concatenate([best, around, since]))
+        return self.Out(candidates=self.with_others(chosen, map), word_similarities=out)

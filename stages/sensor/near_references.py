@@ -107,6 +107,11 @@ def weighted_quantile(values: Floats, weights: Array, quantile: float) -> float:
     return float(np.interp(quantile * upto[-1], upto - 0.5 * weights[order], values[order]))
 
 
+def weighted_median(values: Floats, weights: Array | None) -> float:
+    """The median of values by their weights; None: all weigh the same."""
+    return float(np.median(values)) if weights is None else weighted_quantile(values, weights, 0.5)
+
+
 def background_similarity(
     best: Floats, places: Array, background_distance_m: float, quantile: float, sampling_weight: Array | None = None
 ) -> float:
@@ -119,7 +124,7 @@ def background_similarity(
     gap = places[:, :2] - places[int(np.argmax(best)), :2]
     background = gap[:, 0] ** 2 + gap[:, 1] ** 2 > background_distance_m**2
     if not background.any():
-        return float(np.median(best))
+        return weighted_median(best, sampling_weight)
     if sampling_weight is None:
         return float(np.quantile(best[background], quantile, method="hazen"))  # the same, without sorting
     return weighted_quantile(best[background], sampling_weight[background], quantile)

@@ -19,7 +19,7 @@ from omninav.stages.values.visibility import VisibilityAreas
 
 from .calibrated_similarity import Outliers, likelihood_ratios
 from .compared_rows import ComparedRows
-from .near_references import similarity_field
+from .near_references import similarity_field, weighted_median
 from .visibility_index import looks_at, seen_from, sees_any
 from .visibility_similarity import CUTOFF_SIGMAS, Window, mean_seen, sums_by_turn
 
@@ -141,4 +141,4 @@ class Visibility(Stage):
         best = best_headings(np.ascontiguousarray(values))
         power = contrast_power(best, self.contrast, each) if self.power is None else self.power
         top = max(float(best.max()), 1e-12)
-        return (values.astype(np.float64) / top) ** power, (float(np.median(best)) / top) ** power
+        return (values.astype(np.float64) / top) ** power, (weighted_median(best, each) / top) ** power

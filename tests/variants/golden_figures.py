@@ -31,7 +31,6 @@ RUNS: dict[str, tuple[str, ...]] = {
     "matched_pairs": (MAPPED, "nodes.matches.pairs=4"),
     "omninav": (TOUR, DRIVE),
     "omninav_map": (MAPPED,),
-    "omninav_map_words": (MAPPED,),
     "omniview_cml": (BOTH, "nodes.novelty_threshold.views=30"),
     "omniview_cml_as_printed": (BOTH, "nodes.novelty_threshold.views=30"),
     "omniview_cml_as_printed_map": (MAPPED, "nodes.novelty_threshold.views=30"),
@@ -40,7 +39,6 @@ RUNS: dict[str, tuple[str, ...]] = {
     "omniview_mcl_as_printed": (TOUR, DRIVE),
     "omniview_mcl_as_printed_map": (MAPPED,),
     "omniview_mcl_map": (MAPPED,),
-    "omniview_mcl_map_words": (MAPPED,),
     "particle_cml": (BOTH, "nodes.novelty_threshold.views=30", "nodes.source.stop=40"),
     "particle_cml_as_printed": (BOTH, "nodes.novelty_threshold.views=30", "nodes.source.stop=40"),
     "particle_cml_baseline": (TOUR, DRIVE, EVERY_SECOND),
@@ -51,7 +49,6 @@ RUNS: dict[str, tuple[str, ...]] = {
     "retrieval_mcl_as_printed": (TOUR, DRIVE, f"grid={DATA / 'map.yaml'}", EVERY_SECOND),
     "retrieval_mcl_as_printed_map": (MAPPED, EVERY_SECOND),
     "retrieval_mcl_map": (MAPPED, EVERY_SECOND),
-    "retrieval_mcl_map_words": (MAPPED, EVERY_SECOND),
     "simulate": (
         "world=home_store_demo",
         *SMALL_CAMERA,

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from hydra import compose
 from omegaconf import OmegaConf
 
-from omninav.pipeline.cli.config_groups import group_files
+from omninav.pipeline.cli.config_groups import group_files, suggest_option
 from omninav.pipeline.cli.hydra_session import hydra_started
-from omninav.pipeline.graph.problems import BadInput, suggest
+from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.run.inputs import Input, read_inputs
 
 INDENT = 27
@@ -22,7 +22,9 @@ def command(arguments: list[str]) -> int:
     }
     for word in arguments:
         if word not in summaries:
-            raise BadInput(f"variants: there is no variant {word}; {suggest(word, summaries, 'variants')}")
+            raise BadInput(
+                f"variants: there is no variant {word}; {suggest_option('variant', word, summaries, 'variants')}"
+            )
     with hydra_started():
         default = str(compose("config").variant)
         names = arguments or sorted(summaries, key=lambda name: (name != default, name))

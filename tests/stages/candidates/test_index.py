@@ -8,8 +8,8 @@ import pytest
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.artifact import read_artifact, write_artifact
 from omninav.pipeline.graph.problems import BadInput
+from omninav.stages.candidates.around_belief import AroundBelief
 from omninav.stages.candidates.index import IndexedCandidates
-from omninav.stages.candidates.near_belief import NearBelief
 from omninav.stages.candidates.reference_index import BuildReferenceIndex, BuildReferenceIndexState
 from omninav.stages.geometry.appearance.segments import similarities, turned_view
 from omninav.stages.values.belief import Particles
@@ -17,12 +17,17 @@ from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
-from omninav.stages.values.reference_index import ReferenceIndex
+from omninav.stages.values.reference_index import InvertedLists, ReferenceIndex, ShortVectors
 
 faiss = pytest.importorskip("faiss")
 
 SEGMENTS, BINS, SPACING = 12, 16, 0.25
-FIELDS = ("mean", "axes", "centroids", "codebooks", "lists", "codes")
+EXACT: dict[str, int] = {}
+INVERTED = {"exact_up_to": 0}
+FIELDS = {
+    ShortVectors: ("mean", "axes", "vectors"),
+    InvertedLists: ("mean", "axes", "centroids", "codebooks", "lists", "codes"),
+}
 
 
 def views(number: int, seed: int = 0) -> np.ndarray:
@@ -43,17 +48,22 @@ def a_map(number: int = 4000) -> ReferenceGraph:
 MAP = a_map()
 
 
-def index_of(map: ReferenceGraph, state: BuildReferenceIndexState | None = None) -> ReferenceIndex:
-    stage, ctx = BuildReferenceIndex(dimensions=64), Context("reference_index")
+def index_of(map: ReferenceGraph, state: BuildReferenceIndexState | None = None, **kw: Any) -> ReferenceIndex:
+    stage, ctx = BuildReferenceIndex(dimensions=64, **kw), Context("reference_index")
     stage.setup(ctx)
     index = stage.step(ctx, map, state or BuildReferenceIndexState()).index
     assert index is not None
     return index
 
 
-@pytest.fixture(scope="module")
-def index() -> ReferenceIndex:
-    return index_of(MAP)
+@pytest.fixture(scope="module", params=[EXACT, INVERTED], ids=["exact", "inverted"])
+def index(request: pytest.FixtureRequest) -> ReferenceIndex:
+    return index_of(MAP, **request.param)
+
+
+def assert_same(one: ReferenceIndex | None, other: ReferenceIndex) -> None:
+    assert type(one) is type(other)
+    assert all(getattr(one, name).tobytes() == getattr(other, name).tobytes() for name in FIELDS[type(other)])
 
 
 def selected(
@@ -70,11 +80,10 @@ def selected(
     return stage.step(ctx, SegmentHistograms(view), map, index, near).candidates
 
 
-def near_belief(near: Particles) -> Candidates:
-    stage, ctx = NearBelief(), Context("candidates")
-    ctx.tick = Tick(index=1, stamp=0)
-    stage.setup(ctx)
-    return stage.step(ctx, MAP, near).candidates
+def around(near: Particles) -> np.ndarray:
+    some = AroundBelief()
+    some.setup(Context("candidates"))
+    return some.around(MAP, near, None)
 
 
 def chosen(candidates: Candidates) -> np.ndarray:
@@ -102,8 +111,8 @@ def test_what_is_most_similar_at_any_heading_is_found(index: ReferenceIndex) -> 
 
 
 def test_the_index_is_the_same_in_every_run(index: ReferenceIndex) -> None:
-    again = index_of(a_map())
-    assert all(getattr(index, name).tobytes() == getattr(again, name).tobytes() for name in FIELDS)
+    again = index_of(a_map(), **(EXACT if isinstance(index, ShortVectors) else INVERTED))
+    assert_same(index, again)
     one, other = (chosen(selected(each, MAP.features[5])).tobytes() for each in (index, again))
     assert one == other
 
@@ -122,12 +131,10 @@ def test_the_background_is_the_same_at_each_image(index: ReferenceIndex) -> None
 
 def test_a_known_place_is_looked_after_and_a_kidnapped_robot_is_found(index: ReferenceIndex) -> None:
     near = particles_at(100.0)
-    around = chosen(near_belief(near))
-    two = [chosen(selected(index, MAP.features[3000], near=near, turn=turn, recovery_references=20)) for turn in (0, 1)]
-    assert 3000 in np.concatenate(two)  # every other heading at each image
-    for among in two:
-        assert set(around) <= set(among)
-        assert len(among) <= len(around) + 20
+    among = chosen(selected(index, MAP.features[3000], near=near, similar_references=20))
+    assert 3000 in among
+    assert set(around(near)) <= set(among)
+    assert len(among) <= len(around(near)) + 20
 
 
 @pytest.mark.parametrize("turned", range(4))
@@ -149,9 +156,10 @@ def test_references_that_a_map_has_learned_since_are_found(index: ReferenceIndex
     assert 4030 in chosen(selected(index, map.features[4030], map))
 
 
-def test_an_index_is_built_anew_when_its_map_has_doubled_and_is_the_same_after_a_kill() -> None:
+@pytest.mark.parametrize("form", [EXACT, INVERTED], ids=["exact", "inverted"])
+def test_an_index_is_built_anew_when_its_map_has_doubled_and_is_the_same_after_a_kill(form: dict[str, int]) -> None:
     map, state, ctx = a_map(1200), BuildReferenceIndexState(), Context("reference_index")
-    stage = BuildReferenceIndex(dimensions=64)
+    stage = BuildReferenceIndex(dimensions=64, **form)
     stage.setup(ctx)
     sizes = []
     for n, view in enumerate(views(1300, seed=5)):
@@ -159,8 +167,8 @@ def test_an_index_is_built_anew_when_its_map_has_doubled_and_is_the_same_after_a
             sizes.append(len(stage.step(ctx, map, state).index or ()))
         map.insert(Pose(float(n), 5.0, 0.0), view, "histograms")
     assert sizes == [1200] * 12 + [2400]
-    grown, resumed = stage.step(ctx, map, state).index, index_of(map, BuildReferenceIndexState(references=2400))
-    assert all(getattr(grown, name).tobytes() == getattr(resumed, name).tobytes() for name in FIELDS)
+    resumed = index_of(map, BuildReferenceIndexState(references=2400), **form)
+    assert_same(stage.step(ctx, map, state).index, resumed)
 
 
 def test_small_maps_are_compared_whole() -> None:
@@ -170,7 +178,9 @@ def test_small_maps_are_compared_whole() -> None:
     assert selected(None, MAP.features[0], a_map(500)).references is None
 
 
-def test_without_faiss_the_search_goes_on_and_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_faiss_all_references_of_a_large_map_are_looked_through_and_it_is_said(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     real = builtins.__import__
 
     def without(name: str, *args: Any, **kw: Any) -> Any:
@@ -179,15 +189,13 @@ def test_without_faiss_the_search_goes_on_and_says_what_to_install(monkeypatch: 
         return real(name, *args, **kw)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    stage, ctx = BuildReferenceIndex(), Context("reference_index")
+    stage, ctx = BuildReferenceIndex(exact_up_to=2000), Context("reference_index")
     stage.setup(ctx)
-    for _ in range(2):
-        assert stage.step(ctx, MAP, BuildReferenceIndexState()).index is None
+    indices = [stage.step(ctx, MAP, BuildReferenceIndexState()).index for _ in range(2)]
+    assert isinstance(indices[0], ShortVectors)
     assert len(ctx.warnings) == 1
     assert "pip install 'omninav[index]'" in ctx.warnings[0]
-    assert selected(None, MAP.features[0]).references is None
-    near = particles_at(100.0)
-    assert np.array_equal(chosen(selected(None, MAP.features[0], near=near)), chosen(near_belief(near)))
+    assert 123 in chosen(selected(indices[0], MAP.features[123]))
 
 
 def test_an_index_of_another_map_is_refused(index: ReferenceIndex) -> None:
@@ -195,17 +203,20 @@ def test_an_index_of_another_map_is_refused(index: ReferenceIndex) -> None:
         selected(index, MAP.features[0], a_map(3000))
 
 
-def test_codes_that_name_no_list_are_refused(tmp_path: Path, index: ReferenceIndex) -> None:
+def test_codes_that_name_no_list_are_refused(tmp_path: Path) -> None:
+    index = index_of(MAP, **INVERTED)
+    assert isinstance(index, InvertedLists)
     lists = index.lists.copy()
     lists[7] = len(index.centroids)
-    broken = ReferenceIndex(index.mean, index.axes, index.centroids, index.codebooks, lists, index.codes)
+    broken = InvertedLists(index.mean, index.axes, index.centroids, index.codebooks, lists, index.codes)
     write_artifact(tmp_path / "index.omap", broken)
-    with pytest.raises(BadInput, match="no sound ReferenceIndex: 'lists'"):
+    with pytest.raises(BadInput, match="no sound InvertedLists: 'lists'"):
         read_artifact(tmp_path / "index.omap")
 
 
+@pytest.mark.parametrize("form", [EXACT, INVERTED], ids=["exact", "inverted"])
 @pytest.mark.parametrize("shape", [(1, 5), (1, 1), (36, 3)])
-def test_views_of_few_numbers_have_an_index_too(shape: tuple[int, int]) -> None:
+def test_views_of_few_numbers_have_an_index_too(shape: tuple[int, int], form: dict[str, int]) -> None:
     features = np.random.default_rng(0).random((1500, *shape)).astype(np.float32) * 255
     map = ReferenceGraph(np.zeros((1500, 3)), features, "colours", np.zeros((0, 2), np.int64), "truth")
-    assert len(index_of(map)) == 1500
+    assert len(index_of(map, **form)) == 1500

@@ -4,7 +4,7 @@ from made_words import NOTHING, features_of, seen_along
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.candidates.near_belief import NearBelief
+from omninav.stages.candidates.around_belief import AroundBelief
 from omninav.stages.candidates.words import WordCandidates
 from omninav.stages.mapping.learned_words import vocabulary_and_words
 from omninav.stages.values.belief import Particles
@@ -48,11 +48,10 @@ def test_references_that_share_words_are_found_without_a_belief() -> None:
 
 def test_a_kidnapped_robot_is_found_and_the_belief_looked_after() -> None:
     near = particles_at(60.0)
-    stage, ctx = NearBelief(compare_all_up_to=0, background_references=0), Context("candidates")
-    stage.setup(ctx)
-    around = stage.step(ctx, a_map(), near).candidates.references
+    some = AroundBelief()
+    some.setup(Context("candidates"))
+    around = some.around(a_map(), near, None)
     found = chosen(output(near=near, background_references=50).candidates)
-    assert around is not None
     assert set(around.tolist()) | {99, 100, 101} <= found
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.candidates.near_belief import NearBelief
+from omninav.stages.candidates.index import IndexedCandidates
+from omninav.stages.candidates.reference_index import BuildReferenceIndex, BuildReferenceIndexState
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.particle_prior import ParticlePrior
 from omninav.stages.geometry.appearance.segments import turned_view
@@ -14,7 +15,7 @@ from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.motion.rotation_translation_rotation import RotationTranslationRotation
 from omninav.stages.sensor.near_references import NearReferences
 from omninav.stages.sensor.similarity_proposals import SimilarityProposals
-from omninav.stages.values.belief import Likelihood
+from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.features import SegmentHistograms
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
@@ -50,6 +51,9 @@ class Land:
 
 LAND = Land()
 MAP = LAND.map()
+BUILD, BUILT = BuildReferenceIndex(), Context("reference_index")
+BUILD.setup(BUILT)
+INDEX = BUILD.step(BUILT, MAP, BuildReferenceIndexState()).index
 DRIVE = [np.array([4.0 + 0.3 * k, 5.25, 0.0]) for k in range(30)]
 ELSEWHERE = [np.array([24.15, 25.0 - 0.3 * k, -np.pi / 2]) for k in range(40)]
 
@@ -62,7 +66,7 @@ class Filtered(NamedTuple):
     compared: list[int]
 
 
-def drive(path: list[np.ndarray], candidates: NearBelief, seed: int = 0) -> Filtered:
+def drive(path: list[np.ndarray], candidates: IndexedCandidates, seed: int = 0) -> Filtered:
     stages = {
         "start": ParticlePrior(),
         "motion": RotationTranslationRotation(),
@@ -85,7 +89,7 @@ def drive(path: list[np.ndarray], candidates: NearBelief, seed: int = 0) -> Filt
             belief = start.step(contexts["start"], MAP, None, LENGTH_SCALE).belief
         belief = motion.step(contexts["motion"], belief, moved).belief
         view = SegmentHistograms(LAND.seen_from(pose, noise.normal(0, 0.5, (SEGMENTS, BINS))))
-        chosen = candidates.step(contexts["candidates"], MAP, belief, LENGTH_SCALE).candidates
+        chosen = candidates.step(contexts["candidates"], view, MAP, INDEX, belief, LENGTH_SCALE).candidates
         alike = match.step(contexts["match"], view, MAP, chosen).similarities
         out = sensor.step(contexts["sensor"], alike, belief, MAP, moved, LENGTH_SCALE)
         proposed = proposals.step(contexts["proposals"], out.field, MAP, LENGTH_SCALE).proposals
@@ -97,27 +101,46 @@ def drive(path: list[np.ndarray], candidates: NearBelief, seed: int = 0) -> Filt
     return Filtered(np.array(errors), said, compared)
 
 
-def near() -> NearBelief:
-    return NearBelief()
+def some() -> IndexedCandidates:
+    return IndexedCandidates()
 
 
-def whole() -> NearBelief:
-    return NearBelief(radius=0.0)
+def whole() -> IndexedCandidates:
+    return IndexedCandidates(compare_all_up_to=len(MAP))
 
 
-def test_tracking_near_the_belief_is_as_good_as_comparing_the_whole_map() -> None:
-    some, all_ = drive(DRIVE, near()), drive(DRIVE, whole())
+def test_tracking_by_some_references_is_as_good_as_comparing_the_whole_map() -> None:
+    few, all_ = drive(DRIVE, some()), drive(DRIVE, whole())
     assert len(MAP) > 3000
     assert all_.compared[-1] == len(MAP)
-    assert max(some.compared[10:]) < 0.2 * len(MAP)
+    assert max(few.compared[10:]) < 0.2 * len(MAP)
     assert np.median(all_.errors[5:]) < 0.25  # references stand 0.4 m and 0.7 m apart
-    assert np.median(some.errors[5:]) < np.median(all_.errors[5:]) + 0.05
+    assert np.median(few.errors[5:]) < np.median(all_.errors[5:]) + 0.05
     # "Anywhere" is that of the whole map, on average over some pictures, to a factor of two.
-    ratio = [np.log(a.mean_likelihood / b.mean_likelihood) for a, b in zip(some.said[5:], all_.said[5:], strict=True)]  # type: ignore[operator]
+    ratio = [np.log(a.mean_likelihood / b.mean_likelihood) for a, b in zip(few.said[5:], all_.said[5:], strict=True)]  # type: ignore[operator]
     assert abs(np.mean(ratio)) < np.log(2)
 
 
-@pytest.mark.parametrize("candidates", [near, whole])
+def test_how_well_a_picture_fits_anywhere_is_that_of_the_whole_map_however_wrong_the_belief() -> None:
+    rng, ratio = np.random.default_rng(3), []
+    belief = Particles(rng.normal(DRIVE[0], (0.1, 0.1, 0.05), (200, 3)), np.full(200, 1 / 200))
+    for pose in ELSEWHERE[::4]:
+        view, said = SegmentHistograms(LAND.seen_from(pose, rng.normal(0, 0.5, (SEGMENTS, BINS)))), []
+        for candidates in (some(), whole()):
+            ctx = Context("candidates")
+            candidates.setup(ctx)
+            chosen = candidates.step(ctx, view, MAP, INDEX, belief, LENGTH_SCALE).candidates
+            alike = SelectiveMatch().step(Context("match"), view, MAP, chosen).similarities
+            sensor = NearReferences()
+            sensor.setup(ctx)
+            said.append(sensor.step(ctx, alike, belief, MAP, None, LENGTH_SCALE).likelihood.mean_likelihood)
+        assert len(alike.values) == len(MAP)
+        ratio.append(np.log(said[0] / said[1]))  # type: ignore[operator]
+    assert abs(np.mean(ratio)) < 0.3
+    assert np.std(ratio) < 0.7
+
+
+@pytest.mark.parametrize("candidates", [some, whole])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_robot_that_is_put_elsewhere_is_found_within_some_tens_of_pictures(candidates, seed: int) -> None:  # type: ignore[no-untyped-def]
     errors = drive(DRIVE[:15] + ELSEWHERE, candidates(), seed).errors

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from omninav.pipeline import Context, Tick
-from omninav.stages.candidates.near_belief import NearBelief
+from omninav.pipeline import Context
+from omninav.stages.candidates.around_belief import AroundBelief
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.candidates import Candidates
 from omninav.stages.values.length_scale import LengthScale
@@ -27,19 +27,11 @@ def gaps_to(map: ReferenceGraph, belief: Particles) -> np.ndarray:
 
 
 def near(
-    map: ReferenceGraph, belief: Particles, radius: float, recovery: float = 0.0, background: int = 20, turn: int = 3
+    map: ReferenceGraph, belief: Particles | None, radius: float, recovery: float = 0.0, background: int = 20
 ) -> Candidates:
-    stage = NearBelief(
-        radius=radius,
-        recovery_radius=recovery,
-        background_references=background,
-        compare_all_up_to=0,
-        length_scale_m=1.0,
-    )
-    ctx = Context("candidates")
-    ctx.tick = Tick(index=turn, stamp=0)
-    stage.setup(ctx)
-    return stage.step(ctx, map, belief).candidates
+    some = AroundBelief(radius=radius, recovery_radius=recovery, background_references=background, length_scale_m=1.0)
+    some.setup(Context("candidates"))
+    return some.with_others(some.around(map, belief, None), map)
 
 
 def chosen(candidates: Candidates) -> tuple[np.ndarray, np.ndarray]:
@@ -87,48 +79,35 @@ def test_around_recovery_particles_only_the_nearest_references_are_compared() ->
     assert set(alone) == set(without)
 
 
-def test_background_references_represent_the_whole_map_and_all_come_up() -> None:
-    map, belief = a_map(), particles_at(8.0)
-    seen: set[int] = set()
-    value = np.random.default_rng(0).random(400)
-    sums = []
-    for turn in range(200):
-        references, weight = chosen(near(map, belief, 1.0, turn=turn))
-        assert weight.sum() == pytest.approx(400)
-        seen |= set(references)
-        sums.append((value[references] * weight).sum())
-    assert len(seen) == 400
-    # A sum over the map, estimated turn by turn, is right on average.
-    assert np.mean(sums) == pytest.approx(value.sum(), rel=0.005)
+@pytest.mark.parametrize("x", [5.0, 20.0, 33.0])
+def test_background_references_represent_the_whole_map(x: float) -> None:
+    map, value = a_map(), np.cos(np.arange(400) / 60.0) + 2.0
+    references, weight = chosen(near(map, particles_at(x), 1.0, background=60))
+    assert weight.sum() == pytest.approx(400)
+    assert (value[references] * weight).sum() == pytest.approx(value.sum(), rel=0.02)
 
 
 def test_all_are_compared_where_none_is_near_and_without_a_belief() -> None:
     assert near(a_map(), particles_at(500.0), 2.0).references is None
-    assert NearBelief(compare_all_up_to=0).step(Context("candidates"), a_map()).candidates.references is None
+    assert near(a_map(), None, 2.0).references is None
 
 
 def test_the_radius_is_in_length_scales_of_the_map() -> None:
     map, belief = a_map(800), particles_at(30.0)
     compared = []
     for metres in (0.1, 0.5, 2.0):
-        stage, ctx = NearBelief(background_references=10, compare_all_up_to=0), Context("candidates")
-        stage.setup(ctx)
-        references, _ = chosen(stage.step(ctx, map, belief, LengthScale(metres)).candidates)
+        some = AroundBelief()
+        some.setup(Context("candidates"))
+        references = some.around(map, belief, LengthScale(metres))
         assert set(np.flatnonzero(gaps_to(map, belief) <= 4.5 * metres)) <= set(references)
         compared.append(len(references))
     assert compared[0] < 40 < compared[1] < 130 < compared[2]
 
 
-def test_small_maps_are_always_compared_whole() -> None:
-    stage = NearBelief(compare_all_up_to=400)
-    assert stage.step(Context("candidates"), a_map(), particles_at(8.0)).candidates.references is None
-
-
 def test_references_added_to_a_map_are_found() -> None:
-    map, belief, ctx = a_map(), particles_at(8.0), Context("candidates")
-    stage = NearBelief(radius=1.0, background_references=0, compare_all_up_to=0, length_scale_m=1.0)
-    stage.setup(ctx)
-    before, _ = chosen(stage.step(ctx, map, belief).candidates)
+    map, belief = a_map(), particles_at(8.0)
+    some = AroundBelief(radius=1.0, length_scale_m=1.0)
+    some.setup(Context("candidates"))
+    before = some.around(map, belief, None)
     map.append("poses", np.array([8.0, 0.5, 0.0]))
-    after, _ = chosen(stage.step(ctx, map, belief).candidates)
-    assert set(after) - set(before) == {400}
+    assert set(some.around(map, belief, None)) - set(before) == {400}
