@@ -27,7 +27,7 @@ def suggest_option(group: str, option: str, options: Iterable[str], kind: str, p
 def _replaced() -> dict[str, str]:
     import yaml
 
-    found: dict[str, str] = yaml.load(files(CONF).joinpath("replaced.yaml").read_text("utf-8"), yaml.CSafeLoader)
+    found: dict[str, str] = yaml.load(files(CONF).joinpath("help/replaced.txt").read_text("utf-8"), yaml.CSafeLoader)
     return found
 
 

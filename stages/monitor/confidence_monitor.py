@@ -47,7 +47,6 @@ class ConfidenceMonitor(Stage):
     images tell (`LearnWrongPoseAgreement`): the odds that the estimate is in the right place at all. That probability
     times the belief's share within the tolerance is the confidence.
 
-    Where only references near the belief are compared, matches elsewhere are found among the sample of the others only.
     How well it does, and where the defaults are from: docs/experiments/confidence.md.
     """
 
