@@ -34,6 +34,13 @@ def test_an_unknown_option_comes_before_what_depends_on_it():
     assert [problem.where for problem in found] == ["match"]
 
 
+def test_an_option_that_is_gone_says_what_took_its_place():
+    found = invalid_overrides(["candidates=near_belief", "variant=omninav_map_words"], (), "")
+    assert [problem.what for problem in found] == ["there is no 'near_belief'", "there is no 'omninav_map_words'"]
+    assert "candidates=index" in found[0].hint
+    assert "variant=omninav candidates=words tour=T" in found[1].hint
+
+
 def test_a_sweep_is_tried_by_its_first_choices_and_each_other_option_of_a_group():
     jobs = list(jobs_to_try(["match=selective,l2", "seed=0,1", "day=2"], ()))
     assert jobs == [["match=selective", "seed=0", "day=2"], ["match=l2", "seed=0", "day=2"]]
