@@ -150,7 +150,9 @@ def live_line(
     if total:
         full = min(24, 24 * done // total)
         words.append("━" * full + "─" * (24 - full))
-    words.append(f"{done}/{total} {unit}" if total is not None else f"{done} {unit}")
+    words.append(
+        f"{done}/{total} {unit}" if total is not None else f"{done} {unit.removesuffix('s') if done == 1 else unit}"
+    )
     if rate is not None:
         words.append(f"{rate:.1f} {unit}/s" if rate >= 1 else f"{1 / rate:.1f} s each")
     if left is not None and (total is None or done < total):

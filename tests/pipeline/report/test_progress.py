@@ -153,3 +153,8 @@ def test_a_line_that_takes_several_rows_of_the_terminal_is_painted_over(monkeypa
         progress.say("x" * 30)
         progress.say("y")
     assert stream.getvalue() == f"\r\x1b[J{'x' * 30} …\r\x1b[1A\x1b[Jy …\r\x1b[J"
+
+
+def test_one_of_a_thing_is_not_said_in_the_plural():
+    assert live_line("drive", 1, None, None, None) == "drive  1 frame"
+    assert live_line("drive", 2, None, None, None) == "drive  2 frames"
