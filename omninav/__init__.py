@@ -84,6 +84,10 @@ _PLACE_OF = {name: place for names, place in _PLACES.items() for name in names.s
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("omninav")
     if name not in __all__:
         raise AttributeError(f"module 'omninav' has no attribute '{name}'; it has: {', '.join(__all__)}")
     module = importlib.import_module(f"omninav.{_PLACE_OF.get(name, 'pipeline')}")

@@ -47,9 +47,7 @@ def _run(arguments: list[str]) -> int:
         print(help_text(arguments), end="")
         return 0
     if arguments and arguments[0] == "--version":
-        from importlib.metadata import version
-
-        print("omninav", version("omninav"))
+        print("omninav", omninav.__version__)
         return 0
     os.environ.setdefault("PYTHONSAFEPATH", "1")  # processes of ours do not import what lies in the working directory
     if arguments and arguments[0] in COMMANDS:

@@ -306,9 +306,15 @@ class _Builder:
             for port, spec in ports.items()
             if spec is not None and not _is_optional(spec)
         } | {(wire.to_node, wire.to_port) for wire in self.wires}
+        read = {wire.from_node for wire in self.wires}
         for node in self.nodes.values():
-            for port in node.signature.inputs.values():
-                if not port.optional and (node.name, port.name) not in attempted:
+            ports = [port for port in node.signature.inputs.values() if not port.optional]
+            if ports and node.name not in read | {name for name, _ in attempted} and not any(map(self._fitting, ports)):
+                what = f"{type(node.stage).__name__} has no place in this graph: nothing feeds it, and nothing reads it"
+                self._problem(f"nodes.{node.name}", what, f"leave {node.name}=… out")
+                continue
+            for port in ports:
+                if (node.name, port.name) not in attempted:
                     where = f"wires.{node.name}.{port.name}"
                     wanted = f"{type_name(port.type)} on '{port.name}'"
                     what = f"{type(node.stage).__name__} needs {wanted}, and nothing is wired to it"

@@ -1,11 +1,14 @@
 """A mirror image with nothing known of the mirror: a ring, one azimuth per radius."""
 
-from typing import Annotated, Self
+import dataclasses
+from typing import Annotated, Any, Self
 
 import numpy as np
 
 from omninav.pipeline import BadInput, Bounds
+from omninav.stages.values.image import Pixels
 
+from .mirror_ring import RingNotFound, find_ring
 from .model import FAR_PX, Array, Bools, Camera, Key, Ring, Sense
 from .rays import angles, unit_vectors
 
@@ -14,8 +17,8 @@ class Donut(Camera, projection="donut"):
     """A ring between two circles. Azimuths are right; elevations are a guess: of square pixels, the horizon in the
     middle of the ring.
 
-    Centre and radii are None where they are to be found in the image (`unwarp=donut`); rays and pixels are refused
-    then (BadInput).
+    Centre and radii are None where they are to be found in an image (`found_in`); rays and pixels are refused then
+    (BadInput).
     """
 
     centre_x: Annotated[float | None, Key("centre", "x"), Bounds(ge=-FAR_PX, le=FAR_PX)] = None
@@ -27,7 +30,7 @@ class Donut(Camera, projection="donut"):
 
     @classmethod
     def of_size(cls, width: int, height: int) -> Self:
-        """A ring that `unwarp=donut` has to find."""
+        """A ring that is still to be found."""
         return cls(width, height)
 
     @property
@@ -37,6 +40,25 @@ class Donut(Camera, projection="donut"):
         if x is None or y is None or inner is None or outer is None:
             return None
         return Ring(x, y, inner, outer)
+
+    @property
+    def complete(self) -> bool:
+        """Whether its ring is known."""
+        return self.ring is not None
+
+    def found_in(self, pixels: Pixels) -> Self | None:
+        """The donut with the numbers that it leaves open as an image shows them; None where no ring stands out."""
+        if self.complete:
+            return self
+        try:
+            ring = find_ring(pixels)
+        except RingNotFound:
+            return None
+        names = ("centre_x", "centre_y", "inner_radius_px", "outer_radius_px")
+        left_open: dict[str, Any] = {
+            name: value for name, value in zip(names, ring, strict=True) if getattr(self, name) is None
+        }
+        return dataclasses.replace(self, **left_open)
 
     @property
     def elevations_known(self) -> bool:
@@ -66,7 +88,6 @@ class Donut(Camera, projection="donut"):
         if self.ring is None:
             raise BadInput(
                 "camera: a donut without centre_x, centre_y, inner_radius_px and outer_radius_px; give centre and mask "
-                "in camera.yaml, or use unwarp=donut, which finds them in the image, and its panorama: "
-                "wires.features.image=unwarp.panorama"
+                "in camera.yaml"
             )
         return self.ring

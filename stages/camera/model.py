@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Value
+from omninav.stages.values.image import Pixels
 
 from .rays import unit_vectors
 
@@ -142,6 +143,15 @@ class Camera(Value, ABC):
         """Whether elevations are measured; else azimuths are right, and elevations a guess."""
         return True
 
+    @property
+    def complete(self) -> bool:
+        """Whether everything is known of it; else `found_in` finds the rest in an image."""
+        return True
+
+    def found_in(self, pixels: Pixels) -> Self | None:
+        """The camera with what it leaves open as one of its images shows it; None where the image does not show it."""
+        return self
+
     def shows(self, pixels: Array) -> Bools:
         """Which pixels (..., 2), whole or not, lie in the image and, where it has one, in its ring: (...,)."""
         u, v = pixels[..., 0], pixels[..., 1]
@@ -194,9 +204,9 @@ degrees."""
 def require_sight(camera: Camera) -> None:
     """Raise BadInput for a camera that sees nothing, or almost nothing: its numbers are no camera's.
 
-    One whose centre and mask are still to be found in its images is not asked.
+    One of which something is still to be found in its images is not asked.
     """
-    if camera.elevations is None and not camera.elevations_known:
+    if camera.elevations is None and not camera.complete:
         return
     azimuths = np.linspace(-math.pi, math.pi, SIGHT_STEPS[0])
     elevations = np.linspace(-math.pi / 2, math.pi / 2, SIGHT_STEPS[1])

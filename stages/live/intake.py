@@ -257,6 +257,11 @@ class Intake:
         if is_blank(pixels):
             self._drop("blank_image", f"{where} is blank")
             return None
+        whole = camera.found_in(pixels)
+        if whole is None:
+            self._drop("no_ring_in_image", f"{where} shows no mirror's ring; give centre and mask in camera.yaml")
+            return None
+        self.camera = whole
         made = self.drive.frame(image.stamp)
         if made is None:
             self._drop("outside_odometry", f"{where}: odometry begins later")

@@ -46,7 +46,7 @@ class ImageFolder:
 
     odometry: None = None
     unmeasured_s: None = None
-    assumed: tuple[str, ...] = ()
+    assumed: Sequence[str] = ()
 
     def __init__(self, name: str, folder: Path, description: Description, where: str, options: OpenOptions) -> None:
         self.name = name
@@ -212,7 +212,7 @@ class ImageFolder:
         first = self._first_picture()
         if self._description.camera is None:
             camera, sentence = assumed_camera(self.name, first)
-            self.assumed += (sentence,)
+            self.assumed = (*self.assumed, sentence)
             return camera
         return camera_from(self._description.camera, f"{self._where}: camera", first.shape[1::-1])
 

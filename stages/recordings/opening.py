@@ -5,9 +5,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from omninav.pipeline.files import user_path
+from omninav.stages.camera.model import Ring
 
 from .plausibility import MotionLimits
 from .recording import FORMATS, Format, OpenOptions, Recording, Topics, UnreadableRecording
+
+MAX_SEARCHED = 20
+"""Images of a log, from its first on, in which is looked for what its camera leaves open."""
 
 
 def open_recording(
@@ -34,7 +38,7 @@ def open_recording(
     formats, path = log_formats(), user_path(log)
     meant = next((one for one in formats if one.opens(log)), None)
     if meant is not None and (path.exists() or path.suffix not in meant.suffixes):
-        return meant.open(log, options)
+        return _with_whole_camera(meant.open(log, options))
     kinds = "; ".join(one.names for one in formats)
     if path.is_dir():
         hints = "; ".join(filter(None, (one.hint(log, options) for one in formats)))
@@ -48,6 +52,40 @@ def log_formats() -> list[Format]:
     for file in sorted(Path(__file__).parent.glob("[a-z]*.py")):
         importlib.import_module(f"{__package__}.{file.stem}")
     return [kind() for kind in sorted(FORMATS, key=lambda kind: kind.__module__)]
+
+
+def _with_whole_camera(recording: Recording) -> Recording:
+    """The recording, its camera with what it leaves open as the first image that shows it says (a mirror's ring)."""
+    if recording.camera.complete:
+        return recording
+    counted, details = recording.dropped.copy(), dict(recording.details)
+    images = 0
+    for frame in range(min(MAX_SEARCHED, len(recording.stamps))):
+        pixels = recording.image(frame)
+        images += pixels is not None
+        camera = None if pixels is None else recording.camera.found_in(pixels)
+        if camera is not None and camera.ring is not None:
+            recording.camera = camera
+            recording.assumed = (*recording.assumed, _where_found(recording.name, camera.ring, frame))
+            break
+    if images and not recording.camera.complete:
+        raise UnreadableRecording(
+            f"{recording.name}: no ring of a mirror stands out in its first {images} images; is it another camera "
+            "(camera=…)? If not, give centre and mask in a camera.yaml"
+        )
+    recording.dropped.clear()  # what is wrong with these images is counted when they are read in their turn
+    recording.dropped.update(counted)
+    recording.details.clear()
+    recording.details.update(details)
+    return recording
+
+
+def _where_found(log: str, ring: Ring, frame: int) -> str:
+    return (
+        f"{log}: its mirror's ring is the one in image {frame}, around column {ring.centre_x:.0f} and row "
+        f"{ring.centre_y:.0f}, from {ring.inner:.0f} to {ring.outer:.0f} px (centre and mask in a camera.yaml say "
+        "otherwise)"
+    )
 
 
 def _candidates(path: Path) -> str:

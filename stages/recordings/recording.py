@@ -36,10 +36,11 @@ class Recording(Protocol):
     no odometry is believed, or None where there are none. `assumed`: what nothing in it says and was taken for granted.
     """
 
+    camera: Camera
+    assumed: Sequence[str]
+
     @property
     def name(self) -> str: ...
-    @property
-    def camera(self) -> Camera: ...
     @property
     def stamps(self) -> npt.NDArray[np.int64]: ...
     @property
@@ -52,8 +53,6 @@ class Recording(Protocol):
     def dropped(self) -> Counter[str]: ...
     @property
     def details(self) -> dict[str, str]: ...
-    @property
-    def assumed(self) -> Sequence[str]: ...
 
     def image(self, frame: int, following: Sequence[int] = ()) -> Pixels | None:
         """The image of a frame, (height, width, 3) uint8 blue-green-red; None where it cannot be decoded or is blank.

@@ -31,7 +31,7 @@ class UndescribedFolder(Format):
         description = Description(frames=Frames(images=f"*{suffix}", period=1.0 / rate))
         recording = ImageFolder(log, folder, description, str(folder), options)
         if options.rate is None:
-            recording.assumed += (f"{log}: {rate:g} image per second (rate=… says otherwise)",)
+            recording.assumed = (*recording.assumed, f"{log}: {rate:g} image per second (rate=… says otherwise)")
         return recording
 
 

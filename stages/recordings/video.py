@@ -52,7 +52,7 @@ class VideoRecording:
         self.name, self._path = name, path
         self.dropped: Counter[str] = Counter()
         self.details: dict[str, str] = {}
-        self.assumed: tuple[str, ...] = ()
+        self.assumed: Sequence[str] = ()
         self._capture = _opened(path)
         width, height = (int(self._capture.get(cv2.CAP_PROP_FRAME_WIDTH + axis)) for axis in (0, 1))
         if not 0 < width * height <= MAX_PIXELS:

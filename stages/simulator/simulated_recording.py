@@ -69,7 +69,7 @@ class SimulatedRecording:
         self.dropped: Counter[str] = Counter()
         self.details: dict[str, str] = {}
         self.unmeasured_s: None = None
-        self.assumed: tuple[str, ...] = ()
+        self.assumed: Sequence[str] = ()
         self._start = DAY_0_NS + day * 86400 * 10**9 + (9 + sorted(world.routes).index(route)) * 3600 * 10**9
         self._drive()
         self._schedule_images()

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 from omninav.pipeline import Context, Outputs, Stage
-from omninav.pipeline.files import digest_file, user_path
+from omninav.pipeline.files import digest_file
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.small_files import read_small
 from omninav.stages.camera.model import Camera
-from omninav.stages.recordings.camera_yaml import read_camera
+from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.simulator.cameras import camera_of
 from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.demo import DEMO
@@ -30,7 +30,7 @@ class GoalImage(Stage):
     world: WorldConfig | None = DEMO
     """The simulated world whose robot took it; null: a real one's robot."""
     camera: str | None = None
-    """The camera.yaml of a real robot, or of another one in that world."""
+    """The camera.yaml of a real robot or of another one in that world, or a projection (`equirectangular`, …)."""
 
     class Out(Outputs):
         """Absent where the goal is no image."""
@@ -51,13 +51,21 @@ class GoalImage(Stage):
         pixels = read_image(file)
         if self.camera is None and self.world is None:
             raise BadInput(f"goal: nothing says what camera took {file}; give camera=PATH/camera.yaml")
-        camera = camera_of(self.world or DEMO) if self.camera is None else read_camera(user_path(self.camera))
+        camera = self._camera(pixels)
         if pixels.shape[:2] != (camera.height_px, camera.width):
             raise BadInput(
                 f"goal: {file} has {pixels.shape[1]} x {pixels.shape[0]} pixels, and the robot's camera takes "
                 f"{camera.width} x {camera.height_px}; give an image that this camera took"
             )
         return self.Out(image=Image(pixels), camera=camera)
+
+    def _camera(self, pixels: Pixels) -> Camera:
+        if self.camera is None:
+            return camera_of(self.world or DEMO)
+        camera = named_camera(self.camera, lambda: pixels.shape[1::-1])[0].found_in(pixels)
+        if camera is None:
+            raise BadInput("goal: no ring of a mirror stands out in the image; give centre and mask in a camera.yaml")
+        return camera
 
     def _file(self) -> Path | None:
         if self.goal is None or not str(self.goal).strip():

@@ -222,7 +222,7 @@ class LiveSource(Source):
         return "; ".join(troubles) or "it was ended before the first image; let it run until the robot has been heard"
 
     def _write(self, intake: Intake, arrivals: list[Any]) -> None:
-        if self._path is None or not isinstance(intake.camera, Camera):
+        if self._path is None or not isinstance(intake.camera, Camera) or not intake.camera.complete:
             return
         if self._record is None:
             self._record = DriveRecord(self._path, self._header, intake.camera)

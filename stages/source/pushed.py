@@ -15,7 +15,7 @@ from omninav.pipeline.graph.contents import wrong_output
 from omninav.pipeline.graph.problems import cut
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.plane.se2 import between, compose
-from omninav.stages.recordings.camera_yaml import write_camera
+from omninav.stages.recordings.camera_yaml import parse_camera, write_camera
 from omninav.stages.recordings.messages import is_blank
 from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.values.command import Command
@@ -50,7 +50,8 @@ class PushedFrame(NamedTuple):
 
 
 class PushedSourceState(State):
-    """Ticks made, the present log and its next frame, the last stamp (ns), and the last pose by odometry."""
+    """Ticks made, the present log and its next frame, the last stamp (ns), the last pose by odometry, and what the
+    present log's images have shown of a camera that leaves something open (a camera.yaml)."""
 
     ticks: int = 0
     log: int = 0
@@ -59,6 +60,7 @@ class PushedSourceState(State):
     x: float = 0.0
     y: float = 0.0
     heading: float = 0.0
+    camera: str = ""
 
 
 class PushedSource(Source):
@@ -79,6 +81,7 @@ class PushedSource(Source):
         """Open the camera's file."""
         self._frame: PushedFrame | None = None
         self._opened: Camera | None = None
+        self._whole: Camera | None = None
         if self.camera is not None and user_path(self.camera).is_file():
             self._opened = self._camera_of(self.camera, (0, 0))
 
@@ -137,6 +140,8 @@ class PushedSource(Source):
         if position.ticks and stamp <= position.stamp:
             raise BadInput(f"step: stamp={stamp} is not after that of the image before ({position.stamp})")
         camera = self._camera(image.pixels)
+        if not camera.complete:
+            camera = self._completed(camera, image.pixels, position, new_log)
         if new_log and position.ticks:
             position.log, position.frame = position.log + 1, 0
         before = np.array([position.x, position.y, position.heading])
@@ -180,6 +185,20 @@ class PushedSource(Source):
             wanted = f"{camera.width} x {camera.height_px}"
             raise BadInput(f"step: the image has {size[0]} x {size[1]} pixels, and the camera takes {wanted}")
         return camera
+
+    def _completed(self, camera: Camera, pixels: Pixels, position: PushedSourceState, new_log: bool) -> Camera:
+        """A camera with what it leaves open, as the first image of the log shows it; each log has its own."""
+        if new_log:
+            position.camera, self._whole = "", None
+        if self._whole is None:
+            whole = parse_camera(position.camera, "camera") if position.camera else camera.found_in(pixels)
+            if whole is None:
+                raise BadInput(
+                    "step: no ring of a mirror stands out in the image; leave this frame out, or give centre and mask "
+                    "in a camera.yaml"
+                )
+            position.camera, self._whole = write_camera(whole), whole
+        return self._whole
 
     def _camera_of(self, name: str, size: tuple[int, int]) -> Camera:
         return named_camera(name, lambda: size)[0]

@@ -9,13 +9,13 @@ import numpy as np
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
 from omninav.pipeline.files import user_path, write_whole
 from omninav.pipeline.report.plot_style import PALETTE, plot
+from omninav.stages.camera.mirror_ring import RingNotFound, find_ring
 from omninav.stages.camera.model import Ring
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.values.image import Image, Pixels
 
 from .calibration import Array, Calibration, Model, board_points, calibrated
-from .donut import RingNotFound, find_ring
 from .look_through_camera import draw_panorama
 
 MAX_SQUARES = 40
@@ -52,7 +52,7 @@ class CalibrateCamera(Stage):
         if path.suffix not in (".yaml", ".yml"):
             raise BadInput(f"calibrate: out={self.out:.100} is no .yaml; type out=camera.yaml")
         columns, rows = board_size(self.board)
-        recording = open_recording(self.images, camera="donut")  # of which no number is used
+        recording = open_recording(self.images, camera="perspective")  # of which no number is used
         chosen = np.unique(np.linspace(0, len(recording.stamps) - 1, self.max_images).round().astype(int)).tolist()
         ctx.doing("looking for the board in the images")
         seen: dict[int, Array] = {}

@@ -9,29 +9,27 @@ import numpy as np
 from omninav.pipeline import BadInput, Bounds, Context, Figure, Outputs, Stage
 from omninav.pipeline.files import user_path, write_whole
 from omninav.pipeline.report.plot_style import PALETTE, plot
-from omninav.stages.camera.donut import Donut
 from omninav.stages.camera.model import Camera
+from omninav.stages.camera.rays import angles, turned, unit_vectors
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Topics
 from omninav.stages.values.encoded_image import decode_image
 from omninav.stages.values.image import Image
 
-from .donut import DonutUnwrapState, with_ring
-from .table import PanoramaTable
+from .table import remap_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COLUMNS = 1440
-"""Of the panorama that is drawn."""
+"""Of the full circle; of an ordinary camera's image as many as its part of it has."""
 
 
 class LookThroughCamera(Stage):
-    """Writes the panorama of one image of a log as a PNG, with azimuths and, where they are known, elevations.
+    """Writes one image of a log, unwarped, as a PNG with azimuths and, where they are known, elevations.
 
     Upright things stand upright in it, the horizon is level, and what is ahead of the robot is at 0 degrees, or the
-    camera is not what it is said to be. Raises BadInput where the log cannot be read, or its camera does not see the
-    full circle.
+    camera is not what it is said to be. Raises BadInput where the log cannot be read.
     """
 
     log: str | None = None
@@ -61,14 +59,6 @@ class LookThroughCamera(Stage):
         if pixels is None:
             raise BadInput(f"{self.log}: no image from number {self.frame} on; it has {len(recording.stamps)}")
         image, camera = Image(pixels), recording.camera
-        if isinstance(camera, Donut):
-            complete = with_ring(camera, image, DonutUnwrapState(), ctx)
-            if complete is None:
-                raise BadInput(
-                    f"{self.log}: no ring of a mirror is found in image {frame}; type frame=NUMBER, or give "
-                    "centre and mask in a camera.yaml"
-                )
-            camera = complete
         with plot(12.0, 4.2) as drawn:
             axes = drawn.canvas.subplots()
             draw_panorama(axes, image, camera)
@@ -89,15 +79,27 @@ class LookThroughCamera(Stage):
         )
 
 
+def field_of_view(camera: Camera) -> tuple[float, float, float, float]:
+    """Azimuths of the left and the right edge of all that a camera sees, elevations of the upper and lower (rad)."""
+    if camera.elevations is not None:
+        return math.pi, -math.pi, *camera.elevations
+    rays, looks = camera.unproject(camera.grid())
+    azimuths, elevations = angles(turned(rays[looks], -camera.yaw))
+    return azimuths.max() + camera.yaw, azimuths.min() + camera.yaw, elevations.max(), elevations.min()
+
+
 def draw_panorama(axes: "Axes", image: Image, camera: Camera) -> None:
-    """Draw the panorama of an image over azimuth and elevation (degrees), square where elevations are known."""
-    seen = camera.elevations
-    top, bottom = (math.pi / 6, -math.pi / 6) if seen is None else seen  # without, unwarping says what is wrong
-    rows = max(8, round(COLUMNS * (top - bottom) / (2.0 * math.pi)))
-    panorama = PanoramaTable(COLUMNS, rows).panorama(image, camera)
-    edges = (180.0, -180.0, math.degrees(bottom), math.degrees(top))
-    axes.imshow(cv2.cvtColor(panorama.pixels, cv2.COLOR_BGR2RGB), extent=edges, aspect="equal")
-    axes.set_xticks(np.arange(180, -181, -30))
+    """Draw an image over azimuth and elevation (degrees), square where elevations are known."""
+    left, right, top, bottom = field_of_view(camera)
+    columns, rows = (max(8, round(COLUMNS * span / (2.0 * math.pi))) for span in (left - right, top - bottom))
+    azimuths = left + (right - left) * (np.arange(columns) + 0.5) / columns
+    elevations = top + (bottom - top) * (np.arange(rows) + 0.5) / rows
+    pixels = remap_table(camera, unit_vectors(azimuths, elevations[:, None]))[0].remap(image.pixels)
+    sides = math.degrees(left), math.degrees(right)
+    edges = (*sides, math.degrees(bottom), math.degrees(top))
+    axes.imshow(cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB), extent=edges, aspect="equal")
+    step = 30 if left - right > math.pi else 10
+    axes.set_xticks(np.arange(math.floor(sides[0] / step), sides[1] / step - 1e-9, -1) * step)
     axes.set_xlabel("azimuth (degrees, left of forward is positive)")
     axes.grid(color="white", alpha=0.5, linewidth=0.6)
     axes.axvline(0.0, color=PALETTE[1], linewidth=1.0)

@@ -12,8 +12,8 @@ from .table import PanoramaTable
 class UnwarpPanorama(Stage):
     """Unwarps an image by its camera's model; rows are equal steps of elevation over all that it sees.
 
-    Raises BadInput where the camera does not see the full circle, or is a donut whose ring has yet to be found
-    (`unwarp=donut` finds it).
+    Of a mirror of which no model is known (`donut`) they are equal steps of radius. Raises BadInput where the camera
+    does not see the full circle.
     """
 
     columns: Annotated[int, Bounds(ge=8)] = 360

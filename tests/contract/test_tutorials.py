@@ -20,5 +20,5 @@ def test_a_notebook_runs_to_its_end(notebook: Path, tmp_path: Path, monkeypatch:
     content = nbformat.read(notebook, as_version=4)
     assert not [cell for cell in content.cells if cell.get("outputs")], "cells are committed without their outputs"
     NotebookClient(
-        content, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}
+        content, timeout=1800, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}
     ).execute()

@@ -67,6 +67,24 @@ def test_a_map_that_is_learned_on_the_way_is_the_same_too(recording, camera, sha
     assert same_files(whole, session.close()) == []
 
 
+def test_a_mirror_of_which_nothing_is_known_is_the_same_pushed_and_interrupted(recording, shared_cache, tmp_path):
+    whole = omninav.run(
+        "omniview_cml", log=DRIVE, camera="donut", cache=shared_cache, folder=tmp_path / "batch", progress=False
+    )
+    folder = tmp_path / "run"
+    with omninav.open("omniview_cml", camera="donut", folder=folder) as session:
+        with pytest.raises(omninav.BadInput, match="step: no ring of a mirror stands out in the image"):
+            session.step(image=np.indices((210, 280, 3)).sum(0).astype(np.uint8))
+        for frame in frames_of(recording, 0, 9):
+            session.step(**frame)
+        session.save()
+        session.__exit__(RuntimeError, RuntimeError("the program fails"), None)
+    with omninav.resume(folder) as session:
+        for frame in frames_of(recording, 9):
+            session.step(**frame)
+    assert same_files(whole, omninav.open_run(folder)) == []
+
+
 def test_an_interrupted_session_goes_on_from_where_it_was_saved(recording, camera, batch, tmp_path):
     folder = tmp_path / "run"
     settings = {"map": batch.folder / "map.omap", "camera": camera, "checkpoint_s": 1e6}

@@ -9,12 +9,14 @@ from omninav.pipeline.cli.composition import complete, composed, read_words
 from omninav.pipeline.cli.experiments import condition_words, planned_experiment
 from omninav.pipeline.engine.artifact import check_artifact
 from omninav.pipeline.engine.engine import Engine, EngineOptions
+from omninav.pipeline.engine.prefix import lineage, prefix_nodes
 from omninav.pipeline.experiment.conditions import open_inputs
 from omninav.pipeline.experiment.runner import ExperimentRun
 from omninav.pipeline.experiment.specification import DEVELOPMENT
-from omninav.pipeline.graph.graph import LIFETIMES
+from omninav.pipeline.graph.graph import LIFETIMES, Graph
 from omninav.pipeline.graph.ground_truth import truth_readers
 from omninav.pipeline.graph.problems import BadInput, counted
+from omninav.pipeline.graph.recordable import Recordable
 from omninav.pipeline.run.inputs import refuse_missing
 from omninav.pipeline.run.plan import input_digests, plan
 
@@ -37,6 +39,8 @@ def command(arguments: list[str]) -> int:
         engine = Engine(graph, {}, EngineOptions(planned.seed))
         engine.check_source()
         engine.set_up_source()
+        if not _is_simulated(graph):
+            engine.try_once(lineage(graph, prefix_nodes(graph)))
     graph = planned.graph
     before, tick, after = (len(graph.of_lifetime(kind)) for kind in LIFETIMES)
     sizes = f"{counted(len(graph.nodes), 'node')}, {counted(len(graph.wires), 'wire')}"
@@ -44,6 +48,12 @@ def command(arguments: list[str]) -> int:
     print(f"{counted(before, 'stage')} before the loop, {tick} in every tick, {after} after it")
     print(f"ground truth is read by: {', '.join(truth_readers(graph)) or 'no stage'}")
     return 0
+
+
+def _is_simulated(graph: Graph) -> bool:
+    """Whether the ticks of a graph have yet to be computed: one of them may take minutes."""
+    source = graph.source
+    return source is not None and isinstance(source.stage, Recordable) and source.stage.recording_key() is not None
 
 
 def _refuse_unwritable(config: Mapping[str, Any]) -> None:

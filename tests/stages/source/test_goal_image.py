@@ -5,6 +5,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from made_rings import ring_picture
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
@@ -26,6 +27,16 @@ def test_an_image_that_was_written_is_read_again_pixel_by_pixel_with_the_robots_
     assert found.image.pixels.tolist() == PIXELS.tolist()
     assert (found.camera.width, found.camera.height_px) == (16, 12)
     assert stage.inputs_digest() is not None
+
+
+def test_the_camera_of_a_goal_may_be_a_projection_by_its_name(tmp_path):
+    file = str(tmp_path / "goal.png")
+    cv2.imwrite(file, ring_picture((79.5, 59.5), 58, 9, seed=0, size=(160, 120)))
+    found = GoalImage(goal=file, world=None, camera="donut").step(Context("goal"))
+    assert found.camera.ring == pytest.approx((79.5, 59.5, 9.0, 58.0), abs=4.0)
+    cv2.imwrite(file, np.full((120, 160, 3), 90, np.uint8))
+    with pytest.raises(BadInput, match="goal: no ring of a mirror stands out in the image; give centre and mask"):
+        GoalImage(goal=file, world=None, camera="donut").step(Context("goal"))
 
 
 @pytest.mark.parametrize("goal", [None, " "])

@@ -68,7 +68,7 @@ class Drive:
     """A live source that is stepped; a tick is made as soon as one can be."""
 
     def __init__(self, folder: Path, state: LiveSourceState | None = None, **parameters: object) -> None:
-        self.source = LiveSource(camera=CAMERA, diagnostics=None, **parameters)
+        self.source = LiveSource(**{"camera": CAMERA, "diagnostics": None, **parameters})
         self.ctx = Context("source", folder=folder)
         self.state = state or LiveSourceState()
         self.source.setup(self.ctx)
@@ -129,6 +129,22 @@ def test_the_record_of_a_live_drive_gives_the_same_ticks_as_the_drive(robot: Loo
     assert len(drive.outs) > 5
     assert drive.outs[3].motion is not None
     same(drive.outs, replayed(tmp_path / "live.mcap"))
+
+
+def test_a_mirror_of_which_nothing_is_known_is_recorded_with_the_ring_of_its_first_image(
+    robot: Loopback, tmp_path: Path
+):
+    (tmp_path / "camera.yaml").write_text("{projection: donut, image: {width: 280, height: 210}}")
+    for camera in ("donut", str(tmp_path / "camera.yaml")):
+        drive = Drive(tmp_path, camera=camera)
+        drive.join()
+        drive.feed(robot, said())
+        drive.end()
+        assert drive.outs[0].camera.ring == pytest.approx((139.5, 104.5, 15.0, 104.0), abs=3.0)
+        again = replayed(tmp_path / "live.mcap")
+        same(drive.outs, again)
+        assert again[0].camera.ring == drive.outs[0].camera.ring
+        (tmp_path / "live.mcap").unlink()
 
 
 def test_a_pose_and_a_goal_that_somebody_names_are_in_the_record_at_the_tick_that_had_them(

@@ -1,19 +1,14 @@
-"""Unwarps the image of a mirror nothing is known of: a ring around a centre, found in the image if need be."""
+"""The ring that a mirror of which nothing is known leaves in its image: found by its two circles."""
 
-import dataclasses
-import math
-from typing import Annotated, Any, cast
+from typing import cast
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage, State
-from omninav.stages.camera.donut import Donut
-from omninav.stages.camera.model import Camera, Ring
-from omninav.stages.values.image import Image, Panorama, Pixels
+from omninav.stages.values.image import Pixels
 
-from .table import PanoramaTable
+from .model import Ring
 
 Array = npt.NDArray[np.float64]
 Grey = npt.NDArray[np.float32]
@@ -90,70 +85,3 @@ def find_ring(pixels: Pixels) -> Ring:
         (inner + 1.5) * scale,
         (outer - 0.5) * scale,
     )
-
-
-class DonutUnwrapState(State):
-    """What was found in the first image of a log that showed a ring; it stays, so that panoramas do not jump."""
-
-    log: int = -1
-    centre_x: float = math.nan
-    centre_y: float = math.nan
-    inner_radius_px: float = math.nan
-    outer_radius_px: float = math.nan
-
-
-def with_ring(camera: Donut, image: Image, found: DonutUnwrapState, ctx: Context) -> Donut | None:
-    """The camera with centre and radii; what it leaves open is found in the image, once per log (`found`)."""
-    given = (camera.centre_x, camera.centre_y, camera.inner_radius_px, camera.outer_radius_px)
-    if all(value is not None for value in given):
-        return camera
-    if math.isnan(found.centre_x) or found.log != ctx.tick.log:
-        try:
-            ring = find_ring(image.pixels)
-        except RingNotFound:
-            ctx.count(
-                "no_ring_in_image",
-                detail="unwarp: no mirror ring found in the image; give centre and radii in camera.yaml",
-            )
-            return None
-        found.centre_x, found.centre_y, found.inner_radius_px, found.outer_radius_px = ring
-        found.log = ctx.tick.log
-        ctx.fact("mirror_ring_px", list(ring))
-    names = ("centre_x", "centre_y", "inner_radius_px", "outer_radius_px")
-    missing: dict[str, Any] = {n: getattr(found, n) for n, value in zip(names, given, strict=True) if value is None}
-    return dataclasses.replace(camera, **missing)
-
-
-class DonutUnwarp(Stage):
-    """Unwarps an uncalibrated mirror image by centre and radii, which are found in the image where not given.
-
-    Rows are equal steps of radius, the outer circle on top; elevations are not known. What is found in the first
-    image of a log that shows a ring is kept for all of it (State). Raises BadInput where the camera is another one.
-    """
-
-    columns: Annotated[int, Bounds(ge=8)] = 360
-    """Columns of the panorama (pixels)."""
-    rows: Annotated[int, Bounds(ge=1)] = 80
-    """Rows of the panorama (pixels)."""
-
-    class Out(Outputs):
-        """The ring, unrolled; absent as long as no ring was found."""
-
-        panorama: Panorama | None = None
-
-    def setup(self, ctx: Context) -> None:
-        """No table yet: the camera comes with the first image."""
-        self._table = PanoramaTable(self.columns, self.rows)
-        self._open: tuple[Camera, int] | None = None
-        self._complete: Donut | None = None
-
-    def step(self, ctx: Context, image: Image, camera: Camera, found: DonutUnwrapState) -> Out:
-        """Unroll one image."""
-        if not isinstance(camera, Donut):
-            raise BadInput(f"unwarp: this recording's camera is {camera.projection}, not donut; use unwarp=panorama")
-        here = (camera, ctx.tick.log)
-        if self._complete is None or self._open != here:
-            self._complete, self._open = with_ring(camera, image, found, ctx), here
-        if self._complete is None:
-            return self.Out()
-        return self.Out(panorama=self._table.panorama(image, self._complete))
