@@ -31,6 +31,16 @@ def _replaced() -> dict[str, str]:
     return found
 
 
+def tools() -> list[str]:
+    """Commands of two words that variants without a source are: `camera look`."""
+    named = [file for file in group_files("variant") if "_" in file.name]
+    return [
+        file.name.removesuffix(".yaml").replace("_", " ", 1)
+        for file in named
+        if "\n  source: null\n" in file.read_text(encoding="utf-8")
+    ]
+
+
 def is_group(name: str) -> bool:
     """Whether configuration has a group of that name."""
     return bool(name) and files(CONF).joinpath(name).is_dir()

@@ -6,8 +6,10 @@ import sys
 from collections.abc import Sequence
 from importlib.resources import files
 
+from .config_groups import tools
 from .help import asks_for_help, help_text
 from .output import lost_output, mend_streams
+from .typing_mistakes import command_first, mistyped_word
 
 COMMANDS = (
     "check",
@@ -23,6 +25,9 @@ COMMANDS = (
     "doctor",
 )
 """Each is the function `command` of its module in `commands`; everything else runs a variant or an experiment."""
+
+WITHOUT_CONFIGURATION = ("stages", "report", "compare", "resume", "experiments", "doctor")
+"""Those that compose none, and have no use for flags of it."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -43,12 +48,19 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
+    arguments = command_first(arguments)
     if asks_for_help(arguments):
         print(help_text(arguments), end="")
         return 0
     if arguments and arguments[0] == "--version":
-        print("omninav", omninav.__version__)
+        from omninav import __version__
+
+        print("omninav", __version__)
         return 0
+    mistyped = mistyped_word(arguments)
+    if mistyped:
+        print(mistyped, file=sys.stderr)
+        return 2
     os.environ.setdefault("PYTHONSAFEPATH", "1")  # processes of ours do not import what lies in the working directory
     if arguments and arguments[0] in COMMANDS:
         name, arguments = arguments[0], arguments[1:]
@@ -62,11 +74,14 @@ def _run(arguments: list[str]) -> int:
         from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input
 
         from .config_groups import refuse_null_groups
-        from .words import refuse_unreadable
+        from .words import refuse_twice, refuse_unreadable, without_flags
 
         refuse_unreadable(arguments)
         _refuse_lost_folder()
         refuse_null_groups(arguments)
+        refuse_twice(arguments)
+        if name in WITHOUT_CONFIGURATION:
+            arguments = without_flags(arguments)
         command = importlib.import_module(f"omninav.pipeline.cli.commands.{name}").command
         return int(command(arguments))
     except KeyboardInterrupt:  # it may come before anything is imported, so it stands first
@@ -118,14 +133,14 @@ def _unknown_command(name: str, second: str = "") -> int:
     if name in variants:
         hint = f"type omninav variant={name}"
     elif longer:
-        tools = ", ".join(f"omninav {name} {one}" for one in longer)
+        listing = ", ".join(f"omninav {name} {one}" for one in longer)
         name, near = f"{name} {second}".strip(), nearest(second, longer)
         hint = (
-            f"there are: {tools}"
+            f"there are: {listing}"
             if near is None
-            else f"did you mean 'omninav {name.split()[0]} {near}'? there are: {tools}"
+            else f"did you mean 'omninav {name.split()[0]} {near}'? there are: {listing}"
         )
     else:
-        hint = suggest(name, COMMANDS, "commands", prefix="omninav ")
+        hint = suggest(name, (*COMMANDS, *{tool.partition(" ")[0] for tool in tools()}), "commands", prefix="omninav ")
     print(f"'{name}' is no command. {hint}", file=sys.stderr)
     return 2

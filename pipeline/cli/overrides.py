@@ -44,7 +44,16 @@ def invalid_overrides(words: Sequence[str], folders: Sequence[str], message: str
         if word not in swaps and not (options and word.key_or_group.startswith(WITHIN_GRAPH)):
             problems += _unknown_setting(word, plain, list(groups))
     problems += options
+    if not problems and message.startswith(("Ambiguous value", "Sweep parameters")):
+        problems = [_several_values(word) for word in parsed if word.is_sweep_override()]
     return problems or [Problem("command line", " ".join(message.partition("Config search path")[0].split()))]
+
+
+def _several_values(word: Override) -> Problem:
+    text = str(word.input_line)
+    name, _, values = text.partition("=")
+    listed = f"'{name}=[{values}]' for a list, or " if isinstance(word.value(), ChoiceSweep) else ""
+    return Problem(name, f"{shown(values)} are several values", f"type {listed}omninav -m {text} … for a run with each")
 
 
 def with_unlisted_parameters(words: Sequence[str], folders: Sequence[str]) -> list[str]:

@@ -3,10 +3,13 @@
 import re
 from argparse import Namespace
 from collections.abc import Mapping, Sequence, Sized
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
-from omninav.pipeline.graph.problems import BadInput, shown
+from omninav.pipeline.graph.problems import BadInput, nearest, shown
+
+from .config_groups import settings_left_open
 
 MAX_WORD = 10_000
 """Characters of a word."""
@@ -24,7 +27,8 @@ def read_flags(arguments: Sequence[str]) -> Namespace:
     from hydra._internal.utils import get_args_parser  # the words themselves are looked at without it
 
     parser = get_args_parser()
-    parser.error = _refuse  # type: ignore[method-assign]
+    known = [flag for action in parser._actions for flag in action.option_strings]
+    parser.error = partial(_refuse, known)  # type: ignore[method-assign]
     read = parser.parse_intermixed_args(list(arguments))  # flags may stand between words
     for name in NOT_TAKEN:
         if getattr(read, name, None):
@@ -36,7 +40,28 @@ def read_flags(arguments: Sequence[str]) -> Namespace:
     return read
 
 
-def _refuse(message: str) -> NoReturn:
+def refuse_twice(arguments: Sequence[str]) -> None:
+    """Raise `BadInput` where the variant, or what it is run on, is typed twice: the first would be passed over."""
+    given: dict[str, str] = {}
+    for name, _, value in (word.partition("=") for word in arguments if "=" in word):
+        if given.setdefault(name, value) != value and name in ("variant", *settings_left_open()):
+            both = f" (both, where it takes several: '{name}=[{given[name]},{value}]')" if name != "variant" else ""
+            raise BadInput(f"{name}: {given[name]:.100} and {value:.100} are typed; leave one of them out{both}")
+
+
+def without_flags(arguments: Sequence[str]) -> list[str]:
+    """The words of a command that composes nothing; flags of Hydra change nothing there. Raises `BadInput`."""
+    flags = any(word.startswith("-") for word in arguments)
+    return list(read_flags(arguments).overrides) if flags else list(arguments)
+
+
+def _refuse(known: Sequence[str], message: str) -> NoReturn:
+    what, _, flag = message.partition("unrecognized arguments: ")
+    if flag and not what:
+        name, _, value = flag.split()[0].lstrip("-").partition("=")
+        near = nearest(f"--{name}", known, 0.75)
+        hint = f"did you mean {near}?" if near else f"settings have no dashes: type {name}={value or '…'}"
+        raise BadInput(f"{flag.split()[0]:.60}: there is no such flag; {hint}")
     raise BadInput(f"{message}; `omninav --help` shows what to type")
 
 

@@ -5,6 +5,7 @@ Every combination of the sweep's labels is a condition, and each condition is ru
 
 import itertools
 import math
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -16,6 +17,8 @@ from .series import Aggregate, figure_at
 
 DEVELOPMENT = "development"
 """The scenario that is run and shown, and never judged: choices were made on it."""
+TYPED = ("common", "set", "scenarios", "development", "sweep")
+"""Entries of a file that are overrides, or labels of overrides."""
 MAX_RUNS = 100_000
 """Conditions of an experiment, and repetitions of each."""
 Labels = dict[str, str]
@@ -133,7 +136,7 @@ class ReferenceRun:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What an experiment's file holds. Overrides are written as one would type them."""
+    """What an experiment's file holds. Overrides are written as one would type them, or as a list of such words."""
 
     name: str
     title: str
@@ -246,14 +249,35 @@ def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
         scaled["sweep"] = {factor: _without_null(labels) for factor, labels in sweep.items()}
     for key in ("measures", "scenarios"):
         scaled[key] = _without_null(scaled.get(key) or {})
+    scaled |= {key: _as_typed(scaled[key]) for key in TYPED if key in scaled}
     arguments, problems = convert_fields(scaled, Experiment, "experiment")
     if problems:
-        raise ProblemsFound(problems)
+        raise ProblemsFound(_hinted(problem) for problem in problems)
     experiment = Experiment(**arguments)
     problems = list(_contradictions(experiment))
     if problems:
         raise ProblemsFound(problems)
     return experiment
+
+
+def _hinted(problem: Problem) -> Problem:
+    place = problem.where.removeprefix("experiment.")
+    if place.partition(".")[0] not in TYPED or problem.hint:
+        return problem
+    label = place.rpartition(".")[2]
+    return Problem(problem.where, problem.what, f"write what one would type: {label}: start=truth seed=1, or a list")
+
+
+def _as_typed(written: Any) -> Any:
+    """Overrides as one would type them, also where a list holds them one by one; within labels too.
+
+    Anything else stays as it is, because its type is checked later.
+    """
+    if isinstance(written, Mapping) and written:
+        return {label: _as_typed(part) for label, part in written.items()}
+    if isinstance(written, list) and all(isinstance(word, str) for word in written):
+        return shlex.join(written)
+    return written
 
 
 def _without_null(entries: Any) -> Any:

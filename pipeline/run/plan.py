@@ -107,13 +107,23 @@ def plan(config: Mapping[str, Any]) -> Plan:
                 problems.append(_no_output(f"saves.{name}", str(origin), graph))
         problems += _unrecordable(graph, config.get("record") or ())
     if problems or graph is None:
-        raise ProblemsFound(_once(problems))
+        raise ProblemsFound(_once([*_unreadable_inputs(graph), *problems]))
     record = tuple(dict.fromkeys(config.get("record") or ()))
     graph = with_plots(graph, plots, [str(origin).partition(".")[0] for origin in (*saves.values(), *record)])
     read = {origin for wire in graph.wires for origin in (wire.origin, wire.initial)}
     artifacts = [made for made in artifacts if f"{ARTIFACTS}.{made.name}" in read or specs[made.name].required]
     artifacts.sort(key=lambda made: not specs[made.name].required)  # what comes with another one follows it
     return Plan(config, graph, tuple(artifacts), saves, record)
+
+
+def _unreadable_inputs(graph: Graph | None) -> Iterator[Problem]:
+    """What of its inputs a graph with other problems cannot read: a name that is misspelled is said first."""
+    try:
+        if graph is not None and graph.source is not None:
+            graph.source.stage.inputs_digest()
+    except BadInput as error:
+        where, _, what = str(error).partition(": ")
+        yield Problem(where, what)
 
 
 def _once(problems: Sequence[Problem]) -> Iterable[Problem]:

@@ -13,8 +13,10 @@ import numpy.typing as npt
 
 from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.recordings.camera_yaml import write_camera
+from omninav.stages.recordings.rooms_yaml import ROOMS, write_rooms
 
 from .simulated_recording import SimulatedRecording
+from .world_rooms import rooms_of
 
 F64 = npt.NDArray[np.float64]
 
@@ -31,15 +33,18 @@ def record(
     """Write a simulated drive, or several one after the other, as an MCAP log; the same drives give the same bytes.
 
     Topics as every recording has them: JPEG images, camera information, odometry, truth, ranges (`/scan`); what was
-    done to the robot stands on `/ground_truth/event` as JSON; camera.yaml is attached. Odometry, truth and ranges come
-    at their own rates. Log times run behind header stamps as a camera's, a wheel's and a ring's do. `progress` hears of
-    every image: how many are written, of how many.
+    done to the robot stands on `/ground_truth/event` as JSON; camera.yaml is attached, and rooms.yaml where rooms have
+    names. Odometry, truth and ranges come at their own rates. Log times run behind header stamps as a camera's, a
+    wheel's and a ring's do. `progress` hears of every image: how many are written, of how many.
     """
     drives = [recordings] if isinstance(recordings, SimulatedRecording) else recordings
     total = sum(len(drive.sent) for drive in drives)
     written = itertools.count(1)
     with LogWriter(path) as log:
         log.attach("camera.yaml", write_camera(drives[0].camera).encode(), "application/yaml")
+        rooms = rooms_of(drives[0].world)
+        if rooms is not None:
+            log.attach(ROOMS, write_rooms(rooms).encode(), "application/yaml")
         for drive in drives:
             _write(log, drive, quality, lambda: progress(next(written), total))
 

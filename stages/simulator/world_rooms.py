@@ -1,31 +1,38 @@
-"""Names of a simulated world's rooms."""
+"""Names of rooms, of a simulated world or of the log of a drive through one."""
 
 import numpy as np
 
 from omninav.pipeline import Context, Outputs, Stage
+from omninav.stages.recordings.rooms_yaml import rooms_of_log
 from omninav.stages.values.rooms import Rooms
 
 from .config import WorldConfig
 from .demo import DEMO
 
 
+def rooms_of(world: WorldConfig) -> Rooms | None:
+    """The rooms of a world; None where it has none."""
+    corners = [(*room.corner, room.corner[0] + room.size[0], room.corner[1] + room.size[1]) for room in world.rooms]
+    return Rooms(tuple(room.name for room in world.rooms), np.array(corners, np.float64)) if corners else None
+
+
 class WorldRooms(Stage):
     """Gives the named rooms of a simulated world, which can be goals of a robot."""
 
     log: str | tuple[str, ...] | None = None
-    """A recorded log: then nothing is known of the place and the output is absent."""
+    """A recorded log: its rooms are those that are attached to the first log that has any, as those of simulated drives
+    have."""
     world: WorldConfig = DEMO
-    """The simulated world."""
+    """The simulated world, where no log is named."""
 
     class Out(Outputs):
-        """`rooms`: absent if the world has none, and with a recorded log."""
+        """`rooms`: absent where nobody has named any."""
 
         rooms: Rooms | None = None
 
     def step(self, ctx: Context) -> Out:
-        """Read the world's rooms."""
-        if self.log is not None or not self.world.rooms:
-            return self.Out()
-        corners = [(*room.corner, room.corner[0] + room.size[0], room.corner[1] + room.size[1])
-                   for room in self.world.rooms]  # fmt: skip
-        return self.Out(rooms=Rooms(tuple(room.name for room in self.world.rooms), np.array(corners, np.float64)))
+        """Read the rooms."""
+        logs = (self.log,) if isinstance(self.log, str) else self.log
+        if logs is None:
+            return self.Out(rooms=rooms_of(self.world))
+        return self.Out(rooms=next(filter(None, map(rooms_of_log, logs)), None))

@@ -112,7 +112,7 @@ def test_a_mirror_of_which_nothing_is_known_serves_every_localiser(
     assert main(["check", *line]) == 0, capsys.readouterr().err
     assert main(line) == 0, capsys.readouterr().err
     said = capsys.readouterr().err
-    assert "its mirror's ring is the one in image 0, around column 140 and row 104, from 1" in said
+    assert "its mirror's ring is the one in image 0, around column 140 and row 105, from 17 to 103 px" in said
 
 
 @needs_data

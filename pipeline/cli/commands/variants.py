@@ -2,10 +2,12 @@
 
 from collections import Counter
 from collections.abc import Mapping
+from pathlib import Path
 
 from hydra import compose
 from omegaconf import OmegaConf
 
+from omninav.pipeline.cli.composition import read_words
 from omninav.pipeline.cli.config_groups import group_files, suggest_option
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.graph.problems import BadInput
@@ -17,15 +19,16 @@ INDENT = 27
 
 def command(arguments: list[str]) -> int:
     """Print what all variants, or those that are named, do and take; what several share is explained once."""
-    summaries = {
-        file.name.removesuffix(".yaml"): _summary(file.read_text(encoding="utf-8")) for file in group_files("variant")
-    }
+    arguments, folders = read_words(arguments)
+    own = [Path(folder) / "variant" for folder in folders]
+    found = [*group_files("variant"), *(file for folder in own for file in sorted(folder.glob("*.yaml")))]
+    summaries = {file.name.removesuffix(".yaml"): _summary(file.read_text(encoding="utf-8")) for file in found}
     for word in arguments:
         if word not in summaries:
             raise BadInput(
                 f"variants: there is no variant {word}; {suggest_option('variant', word, summaries, 'variants')}"
             )
-    with hydra_started():
+    with hydra_started(folders):
         default = str(compose("config").variant)
         names = arguments or sorted(summaries, key=lambda name: (name != default, name))
         inputs = {name: _inputs(name) for name in names}

@@ -22,6 +22,25 @@ def test_conditions_are_all_combinations_but_those_left_out():
     assert [condition.overrides for condition in found] == ["x=1 y=1", "x=1 y=2", "x=2 y=2"]
 
 
+def test_overrides_may_be_a_list_of_words():
+    listed = {
+        "set": ["start=truth", "x.y=[1, 2]"],
+        "common": ["seed=1"],
+        "sweep": {"method": {"a": ["x=1", "z=2"], "b": "x=2"}, "data": {"first": [], "second": "y=2"}},
+    }
+    found = read_experiment(FILE | listed, "paper")
+    assert (found.set, found.common) == ("start=truth 'x.y=[1, 2]'", "seed=1")
+    assert [condition.overrides.strip() for condition in found.conditions()] == [
+        "x=1 z=2",
+        "x=1 z=2 y=2",
+        "x=2",
+        "x=2 y=2",
+    ]
+    for wrong in ({"set": {"start": "truth"}}, {"set": [{"start": "truth"}]}):
+        with pytest.raises(ProblemsFound, match=r"experiment\.set: .*\n.*write what one would type: set: start=truth"):
+            read_experiment(FILE | wrong, "paper")
+
+
 def test_a_profile_changes_mappings_key_by_key_and_null_takes_a_label_out():
     file = FILE | {"profiles": {"quick": {"sweep": {"data": {"first": "y=9", "second": None}}, "repetitions": 2}}}
     quick = read_experiment(file, "quick")

@@ -1,0 +1,103 @@
+"""Command lines as newcomers mistype them: one line each, which says what to type."""
+
+from pathlib import Path
+
+import pytest
+from conftest import DRIVE, TOUR
+
+from omninav.pipeline.cli.main import main
+
+
+def said(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    assert main(list(words)) == 2, words
+    err = capsys.readouterr().err
+    assert "Traceback" not in err
+    return "\n".join(line for line in err.splitlines() if not line.startswith("{"))
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        (["log", "=", "a.mcap"], "no spaces around =: type log=a.mcap"),
+        (["log=", "a.mcap"], "no spaces around =: type log=a.mcap"),
+        (["check", "log", "=a.mcap"], "=a.mcap: there is no name before =: type log=a.mcap"),
+        (["=x"], "=x: there is no name before =: type name=x"),
+        (["+=x"], "+=x: there is no name behind +: type +name=value"),
+        (["++=x"], "++=x: there is no name behind ++: type ++name=value"),
+        (["~"], "~: there is no name behind ~: type ~name=value"),
+        (["a+=b"], "a+=b: cannot be read\n      write name=value"),
+        (["\u2013help"], "\u2013help: this begins with a typographic dash; type --help"),
+        (["check", "\u2014config-dir", "my"], "type --config-dir"),
+        (["log=\u201ca.mcap\u201d"], "these are typographic quotes; type ' or \" in their place"),
+        (["check", "seed\u00a0=1"], "a space in it is a no-break space; type it anew"),
+        (["--log", "a.mcap"], "--log: there is no such flag; settings have no dashes: type log=…"),
+        (["check", "--log=a.mcap"], "--log=a.mcap: there is no such flag; settings have no dashes: type log=a.mcap"),
+        (["check", "--hepl"], "--hepl: there is no such flag; did you mean --help?"),
+        (["report", "--config-dri", "my"], "--config-dri: there is no such flag; did you mean --config-dir?"),
+        (["stagse"], "did you mean 'omninav stages'? commands: camera, check, compare,"),
+        (["mapp"], "did you mean 'omninav map'?"),
+        (["cammera", "look"], "did you mean 'omninav camera'?"),
+        (["log=a.mcap", "log=b.mcap"], "log: a.mcap and b.mcap are typed; leave one of them out (both, where it takes"),
+        (["variant=omninav", "variant=wander"], "variant: omninav and wander are typed; leave one of them out"),
+        (["check", "seed=0,1"], "type 'seed=[0,1]' for a list, or omninav -m seed=0,1 … for a run with each"),
+        (["check", "seed=range(3)"], "seed: 'range(3)' are several values\n      type omninav -m seed=range(3) …"),
+        (["log=nothere.mcap"], "  nothere.mcap: no such file"),
+        (["check", "log=nothere.mcap"], "  map: this variant needs a map, and none is given"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_a_mistyped_word_is_named_with_what_to_type(
+    words: list[str], wanted: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert wanted in said(capsys, *words)
+
+
+def test_a_file_may_be_called_by_odd_characters(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    name = "\u201ctour\u201d 9\u202fPM.mcap"
+    (tmp_path / name).symlink_to(TOUR)
+    assert main(["check", f"tour='{name}'", f"log={DRIVE}"]) == 0, capsys.readouterr().err
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> str:
+    """A folder of `--config-dir` with a variant of somebody's own."""
+    (tmp_path / "my/variant").mkdir(parents=True)
+    (tmp_path / "my/variant/mine.yaml").write_text(
+        "# @package _global_\n# somebody's own.  omninav variant=mine\n"
+        "defaults: [plain_matching, _self_]\nvariant: mine\n"
+    )
+    return str(tmp_path / "my")
+
+
+def test_config_dir_stands_before_or_behind_every_command(folder: str, capsys: pytest.CaptureFixture[str]) -> None:
+    run = ["variant=mine", f"tour={TOUR}", f"log={DRIVE}"]
+    for words in (["check", *run], ["stages", "match.l2"], ["variants", "mine"], ["doctor"]):
+        for line in (["--config-dir", folder, *words], [*words, f"--config-dir={folder}"]):
+            assert main(line) == 0, capsys.readouterr().err
+    out = capsys.readouterr().out
+    assert out.count("mine: nothing wrong with it") == 2
+    assert out.count("somebody's own.") == 2
+    assert main(["variants", "--config-dir", folder]) == 0
+    listed = capsys.readouterr().out
+    assert "\nmine " in listed
+    assert "\nomniview_mcl " in listed
+
+
+def test_an_own_variant_is_drawn(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["graph", "variant=mine", f"tour={TOUR}", f"log={DRIVE}", f"out={tmp_path}"]
+    assert main(["--config-dir", folder, *words]) == 0
+    assert (tmp_path / "mine.svg").is_file()
+    assert "mine.svg" in capsys.readouterr().out
+
+
+def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+    from importlib.metadata import version
+
+    import omninav
+
+    assert omninav.__version__ == version("omninav")
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"omninav {omninav.__version__}\n"
