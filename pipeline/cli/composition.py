@@ -84,7 +84,7 @@ def complete(config: Any) -> dict[str, Any]:
         _name_past_links(config)
         plain: dict[str, Any] = _without_taken_out(OmegaConf.to_container(config, resolve=True))  # type: ignore[arg-type]
         specs = read_specifications(plain)
-        problems = [*not_taken(plain, settings_left_open()), *_unfit_settings(plain)]
+        problems = [*not_taken(plain, settings_left_open()), *_nothing_named(plain), *_unfit_settings(plain)]
         for name, spec in specs.items():
             problems += [*_given_twice(config, name, spec), *_given_alone(name, spec, specs)]
         if problems:
@@ -105,6 +105,12 @@ def complete(config: Any) -> dict[str, Any]:
         raise ProblemsFound([Problem(str(where), str(error).split("\n")[0])]) from None
     read = {*OF_THE_VARIANT, *OF_THE_RUN, *read_inputs(plain), *settings_read(config)}
     return _without_unset({name: value for name, value in plain.items() if name in read})
+
+
+def _nothing_named(plain: Mapping[str, Any]) -> Iterator[Problem]:
+    for name in settings_left_open():
+        if isinstance(plain.get(name), str) and not plain[name].strip():
+            yield Problem(name, "nothing stands behind the =", f"name it, as {name}=FILE, or leave {name}= out")
 
 
 @dataclass(frozen=True)

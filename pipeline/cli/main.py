@@ -9,7 +9,7 @@ from importlib.resources import files
 from .config_groups import tools
 from .help import asks_for_help, help_text
 from .output import lost_output, mend_streams
-from .typing_mistakes import command_first, mistyped_word
+from .typing_mistakes import command_first, mistyped_word, with_homes
 
 COMMANDS = (
     "check",
@@ -48,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
-    arguments = command_first(arguments)
+    arguments = with_homes(command_first(arguments))
     if asks_for_help(arguments):
         print(help_text(arguments), end="")
         return 0
@@ -140,6 +140,8 @@ def _unknown_command(name: str, second: str = "") -> int:
             if near is None
             else f"did you mean 'omninav {name.split()[0]} {near}'? there are: {listing}"
         )
+    elif os.path.exists(name):
+        hint = f"a file or folder stands behind the setting that reads it: omninav log={name}"
     else:
         hint = suggest(name, (*COMMANDS, *{tool.partition(" ")[0] for tool in tools()}), "commands", prefix="omninav ")
     print(f"'{name}' is no command. {hint}", file=sys.stderr)

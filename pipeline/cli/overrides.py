@@ -5,6 +5,7 @@ the configuration that the fitting ones give. Everything here is called where Hy
 """
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -81,9 +82,16 @@ def _parsed(words: Sequence[str]) -> tuple[list[Problem], list[Override]]:
         try:
             parsed += _parse(text)
         except HydraException:
-            hint = "write name=value, and quotes within quotes around odd characters: \"name='a=b.yaml'\""
-            problems.append(Problem(text, "cannot be read", hint))
+            problems.append(Problem(text, "cannot be read", _how_to_write(text)))
     return problems, parsed
+
+
+def _how_to_write(word: str) -> str:
+    if "=" not in word and Path(word).exists():
+        return f"a file or folder stands behind the setting that reads it: log={word}"
+    if re.search(r"\s[\w.+~/]+=", word):
+        return "quotes hold several words together: type each by itself, name=value name=value"
+    return "write name=value, and quotes within quotes around odd characters: \"name='a=b.yaml'\""
 
 
 def _parse(word: str) -> list[Override]:

@@ -6,6 +6,8 @@ A shell takes such words apart or hands them on as they are; what is said of the
 from collections.abc import Sequence
 from pathlib import Path
 
+from .words import word_of
+
 WITH_VALUE = ("--config-dir", "-cd", "--cfg", "-c", "--package", "-p", "--config-name", "-cn", "--config-path", "-cp")
 """Flags whose value is the next word."""
 DASHES = "\u2010\u2011\u2012\u2013\u2014\u2015\u2212"
@@ -20,6 +22,16 @@ def command_first(arguments: Sequence[str]) -> list[str]:
         flags += 2 if arguments[flags] in WITH_VALUE else 1
     named = arguments[flags : flags + 1]
     return [*arguments[flags:], *arguments[:flags]] if named and named[0].isidentifier() else list(arguments)
+
+
+def with_homes(arguments: Sequence[str]) -> list[str]:
+    """The words, with `name=~/…` as the path that is meant: a shell leaves it as it is, and Hydra cannot read it."""
+    return [_with_home(word) for word in arguments]
+
+
+def _with_home(word: str) -> str:
+    name, _, value = word.partition("=")
+    return f"{name}={word_of(Path(value).expanduser())}" if value == "~" or value.startswith("~/") else word
 
 
 def mistyped_word(arguments: Sequence[str]) -> str:

@@ -208,7 +208,7 @@ def _opened(path: Path) -> Iterator[tuple[zipfile.ZipFile, int]]:
     What is wrong inside becomes `BadInput` too.
     """
     if not path.is_file():
-        raise BadInput(f"{path}: there is no such file")
+        raise BadInput(f"{path}: {'this is a folder, expected a file' if path.is_dir() else 'there is no such file'}")
     with path.open("rb") as file:
         end, size = _checked_sum(path, file)
         try:

@@ -66,7 +66,7 @@ def _with_whole_camera(recording: Recording) -> Recording:
         camera = None if pixels is None else recording.camera.found_in(pixels)
         if camera is not None and camera.ring is not None:
             recording.camera = camera
-            recording.assumed = (*recording.assumed, _where_found(recording.name, camera.ring, frame))
+            recording.assumed = (*recording.assumed, ring_found_in(recording.name, camera.ring, frame))
             break
     if images and not recording.camera.complete:
         raise UnreadableRecording(
@@ -80,7 +80,8 @@ def _with_whole_camera(recording: Recording) -> Recording:
     return recording
 
 
-def _where_found(log: str, ring: Ring, frame: int) -> str:
+def ring_found_in(log: str, ring: Ring, frame: int) -> str:
+    """What is said of a mirror's ring that was found in an image."""
     return (
         f"{log}: its mirror's ring is the one in image {frame}, around column {ring.centre_x:.0f} and row "
         f"{ring.centre_y:.0f}, from {ring.inner:.0f} to {ring.outer:.0f} px (centre and mask in a camera.yaml say "

@@ -18,6 +18,7 @@ from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.camera_yaml import parse_camera, write_camera
 from omninav.stages.recordings.messages import is_blank
 from omninav.stages.recordings.named_camera import named_camera
+from omninav.stages.recordings.opening import ring_found_in
 from omninav.stages.values.command import Command
 from omninav.stages.values.encoded_image import MAX_FILE_BYTES, MAX_PIXELS, Undecodable, decode_image
 from omninav.stages.values.image import Image, Pixels
@@ -141,7 +142,7 @@ class PushedSource(Source):
             raise BadInput(f"step: stamp={stamp} is not after that of the image before ({position.stamp})")
         camera = self._camera(image.pixels)
         if not camera.complete:
-            camera = self._completed(camera, image.pixels, position, new_log)
+            camera = self._completed(ctx, camera, image.pixels, position, new_log)
         if new_log and position.ticks:
             position.log, position.frame = position.log + 1, 0
         before = np.array([position.x, position.y, position.heading])
@@ -186,7 +187,9 @@ class PushedSource(Source):
             raise BadInput(f"step: the image has {size[0]} x {size[1]} pixels, and the camera takes {wanted}")
         return camera
 
-    def _completed(self, camera: Camera, pixels: Pixels, position: PushedSourceState, new_log: bool) -> Camera:
+    def _completed(
+        self, ctx: Context, camera: Camera, pixels: Pixels, position: PushedSourceState, new_log: bool
+    ) -> Camera:
         """A camera with what it leaves open, as the first image of the log shows it; each log has its own."""
         if new_log:
             position.camera, self._whole = "", None
@@ -197,6 +200,8 @@ class PushedSource(Source):
                     "step: no ring of a mirror stands out in the image; leave this frame out, or give centre and mask "
                     "in a camera.yaml"
                 )
+            if not position.camera and whole.ring is not None:
+                ctx.warn(f"assumed: {ring_found_in('the images', whole.ring, position.ticks)}")
             position.camera, self._whole = write_camera(whole), whole
         return self._whole
 

@@ -43,6 +43,14 @@ def said(capsys: pytest.CaptureFixture[str], *words: str) -> str:
         (["check", "seed=range(3)"], "seed: 'range(3)' are several values\n      type omninav -m seed=range(3) …"),
         (["log=nothere.mcap"], "  nothere.mcap: no such file"),
         (["check", "log=nothere.mcap"], "  map: this variant needs a map, and none is given"),
+        (["check", "log="], "  log: nothing stands behind the =\n      name it, as log=FILE, or leave log= out"),
+        (["check", "map= "], "  map: nothing stands behind the ="),
+        (["log=~/nothere.mcap"], f"  {Path.home()}/nothere.mcap: no such file"),
+        ([str(DRIVE)], f"a file or folder stands behind the setting that reads it: log={DRIVE}"),
+        (["check", "variant=omninav match=l2"], "quotes hold several words together: type each by itself"),
+        (["check variant=omninav"], "quotes hold several words together: type each by itself"),
+        (["map", "show", str(DRIVE.parent)], f"{DRIVE.parent}: this is a folder, expected a file"),
+        (["resume", str(DRIVE)], f"{DRIVE}: not a run folder"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
@@ -50,6 +58,21 @@ def test_a_mistyped_word_is_named_with_what_to_type(
     words: list[str], wanted: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert wanted in said(capsys, *words)
+
+
+def test_a_folder_that_is_not_there_is_not_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "drives").mkdir()
+    assert "nothere: not a run folder" in said(capsys, "resume", "nothere")
+    assert "stands behind the setting that reads it: omninav log=drives" in said(capsys, "drives")
+    assert [path.name for path in tmp_path.iterdir()] == ["drives"]
+
+
+def test_a_stage_is_named_as_it_is_typed_for_a_run(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["stages", "match=l2"]) == 0
+    assert "use  match=l2" in capsys.readouterr().out
 
 
 def test_a_file_may_be_called_by_odd_characters(

@@ -82,7 +82,10 @@ def test_a_mirror_of_which_nothing_is_known_is_the_same_pushed_and_interrupted(r
     with omninav.resume(folder) as session:
         for frame in frames_of(recording, 9):
             session.step(**frame)
-    assert same_files(whole, omninav.open_run(folder)) == []
+    pushed = omninav.open_run(folder)
+    assert same_files(whole, pushed) == ["map.omap"]  # which says of which log the ring was found
+    assert pushed.map.views[:].tobytes() == whole.map.views[:].tobytes()
+    assert "its mirror's ring is the one in image 0" in pushed.manifest["warnings"][0]
 
 
 def test_an_interrupted_session_goes_on_from_where_it_was_saved(recording, camera, batch, tmp_path):

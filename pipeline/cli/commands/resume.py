@@ -37,6 +37,8 @@ def command(arguments: list[str]) -> int:
     if any(Path(word).is_dir() for word in typed):
         raise BadInput("resume: give one run folder: omninav resume runs/latest")
     here, folder = Path.cwd(), Path(os.path.realpath(given))
+    if not folder.is_dir():
+        raise BadInput(f"{folder}: not a run folder (no manifest.json and config.yaml); `ls runs` shows what there is")
     with only_listed(typed):
         return _resume_experiment(folder) if (folder / "experiment.json").is_file() else _resume_run(given, here)
 

@@ -14,6 +14,7 @@ from omninav.pipeline.graph.signature import Parameter, signature
 
 def command(arguments: list[str]) -> int:
     """List stages in one line each, by role; of a stage that is named, print ports, parameters, source and use."""
+    arguments = [word.replace("=", ".") for word in arguments]  # as it is typed for a run: match=l2
     known = list(entries())
     roles, names = {entry.role for entry in known}, {entry.name for entry in known}
     for word in arguments:
