@@ -32,7 +32,7 @@ def _replaced() -> dict[str, str]:
 
 
 def tools() -> list[str]:
-    """Commands of two words that variants without a source are: `camera look`."""
+    """Commands of two words, which variants without a source are."""
     named = [file for file in group_files("variant") if "_" in file.name]
     return [
         file.name.removesuffix(".yaml").replace("_", " ", 1)

@@ -309,7 +309,11 @@ class _Builder:
         read = {wire.from_node for wire in self.wires}
         for node in self.nodes.values():
             ports = [port for port in node.signature.inputs.values() if not port.optional]
-            if ports and node.name not in read | {name for name, _ in attempted} and not any(map(self._fitting, ports)):
+            if (
+                len(ports) > 1
+                and node.name not in read | {name for name, _ in attempted}
+                and not any(map(self._fitting, ports))
+            ):
                 what = f"{type(node.stage).__name__} has no place in this graph: nothing feeds it, and nothing reads it"
                 self._problem(f"nodes.{node.name}", what, f"leave {node.name}=… out")
                 continue
