@@ -13,6 +13,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+DISK = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)
+"""Errors of a full or read-only disk: no fault of whoever writes."""
 SUM = "sha256"
 """The key of a JSON file's own checksum."""
 PART = f"@{re.sub(r'[^A-Za-z0-9-]', '_', os.uname().nodename)}.part"
@@ -41,13 +43,21 @@ def whole_file(path: Path) -> Iterator[Path]:
     part.unlink(missing_ok=True)  # a link of that name would be written through
     _remove_left_over(path)
     try:
-        yield part
-        os.replace(part, path)
-    except OSError as error:  # a full disk names no file
-        error.filename = error.filename or str(path)
-        raise
+        with named(path):
+            yield part
+            os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
+
+
+@contextmanager
+def named(path: Path) -> Iterator[None]:
+    """Give an error of the block the name of its file where it has none: a full disk names no file."""
+    try:
+        yield
+    except OSError as error:
+        error.filename = error.filename or str(path)
+        raise
 
 
 def _remove_left_over(path: Path) -> None:

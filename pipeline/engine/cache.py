@@ -5,7 +5,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from omninav.pipeline.files import digest_file, digest_text, locked, whole_file, write_whole
+from omninav.pipeline.files import DISK, digest_file, digest_text, locked, whole_file, write_whole
 
 from .codec import BadEncoding, decode, encode, seal, unseal
 from .damage import say_damaged
@@ -52,6 +52,17 @@ class Cache:
             yield part
             digest = digest_file(part)
         write_whole(self._entry(key, suffix), seal(encode({"key": key, "sha256": digest, "notes": notes})))
+
+    @contextmanager
+    def unless_full(self) -> Iterator[None]:
+        """Around what puts a result there that is at hand: a full disk is said, and no fault of the run."""
+        try:
+            yield
+        except OSError as error:
+            if error.errno not in DISK:
+                raise
+            where = f"cache: {error.filename or self.folder}: {error.strerror}"
+            say_damaged(f"{where}; results are not kept there: free some space, or type cache=FOLDER")
 
     def discard(self, key: str, suffix: str, why: str) -> None:
         """Throw a result away, and say why."""

@@ -1,21 +1,18 @@
 """A node made ready to run: one call of its step each tick, from the tick's values and back into them."""
 
-import errno
 import math
 import time
 from array import array
 from collections.abc import Callable
 from typing import Any
 
+from omninav.pipeline.files import DISK
 from omninav.pipeline.graph.contents import wrong_output
 from omninav.pipeline.graph.graph import Node, Wire
 from omninav.pipeline.graph.problems import BadInput, one_line
 from omninav.pipeline.graph.stage import Context, State
 
 from .channel import channel_key, held_key
-
-DISK = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)
-"""What a full or read-only disk answers: no fault of the stage that writes."""
 
 CHECKED_TICKS = 10
 """Of so many first calls of a stage every output is checked against what its type states: enough for a mistake in the

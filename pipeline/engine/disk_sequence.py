@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, overload
 
-from omninav.pipeline.files import open_itself
+from omninav.pipeline.files import named, open_itself
 
 from .codec import BadEncoding, decode, encode
 
@@ -42,7 +42,8 @@ class DiskSequence(Sequence[Any]):
 
     def flush(self) -> None:
         """Hand what is buffered to the operating system."""
-        self._file.flush()
+        with named(self.path):
+            self._file.flush()
 
     @property
     def size(self) -> int:
@@ -53,8 +54,9 @@ class DiskSequence(Sequence[Any]):
     def append(self, value: Any) -> None:
         """Add a value (None stands for an absent one)."""
         content = encode(value)
-        self._file.write(_RECORD.pack(len(content), _checksum(self._size, content)))
-        self._file.write(content)
+        with named(self.path):
+            self._file.write(_RECORD.pack(len(content), _checksum(self._size, content)))
+            self._file.write(content)
         self._size += _RECORD.size + len(content)
         self._offsets = None
 

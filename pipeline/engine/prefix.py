@@ -159,7 +159,10 @@ def keep_prefix(engine: Engine, prefix: CachedPrefix | None, cache: Cache | None
     sequence = engine.sequences[SEQUENCE]
     sequence.flush()
     names = sorted(lineage(engine.graph, prefix.nodes))
-    _keep(prefix, cache, engine.options.seed, sequence.path, {name: engine.calls[name].ctx.notes() for name in names})
+    with cache.unless_full():
+        _keep(
+            prefix, cache, engine.options.seed, sequence.path, {name: engine.calls[name].ctx.notes() for name in names}
+        )
 
 
 def _keep(

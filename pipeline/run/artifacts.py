@@ -97,7 +97,11 @@ def obtain(
             file, value = found
             reason = "found: the same graph over the same log had made it before"
         else:
-            file, value = _into(cache, seed, _make(execution, [artifact, *together]))
+            own, every = Cache(run.memory / "artifacts"), list(_make(execution, [artifact, *together]))
+            kept: list[tuple[Path, Value]] = []
+            with cache.unless_full():
+                kept.append(_into(cache, seed, every))
+            file, value = kept[0] if kept else _into(own, seed, every)
             reason = "made: code, parameters or log are new to the cache"
         _copy(file, target)
     made = {"variant": artifact.variant, "output": artifact.origin, "sha256": artifact_digest(target), "reason": reason}

@@ -36,7 +36,8 @@ def costly_values(engine: Engine, cache: Cache | None, artifacts: Mapping[str, s
         for origin, key in made.items():
             value, ctx = engine.values.get(origin), engine.calls[origin.partition(".")[0]].ctx
             if isinstance(value, Value) and cache is not None:
-                with cache.keep(seeded(key, seed) if ctx.drew else key, SUFFIX, ctx.notes()) as part:
+                own = seeded(key, seed) if ctx.drew else key
+                with cache.unless_full(), cache.keep(own, SUFFIX, ctx.notes()) as part:
                     write_artifact(part, value)
 
 

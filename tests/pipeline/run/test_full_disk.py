@@ -1,0 +1,51 @@
+"""A disk that is full: the run says which file, and a cache that is full is no error of the run."""
+
+import errno
+import os
+import resource
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import DRIVE, TOUR
+
+import omninav
+from omninav.pipeline.engine.cache import Cache
+from omninav.pipeline.engine.disk_sequence import DiskSequence
+
+
+def test_a_full_disk_names_the_file_that_it_could_not_take(tmp_path: Path) -> None:
+    sequence = DiskSequence(tmp_path / "match.similarities.sequence")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        with pytest.raises(OSError, match=r"match\.similarities\.sequence") as full:
+            sequence.append(np.zeros(100_000))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert full.value.errno == errno.EFBIG
+
+
+def test_a_full_cache_is_said_and_the_run_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keep = Cache.keep
+
+    def full(cache: Cache, key: str, suffix: str, notes: object = None) -> object:
+        if cache.folder == tmp_path / "cache":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(cache.path(key, suffix)))
+        return keep(cache, key, suffix, notes)
+
+    monkeypatch.setattr(Cache, "keep", full)
+    words = {"tour": TOUR, "log": DRIVE, "cache": tmp_path / "cache", "nodes.source.stop": 3, "progress": False}
+    run = omninav.run("plain_matching", folder=tmp_path / "run", **words)
+    assert run.status == "complete"
+    assert len(run.map) > 0
+    said = capsys.readouterr().err
+    assert f"cache: {tmp_path}/cache/" in said
+    assert "No space left on device; results are not kept there: free some space, or type cache=FOLDER" in said
+
+
+def test_an_error_of_the_cache_that_is_no_full_disk_is_one(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="no such"), Cache(tmp_path).unless_full():
+        raise OSError(errno.EIO, "no such")
