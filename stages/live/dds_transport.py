@@ -173,9 +173,11 @@ def _settings() -> str:
     listed = "".join(f'<Peer address="{escape(peer)}"/>' for peer in peers)
     discovery = f"<ParticipantIndex>auto</ParticipantIndex><Peers>{listed}</Peers>" if peers else ""
     discovery += "<MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>" if peers else ""
+    discovery += f"<Tag>omninav_{os.getpid()}</Tag>" if reach == "OFF" else ""  # none but who has the same tag
+    alone = "<General><AllowMulticast>false</AllowMulticast></General>" if reach in ("LOCALHOST", "OFF") else ""
     return (
         "<CycloneDDS><Domain>"
         f"<Compatibility><IgnoreTypeInformation>{FAST_DDS}</IgnoreTypeInformation></Compatibility>"
-        f"{f'<Discovery>{discovery}</Discovery>' if discovery else ''}"
+        f"{alone}{f'<Discovery>{discovery}</Discovery>' if discovery else ''}"
         "</Domain></CycloneDDS>"
     )

@@ -21,7 +21,10 @@ def open_transport(domain: int) -> Transport:
         raise TransportError(
             "transport=rclpy needs ROS 2: source its setup.bash, or pip install 'omninav[ros2]' with Python 3.11"
         ) from None
-    return RclpyTransport(domain)
+    try:
+        return RclpyTransport(domain)
+    except Exception as error:  # a keystore that is missing, no RMW: rclpy's own errors are of no common class
+        raise TransportError(f"transport=rclpy: domain {domain} cannot be joined ({error!s:.300})") from None
 
 
 class RclpyTransport(Transport):

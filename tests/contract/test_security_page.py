@@ -8,7 +8,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/security.md").read_text()
-TRUST = "tests/cli/test_trust.py"
+TRUST, LIVE = "tests/cli/test_trust.py", "tests/stages/source/test_live.py"
 TESTS = {
     "Installed packages": (
         "tests/pipeline/graph/test_registry.py",
@@ -55,6 +55,23 @@ TESTS = {
         "test_what_is_no_file_is_named_without_waiting_for_it",
     ),
     "Folders that cannot be written": (TRUST, "test_a_folder_that_cannot_be_used_is_one_line"),
+    "What a peer can do": (LIVE, "test_requests_that_are_turned_off_are_not_heard"),
+    "What it can call": (
+        "tests/stages/live/test_amcl_interface.py",
+        "test_amcls_topics_and_services_are_answered",
+    ),
+    "What a message cannot do": (LIVE, "test_a_damaged_image_is_counted_and_the_next_one_is_used"),
+    "What it can read": ("tests/stages/live/test_every_message.py", "test_over_dds"),
+    "How far it is found": ("tests/stages/live/test_transport.py", "test_discovery_reaches_as_far_as_ros_says"),
+    "SROS 2": ("tests/stages/live/test_every_message.py", "test_a_keystore_that_is_not_there_is_one_line"),
+    "Zenoh": (
+        "tests/stages/live/test_zenoh_transport.py",
+        "test_a_configuration_that_is_none_is_refused_in_one_line",
+    ),
+    "Foxglove": (
+        "tests/foxglove/test_foxglove.py",
+        "test_foxgloves_client_watches_a_run_and_gets_what_was_sent_before_it_came",
+    ),
 }
 """The beginning of an item of the page -> file and name of its test."""
 

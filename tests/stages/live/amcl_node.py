@@ -26,7 +26,7 @@ publish.setup(ctx)
 belief = Particles(np.array([[1.0, 2.0, 0.5]]), np.ones(1))
 print("ready", flush=True)
 for number in itertools.count():  # until it is killed
-    publish.step(ctx, Tick(number, number + 1), belief=belief, odometry=Pose(0.0, 0.0, 0.0))
+    publish.step(ctx, Tick(number, number + 1), estimate=belief.estimate(), odometry=Pose(0.0, 0.0, 0.0))
     intake.next(0.1)
     made = drive.frame(number)
     if made is not None and made[0].restart is not None:

@@ -249,3 +249,20 @@ def test_in_this_process(monkeypatch: pytest.MonkeyPatch, one: list[dict[str, di
     assert {topic for topic, _ in wire.sent} == topics_declared(one).keys()
     for topic, message in wire.sent:
         check(topic, message)
+
+
+def test_a_keystore_that_is_not_there_is_one_line(other_end: OtherEnd, tmp_path: Path):
+    libraries = f"{ROOT}{os.pathsep}{Path(np.__file__).parents[1]}"
+    secured = {
+        "ROS_SECURITY_ENABLE": "true",
+        "ROS_SECURITY_STRATEGY": "Enforce",
+        "ROS_SECURITY_KEYSTORE": str(tmp_path),
+    }
+    script = "from omninav.stages.live.transport import *\ntry: connect('rclpy')\nexcept TransportError as e: print(e)"
+    words = [str(ROS2_PYTHON), "-c", script]
+    environment = {**os.environ, **secured, "PYTHONPATH": libraries}
+    ended = subprocess.run(words, capture_output=True, text=True, env=environment, timeout=WAIT_S)
+    if "numpy" in ended.stderr:
+        pytest.skip(f"{ROS2_PYTHON} and {sys.executable} are not of one Python: their libraries do not go together")
+    assert ended.stdout.startswith("transport=rclpy: domain ")
+    assert "SECURITY ERROR" in ended.stdout

@@ -1,8 +1,12 @@
+import subprocess
+import sys
+
 import pytest
 
+from omninav.stages.live.dds_transport import _settings
 from omninav.stages.live.transport import Arrival, Inbox, TransportError, connect
 
-from .conftest import OtherEnd, decode, encode, until
+from .conftest import WAIT_S, OtherEnd, decode, encode, until
 
 ODOMETRY, POSE = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseWithCovarianceStamped"
 
@@ -73,3 +77,29 @@ def test_a_qos_that_does_not_fit_is_named(other_end: OtherEnd):
     transport.publish("/pose", POSE, encode(POSE, {}, 1))
     other_end.order("subscribe", "/pose", type=POSE, durability="TRANSIENT_LOCAL")  # ours is volatile
     until(lambda: transport.mismatched() == {"/pose": "durability"})
+
+
+SEE = """
+import sys, time
+from omninav.stages.live.transport import connect
+transport, until = connect("dds"), time.monotonic() + float(sys.argv[1])
+while "/hello" not in transport.offered() and time.monotonic() < until:
+    time.sleep(0.1)
+print(sorted(transport.offered()), flush=True)
+"""
+
+
+@pytest.mark.parametrize(("reach", "seen"), [("LOCALHOST", "['/hello']"), ("OFF", "[]")])
+def test_discovery_reaches_as_far_as_ros_says(domain: int, monkeypatch: pytest.MonkeyPatch, reach: str, seen: str):
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", reach)
+    assert "<AllowMulticast>false" in _settings()  # nothing is sent to the network to be found
+    connect("dds").publish("/hello", "std_msgs/msg/String", encode("std_msgs/msg/String", {"data": "x"}))
+    words = [sys.executable, "-c", SEE, "30" if reach == "LOCALHOST" else "5"]
+    assert subprocess.run(words, capture_output=True, text=True, timeout=WAIT_S, check=True).stdout.strip() == seen
+
+
+def test_without_limits_discovery_is_cyclones_own(monkeypatch: pytest.MonkeyPatch):
+    for name in ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"):
+        monkeypatch.delenv(name, raising=False)
+    assert "Multicast" not in _settings()
+    assert "<Discovery>" not in _settings()

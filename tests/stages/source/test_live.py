@@ -16,6 +16,7 @@ from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.live import intake
 from omninav.stages.live.status import LiveStatus
 from omninav.stages.live.transport import Arrival, Transport
+from omninav.stages.recordings.topics import IMAGE_TOPICS
 from omninav.stages.source import live
 from omninav.stages.source.live import LiveSource, LiveSourceState
 from omninav.stages.source.log import LogSource, LogSourceState
@@ -344,3 +345,9 @@ def test_latency_is_measured_from_the_arrival_and_a_clock_that_is_off_shows_as_a
     assert 20.0 <= status.latencies_ms[0] < 2000.0
     assert status.age_ms is not None
     assert status.age_ms > 1e12
+
+
+def test_requests_that_are_turned_off_are_not_heard(robot: Loopback, tmp_path: Path):
+    drive = Drive(tmp_path, initial_pose=None, goal=None, restart=None)
+    drive.join()
+    assert set(robot.inbox.topics) == {*IMAGE_TOPICS, "/odom", "/ground_truth/pose", "/scan"}
