@@ -24,7 +24,9 @@ def test_a_sweep_runs_every_combination_and_has_one_page(omninav, shared_cache: 
     assert all((sweep / str(n) / "report.html").exists() for n in range(4))
     assert not any("<figure id=" in (sweep / str(n) / "report.html").read_text() for n in range(4))
     page = next(sweep.glob("*.html")).read_text()
-    assert all(m["overrides"].split()[0] in page for m in manifests)
+    values = [m["overrides"].split()[0].partition("=")[2] for m in manifests]
+    assert all(f"<code>{value}</code>" in page for value in values)
+    assert '<th class="text">match</th>' in page
 
 
 def test_a_failing_job_is_named_at_once_and_the_others_finish(omninav, shared_cache: Path, tmp_path: Path):
