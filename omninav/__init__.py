@@ -7,6 +7,9 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
+from .working_directory import ignore_working_directory
+
+ignore_working_directory()
 os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", "100000000")  # read as OpenCV is loaded: none larger is decoded
 
 if TYPE_CHECKING:

@@ -61,7 +61,7 @@ def _run(arguments: list[str]) -> int:
     if mistyped:
         print(mistyped, file=sys.stderr)
         return 2
-    os.environ.setdefault("PYTHONSAFEPATH", "1")  # processes of ours do not import what lies in the working directory
+    os.environ["PYTHONSAFEPATH"] = "1"  # processes of ours do not import what lies in the working directory
     if arguments and arguments[0] in COMMANDS:
         name, arguments = arguments[0], arguments[1:]
     elif _is_tool(arguments):

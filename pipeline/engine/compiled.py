@@ -1,12 +1,13 @@
 """Compiled functions, kept on disk for as long as nothing that they were compiled from has changed."""
 
-from collections.abc import Callable
-from contextlib import suppress
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
 import numba
 import numpy as np
-from numba.core import caching
+from numba.core import caching, config
 
 from .code_version import module_version, version
 from .compile_notice import compiling
@@ -16,6 +17,8 @@ Index: Any = caching.IndexDataCacheFile
 Function = TypeVar("Function", bound=Callable[..., Any])
 FRAMEWORK = __name__.rpartition(".engine.")[0]
 """No compiled function calls what lies there."""
+CACHE_SETTINGS = ("CACHE_DIR", "CACHE_LOCATOR_CLASSES")
+"""numba's settings of where it keeps machine code, which it unpickles."""
 
 
 def compiled(**options: Any) -> Callable[[Function], Function]:
@@ -36,10 +39,11 @@ def compiled(**options: Any) -> Callable[[Function], Function]:
 
 
 class CompiledCache(FunctionCache):  # type: ignore[misc]
-    """The machine code of one function, in the folder that numba chooses."""
+    """The machine code of one function, in the folder that numba chooses, whatever the working directory says of it."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        super().__init__(function)
+        with _settings_of_the_environment():
+            super().__init__(function)
         stamp = (module_version(function.__module__, FRAMEWORK), np.__version__, version("llvmlite"))
         self._cache_file = Index(self._cache_path, self._impl.filename_base, stamp)
 
@@ -59,3 +63,15 @@ class CompiledCache(FunctionCache):  # type: ignore[misc]
         """Keep it; where the disk is full it is compiled again the next time."""
         with suppress(OSError):
             super().save_overload(sig, data)
+
+
+@contextmanager
+def _settings_of_the_environment() -> Iterator[None]:
+    """numba's `CACHE_SETTINGS` as environment variables have them: where somebody imported numba before omninav, it has
+    read them from the working directory too."""
+    before = {name: getattr(config, name) for name in CACHE_SETTINGS if hasattr(config, name)}
+    vars(config).update({name: os.environ.get(f"NUMBA_{name}", "") for name in before})
+    try:
+        yield
+    finally:
+        vars(config).update(before)

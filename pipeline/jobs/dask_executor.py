@@ -2,6 +2,7 @@
 
 import logging
 import re
+import sys
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from contextlib import suppress
@@ -73,6 +74,7 @@ def slurm(settings: EngineSettings) -> DaskExecutor:
     cluster = SLURMCluster(
         cores=1,
         processes=1,
+        python=f"{sys.executable} -P",  # it imports nothing from the folder that it is started in
         memory=f"{memory}B",
         job_name="omninav",
         queue=options.get("partition"),

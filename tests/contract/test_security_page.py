@@ -20,7 +20,10 @@ TESTS = {
     "Networks": ("tests/stages/features/test_onnx_encoder.py", "test_what_does_not_fit_is_refused_in_one_line"),
     "Configurations": (TRUST, "test_what_a_configuration_says_of_hydra_is_refused_before_anything_is_called"),
     "Words of the command line": (TRUST, "test_hostile_words_are_refused_in_a_few_short_lines"),
-    "The working directory": (TRUST, "test_a_folder_of_data_runs_no_code"),
+    "The working directory": (
+        "tests/contract/test_working_directory.py",
+        "test_a_run_reads_nothing_of_the_folder_that_it_is_started_in",
+    ),
     "Run folders": (TRUST, "test_resume_runs_only_stages_that_are_listed_or_typed_again"),
     "YAML files": (
         "tests/pipeline/graph/test_small_files.py",
