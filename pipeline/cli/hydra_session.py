@@ -18,6 +18,7 @@ from hydra._internal.utils import create_config_search_path
 from hydra.core.config_search_path import SearchPathQuery
 from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
+from hydra.core.object_type import ObjectType
 from hydra.errors import ConfigCompositionException, HydraException
 from hydra.plugins.config_source import ConfigResult, ConfigSource
 from omegaconf import OmegaConf
@@ -28,6 +29,7 @@ from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, sh
 from omninav.pipeline.graph.small_files import read_yaml
 
 from .config_groups import CONF
+from .interpolations import interpolations_limited
 
 FOLDERS_OF_JOBS = ("run", "sweep")
 LAUNCHING = ("launcher", "sweeper")
@@ -59,7 +61,8 @@ def hydra_started(folders: Sequence[str] = ()) -> Iterator[Hydra]:
         search_path.prepend("command-line", place, SearchPathQuery(provider="schema"))
     session.hydra = Hydra(task_name="omninav", config_loader=CheckedLoader(search_path))
     try:
-        yield session.hydra
+        with interpolations_limited():
+            yield session.hydra
     finally:
         session.hydra = before
 
@@ -105,6 +108,11 @@ class CheckedFolder(FileConfigSource):
             if content is not None and not isinstance(content, dict):
                 raise BadInput(f"{file}: {shown(content)}, expected names and their values (name: value)")
         return super().load_config(config_path)
+
+    def list(self, config_path: str, results_filter: ObjectType | None) -> list[str]:
+        """Names of files and folders in a folder; a link to a folder is not listed: it may lead back here."""
+        folder, names = Path(self.path, config_path), super().list(config_path, results_filter)
+        return [name for name in names if not ((folder / name).is_symlink() and (folder / name).is_dir())]
 
 
 @contextmanager

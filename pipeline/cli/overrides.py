@@ -5,8 +5,10 @@ the configuration that the fitting ones give. Everything here is called where Hy
 """
 
 import math
+import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +28,8 @@ from .hydra_session import SETTABLE, not_settable
 
 MAX_JOBS = 100_000
 """Jobs of a sweep, and values of each setting that varies."""
+MAX_LISTED = 10_000
+"""Files of a folder of `--config-dir` that are looked at for a name that is like a mistyped one."""
 WITHIN_GRAPH = ("nodes.", "wires.", "artifacts.", "saves.")
 
 
@@ -164,7 +168,7 @@ def _texts(word: Override) -> list[str]:
 def _groups(folders: Sequence[str]) -> list[str]:
     found = {name for name in GlobalHydra.instance().config_loader().list_groups("") if name != "hydra"}
     for folder in folders:
-        found |= {path.name for path in Path(folder).glob("*/") if any(path.rglob("*.yaml"))}
+        found |= {file.relative_to(folder).parts[0] for file in _configurations(Path(folder))}
     return sorted(found)
 
 
@@ -176,8 +180,14 @@ def _options(group: str, folders: Sequence[str]) -> list[str]:
         found |= {f"{inner}/{option}" for option in _options(f"{group}/{inner}", ())}
     for folder in folders:
         place = Path(folder) / group
-        found |= {str(path.relative_to(place).with_suffix("")) for path in place.rglob("*.yaml")}
+        found |= {str(file.relative_to(place).with_suffix("")) for file in _configurations(place)}
     return sorted(found)
+
+
+def _configurations(folder: Path) -> Iterator[Path]:
+    """The files of configuration in a folder and in those within it; links to folders are not followed."""
+    files = (Path(place, name) for place, _, names in os.walk(folder) for name in names)
+    return (file for file in islice(files, MAX_LISTED) if file.suffix == ".yaml")
 
 
 def _unknown_option(word: Override, options: Sequence[str]) -> Iterator[Problem]:

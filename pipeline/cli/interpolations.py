@@ -1,0 +1,56 @@
+"""How much of a configuration its interpolations (`${name}`) may repeat: counted as what YAML's aliases repeat is."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
+
+from omegaconf import Container
+from omegaconf.errors import InterpolationResolutionError
+
+MAX_REPEATED = 10_000
+"""Values that the interpolations of a configuration repeat, 100 characters of a text counted as one: ours
+repeat 1,300 at most."""
+_CHARACTERS = 100
+_SPENT = "_repeated"
+_limited: ContextVar[bool] = ContextVar("_limited", default=False)
+
+
+@contextmanager
+def interpolations_limited() -> Iterator[None]:
+    """While the block runs, a configuration that repeats more than `MAX_REPEATED` raises OmegaConf's error."""
+    token = _limited.set(True)
+    try:
+        yield
+    finally:
+        _limited.reset(token)
+
+
+def _counted(self: Any, *arguments: Any, **named: Any) -> Any:
+    value = _resolve(self, *arguments, **named)
+    if _limited.get():
+        root = vars(self._get_root())
+        root[_SPENT] = root.get(_SPENT, 0) + _number(value, MAX_REPEATED)
+        if root[_SPENT] > MAX_REPEATED:
+            raise InterpolationResolutionError(f"interpolations repeat more than {MAX_REPEATED:,} values")
+    return value
+
+
+_resolve: Any = Container.resolve_parse_tree
+Container.resolve_parse_tree = _counted  # type: ignore[method-assign]
+
+
+def _number(value: Any, most: int) -> int:
+    """How many values a value is, counted up to a little more than `most`."""
+    number, waiting = 0, [value]
+    while waiting and number <= most:
+        each = waiting.pop()
+        number += 1
+        content = vars(each).get("_content") if isinstance(each, Container) else each
+        if isinstance(content, dict):
+            waiting += content.values()
+        elif isinstance(content, list):
+            waiting += content
+        elif isinstance(content, str):
+            number += len(content) // _CHARACTERS
+    return number
