@@ -6,6 +6,8 @@ import sys
 from collections.abc import Sequence
 from importlib.resources import files
 
+from omninav.pipeline.report.terminal_text import cleaned
+
 from .config_groups import tools
 from .help import asks_for_help, help_text
 from .output import lost_output, mend_streams
@@ -35,7 +37,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     before = sys.stdout
     mend_streams()
     try:
-        code = _run(list(sys.argv[1:] if argv is None else argv))
+        with cleaned(sys.stdout, sys.stderr):
+            code = _run(list(sys.argv[1:] if argv is None else argv))
         lost = lost_output()
     except BrokenPipeError:
         return 0

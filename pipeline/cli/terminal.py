@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline.report.terminal_text import PlainTexts, Uncleaned
 
 NO_TERMINAL = 120
 """Columns of what is printed where there is no terminal."""
@@ -13,7 +14,7 @@ NO_TERMINAL = 120
 
 def show(renderable: Any) -> None:
     """Print a table or a text in the terminal's width; without one in `NO_TERMINAL` columns and no colour."""
-    _console().print(renderable)
+    _console().print(PlainTexts(renderable))
 
 
 def terminal_width() -> int:
@@ -24,7 +25,8 @@ def terminal_width() -> int:
 def _console() -> Any:
     from rich.console import Console
 
-    return Console(width=None if sys.stdout.isatty() else NO_TERMINAL, highlight=False)
+    file: Any = Uncleaned(sys.stdout)
+    return Console(file=file, width=None if sys.stdout.isatty() else NO_TERMINAL, highlight=False)
 
 
 def show_results(folder: Path, metrics: Metrics, manifest: Mapping[str, Any]) -> None:

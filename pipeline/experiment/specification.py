@@ -5,13 +5,14 @@ Every combination of the sweep's labels is a condition, and each condition is ru
 
 import itertools
 import math
+import re
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from omninav.pipeline.graph.ports import convert, convert_fields
-from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
+from omninav.pipeline.graph.problems import Problem, ProblemsFound, shown, suggest
 
 from .series import Aggregate, figure_at
 
@@ -19,6 +20,8 @@ DEVELOPMENT = "development"
 """The scenario that is run and shown, and never judged: choices were made on it."""
 TYPED = ("common", "set", "scenarios", "development", "sweep")
 """Entries of a file that are overrides, or labels of overrides."""
+NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
+"""Of an experiment: its pages and its folder are named after it."""
 MAX_RUNS = 100_000
 """Conditions of an experiment, and repetitions of each."""
 Labels = dict[str, str]
@@ -289,6 +292,9 @@ def _without_null(entries: Any) -> Any:
 
 def _contradictions(experiment: Experiment) -> "list[Problem]":
     problems = []
+    if not NAME.fullmatch(experiment.name):
+        what = f"{shown(experiment.name)}, expected at most 100 letters, digits, '_' and '-': files are named after it"
+        problems.append(Problem("experiment.name", what))
     if DEVELOPMENT in experiment.scenarios:
         hint = f"development: {experiment.scenarios[DEVELOPMENT]}"
         problems.append(
@@ -301,10 +307,10 @@ def _contradictions(experiment: Experiment) -> "list[Problem]":
     if conditions > MAX_RUNS:
         problems.append(Problem("experiment.sweep", f"{conditions:,} conditions, expected at most {MAX_RUNS:,}"))
     page = experiment.page
-    shown = [("page.rows", f) for f in page.rows] + [("page.columns", page.columns)]
-    shown += [("page." + k, f) for k, f in (("along", page.along), ("panels", page.panels)) if f]
-    shown += [(f"curves[{n}].panels", curve.panels) for n, curve in enumerate(experiment.curves) if curve.panels]
-    shown += [(f"reference_runs[{n}].over", each.over) for n, each in enumerate(experiment.reference_runs)]
+    named = [("page.rows", f) for f in page.rows] + [("page.columns", page.columns)]
+    named += [("page." + k, f) for k, f in (("along", page.along), ("panels", page.panels)) if f]
+    named += [(f"curves[{n}].panels", curve.panels) for n, curve in enumerate(experiment.curves) if curve.panels]
+    named += [(f"reference_runs[{n}].over", each.over) for n, each in enumerate(experiment.reference_runs)]
     labelled = [(f"without[{n}]", labels) for n, labels in enumerate(experiment.without)]
     labelled += [(f"curves[{n}].only", curve.only) for n, curve in enumerate(experiment.curves)]
     measured = [(f"page.drawn[{n}]", name) for n, name in enumerate(page.drawn)]
@@ -315,7 +321,7 @@ def _contradictions(experiment: Experiment) -> "list[Problem]":
         sides = [getattr(claim, side) for side in SIDES]
         labelled += [(where, side) for side in (claim.of, claim.ratio_to, *sides) if isinstance(side, Mapping)]
     for where, labels in labelled:
-        shown += [(where, factor) for factor in labels]
+        named += [(where, factor) for factor in labels]
         for factor, label in labels.items():
             if factor in factors and str(label) not in experiment.labels(factor):
                 problems.append(_unknown(f"{where}.{factor}", str(label), experiment.labels(factor), "labels"))
@@ -324,7 +330,7 @@ def _contradictions(experiment: Experiment) -> "list[Problem]":
         for where, name in measured
         if name not in experiment.measures
     ]
-    problems += [_unknown(where, factor, factors, "factors") for where, factor in shown if factor not in factors]
+    problems += [_unknown(where, factor, factors, "factors") for where, factor in named if factor not in factors]
     left = [f for f in factors if f not in (*page.rows, page.columns)]
     if left:
         fault = f"{', '.join(left)}: each factor of the sweep is a row or the column of the table"

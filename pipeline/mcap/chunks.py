@@ -21,6 +21,34 @@ MAX_RATIO = 256
 """How many times as long as packed a chunk of more than 4 MB may be unpacked."""
 
 
+MAX_BYTES_IN_ALL, MAX_RATIO_IN_ALL = 1 << 26, 128
+"""All that is unpacked of a file has at most so many bytes, and so many times its own."""
+MAX_MESSAGES, BYTES_PER_MESSAGE = 100_000, 8
+"""A file holds at most so many messages, and one more for each so many of its bytes: packed as well as can be, a
+message of a robot takes more."""
+
+
+class Allowance:
+    """What may still be read of a log, by the size of its file (bytes)."""
+
+    def __init__(self, size: int) -> None:
+        self._bytes = MAX_BYTES_IN_ALL + MAX_RATIO_IN_ALL * size
+        self._messages = MAX_MESSAGES + size // BYTES_PER_MESSAGE
+        self._stated = f"more than a log of {size:,} bytes holds"
+
+    def unpack(self, number: int) -> None:
+        """Take off some bytes. Raises ValueError where there are too many."""
+        self._bytes -= number
+        if self._bytes < 0:
+            raise ValueError(f"all that was unpacked so far is {self._stated}")
+
+    def read_message(self) -> None:
+        """Take off a message. Raises ValueError where there are too many."""
+        self._messages -= 1
+        if self._messages < 0:
+            raise ValueError(f"these are more messages than {self._stated.removeprefix('more than ')}")
+
+
 class Place(NamedTuple):
     """Where a record lies in its file, with its head: first byte and length."""
 

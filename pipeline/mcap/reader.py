@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, MessageIndex, Schema
 
-from .chunks import MAGIC, RECORD_HEAD, Place, parse, records_in, unpack
+from .chunks import MAGIC, RECORD_HEAD, Allowance, Place, parse, records_in, unpack
 from .message import BadMessage, Location, LogError, Message, Record
 from .message_types import standard_types, types_of
 from .summary import read_summary, walk
@@ -24,9 +24,6 @@ _STAMP_LITTLE, _STAMP_BIG = struct.Struct("<iI").unpack_from, struct.Struct(">iI
 _BYTES_IN_MEMORY = 32_000_000
 """Of unpacked chunks, beside the last one used: logs up to that size are unpacked once."""
 
-
-_BYTES_IN_ALL, _RATIO_IN_ALL = 1 << 26, 128
-"""All chunks of a file unpack to at most so many bytes, and so many times its own."""
 _BYTES_OF_ATTACHMENTS = 32_000_000
 """That are kept: descriptions of sensors are far shorter."""
 _LAST_TIME = 2**63
@@ -171,7 +168,7 @@ class LogReader:
     def _scan(self, topics: Collection[str] | None) -> Iterator[Record]:
         before, seen, checksum = self.dropped.total(), set(), zlib.crc32(MAGIC)
         self._found: Counter[int] = Counter()
-        self._spent = 0
+        self._allowance = Allowance(self._size)
         expected = Counter(self._summary.counts or {})
         opcode, unbroken = 0, True
         with self.path.open("rb") as file:
@@ -234,9 +231,7 @@ class LogReader:
         self._chunks.append((place, whole))
         try:
             data = unpack(content, whole)
-            self._spent += len(data)
-            if self._spent > _BYTES_IN_ALL + _RATIO_IN_ALL * self._size:
-                raise ValueError(f"all chunks so far unpack to {self._spent} bytes, far more than a log holds")
+            self._allowance.unpack(len(data))
         except Exception as error:
             if whole:
                 self.drop("bad_chunk", f"{self.path}: chunk at byte {place.start}: {' '.join(str(error).split()):.160}")
@@ -251,6 +246,11 @@ class LogReader:
         end = 0
         for opcode, start, end in records_in(data):
             if opcode == Opcode.MESSAGE and end - start >= _MESSAGE.size:
+                try:
+                    self._allowance.read_message()
+                except ValueError as error:
+                    self.drop("bad_chunk", f"{self.path}: chunk {chunk}: {error}")
+                    return
                 channel, _, log_time, _ = _MESSAGE.unpack_from(data, start)
                 start += _MESSAGE.size
                 data_at = Location(chunk, start, end - start)

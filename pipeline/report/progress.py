@@ -9,6 +9,8 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import TextIO
 
+from .terminal_text import Uncleaned, plain
+
 SAID_S = 2.5
 """How long words of a stage stand beside the frames, seconds."""
 
@@ -25,7 +27,7 @@ class Progress:
         self, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic, unit: str = "frames"
     ) -> None:
         self._unit = unit
-        self._stream = sys.stderr if stream is None else stream
+        self._stream = Uncleaned(sys.stderr) if stream is None else stream
         self._clock = clock
         self._live = self._stream.isatty()
         self._every = 0.1 if self._live else 2.0
@@ -126,6 +128,7 @@ class Progress:
 
     def _paint(self, line: str) -> None:
         """Write over what was painted last, however many rows of the terminal that took."""
+        line = plain(line)
         up = f"\x1b[{self._rows - 1}A" if self._rows > 1 else ""
         self._stream.write(f"\r{up}\x1b[J{line}")
         self._rows = 1 + max(len(line) - 1, 0) // max(shutil.get_terminal_size().columns, 1)

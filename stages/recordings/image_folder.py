@@ -1,6 +1,7 @@
 """Folders of images with CSVs of times and positions, read by a description: everything about them is configuration."""
 
 import hashlib
+import os
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -156,7 +157,13 @@ class ImageFolder:
         base /= frames.images.lstrip("/")
         names = table.texts(frames.file)
         self._rows = [f"{table.path.name}, line {line}" for line in table.lines]
-        return [base / self._renamed(name, row) for name, row in zip(names, self._rows, strict=True)]
+        return [self._inside(base / self._renamed(name, row), row) for name, row in zip(names, self._rows, strict=True)]
+
+    def _inside(self, path: Path, row: str) -> Path:
+        """A path that a table names. Raises `UnreadableRecording` where it leads out of the recording's folder."""
+        if not Path(os.path.abspath(path)).is_relative_to(os.path.abspath(self._folder)):
+            raise UnreadableRecording(f"{self._folder}: {row}: {shown(str(path))} is not within the recording's folder")
+        return path
 
     def _renamed(self, name: str, row: str) -> str:
         try:
@@ -280,4 +287,7 @@ class DescribedFolder(Format):
         if description.folder is None and file.name != "recording.yaml":
             raise UnreadableRecording(f"{file}: folder is missing; type log={file}:FOLDER, or write folder: … into it")
         folder = file.parent / user_path(description.folder or "")
+        inside = Path(os.path.abspath(folder)).is_relative_to(os.path.abspath(file.parent))
+        if file.name == "recording.yaml" and not inside:
+            raise UnreadableRecording(f"{file}: folder: {shown(description.folder)} is not within its own folder")
         return ImageFolder(log, folder, description, str(file), options)

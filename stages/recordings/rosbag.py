@@ -2,9 +2,10 @@
 
 import bz2
 import io
+import sqlite3
 import struct
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -17,13 +18,19 @@ if TYPE_CHECKING:
 from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.small_files import read_yaml
-from omninav.pipeline.mcap.chunks import MAX_BYTES, MAX_RATIO, unpack_lz4, unpack_zstd
+from omninav.pipeline.mcap.chunks import MAX_BYTES, MAX_RATIO, Allowance, unpack_lz4, unpack_zstd
 from omninav.pipeline.mcap.message import BadMessage, Record
 from omninav.pipeline.mcap.message_types import standard_types
 
 from .recording import Format, OpenOptions, UnreadableRecording
 from .topic_recording import TopicRecording
 from .topics import record_topics
+
+STEPS, MIN_STEPS, STEPS_PER_BYTE = 10_000, 2_000_000, 20
+"""SQLite asks after so many steps of its machine whether to go on; so many are a question's, and so many more for each
+byte of the file. A row takes some 25 bytes at least, and 30 steps."""
+MIN_VALUE_BYTES = 1_000_000
+"""Of a value in a file of SQLite, however small the file is."""
 
 
 class Rosbag(Format):
@@ -44,13 +51,65 @@ class Rosbag(Format):
         return record_topics(log, BagFeed(path), options, files)
 
 
-def _bz2(packed: bytes) -> bytes:
-    """A chunk of a ROS 1 bag; one that unpacks to more than any log holds is cut, and its messages cannot be read."""
-    return bz2.BZ2Decompressor().decompress(packed, max_length=MAX_BYTES)
+class _Limits:
+    """What rosbags may unpack of a bag, and how long SQLite may work on one question."""
+
+    def __init__(self, files: Sequence[Path]) -> None:
+        self._size = sum(file.stat().st_size for file in files)
+        self._longest = self._size * (MAX_RATIO if any(file.suffix == ".zstd" for file in files) else 1)
+        self.begin()
+
+    def begin(self) -> None:
+        """From now on the bag is gone through anew, or another message is looked up."""
+        self.allowance = Allowance(self._size)
+        self._steps = MIN_STEPS + STEPS_PER_BYTE * self._size
+
+    def bz2(self, packed: bytes) -> bytes:
+        """A chunk of a ROS 1 bag. Raises ValueError where the bag unpacks to more than a log holds."""
+        return self._unpacked(bz2.BZ2Decompressor().decompress(packed, max_length=MAX_BYTES))
+
+    def lz4(self, packed: bytes) -> bytes:
+        """As `bz2`."""
+        return self._unpacked(unpack_lz4(packed, MAX_BYTES))
+
+    def _unpacked(self, data: bytes) -> bytes:
+        self.allowance.unpack(len(data))
+        return data
+
+    def limit(self, connection: Any) -> Any:
+        """A connection to a file of SQLite that holds no longer value than the file, and that works no longer on a
+        question than it takes to look at every row, some times over."""
+        limit = getattr(connection, "setlimit", None) or connection.limit  # of sqlite3; of apsw, which rosbags has now
+        limit(sqlite3.SQLITE_LIMIT_LENGTH, min(MAX_BYTES, max(self._longest, MIN_VALUE_BYTES)))
+        limit(sqlite3.SQLITE_LIMIT_LIKE_PATTERN_LENGTH, 100)
+        connection.set_progress_handler(self._works_on, STEPS)
+        for table in ("messages", "topics"):
+            if any(hidden for *_, hidden in connection.execute(f"PRAGMA table_xinfo({table})")):
+                raise ValueError(f"a column of its table {table} is computed, expected stored values")
+        return connection
+
+    def _works_on(self) -> bool:
+        self._steps -= STEPS
+        return self._steps < 0
 
 
-def _lz4(packed: bytes) -> bytes:
-    return unpack_lz4(packed, MAX_BYTES)
+class _Sqlite:
+    """In place of the module by which rosbags opens files of SQLite: their connections are limited."""
+
+    def __init__(self, module: Any, limits: _Limits) -> None:
+        self._module: Any = module._module if isinstance(module, _Sqlite) else module
+        self._limits = limits
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._module, name)
+
+    def connect(self, *arguments: Any, **named: Any) -> Any:
+        """A limited connection, with the name that sqlite3 has for it."""
+        return self._limits.limit(self._module.connect(*arguments, **named))
+
+    def Connection(self, *arguments: Any, **named: Any) -> Any:  # noqa: N802
+        """A limited connection, with the name that apsw has for it."""
+        return self._limits.limit(self._module.Connection(*arguments, **named))
 
 
 class _Zstd:
@@ -117,6 +176,8 @@ class BagFeed:
             if part.exists() and not part.is_file():
                 raise UnreadableRecording(f"{part}: this is a folder, a pipe or a device, expected a file")
         self._stated: dict[str, int] = {}
+        files = [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]
+        self._limits = _Limits(files)
         try:
             if (path / "metadata.yaml").is_file():
                 self._stated = _stated_counts(path)
@@ -126,7 +187,9 @@ class BagFeed:
             try:
                 parts = sorted(path.glob("*.db3")) if path.is_dir() else []
                 self._reader = self._open(parts)  # each part can be read without the folder's metadata
-            except Exception:
+            except Exception as last:
+                if parts and not self._stated:  # else the first error says more
+                    said = " ".join(str(last).split())[:160] or said
                 repair = "rosbag reindex" if path.suffix == ".bag" else "ros2 bag reindex"
                 raise UnreadableRecording(
                     f"{path}: not a readable bag ({said}); if it was cut off, repair it with {repair}"
@@ -141,9 +204,13 @@ class BagFeed:
         from rosbags.highlevel import AnyReader  # slow to import, and seldom needed
         from rosbags.rosbag1.reader import decompressors
         from rosbags.rosbag2 import reader as rosbag2
+        from rosbags.rosbag2 import storage_sqlite3 as storage
 
-        decompressors.update(bz2=_bz2, lz4=_lz4)
+        decompressors.update(bz2=self._limits.bz2, lz4=self._limits.lz4)
         vars(rosbag2)["zstd"] = _Zstd
+        for name in {"sqlite3", "apsw"} & {*vars(storage)}:
+            vars(storage)[name] = _Sqlite(vars(storage)[name], self._limits)
+        self._limits.begin()
         reader = AnyReader(paths, default_typestore=standard_types())
         reader.open()
         return reader
@@ -158,14 +225,18 @@ class BagFeed:
         wanted = [c for c in self._connections if topics is None or c.topic in topics]
         headers = {c.topic: self._has_header(c.msgtype) for c in wanted}
         number: Counter[tuple[str, int]] = Counter()
+        self._limits.begin()
+        allowance = self._limits.allowance
         try:
             for connection, time, data in self._reader.messages(wanted) if wanted else ():
+                allowance.read_message()
                 topic, stamp = connection.topic, time
                 if not (
                     isinstance(time, int) and 0 <= time < 2**63 and isinstance(data, bytes | memoryview)
                 ):  # SQLite holds all
                     self.drop("bad_message", f"{self.path}: a message on {topic:.80} is no message, or has no time")
                     continue
+                allowance.unpack(len(data))
                 if headers[topic] and len(data) >= 12:
                     stamp = self._stamp(data)
                 yield Record(topic, stamp, time, data, (topic, time, number[topic, time]))
@@ -185,6 +256,7 @@ class BagFeed:
         """The bytes of a message again. Raises `BadMessage`."""
         topic, time, number = location
         wanted = [c for c in self._connections if c.topic == topic]
+        self._limits.begin()
         try:
             for passed, (_, _, data) in enumerate(self._reader.messages(wanted, start=time, stop=time + 1)):
                 if passed == number:

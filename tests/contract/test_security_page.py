@@ -41,6 +41,7 @@ TESTS = {
         "tests/stages/recordings/test_image_folder.py",
         "test_a_hostile_description_is_one_line_that_names_the_place",
     ),
+    "Names": ("tests/hostile/test_names.py", "test_an_experiments_name_is_a_name"),
     "Logs": (
         "tests/pipeline/mcap/test_reader_and_writer.py",
         "test_a_chunk_that_unpacks_to_far_more_than_a_log_holds_is_not_unpacked",

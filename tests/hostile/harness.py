@@ -119,6 +119,17 @@ def judge_files(format: Format, files: Files, folder: Path) -> tuple[str, str]:
     return ending
 
 
+@contextmanager
+def within(cpu_s: float = CPU_S, memory_bytes: int = MEMORY_BYTES) -> Iterator[None]:
+    """Raise where the block takes more processor time or memory, `TooSlow` while it is at work."""
+    before, started = _reset_peak(), time.process_time()
+    with _alarm(2 * cpu_s):
+        yield
+    took, grown = time.process_time() - started, _peak() - before
+    if took > cpu_s or grown > memory_bytes:
+        raise Wrong(f"it took {took:.1f} s of CPU and {grown / 1e6:.0f} MB")
+
+
 def minimal(format: Format, case: Case, folder: Path) -> tuple[Case, str]:
     """A failing case with as few mutations as still fail, and its message."""
     message = judge(format, case, folder)[1]

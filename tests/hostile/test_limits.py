@@ -1,0 +1,160 @@
+"""Small inputs that would take minutes or gigabytes: each is refused or counted within limits of time and memory."""
+
+import bz2
+import sqlite3
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import DATA, needs_data
+
+from hostile.harness import within
+from omninav.pipeline import BadInput
+from omninav.pipeline.cli.main import main
+from omninav.pipeline.mcap.reader import LogReader
+from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.rosbag import _Limits, _Sqlite
+
+NEW = DATA / "hostile" / "new"
+COMMAND_S = 8.0
+"""Processor seconds of a command that composes a configuration, as for the formats beside this file."""
+
+
+def bomb(kind: str, levels: int) -> str:
+    """A configuration whose interpolations repeat ten values for each of its lines."""
+    lines = {
+        "text": ["a0: aaaaaaaaaa", *(f"a{n}: {f'${{a{n - 1}}}' * 10}" for n in range(1, levels))],
+        "list": ["a0: [1, 2]", *(f"a{n}: [" + 10 * f"'${{a{n - 1}}}', " + "]" for n in range(1, levels))],
+        "computed name": ["one: a0", "a0: x", *(f"a{n}: {f'${{oc.select:a{n - 1}}}' * 10}" for n in range(1, levels))],
+        "decoded": ["d: $", "a0: x"]
+        + [f'a{n}: "{f"${{oc.decode:${{d}}{{a{n - 1}}}}}" * 10}"' for n in range(1, levels)],
+        "node": [f"nodes: {{match: {{x: '{'${nodes}' * 10}'}}}}"],
+        "long": [f"a0: {'a' * 200_000}", f"a1: {'${a0}' * 5000}"],
+    }[kind]
+    return "# @package _global_\n" + "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("kind", ["text", "list", "computed name", "decoded", "node", "long"])
+def test_interpolations_that_multiply_are_refused_in_one_problem(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    kind: str,
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my/match").mkdir(parents=True)
+    (tmp_path / "my/match/mine.yaml").write_text(bomb(kind, 8))
+    with within(COMMAND_S):
+        assert main(["check", "--config-dir=my", "match=mine"]) == 2
+    said = capsys.readouterr().err
+    assert "Traceback" not in said
+    assert kind in ("decoded", "node") or "interpolations repeat more than 10,000 values" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["my"]
+
+
+@needs_data
+def test_the_example_of_multiplying_interpolations_is_refused(capsys: pytest.CaptureFixture[str]):
+    with within(COMMAND_S):
+        assert main(["check", f"--config-dir={NEW / 'config_interpolation_bomb'}", "match=mine"]) == 2
+    assert "interpolations repeat more than 10,000 values" in capsys.readouterr().err
+
+
+def test_links_between_folders_of_configurations_are_not_followed_when_names_are_listed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.chdir(tmp_path)
+    Path("my/match").mkdir(parents=True)
+    Path("my/match/mine.yaml").write_text("a: 1\n")
+    for name, target in (("match/self", "."), ("match/self2", "."), ("match/up", ".."), ("again", ".")):
+        Path("my", name).symlink_to(target)
+    with within(COMMAND_S):
+        assert main(["check", "--config-dir=my", "match=minr"]) == 2
+    assert "did you mean 'match=mine'?" in capsys.readouterr().err
+
+
+def bag(folder: Path, columns: str, rows: list[tuple[object, ...]] = (), more: str = "") -> Path:
+    """A rosbag2 file of SQLite with these columns for its messages."""
+    folder.mkdir(exist_ok=True)
+    with sqlite3.connect(folder / "bag_0.db3") as base:
+        base.executescript(
+            "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT, "
+            "offered_qos_profiles TEXT); INSERT INTO topics VALUES"
+            f"(1, '/camera/image/compressed', 'sensor_msgs/msg/CompressedImage', 'cdr', ''); "
+            f"CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, {columns}); {more}"
+        )
+        marks = ",".join("?" * (3 + (len(rows[0]) - 3 if rows else 0)))
+        base.executemany(f"INSERT INTO messages VALUES ({marks})", rows)
+    return folder
+
+
+@pytest.mark.parametrize("value", ["zeroblob(900000000)", "zeroblob(9000000)", "printf('%.*c', 900000000, 'x')"])
+def test_a_computed_column_of_a_bag_is_refused(tmp_path: Path, value: str):
+    rows = [(number, 1, number) for number in range(100)]
+    folder = bag(tmp_path / "bag", "other BLOB", [(*row, b"x") for row in rows])
+    with sqlite3.connect(folder / "bag_0.db3") as base:
+        base.execute(f"ALTER TABLE messages ADD COLUMN data BLOB GENERATED ALWAYS AS ({value}) VIRTUAL")
+    with within(), pytest.raises(BadInput, match="is computed"):
+        open_recording(str(folder))
+
+
+@needs_data
+def test_the_example_of_a_computed_column_is_refused():
+    with within(), pytest.raises(BadInput, match="is computed"):
+        open_recording(str(NEW / "bag_generated_column"))
+
+
+@pytest.mark.parametrize("module", [sqlite3, pytest.importorskip("apsw")], ids=lambda module: module.__name__)
+def test_a_question_of_sqlite_that_does_not_end_is_given_up(tmp_path: Path, module: Any):
+    (tmp_path / "bag.db3").write_bytes(bytes(1000))
+    database = _Sqlite(module, _Limits([tmp_path / "bag.db3"]))
+    connection = (database.connect if module is sqlite3 else database.Connection)(":memory:")
+    with within(), pytest.raises(Exception, match="nterrupt"):
+        connection.execute(
+            "WITH RECURSIVE n(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM n) SELECT count(*) FROM n"
+        ).fetchall()
+    with within(), pytest.raises(Exception, match="too big"):
+        connection.execute("SELECT zeroblob(900000000)").fetchall()
+
+
+def test_the_chunks_of_a_ros_1_bag_unpack_within_a_total(tmp_path: Path):
+    (tmp_path / "x.bag").write_bytes(bytes(1000))
+    limits, packed = _Limits([tmp_path / "x.bag"]), bz2.compress(bytes(30_000_000))
+    assert sum(len(limits.bz2(packed)) for _ in range(2)) == 60_000_000
+    with pytest.raises(ValueError, match="all that was unpacked so far is more than a log of 1,000 bytes holds"):
+        limits.bz2(packed)
+    limits.begin()
+    limits.bz2(packed)
+
+
+def empty_messages(path: Path, number: int) -> Path:
+    """A log with a chunk of many messages without content."""
+    from mcap.writer import CompressionType, Writer
+
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=1 << 26, compression=CompressionType.ZSTD)
+        writer.start()
+        schema = writer.register_schema("std_msgs/msg/Empty", "ros2msg", b"")
+        channel = writer.register_channel("/camera/image/compressed", "cdr", schema)
+        for n in range(number):
+            writer.add_message(channel, n, b"", n)
+        writer.finish()
+    return path
+
+
+def test_of_more_messages_than_a_file_of_its_size_holds_the_rest_is_counted(tmp_path: Path):
+    file = empty_messages(tmp_path / "log.mcap", 400_000)
+    data = file.read_bytes()
+    reader = LogReader(file)
+    found = sum(1 for _ in reader.scan())
+    assert found == min(400_000, 100_000 + len(data) // 8)
+    if found < 400_000:
+        assert "these are more messages than a log of" in reader.details["bad_chunk"]
+        assert reader.dropped["missing_message"] == 400_000 - found
+
+
+@needs_data
+def test_the_example_of_empty_messages_is_read_to_its_limit():
+    reader = LogReader(NEW / "empty_messages.mcap")
+    with within(cpu_s=2.0):
+        assert sum(1 for _ in reader.scan()) == 100_000 + (NEW / "empty_messages.mcap").stat().st_size // 8
+    assert "these are more messages than a log of" in reader.details["bad_chunk"]
