@@ -1,0 +1,46 @@
+"""What a check finds that composing a configuration cannot: by what is in files, and by the first image."""
+
+from pathlib import Path
+
+import pytest
+from conftest import DRIVE, RECORDINGS, TOUR
+
+from omninav.pipeline.cli.main import main
+
+WRONG = {
+    "a map of other segments": (
+        {"map": RECORDINGS / "references_format_1.omap", "nodes.features.segments": 18},
+        "its views are histograms of 10 segments x 20 bins, the current one is histograms of 18 x 20",
+    ),
+    "no true pose to start at": (
+        {"map": RECORDINGS / "references_format_1.omap", "nodes.features.segments": 10, "start": "truth",
+         "topics.truth": None},
+        "start: this log has no true pose at its first image",
+    ),
+    "no network": ({"tour": TOUR, "features": "onnx", "model": "/etc/passwd"}, "/etc/passwd: this is no network"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("settings", "what"), WRONG.values(), ids=WRONG)
+def test_what_the_first_image_shows_to_be_wrong_is_found(settings, what, tmp_path: Path, monkeypatch, capsys) -> None:
+    if "model" in settings:
+        pytest.importorskip("onnxruntime")
+    monkeypatch.chdir(tmp_path)
+    words = [f"{name}={'null' if value is None else value}" for name, value in settings.items()]
+    for first in (["check"], []):  # the run says the same
+        assert main([*first, "variant=omniview_mcl", f"log={DRIVE}", *words]) == 2
+        assert what in capsys.readouterr().err
+
+
+def test_what_can_run_passes_and_leaves_nothing(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ["variant=omniview_mcl", f"log={DRIVE}", f"map={RECORDINGS / 'references_format_1.omap'}"]
+    assert main(["check", *words, "nodes.features.segments=10"]) == 0
+    assert "nothing wrong" in capsys.readouterr().out
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_engine_that_a_sweep_refuses_is_refused(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["check", "variant=omniview_cml", f"log={DRIVE}", "engine.workers=-1"]) == 2
+    assert "engine.workers: -1, expected a whole number >= 1" in capsys.readouterr().err
