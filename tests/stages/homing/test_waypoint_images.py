@@ -70,6 +70,8 @@ def test_a_view_that_lies_behind_before_half_of_the_way_is_gone_is_not_passed() 
 def test_the_last_view_is_reached_where_it_is_near_or_just_behind(there) -> None:
     path, one = Path(), ImagePath(1, (none_found(),), ())
     path.step(path=one)
+    away = {**there, "nearness": 0.2, "metres": None}
+    assert not path.step(vector(0, **{**away, "turn": -0.5}), one).progress.arrived
     assert not path.step(vector(0, **{**there, "nearness": 0.2, "metres": None}), one).progress.docking
     assert path.step(vector(0, **there), one).progress.docking
 

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.monitor.confidence_monitor import MIN_NOVELTY, ConfidenceMonitor, ConfidenceMonitorState
+from omninav.stages.monitor.confidence_monitor import (
+    MIN_NOVELTY,
+    ConfidenceMonitor,
+    ConfidenceMonitorState,
+    best_place,
+    mass_within,
+)
 from omninav.stages.monitor.wrong_pose_agreement import LearnWrongPoseAgreement
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.confidence import WrongPoseAgreement
@@ -118,3 +124,40 @@ def test_images_taken_close_by_do_not_tell_how_often_a_wrong_place_looks_right()
     poses = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [10.0, 0.0, 0.0], [10.2, 0.0, 0.0]])
     pairs = ReferenceGraph(poses, np.stack([one, one, other, other]), "histograms", LINE.edges, "truth")
     assert LearnWrongPoseAgreement().step(Context("chance"), pairs, LengthScale(0.3)).when_wrong.share == 0.5
+
+
+@pytest.mark.parametrize("column", [0, 9, 30])
+def test_the_best_place_is_the_most_similar_references_turned_as_the_view_is(column: int):
+    poses = np.array([[0.0, 0.0, 0.5], [3.0, 4.0, -1.0], [8.0, 8.0, 2.0]])
+    values = np.full((2, 36), 0.1, np.float32)
+    values[1, column] = 0.9
+    map = ReferenceGraph(poses, LINE.features[:3], "histograms", LINE.edges, "truth")
+    place = best_place(Similarities(values, np.array([0, 2])), map)
+    assert place[:2] == pytest.approx((8.0, 8.0))
+    assert math.remainder(place[2] - 2.0 - math.radians(10 * column), math.tau) == pytest.approx(0.0, abs=1e-6)
+    one = Similarities(np.array([[0.9], [0.1]], np.float32))  # one heading says no turn
+    assert best_place(one, map) == pytest.approx(poses[0])
+
+
+def test_the_mass_within_a_tolerance_counts_position_and_heading_by_weight():
+    poses = np.array([[0.3, 0.3, math.pi], [0.3, 0.3, -math.pi + 0.1], [0.3, 0.3, 0.0], [0.5, 0.5, math.pi]])
+    belief = Particles(poses, np.array([0.1, 0.2, 0.3, 0.4]))
+    assert mass_within(belief, np.array([0.0, 0.0, -math.pi]), 0.5, 0.2) == pytest.approx(0.3)
+    assert mass_within(belief, np.array([0.0, 0.0, -math.pi]), 0.5, 0.05) == pytest.approx(0.1)
+    assert mass_within(belief, np.array([0.0, 0.0, -math.pi]), 0.8, 0.2) == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize(("metres", "scale"), [(0.5, 2.0), (2.0, 0.5)])
+def test_matches_agree_within_the_wider_of_tolerance_and_length_scale(metres: float, scale: float):
+    def sure(within_m: float, length_scale_m: float) -> float:
+        monitor, recent = ConfidenceMonitor(within_m=within_m), ConfidenceMonitorState()
+        values = np.zeros((len(LINE), 1), np.float32)
+        values[1, 0] = 0.9  # 1 m beside the estimate
+        belief = Particles(np.zeros((5, 3)), np.full(5, 0.2))
+        return monitor.step(
+            Context("monitor"), recent, belief, belief.estimate(), LINE, LengthScale(length_scale_m),
+            WrongPoseAgreement(0.02), Similarities(values),
+        ).confidence.probability  # fmt: skip
+
+    assert sure(metres, scale) == pytest.approx(sure(2.0, 2.0))
+    assert sure(0.5, 0.5) < sure(metres, scale) - 0.1
