@@ -227,7 +227,7 @@ def said(map: ReferenceGraph, drive: str) -> list[Found]:
     """What is said of a map and during a drive in it, by the stages that `omninav` takes."""
     ctx = Context("conflicts")
     scale = AppearanceLengthScale().step(ctx, map).length_scale
-    fit = CheckMap().step(ctx, map, scale).fit
+    of_map = CheckMap().step(ctx, map).conflicts
     found = [Found(0, sentence) for sentence in ctx.warnings]
     describe, match, strip = HsvHistogram(grey_world="local"), SelectiveMatch(penalty="three_quarters"), GreyStrip()
     watch, state = InputConflicts(), InputConflictsState()
@@ -237,7 +237,7 @@ def said(map: ReferenceGraph, drive: str) -> list[Found]:
         features = describe.step(ctx, panorama=panorama).features
         watch.step(
             ctx, state, strip.step(ctx, panorama).strip, out.odometry, out.motion,
-            match.step(ctx, features, map).similarities, features, map, scale, fit,
+            match.step(ctx, features, map).similarities, map, scale, of_map,
         )  # fmt: skip
         found += [Found(number, sentence) for sentence in ctx.warnings[len(found) :]]
     return found

@@ -9,13 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage, State, Tick
-from omninav.stages.geometry.appearance.segments import similarity_at
 from omninav.stages.geometry.appearance.turn_fit import clipped, explained, turn_fit
 from omninav.stages.geometry.appearance.visual_compass import turn_and_correlation
 from omninav.stages.geometry.plane.se2 import between, compose, wrap
 from omninav.stages.geometry.plane.track_fit import track_fit
-from omninav.stages.values.conflicts import Conflicts, MapFit
-from omninav.stages.values.features import SegmentFeatures
+from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.image import Strip
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
@@ -33,26 +31,25 @@ WINDOW = 128
 """Images that are remembered."""
 EVERY = 8
 """Images between two judgements; a finding is said once two in a row agree."""
-COLUMNS = 11
+COLUMNS = 10
 """Numbers that are remembered of an image."""
 
 
 class Watched(NamedTuple):
     """The last images, N rows: `times` (s), `odometry` (N, 3) with headings that are not wrapped, best `matches` (N, 3)
-    in the map (NaN without one) and how `similar` they are, and against the image before: the turn `seen` (rad), its
-    `correlation`, and whether the images are `same`."""
+    in the map (NaN without one), and against the image before: the turn `seen` (rad), its `correlation`, and whether
+    the images are `same`."""
 
     times: Array
     odometry: Array
     matches: Array
-    similar: Array
     seen: Array
     correlation: Array
     same: Array
 
     @classmethod
     def of(cls, rows: Array) -> "Watched":
-        """From rows (N, 11)."""
+        """From rows (N, 10)."""
         return cls(rows[:, 0], rows[:, 1:4], rows[:, 4:7], *rows[:, 7:].T)
 
     def last(self, number: int) -> "Watched":
@@ -76,22 +73,8 @@ class Watched(NamedTuple):
         return float(np.abs(np.diff(self.odometry[:, 2])).sum())
 
 
-class OfMap(NamedTuple):
-    """What the map says: its appearance length scale (m), and how similar its images are to others' (`MapFit`)."""
-
-    length_scale_m: float = math.inf
-    other_places: float | None = None
-
-    @classmethod
-    def sound(cls, length_scale: LengthScale | None, fit: MapFit | None) -> "OfMap":
-        """What may be compared with odometry: nothing of a map that is wrong by itself."""
-        if length_scale is None or (fit is not None and fit.sentences):
-            return cls()
-        return cls(length_scale.metres, None if fit is None else fit.other_places)
-
-
 class InputConflictsState(State):
-    """`strip` (rows, columns), `stamp` (ns) and `pose` (3,) of the last watched image; `rows` (N, 11) of `Watched`;
+    """`strip` (rows, columns), `stamp` (ns) and `pose` (3,) of the last watched image; `rows` (N, 10) of `Watched`;
     what was found by the last judgement, and all that was said."""
 
     strip: npt.NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 0), np.float32))
@@ -127,13 +110,13 @@ class InputConflicts(Stage):
         odometry: Pose | None = None,
         motion: Motion | None = None,
         similarities: Similarities | None = None,
-        features: SegmentFeatures | None = None,
         map: ReferenceGraph | None = None,
         length_scale: LengthScale | None = None,
-        map_fit: MapFit | None = None,
+        map_conflicts: Conflicts | None = None,
         restart: Restart | None = None,
     ) -> Out:
         """One image, or a tick without one."""
+        of_map = () if map_conflicts is None else map_conflicts.sentences
         if ctx.tick.first_of_log or restart is not None:
             recent.rows, recent.pose, recent.judged = np.zeros((0, COLUMNS)), np.full(3, np.nan), 0
             recent.suspected = ""
@@ -141,21 +124,21 @@ class InputConflicts(Stage):
             self._say(ctx, recent, "leap", sentence)
         recent.pose = pose_now(recent.pose, odometry, motion)
         if strip is not None and np.isfinite(recent.pose).all() and self._due(ctx, recent):
-            match = np.full(4, np.nan)
+            match = np.full(3, np.nan)
             if similarities is not None and map is not None and min(similarities.values.shape) > 1:
-                match = matched(similarities, features, map)
+                match = best_place(similarities, map)
             remember(recent, ctx.tick.stamp, strip.pixels, match)
             recent.judged += 1
             if not recent.judged % EVERY:
-                self._judge(ctx, recent, OfMap.sound(length_scale, map_fit))
-        of_map = () if map_fit is None else map_fit.sentences
+                # nothing is compared with a map that is wrong by itself
+                self._judge(ctx, recent, math.inf if length_scale is None or of_map else length_scale.metres)
         return self.Out(conflicts=Conflicts(of_map + recent.sentences))
 
     def _due(self, ctx: Context, recent: InputConflictsState) -> bool:
         return not len(recent.rows) or not 0 <= ctx.tick.stamp - recent.stamp < INTERVAL_S * 1e9
 
-    def _judge(self, ctx: Context, recent: InputConflictsState, map: OfMap) -> None:
-        kind, sentence = judge(Watched.of(recent.rows), map)
+    def _judge(self, ctx: Context, recent: InputConflictsState, length_scale_m: float) -> None:
+        kind, sentence = judge(Watched.of(recent.rows), length_scale_m)
         if kind and kind == recent.suspected and not set(recent.found) - {"leap"}:
             self._say(ctx, recent, kind, sentence)
         recent.suspected = kind
@@ -203,23 +186,8 @@ def pose_now(before: Array, odometry: Pose | None, motion: Motion | None) -> Arr
     return np.array((moved[0], moved[1], start[2] + motion.turn))
 
 
-def matched(similarities: Similarities, features: SegmentFeatures | None, map: ReferenceGraph) -> Array:
-    """The pose (3,) at which the most similar reference says the robot is, and how similar its best segments are: (4,).
-
-    The latter as `CheckMap` compares, whatever the variant compares by; NaN without features.
-    """
-    place = best_place(similarities, map)
-    if features is None or map.kind != features.kind or map.features.shape[1:] != features.values.shape:
-        return np.append(place, np.nan)
-    row = int(similarities.values.max(axis=1).argmax())
-    reference = row if similarities.candidates is None else int(similarities.candidates[row])
-    view = np.asarray(map.features[reference])
-    turn = np.array([place[2] - map.poses[reference, 2]])
-    return np.append(place, similarity_at(view[None], features.values, turn, map.kind))
-
-
 def remember(recent: InputConflictsState, stamp: int, pixels: npt.NDArray[np.float32], match: Array) -> None:
-    """Add a row for an image; `match` (4,) as `matched` gives it."""
+    """Add a row for an image."""
     turn, correlation, same, time = math.nan, math.nan, 0.0, 0.0
     if recent.strip.shape == pixels.shape and len(recent.rows):
         turn, correlation = turn_and_correlation(recent.strip, pixels)
@@ -256,25 +224,22 @@ TRACK_SCALES, MIN_PAIRS, SHARE, GAIN = 3.0, 40, 0.45, 0.25
 of the tracks, and so much less on the right one."""
 REVERSED = (np.array((1.0, 1.0, -1.0)), np.array((1.0, -1.0, -1.0)))
 """Factors that put right an odometry whose heading has the wrong sign, and one whose left is its right."""
-FOREIGN_SHARE, UNLIKE = 0.12, 0.03
-"""Of a whole window at most this share of pairs agrees on any relation of the tracks: matches are drawn by chance. They
-are less similar than images of different places of the map, by more than the last."""
 CHANGING = 0.97
 """Images of a robot that drives correlate less with the ones before."""
 MISSCALED_OCTAVES, MISTURNED = 0.6, math.radians(35.0)
 """A relation of tracks is a wrong one beyond these."""
 
 
-def judge(watched: Watched, map: OfMap) -> tuple[str, str]:
+def judge(watched: Watched, length_scale_m: float) -> tuple[str, str]:
     """The first conflict that is found, by its kind and in a sentence; ("", "") where there is none."""
     for kind, finding in JUDGEMENTS.items():
-        sentence = finding(watched, map)
+        sentence = finding(watched, length_scale_m)
         if sentence:
             return kind, sentence
     return "", ""
 
 
-def frozen(watched: Watched, map: OfMap) -> str:
+def frozen(watched: Watched, length_scale_m: float) -> str:
     """The camera gives one image again and again."""
     number = int(np.argmin(watched.same[::-1])) if not watched.same.all() else len(watched.same)
     run = watched.last(number + 1)
@@ -286,7 +251,7 @@ def frozen(watched: Watched, map: OfMap) -> str:
     )
 
 
-def blind(watched: Watched, map: OfMap) -> str:
+def blind(watched: Watched, length_scale_m: float) -> str:
     """Images that show nothing."""
     recent = watched.last(MIN_BLIND).correlation
     if len(recent) < MIN_BLIND or not np.nanmedian(recent) < BLIND_CORRELATION:
@@ -298,7 +263,7 @@ def blind(watched: Watched, map: OfMap) -> str:
     )
 
 
-def turned(watched: Watched, map: OfMap) -> str:
+def turned(watched: Watched, length_scale_m: float) -> str:
     """Turns that are seen against turns that are measured."""
     seen = sure_turns(watched)
     sure = np.abs(clipped(seen[np.abs(seen) > SURE_TURN]))
@@ -329,7 +294,8 @@ def turned(watched: Watched, map: OfMap) -> str:
         )
     correlation = float(np.corrcoef(clipped(seen[known]), clipped(turns))[0, 1])
     if fit.sign < 0 and fit.as_is < REVERSED_AS_IS:
-        return f"the images turn against odometry's turns (correlation {correlation:.2f} {over}): {whose(watched, map)}"
+        blame = whose(watched, length_scale_m)
+        return f"the images turn against odometry's turns (correlation {correlation:.2f} {over}): {blame}"
     if fit.sign > 0 and abs(fit.delay_s) >= MIN_DELAY_S and fit.explained - fit.as_is > DELAY_GAIN:
         late = "after" if fit.delay_s > 0 else "before"
         return (
@@ -353,10 +319,10 @@ def sure_turns(watched: Watched) -> Array:
     return np.where(watched.correlation[1:] > SURE_CORRELATION, watched.seen[1:], np.nan)
 
 
-def whose(watched: Watched, map: OfMap) -> str:
+def whose(watched: Watched, length_scale_m: float) -> str:
     """Who is to blame for turns that are reversed: matches of mirrored images fit no track, reversed or not."""
     odometry, matches = watched.placed
-    fits = [track_fit(odometry * sign, matches, TRACK_SCALES * map.length_scale_m) for sign in REVERSED]
+    fits = [track_fit(odometry * sign, matches, TRACK_SCALES * length_scale_m) for sign in REVERSED]
     if all(fit is not None and fit.pairs >= MIN_PAIRS for fit in fits):
         share = max(fit.as_is for fit in fits if fit is not None)
         if share > SHARE:
@@ -374,10 +340,10 @@ def whose(watched: Watched, map: OfMap) -> str:
     )
 
 
-def tracked(watched: Watched, map: OfMap) -> str:
+def tracked(watched: Watched, length_scale_m: float) -> str:
     """The track of best matches against odometry's."""
     odometry, matches = watched.placed
-    fit = track_fit(odometry, matches, TRACK_SCALES * map.length_scale_m)
+    fit = track_fit(odometry, matches, TRACK_SCALES * length_scale_m)
     if fit is None or fit.pairs < MIN_PAIRS or fit.share < SHARE or fit.share - fit.as_is < GAIN:
         return ""
     agree = f"{100 * fit.share:.0f} % of {fit.pairs} pairs of images agree, as it is {100 * fit.as_is:.0f} %"
@@ -416,29 +382,10 @@ def tracked(watched: Watched, map: OfMap) -> str:
     return ""
 
 
-def foreign(watched: Watched, map: OfMap) -> str:
-    """Images of another place, or of a map that was made in another way."""
-    odometry, matches = watched.placed
-    if map.other_places is None or len(matches) < WINDOW:
-        return ""
-    fit = track_fit(odometry, matches, TRACK_SCALES * map.length_scale_m)
-    if fit is None or fit.pairs < WINDOW or fit.share > FOREIGN_SHARE:
-        return ""
-    similar = float(np.nanmedian(watched.similar))
-    if not similar < map.other_places - UNLIKE:
-        return ""
-    return (
-        f"the images fit no place of the map: their best matches are scattered ({100 * fit.share:.0f} % of {fit.pairs} "
-        f"pairs of images fit odometry) and less similar ({similar:.2f}) than the map's own images of different places "
-        f"({map.other_places:.2f}): check that the map is of this building and was made with this camera"
-    )
-
-
-JUDGEMENTS: dict[str, Callable[[Watched, OfMap], str]] = {
+JUDGEMENTS: dict[str, Callable[[Watched, float], str]] = {
     "frozen": frozen,
     "blind": blind,
     "turned": turned,
     "tracked": tracked,
-    "foreign": foreign,
 }
 """In the order in which causes hide each other."""

@@ -11,8 +11,7 @@ from omninav.stages.geometry.appearance.segments import MAX_DISTANCES, similarit
 from omninav.stages.geometry.appearance.turn_fit import explained
 from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
 from omninav.stages.geometry.plane.se2 import wrap
-from omninav.stages.values.conflicts import MapFit
-from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.maps import ReferenceGraph
 
 Array = npt.NDArray[np.float64]
@@ -50,23 +49,23 @@ class CheckMap(Stage):
     class Out(Outputs):
         """What was found."""
 
-        fit: MapFit
+        conflicts: Conflicts
 
-    def step(self, ctx: Context, map: ReferenceGraph, length_scale: LengthScale) -> Out:
+    def step(self, ctx: Context, map: ReferenceGraph) -> Out:
         """Check one map."""
         if len(map) < MIN_REFERENCES:
-            return self.Out(fit=MapFit(()))
-        sentence, other_places = of_poses(map.poses), None
+            return self.Out(conflicts=Conflicts(()))
+        sentence = of_poses(map.poses)
         if not sentence and map.features.shape[1] > 1:
-            sentence, other_places = self._of_images(map, length_scale.metres)
+            sentence = self._of_images(map)
         if sentence:
             ctx.warn(sentence)
-        return self.Out(fit=MapFit((sentence,) if sentence else (), other_places))
+        return self.Out(conflicts=Conflicts((sentence,) if sentence else ()))
 
-    def _of_images(self, map: ReferenceGraph, length_scale_m: float) -> tuple[str, float | None]:
+    def _of_images(self, map: ReferenceGraph) -> str:
         number = len(map)
         evenly = np.unique(np.linspace(0, number - 1, min(MAX_COMPARED, number)).astype(np.int64))
-        likeness, other_places, turned, headings = [], [], [], []
+        likeness, turned, headings = [], [], []
         for sample in np.unique(np.linspace(0, number - 1, min(self.samples, number)).astype(np.int64)).tolist():
             away = np.hypot(*(map.poses - map.poses[sample])[:, :2].T)
             away[sample] = math.inf
@@ -79,20 +78,16 @@ class CheckMap(Stage):
             )  # fmt: skip
             best = values.max(axis=1)
             likeness.append(float((best[: len(near), None] > best[None, len(near) :]).mean()))
-            far = away[others] > length_scale_m
-            if far.any():
-                other_places.append(float(best[len(near) :][far].max()))
             for row, reference in enumerate(near.tolist()):
                 turned.append(angle_of_peak(values[row]))
                 headings.append(float(wrap(map.poses[sample, 2] - map.poses[reference, 2])))
         like = float(np.mean(likeness))
-        level = float(np.median(other_places)) if other_places else None
         if like < MIN_LIKENESS:
             return (
                 f"the map's poses do not fit its images: a neighbour in space is more similar than another image in "
                 f"{100 * like:.0f} % of the pairs (50 % are chance): check that poses and images are in one order"
-            ), level
-        return of_headings(np.array(turned), np.array(headings)), level
+            )
+        return of_headings(np.array(turned), np.array(headings))
 
 
 def of_poses(poses: Array) -> str:

@@ -2,7 +2,6 @@ import numpy as np
 
 from omninav.pipeline import Context
 from omninav.stages.monitor.map_check import CheckMap, of_headings, of_poses
-from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 
 LINE = np.column_stack([np.arange(30) * 0.5, np.zeros(30), np.zeros(30)])
@@ -11,7 +10,7 @@ LINE = np.column_stack([np.arange(30) * 0.5, np.zeros(30), np.zeros(30)])
 def test_a_small_map_is_not_judged():
     map = ReferenceGraph(LINE[:5] * 0.0, np.ones((5, 12, 4)), "histograms", np.zeros((0, 2), np.int64), "truth")
     ctx = Context("map_check")
-    assert CheckMap().step(ctx, map, LengthScale(0.5)).fit.sentences == ()
+    assert CheckMap().step(ctx, map).conflicts.sentences == ()
     assert ctx.warnings == []
 
 
