@@ -137,7 +137,9 @@ class Intake:
         self.status.counts = self.dropped()
         unseen = f"no publisher is seen ({self.transport.place}): is the robot on, and in the same domain and reach?"
         self.status.note("robot", "" if offered or self._received else unseen)
-        self.status.note("ticks", self._unused(now))
+        self.status.note("ticks", "")
+        if not self.status.troubles:  # else that is why
+            self.status.note("ticks", self._unused(now))
 
     def _advice(self, topic: str, kind: str, offered: Mapping[str, str]) -> str:
         """Say what to type where another topic carries what is missing, or the robot has none."""

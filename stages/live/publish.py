@@ -165,13 +165,8 @@ class PublishBelief(Stage):
         poses = pose_messages(belief.poses if isinstance(belief, Particles) else belief.means)
         if self.message == "PoseArray":
             return POSE_ARRAY, {"poses": poses}
-        types = standard_types()
-        if PARTICLE_CLOUD not in types.fielddefs:
-            from rosbags.typesys import get_types_from_msg
-
-            for msgtype, definition in NAV2.items():
-                types.register(get_types_from_msg(definition, msgtype))
-        particle = types.types[PARTICLE]
+        register_nav2()
+        particle = standard_types().types[PARTICLE]
         weighted = [particle(pose, weight) for pose, weight in zip(poses, belief.weights.tolist(), strict=True)]
         return PARTICLE_CLOUD, {"particles": weighted}
 
@@ -202,6 +197,16 @@ class PublishMessages(Stage):
                 if topic in self.topics:
                     send(self._transport, self.grid if topic == "/grid" else topic, msgtype, data, latched=True)
         return self.Out()
+
+
+def register_nav2() -> None:
+    """Add nav2's messages to those that come with ROS."""
+    from rosbags.typesys import get_types_from_msg
+
+    types = standard_types()
+    if PARTICLE_CLOUD not in types.fielddefs:
+        for msgtype, definition in NAV2.items():
+            types.register(get_types_from_msg(definition, msgtype))
 
 
 def send(transport: Transport, topic: str, msgtype: str, data: bytes, latched: bool = False) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline.cli.composition import complete, composed
+from omninav.stages.live.publish import register_nav2
 from omninav.stages.live.transport import connect
 
 from . import idl_types
@@ -190,14 +191,17 @@ def test_over_zenoh(monkeypatch: pytest.MonkeyPatch, one: list[dict[str, dict[st
     pytest.importorskip("zenoh")
     from .test_zenoh_transport import router
 
-    for _ in router.__wrapped__(monkeypatch):  # type: ignore[attr-defined]
-        process = teller("zenoh", sys.executable, one)
-        try:
-            for topic, data in hear_all(connect("zenoh"), one).items():
-                check(topic, with_idl(topics_declared(one)[topic], data))
-        finally:
-            process.kill()
-            process.wait()
+    routers = router.__wrapped__(monkeypatch)  # type: ignore[attr-defined]
+    next(routers)
+    register_nav2()  # a subscription's key has the type's hash
+    process = teller("zenoh", sys.executable, one)
+    try:
+        for topic, data in hear_all(connect("zenoh"), one).items():
+            check(topic, with_idl(topics_declared(one)[topic], data))
+    finally:
+        process.kill()
+        process.wait()
+        next(routers, None)
 
 
 def with_rclpy(other_end: OtherEnd, topics: dict[str, str]) -> Iterator[tuple[str, Any]]:
