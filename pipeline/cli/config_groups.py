@@ -1,12 +1,17 @@
-"""The groups of configuration that omninav brings: which option puts which stage into a graph."""
+"""The groups of configuration that omninav brings: which option puts which stage into a graph.
+
+A group's options are its files, and, where a role of stages has its name, every stage of that role: `match=l2` takes
+`match.l2` with its defaults. A file is there for what a name alone does not say: wires, or other values.
+"""
 
 import functools
 from collections.abc import Iterable, Sequence
 from importlib.resources import files
 from importlib.resources.abc import Traversable
+from typing import Any
 
 from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
-from omninav.pipeline.graph.registry import Entry
+from omninav.pipeline.graph.registry import Entry, built_in_stage, is_role, of_role
 
 CONF = "omninav.conf"
 
@@ -43,7 +48,31 @@ def tools() -> list[str]:
 
 def is_group(name: str) -> bool:
     """Whether configuration has a group of that name."""
-    return bool(name) and files(CONF).joinpath(name).is_dir()
+    return bool(name) and (name in listed_groups() or files(CONF).joinpath(name).is_dir())
+
+
+@functools.cache
+def listed_groups() -> tuple[str, ...]:
+    """The groups that every configuration is composed of, in the order of `config.yaml`."""
+    listed = (next(iter(item)) for item in _config_file()["defaults"] if isinstance(item, dict))
+    return tuple(name for name in listed if not name.startswith("override "))
+
+
+def stage_option(group: str, name: str) -> str | None:
+    """The `_target_` of the built-in stage that an option is named after (`match=l2`), None where there is none."""
+    entry = built_in_stage(group, name) if group in listed_groups() else None
+    return entry.target if entry is not None else None
+
+
+def stage_options(group: str) -> list[str]:
+    """The built-in stages that are options of a group, by name. Imports all of them."""
+    offered = group in listed_groups() and is_role(group)
+    return [entry.name.partition(".")[2] for entry in of_role(group)] if offered else []
+
+
+def group_options(group: str) -> list[str]:
+    """All options of a group that omninav brings, by name. Imports its stages."""
+    return sorted({file.name.removesuffix(".yaml") for file in group_files(group)} | {*stage_options(group)})
 
 
 def refuse_null_groups(words: Sequence[str]) -> None:
@@ -58,18 +87,24 @@ def refuse_null_groups(words: Sequence[str]) -> None:
 
 def settings_left_open() -> list[str]:
     """The settings that are null until they are given: what a run may be of. A variant names those that it takes."""
+    return [name for name, value in _config_file().items() if value is None and name not in ("variant", "objective")]
+
+
+@functools.cache
+def _config_file() -> dict[str, Any]:
     import yaml
 
-    settings = yaml.load(files(CONF).joinpath("config.yaml").read_text(encoding="utf-8"), yaml.CSafeLoader)
-    return [name for name, value in settings.items() if value is None and name not in ("variant", "objective")]
+    text = files(CONF).joinpath("config.yaml").read_text(encoding="utf-8")
+    return dict(yaml.load(text, yaml.CSafeLoader))
 
 
 def options_with(entry: Entry) -> list[str]:
-    """What to type so that a graph has this stage (`match=l2`): the options whose file names it."""
+    """What to type so that a graph has this stage: `match=l2`, and the options whose file names it."""
+    role, _, name = entry.name.partition(".")
     if entry.origin != "built in":  # offered to Hydra under its own name
-        role, _, name = entry.name.partition(".")
         return [f"{'' if is_group(role) else '+'}{role}={name}"]
-    return _options().get(entry.target, [])
+    own = [f"{role}={name}"] if stage_option(role, name) else []
+    return list(dict.fromkeys([*own, *_options().get(entry.target, [])]))
 
 
 @functools.cache

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from importlib.resources import files
 
-from .config_groups import CONF, group_files
+from .config_groups import CONF, group_files, group_options
 
 FLAGS = ("-h", "--help")
 BLOCKS = ("defaults", "variant", "inputs", "nodes", "wires", "artifacts", "saves")
@@ -30,7 +30,7 @@ def help_text(words: Sequence[str]) -> str:
 
 
 def _options(group: str) -> str:
-    return ", ".join(file.name.removesuffix(".yaml") for file in group_files(group))
+    return ", ".join(group_options(group))
 
 
 def _of_tool(named: Sequence[str], text: str) -> str:

@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import yaml
@@ -20,7 +20,7 @@ from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.object_type import ObjectType
 from hydra.errors import ConfigCompositionException, HydraException
-from hydra.plugins.config_source import ConfigResult, ConfigSource
+from hydra.plugins.config_source import ConfigLoadError, ConfigResult, ConfigSource
 from omegaconf import OmegaConf
 from omegaconf._utils import get_yaml_loader
 from omegaconf.errors import OmegaConfBaseException
@@ -68,17 +68,48 @@ def hydra_started(folders: Sequence[str] = ()) -> Iterator[Hydra]:
 
 
 class OwnFiles(ImportlibResourcesConfigSource):
-    """omninav's own configurations, each of which a process parses once."""
+    """omninav's own configurations, each of which a process parses once, and the stages that are options by name."""
 
     @staticmethod
     def scheme() -> str:
         """What stands before its path."""
         return "own"
 
+    def load_config(self, config_path: str) -> ConfigResult:
+        """A file's content, or a node with the stage that an option is named after."""
+        if super().is_config(config_path):
+            return super().load_config(config_path)
+        target = _stage_of(config_path)
+        if target is None:
+            raise ConfigLoadError(f"Config not found : {config_path}")
+        header: dict[str, str | None] = {"package": f"nodes.{PurePosixPath(config_path).parent}"}
+        return ConfigResult(
+            self.provider, f"{self.scheme()}://{self.path}", OmegaConf.create({"_target_": target}), header
+        )
+
+    def is_config(self, config_path: str) -> bool:
+        """Whether an option is a file, or a stage's name."""
+        return super().is_config(config_path) or _stage_of(config_path) is not None
+
+    def is_group(self, config_path: str) -> bool:
+        """Whether a path is a folder, or the name of a group whose options are stages alone."""
+        return super().is_group(config_path) or config_path in listed_groups()
+
+    def list(self, config_path: str, results_filter: ObjectType | None) -> list[str]:
+        """The options of a group, those within folders of it apart."""
+        found = super().list(config_path, results_filter) if super().is_group(config_path) else []
+        stages = stage_options(config_path) if results_filter in (None, ObjectType.CONFIG) else []
+        return sorted({*found, *stages})
+
     def _read_config(self, res: Any) -> ConfigResult:
         text = res.read_text(encoding="utf-8")
         header = ConfigSource._get_header_dict(text[:512])
         return ConfigResult(self.provider, f"{self.scheme()}://{self.path}", OmegaConf.create(_parsed(text)), header)
+
+
+def _stage_of(config_path: str) -> str | None:
+    group, _, name = config_path.removesuffix(".yaml").partition("/")
+    return stage_option(group, name)
 
 
 class _YamlLoader(yaml.CSafeLoader):

@@ -203,10 +203,36 @@ def built_in() -> Iterator[Entry]:
     """The stages of omninav itself, in the order of folders and files."""
     package = importlib.import_module(BUILT_IN)
     for module_info in sorted(pkgutil.walk_packages(package.__path__, BUILT_IN + "."), key=lambda info: info.name):
-        if module_info.ispkg:
-            continue
-        module = importlib.import_module(module_info.name)
-        role, name = module_info.name.removeprefix(BUILT_IN + ".").split(".", 1)[0], module_info.name.rpartition(".")[2]
-        for cls in vars(module).values():
-            if _is_stage(cls) and cls.__module__ == module.__name__ and not inspect.isabstract(cls):
-                yield Entry(f"{role}.{name}", f"{module.__name__}.{cls.__qualname__}", "built in", first_line(cls))
+        if not module_info.ispkg:
+            yield from _entries_of(module_info.name)
+
+
+def is_role(name: str) -> bool:
+    """Whether omninav itself has stages of that role."""
+    return name.isidentifier() and importlib.util.find_spec(f"{BUILT_IN}.{name}") is not None
+
+
+def of_role(role: str) -> Iterator[Entry]:
+    """The built-in stages of a role, of each file that holds one: `role.name` leaves no doubt which is meant."""
+    package = importlib.import_module(f"{BUILT_IN}.{role}")
+    for module_info in sorted(pkgutil.iter_modules(package.__path__), key=lambda info: info.name):
+        entry = built_in_stage(role, module_info.name)
+        if entry is not None:
+            yield entry
+
+
+def built_in_stage(role: str, name: str) -> Entry | None:
+    """The stage `role.name` of omninav itself; None where the file does not exist or holds none, or several."""
+    module = f"{BUILT_IN}.{role}.{name}"
+    if not name.isidentifier() or not is_role(role) or importlib.util.find_spec(module) is None:
+        return None
+    found = list(_entries_of(module))
+    return found[0] if len(found) == 1 else None
+
+
+def _entries_of(module_name: str) -> Iterator[Entry]:
+    module = importlib.import_module(module_name)
+    role, name = module_name.removeprefix(BUILT_IN + ".").split(".", 1)[0], module_name.rpartition(".")[2]
+    for cls in vars(module).values():
+        if _is_stage(cls) and cls.__module__ == module.__name__ and not inspect.isabstract(cls):
+            yield Entry(f"{role}.{name}", f"{module.__name__}.{cls.__qualname__}", "built in", first_line(cls))

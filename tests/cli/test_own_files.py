@@ -4,7 +4,10 @@ from pathlib import Path
 
 from hydra._internal.core_plugins.importlib_resources_config_source import ImportlibResourcesConfigSource
 
+from omninav.pipeline.cli.composition import composed
+from omninav.pipeline.cli.config_groups import group_options, listed_groups
 from omninav.pipeline.cli.hydra_session import OwnFiles
+from omninav.pipeline.graph.registry import is_role, of_role
 
 CONF = Path(__file__).resolve().parents[2] / "conf"
 
@@ -16,3 +19,29 @@ def test_every_configuration_is_read_as_hydra_reads_it():
     for file in files:
         found, expected = own.load_config(file), hydras.load_config(file)  # which refuses a key that is there twice
         assert (found.config, found.header) == (expected.config, expected.header), file
+
+
+def test_a_stage_is_an_option_of_its_role_without_a_file():
+    assert not (CONF / "match" / "l2.yaml").exists()
+    with composed(["variant=omniview_mcl", "match=l2"]) as config:
+        assert config.nodes.match._target_ == "omninav.stages.match.l2.L2Match"
+        assert config.wires.match.map == "artifacts.map"  # the wires are the variant's
+
+
+def test_every_stage_of_a_group_is_among_its_options():
+    roles = [group for group in listed_groups() if is_role(group)]
+    assert {"features", "match", "fusion", "control"} <= {*roles}
+    own = OwnFiles("own", "own://omninav.conf")
+    for role in roles:
+        names = {entry.name.partition(".")[2] for entry in of_role(role)}
+        assert names <= {*group_options(role)} == {*own.list(role, None)}
+        assert all(own.is_config(f"{role}/{name}") for name in names)
+
+
+def test_a_file_that_holds_no_stage_or_several_is_no_option():
+    own = OwnFiles("own", "own://omninav.conf")
+    assert not own.is_config("match/calibration")
+    assert "calibration" not in group_options("match")
+    assert not own.is_config("fusion/growing_prior")
+    assert not own.is_config("geometry/plane")
+    assert not own.is_group("geometry")
