@@ -11,6 +11,9 @@ from omninav.stages.values.local_features import LocalFeatures
 from .rotation_reduced_sift import none_found
 from .vertical_segments import FindVerticalSegments
 
+MAX_COLUMNS = 200
+"""Largest number of prototypes; those that stand for most columns are kept."""
+
 
 class ColumnsAlone(Stage):
     """Describes a view by invariant column segments alone, without patches, to measure what these contribute.
@@ -18,8 +21,6 @@ class ColumnsAlone(Stage):
     Goedemé et al. 2007, sections 3.3 and 3.4. Raises BadInput for an image without a camera.
     """
 
-    max_columns: Annotated[int, Bounds(ge=1)] = 200
-    """The prototypes that stand for most columns are kept."""
     max_pixels: Annotated[int, Bounds(ge=1024)] = 76800
     """Larger images are made smaller; 320 x 240 is the paper's size."""
 
@@ -30,7 +31,7 @@ class ColumnsAlone(Stage):
 
     def setup(self, ctx: Context) -> None:
         """Make the detector."""
-        self._columns = FindVerticalSegments(max_segments=self.max_columns, max_pixels=self.max_pixels)
+        self._columns = FindVerticalSegments(max_segments=MAX_COLUMNS, max_pixels=self.max_pixels)
 
     def step(self, ctx: Context, image: Image | Panorama, camera: Camera | None = None) -> Out:
         """Describe one image."""

@@ -18,6 +18,8 @@ Array = npt.NDArray[np.float64]
 
 SEAM = 48
 """Columns that are repeated beyond both edges of a full circle, so that what lies across the seam is found too."""
+COLOUR_RADIUS = 3.0
+"""Radius of the disc whose colours are taken, in diameters of the feature: about what the descriptor sees."""
 
 
 class RotationReducedSift(Stage):
@@ -41,8 +43,6 @@ class RotationReducedSift(Stage):
     """OpenCV's threshold of the ratio of principal curvatures."""
     sigma: Annotated[float, Bounds(gt=0)] = 1.6
     """Blur of the first octave (px)."""
-    colour_radius: Annotated[float, Bounds(gt=0)] = 3.0
-    """Of the disc whose colours are taken, in diameters of the feature: about what the descriptor sees."""
 
     class Out(Outputs):
         """What was found, the strongest first; it may be none."""
@@ -71,7 +71,7 @@ class RotationReducedSift(Stage):
         descriptors = self._described(grey, found)
         points = np.array([point.pt for point in found], np.float64)
         sizes = np.array([point.size for point in found], np.float32)
-        colours = disc_colours(pixels, seen, points, self.colour_radius * sizes)
+        colours = disc_colours(pixels, seen, points, COLOUR_RADIUS * sizes)
         points = read.original(points - (seam, 0))
         sizes *= np.float32(read.scale)
         features = LocalFeatures(read.bearings(points), points, descriptors.astype(np.uint8), colours, sizes)

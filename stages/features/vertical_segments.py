@@ -23,6 +23,14 @@ Ints = npt.NDArray[np.int64]
 
 SAMPLES = 8
 """Of a segment's intensity profile: the paper's 8-point cosine transform."""
+BLUR_PX = 1.0
+"""Standard deviation of the smoothing before edges are searched, pixels."""
+MIN_GRADIENT = 0.25
+"""Smallest gradient of an edge, per pixel, in standard deviations of the image's intensity."""
+MIN_LENGTH_PX = 8.0
+"""Shortest segment, pixels."""
+AZIMUTH_SIGMA_DEG = 3.0
+"""Difference in azimuth that counts as one in the distance of two segments, degrees."""
 
 
 def profile_basis() -> Floats:
@@ -222,18 +230,10 @@ class FindVerticalSegments(Stage):
     """Radii of a mirror image."""
     max_pixels: Annotated[int, Bounds(ge=1024)] = 76800
     """Larger images are made smaller; 320 x 240 is the paper's size."""
-    blur_px: Annotated[float, Bounds(gt=0)] = 1.0
-    """Standard deviation of the smoothing before edges are searched."""
-    min_gradient: Annotated[float, Bounds(ge=0)] = 0.25
-    """Of an edge, per pixel, in standard deviations of the image's intensity."""
-    min_length_px: Annotated[float, Bounds(ge=2)] = 8.0
-    """Of a segment."""
     margin: Annotated[float, Bounds(ge=0)] = 0.2
     """Of its length, by which a segment is widened at both ends for its colours."""
     cluster_distance: Annotated[float, Bounds(gt=0)] = 2.0
     """Mahalanobis distance within which neighbours become one."""
-    azimuth_sigma_deg: Annotated[float, Bounds(gt=0)] = 3.0
-    """Azimuth that counts as one in that distance."""
 
     class Out(Outputs):
         """What was found, the heaviest first; it may be none."""
@@ -244,10 +244,10 @@ class FindVerticalSegments(Stage):
         """Describe one image."""
         read = prepared_image(image, camera, self.max_pixels)
         pixels, circle = self._upright(read)
-        settings = self.blur_px, self.min_gradient, self.min_length_px, self.margin
+        settings = BLUR_PX, MIN_GRADIENT, MIN_LENGTH_PX, self.margin
         found = segments_of(pixels, circle, *settings)
         width = pixels.shape[1]
-        kept, weights = prototypes(found, width, self.azimuth_sigma_deg * width / 360.0, self.cluster_distance, circle)
+        kept, weights = prototypes(found, width, AZIMUTH_SIGMA_DEG * width / 360.0, self.cluster_distance, circle)
         kept, weights = kept[: self.max_segments], weights[: self.max_segments]
         lines = np.broadcast_to(found.lines[kept, None], (len(kept), 2)).astype(np.float64)
         points = read.original(self._back(np.stack([lines, found.ends[kept]], axis=-1), read))

@@ -12,6 +12,11 @@ from omninav.stages.values.belief import Likelihood, Particles
 
 Array = npt.NDArray[np.float64]
 
+KLD_ERROR = 0.05
+"""Kullback-Leibler distance allowed with `adapt: kld` (Fox 2001)."""
+CELL_M = 0.25
+"""Width of the cells counted with `adapt: kld`, metres."""
+
 
 def kld_number(cells: int, error: float, confidence: float) -> int:
     """Samples with which the belief is within `error` (K-L distance) with `confidence`, given its occupied cells.
@@ -50,10 +55,6 @@ class ImportanceResampling(Stage):
     """Probability per image of full novelty that the robot was kidnapped."""
     recovery_share: Annotated[float, Bounds(ge=0, lt=1)] = 0.1
     """Share of the particles that are recovery particles."""
-    kld_error: Annotated[float, Bounds(gt=0)] = 0.05
-    """Kullback-Leibler distance allowed with `adapt: kld`."""
-    cell_m: Annotated[float, Bounds(gt=0)] = 0.25
-    """Width of the cells counted with `adapt: kld`."""
     cell_deg: Annotated[float, Bounds(gt=0)] = 10.0
     """Height of these cells in heading."""
 
@@ -110,5 +111,5 @@ class ImportanceResampling(Stage):
     def _wanted(self, poses: Array) -> int:
         if self.adapt == "none":
             return self.number
-        cells = occupied_cells(poses, self.cell_m, math.radians(self.cell_deg))
-        return min(max(kld_number(cells, self.kld_error, 0.99), self.min_particles), self.number)
+        cells = occupied_cells(poses, CELL_M, math.radians(self.cell_deg))
+        return min(max(kld_number(cells, KLD_ERROR, 0.99), self.min_particles), self.number)

@@ -14,6 +14,9 @@ from omninav.stages.values.belief import GaussianMixture, Particles
 
 Array = npt.NDArray[np.float64]
 
+CELL_M = 0.5
+"""Width of a cell, metres."""
+
 
 class ParticleClustering(Stage):
     """Replaces each cluster of particles by a Gaussian with its mean, covariance and weight.
@@ -23,8 +26,6 @@ class ParticleClustering(Stage):
     circular. Weights are normalised to sum 1. No Gaussian where no cluster is heavy enough: the pose is unknown.
     """
 
-    cell_m: Annotated[float, Bounds(gt=0)] = 0.5
-    """Width of a cell."""
     cell_deg: Annotated[float, Bounds(gt=0, le=120)] = 30.0
     """Height of a cell in heading."""
     min_weight: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
@@ -42,7 +43,7 @@ class ParticleClustering(Stage):
     def step(self, ctx: Context, particles: Particles) -> Out:
         """Cluster the particles."""
         floor = (self.min_sigma_m, self.min_sigma_m, math.radians(self.min_sigma_deg))
-        close = (self.cell_m, math.radians(self.cell_deg))
+        close = (CELL_M, math.radians(self.cell_deg))
         return self.Out(state=cluster_gaussians(particles, close, self.min_weight, floor))
 
 

@@ -21,6 +21,18 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 MIN_MAP_MOTION, MIN_ODOMETRY_M = 0.1, 0.05
 """Distances since the map was made, in its unit and in metres, from which they are compared for the unit in metres."""
+MAX_EPIPOLAR_ERROR_DEG = 1.0
+"""Largest angle by which the two bearings of a feature may together miss the relative pose, degrees."""
+MAX_RESECTION_ERROR_DEG = 2.0
+"""Largest angle by which a bearing may miss its feature's position in the map, degrees."""
+MIN_PARALLAX_DEG = 1.0
+"""Smallest parallax of a feature that is triangulated, degrees."""
+REBUILD_RATIO = 1.5
+"""Ratio of matches to the first inliers from which the map is rebuilt, if as many agree."""
+ARRIVAL_DISTANCE = 0.05
+"""Distance to the target, over the features' typical distance, below which the two views must look the same."""
+MAX_OUTLIER_DEG = 10.0
+"""Largest angle between most matched bearings at the target, after the turn, degrees."""
 
 
 class Matches(NamedTuple):
@@ -66,24 +78,12 @@ class LocalMapping(Stage):
     """Of the first relative pose; `eight_point` is the paper's. `planar` keeps the robot on the floor later too."""
     refine: bool = True
     """Whether poses that samples agree on are brought to their local optimum; the paper keeps the best sample's."""
-    max_epipolar_error_deg: Annotated[float, Bounds(gt=0)] = 1.0
-    """By which the two bearings of a feature may together miss the relative pose."""
-    max_resection_error_deg: Annotated[float, Bounds(gt=0)] = 2.0
-    """By which a bearing may miss its feature's position in the map."""
     min_inliers: Annotated[int, Bounds(ge=4)] = 6
     """Features that must agree with a pose."""
     max_false_alarms: Annotated[float, Bounds(gt=0)] = 0.01
     """Expected number of wrong relative poses with which as many features agree by chance."""
-    min_parallax_deg: Annotated[float, Bounds(ge=0)] = 1.0
-    """Features with less are not triangulated."""
-    rebuild_ratio: Annotated[float, Bounds(ge=1)] = 1.5
-    """Matches over the first inliers from which the map is rebuilt, if as many agree."""
     min_rebuild_distance: Annotated[float, Bounds(ge=0)] = 0.1
     """To the target, over the features' typical distance: closer, the baseline is too short for a new map."""
-    arrival_distance: Annotated[float, Bounds(ge=0)] = 0.05
-    """To the target, over the features' typical distance: closer, the two views must look the same."""
-    max_outlier_deg: Annotated[float, Bounds(gt=0)] = 10.0
-    """By which most matched bearings may differ at the target, after the turn."""
 
     class Out(Outputs):
         """Absent where there is no target; `tracks` are those of the tracker, with what the map says of them."""
@@ -128,7 +128,7 @@ class LocalMapping(Stage):
             local_map = self._resection(ctx, local_map, tracks, fresh)
             if local_map.state == "tracking":
                 if self._could_be_better(local_map, len(fresh.rows)):
-                    more = round(self.rebuild_ratio * local_map.first_inliers)
+                    more = round(REBUILD_RATIO * local_map.first_inliers)
                     new, _ = self._made(ctx, state, local_map, fresh, more)
                     if new is not None:
                         return new
@@ -161,7 +161,7 @@ class LocalMapping(Stage):
         bearings = np.concatenate([bearings, matches.first[matched]])
         places = np.concatenate([places, local_map.places[owners]])
         usable = np.isfinite(bearings).all(axis=1)
-        threshold = math.radians(self.max_resection_error_deg)
+        threshold = math.radians(MAX_RESECTION_ERROR_DEG)
         found = three_point_pose(
             bearings[usable], places[usable], ctx.rng, threshold, refine=self.refine, planar=self.solver == "planar"
         )
@@ -192,15 +192,15 @@ class LocalMapping(Stage):
     def _could_be_better(self, local_map: LocalMap, matches: int) -> bool:
         # Closer to the target more is matched with it; at the target the baseline is too short.
         far = local_map.distance() > self.min_rebuild_distance * local_map.depth()
-        return far and matches > self.rebuild_ratio * local_map.first_inliers
+        return far and matches > REBUILD_RATIO * local_map.first_inliers
 
     def _contradicted(self, local_map: LocalMap, matches: Matches) -> bool:
         # At the target a matched feature has the target view's bearing, but for the turn.
-        near = local_map.distance() <= self.arrival_distance * local_map.depth()
+        near = local_map.distance() <= ARRIVAL_DISTANCE * local_map.depth()
         if not near or local_map.inliers > len(matches.rows) / 3:
             return False
         turned = matches.second @ (local_map.rotation.T @ local_map.goal_rotation).T
-        chord = 2.0 * math.sin(math.radians(self.max_outlier_deg) / 2.0)
+        chord = 2.0 * math.sin(math.radians(MAX_OUTLIER_DEG) / 2.0)
         same = np.linalg.norm(turned - matches.first, axis=1) < chord
         return bool(np.count_nonzero(same) < len(matches.rows) / 2)
 
@@ -210,7 +210,7 @@ class LocalMapping(Stage):
         """A map of two views, or None with the reason."""
         good = np.isfinite(matches.first).all(axis=1) & np.isfinite(matches.second).all(axis=1)
         first, points, second = matches.first[good], matches.points[good], matches.second[good]
-        threshold = math.radians(self.max_epipolar_error_deg)
+        threshold = math.radians(MAX_EPIPOLAR_ERROR_DEG)
         found = relative_pose(first, second, ctx.rng, self.solver, threshold, refine=self.refine)
         inliers = 0 if found is None else int(np.count_nonzero(found.inliers))
         agree = f"{inliers} of {len(first)} matches with the target view agree"
@@ -219,11 +219,11 @@ class LocalMapping(Stage):
         if false_alarms(found, first, second, threshold) > self.max_false_alarms:
             return None, f"{agree}, as they might by chance"
         places = triangulate(first, second, found.rotation, found.translation)
-        wide = parallax(first, second, found.rotation) >= math.radians(self.min_parallax_deg)
+        wide = parallax(first, second, found.rotation) >= math.radians(MIN_PARALLAX_DEG)
         chosen = found.inliers & wide & np.isfinite(places).all(axis=1)
         if np.count_nonzero(chosen) < 3:  # the views are almost the same, and all features are far away
             chosen = found.inliers
-            places = first / math.sin(math.radians(max(self.min_parallax_deg, 0.5)))
+            places = first / math.sin(math.radians(max(MIN_PARALLAX_DEG, 0.5)))
         unit, metres = 1.0, 0.0
         if len(old):
             scale = max(old.distance(), 1e-3)

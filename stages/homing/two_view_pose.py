@@ -8,6 +8,9 @@ from omninav.stages.geometry.two_views.generate_and_select import generate_and_s
 from omninav.stages.geometry.two_views.relative_pose_ransac import Solver, relative_pose
 from omninav.stages.values.two_views import BearingPairs, RelativeView
 
+MAX_ERROR_DEG = 0.5
+"""Largest angle by which the two bearings of a pair may together miss the pose, degrees."""
+
 
 class TwoViewPose(Stage):
     """Relative pose of two views from pairs of bearings of which many are wrong, by one of four solvers.
@@ -19,8 +22,6 @@ class TwoViewPose(Stage):
     solver: Solver | Literal["generate_and_select"] = "planar"
     """`planar`: two pairs in a sample, for a robot on a floor; `five_point`; `eight_point`, the paper's;
     `generate_and_select`, which draws no samples and refines nothing."""
-    max_error_deg: Annotated[float, Bounds(gt=0)] = 0.5
-    """By which the two bearings of a pair may together miss the pose."""
     confidence: Annotated[float, Bounds(gt=0, lt=1)] = 0.9999
     """With which a sample without a wrong pair is among those that are drawn."""
     max_samples: Annotated[int, Bounds(ge=1)] = 5000
@@ -35,7 +36,7 @@ class TwoViewPose(Stage):
 
     def step(self, ctx: Context, pairs: BearingPairs) -> Out:
         """Solve one problem."""
-        threshold = math.radians(self.max_error_deg)
+        threshold = math.radians(MAX_ERROR_DEG)
         if self.solver == "generate_and_select":
             found = generate_and_select(pairs.first, pairs.second, threshold)
         else:

@@ -14,6 +14,13 @@ from omninav.stages.values.image import Image, Panorama
 from .column_table import ColumnTable
 from .column_warping import Columns, warped
 
+NOISE_LEVELS = 14.0
+"""Difference of intensity (of 255) that the same thing may have in two views; smaller ones count for more."""
+HALF_WINDOW = 1
+"""Columns on both sides of one that are compared together with it."""
+MIN_FEATURES = 18
+"""Features that must agree with a vector of two views alone; with fewer, whole images decide."""
+
 
 class WarpingVectorState(State):
     """`target`: the number of the target; `nearness`: at the first vector towards it, 0 before that."""
@@ -36,14 +43,8 @@ class WarpingVector(Stage):
 
     columns: Annotated[int, Bounds(ge=24, le=720)] = 180
     """Columns that an image is brought to; a multiple of 4."""
-    noise_levels: Annotated[float, Bounds(gt=0, le=255)] = 14.0
-    """Of 255, by which the same thing may differ in two views; where less does, that counts for more."""
-    half_window: Annotated[int, Bounds(ge=0, le=10)] = 1
-    """Columns on both sides of one that are compared together with it."""
     max_turn_deg: Annotated[float, Bounds(ge=0, le=180)] = 180.0
     """To both sides, by which the target's heading may differ from the robot's; 180: by any. With a compass less."""
-    min_features: Annotated[int, Bounds(ge=0)] = 18
-    """That must agree with the local map's vector where it is of two views alone; with fewer, whole images decide."""
     min_columns: Annotated[int, Bounds(ge=1)] = 20
     """That match better than by chance; with fewer the local map's vector stays, or the target is lost."""
 
@@ -71,14 +72,14 @@ class WarpingVector(Stage):
         """One homing vector; `vector`: the local map's, `target`: the image to go to."""
         if vector.number != state.target:
             state.target, state.nearness = vector.number, 0.0
-        weak = vector.state == "lost" or (vector.state == "new" and vector.inliers < self.min_features)
+        weak = vector.state == "lost" or (vector.state == "new" and vector.inliers < MIN_FEATURES)
         if not weak or target is None:
             return self.Out(vector=vector)
         if self._target is None or self._target[0] is not target:
             self._target = target, self._columns(target, camera)
         here = self._columns(image, camera)
-        noise = (self.noise_levels / 255.0) ** 2
-        found = warped(here, self._target[1], noise, self.half_window, 2, math.radians(self.max_turn_deg))
+        noise = (NOISE_LEVELS / 255.0) ** 2
+        found = warped(here, self._target[1], noise, HALF_WINDOW, 2, math.radians(self.max_turn_deg))
         if found.columns < self.min_columns:
             ctx.count("too_few_columns")
             if vector.state == "lost":

@@ -22,6 +22,9 @@ QUANTITIES = {
     "straightened.moved_max_m": Quantity(title="References moved by, largest", context=True),
 }
 
+MIN_EXCESS = 0.7
+"""Share of the similarity above the background that a closure keeps; half of it is left a length scale away."""
+
 
 class StraightenMap(Stage):
     """Corrects the references' poses in a map made by odometry so that loop closures become consistent.
@@ -35,8 +38,6 @@ class StraightenMap(Stage):
     graph-based SLAM". Defaults: docs/experiments/straightened_maps.md.
     """
 
-    min_excess: Annotated[float, Bounds(gt=0, lt=1)] = 0.7
-    """Share of the similarity above the background that a closure keeps; half of it is left a length scale away."""
     min_gap: Annotated[float, Bounds(gt=0)] = 5.0
     """Way along the drive, in length scales, after which two references may close a loop."""
     closure_sigma: Annotated[float, Bounds(gt=0)] = 0.5
@@ -66,7 +67,7 @@ class StraightenMap(Stage):
         driven = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
         closures = closures_by_appearance(
             map.features[:], driven, map.kind == "histograms", MAX_DISTANCES[map.kind], self.headings,
-            self.min_excess, self.min_gap * unit, self.samples,
+            MIN_EXCESS, self.min_gap * unit, self.samples,
         )  # fmt: skip
         if not len(closures.pairs):
             ctx.fact(

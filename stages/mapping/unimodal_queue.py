@@ -16,6 +16,9 @@ from omninav.stages.values.views import WholeView
 
 from .unimodality import unimodal_state
 
+NEAR_BELOW = 7.81
+"""Squared Mahalanobis distance that counts as near: the 95 % quantile for three degrees of freedom."""
+
 
 class UnimodalQueueState(State):
     """Updates that wait, the last unimodal state, and the views and motions since then."""
@@ -45,8 +48,6 @@ class UnimodalQueue(Stage):
     state has one component."""
     min_share: Annotated[float, Bounds(ge=0, lt=1)] = 0.5
     """Share of the weight near the heaviest component."""
-    near_below: Annotated[float, Bounds(ge=0)] = 7.81
-    """Squared Mahalanobis distance that counts as near."""
     max_sigma_m: Annotated[float, Bounds(ge=0)] = 0.0
     """Largest standard deviation of a unimodal state's position; 0: any."""
     max_sigma_deg: Annotated[float, Bounds(gt=0)] = 45.0
@@ -100,7 +101,7 @@ class UnimodalQueue(Stage):
         # The state as one Gaussian, where it is unimodal.
         if self.unimodal == "single" and len(state) > 1:
             return None
-        unimodal = unimodal_state(state, self.min_share, self.near_below)
+        unimodal = unimodal_state(state, self.min_share, NEAR_BELOW)
         if unimodal is None:
             return None
         mean, covariance = unimodal

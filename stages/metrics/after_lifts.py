@@ -18,6 +18,9 @@ QUANTITIES = {
     "lifts.never": Quantity(title="Times lifted and not right again", better="lower"),
 }
 
+JUMP_M = 0.5
+"""Distance between true motion and odometry of one frame from which the robot was lifted, metres."""
+
 
 class AfterLifts(Stage):
     """Measures the time from each lifting of the robot until the estimate is right again, in the last log.
@@ -31,8 +34,6 @@ class AfterLifts(Stage):
     it never was. Nothing where it was not lifted, or without ground truth.
     """
 
-    jump_m: Annotated[float, Bounds(gt=0)] = 0.5
-    """Distance (m) between true motion and odometry of one frame from which the robot was lifted."""
     jump_deg: Annotated[float, Bounds(gt=0)] = 15.0
     """The same of their turns (degrees)."""
 
@@ -47,7 +48,7 @@ class AfterLifts(Stage):
         log = log.at(known(log.truth) & known(log.estimate))
         if not len(log):
             return self.Out()
-        starts = lifted(log, self.jump_m, self.jump_deg).tolist()
+        starts = lifted(log, JUMP_M, self.jump_deg).tolist()
         if not starts:
             return self.Out()
         metres, degrees = position_errors(log.estimate, log.truth), heading_errors_deg(log.estimate, log.truth)

@@ -8,6 +8,11 @@ from omninav.pipeline import Bounds, Context, Metrics, Outputs, Stage
 from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.values.drive import Array, Drive, known
 
+SMALL_M = 0.4
+"""Largest error that is small, metres."""
+LARGE_M = 2.0
+"""Error above which it is large, metres."""
+
 
 class ErrorHistograms(Stage):
     """Counts how often position errors of each size occur, in every log that has ground truth.
@@ -21,10 +26,6 @@ class ErrorHistograms(Stage):
     """Width (m) of a bin."""
     bins: Annotated[int, Bounds(ge=2)] = 16
     """Number of bins."""
-    small_m: Annotated[float, Bounds(gt=0)] = 0.4
-    """Largest error (m) that is small."""
-    large_m: Annotated[float, Bounds(gt=0)] = 2.0
-    """Error (m) above which it is large."""
     skip: Annotated[float, Bounds(ge=0, lt=1)] = 0.0
     """Share of each log's frames, from its start, that does not count."""
 
@@ -45,6 +46,6 @@ class ErrorHistograms(Stage):
         return {
             "error_m": ((np.arange(self.bins) + 0.5) * self.bin_m).tolist(),
             "share": (np.bincount(bins, minlength=self.bins) / len(errors)).tolist(),
-            "small": float((errors <= self.small_m).mean()),
-            "large": float((errors > self.large_m).mean()),
+            "small": float((errors <= SMALL_M).mean()),
+            "large": float((errors > LARGE_M).mean()),
         }

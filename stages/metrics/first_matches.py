@@ -21,6 +21,11 @@ Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 Each = TypeVar("Each")
 
+COLUMN_RATIO = 0.8
+"""Largest ratio of the nearest to the second nearest distance of vertical segments that match."""
+COLUMN_WITHIN_DEG = 3.0
+"""Largest angle by which a right match of vertical segments may miss the true bearings of their ends, degrees."""
+
 
 class Judged(NamedTuple):
     """A pair of images: which of its matches are `right`, the best first; the share of wrong partners that pass as
@@ -78,14 +83,10 @@ class FirstMatches(Stage):
     kinds)."""
     ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
     """Largest ratio of the nearest to the second nearest patch."""
-    column_ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
-    """The same of vertical segments."""
     colour: Annotated[float, Bounds(gt=0)] = 0.5
     """Largest distance between the colours of two patches."""
     within_deg: Annotated[float, Bounds(gt=0)] = 2.0
     """Largest angle (degrees) between a patch and where its partner's point is seen."""
-    column_within_deg: Annotated[float, Bounds(gt=0)] = 3.0
-    """The same of a vertical segment's ends."""
     epipolar_deg: Annotated[float, Bounds(gt=0)] = 1.0
     """Largest angle (degrees) to the epipolar plane, where depths are not known."""
 
@@ -138,7 +139,7 @@ class FirstMatches(Stage):
             chances.append(self._right_patches(one, other, shifted(pairs), moved, lens))
             features += len(one.patches)
         if self.by != "patches" and one.columns is not None and other.columns is not None:
-            pairs = mahalanobis_matches(one.columns.descriptors, other.columns.descriptors, self.column_ratio)
+            pairs = mahalanobis_matches(one.columns.descriptors, other.columns.descriptors, COLUMN_RATIO)
             rights.append(self._right_columns(one, other, pairs, moved))
             ratios.append(pairs.distance if self.best == "nearest" else pairs.ratio)
             chances.append(self._right_columns(one, other, shifted(pairs), moved))
@@ -183,7 +184,7 @@ class FirstMatches(Stage):
                 right &= right_by_epipolar(first[:, end], second[:, end], moved, limit)
             else:
                 near, far = one.depths.ends[pairs.first, end], other.depths.ends[pairs.second, end]
-                limit = math.radians(self.column_within_deg)
+                limit = math.radians(COLUMN_WITHIN_DEG)
                 right &= right_by_depth(first[:, end], second[:, end], near, far, moved, limit)
         return right
 

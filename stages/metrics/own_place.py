@@ -20,6 +20,11 @@ QUANTITIES = {
     "own_place.told_rate": Quantity(title="More similar to its own place than to all others", better="higher"),
 }
 
+NEARBY_M = (0.5, 1.5)
+"""Distances between which a view is nearby, metres."""
+ELSEWHERE_M = 5.0
+"""Distance from which a view is of another place, metres."""
+
 
 class Likeness(Value):
     """Similarities of a view: to the map's view of its own place (`own`), to those `nearby` (mean; NaN where there
@@ -41,10 +46,6 @@ class OwnPlace(Stage):
 
     own_m: Annotated[float, Bounds(gt=0)] = 0.1
     """Distance (m) up to which a reference is of the same place."""
-    nearby_m: tuple[float, float] = (0.5, 1.5)
-    """Distances (m) between which it is nearby."""
-    elsewhere_m: Annotated[float, Bounds(gt=0)] = 5.0
-    """Distance (m) from which it is of another place."""
     within_deg: Annotated[float, Bounds(gt=0, le=180)] = 5.0
     """Largest difference between the robot's heading and that of a reference, turned as compared."""
 
@@ -64,8 +65,8 @@ class OwnPlace(Stage):
         column = np.round((truth.heading - map.poses[:, 2]) * headings / (2 * np.pi)).astype(np.int64) % headings
         turned = wrap(map.poses[:, 2] + 2 * np.pi * column / headings - truth.heading)
         alike, same_way = values[np.arange(len(values)), column], np.abs(np.degrees(turned)) <= self.within_deg
-        own, elsewhere = (away <= self.own_m) & same_way, away >= self.elsewhere_m
-        nearby = (away >= self.nearby_m[0]) & (away <= self.nearby_m[1]) & same_way
+        own, elsewhere = (away <= self.own_m) & same_way, away >= ELSEWHERE_M
+        nearby = (away >= NEARBY_M[0]) & (away <= NEARBY_M[1]) & same_way
         if not own.any() or not elsewhere.any():
             return self.Out()
         best = values[elsewhere].max(axis=1)

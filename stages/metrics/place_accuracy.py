@@ -20,6 +20,9 @@ QUANTITIES = {
 }
 HEADLINES = tuple(f"localisation.{name}" for name in ("accuracy", "adjacent_accuracy", "place_distance_m", "images"))
 
+TOLERANCE_M = 0.5
+"""Distance by which a medoid may be farther than the closest for `tolerant_accuracy_after`, metres."""
+
 
 class PlaceAccuracy(Stage):
     """Measures how often the most probable place is the one truly nearest to the robot.
@@ -36,8 +39,6 @@ class PlaceAccuracy(Stage):
 
     updates: Annotated[int, Bounds(ge=1)] = 5
     """Length of the lists by update."""
-    tolerance_m: Annotated[float, Bounds(ge=0)] = 0.5
-    """How much further away (m) than the closest a medoid may be for `tolerant_accuracy_after`."""
 
     class Out(Outputs):
         """`metrics`: the entry `localisation` of metrics.json; absent where poses or the map's are not ground truth."""
@@ -76,7 +77,7 @@ class PlaceAccuracy(Stage):
             "accuracy_after": _after(rights, after, self.updates),
             "adjacent_accuracy_after": _after(nears, after, self.updates),
             "image_accuracy_after": _after(within, after, self.updates),
-            "tolerant_accuracy_after": _after(metres_off - least <= self.tolerance_m, after, self.updates),
+            "tolerant_accuracy_after": _after(metres_off - least <= TOLERANCE_M, after, self.updates),
             "place_distance_m": float(np.median(metres_off)),
             "nearest_place_distance_m": float(np.median(least)),
         }

@@ -10,6 +10,11 @@ from omninav.stages.geometry.plane.pose_errors import first_settled, heading_err
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.drive import Drive, known
 
+UNIMODAL_SHARE = 0.5
+"""Share of the belief that its heaviest mode must hold to be the only one; from a half on no other is as heavy."""
+KIDNAPPED_M = 1.0
+"""Distance between true motion and odometry that counts as a kidnapping, metres."""
+
 
 class SuccessRate(Stage):
     """Measures the share of frames in which the estimate is close to the truth, and how soon it is after a kidnapping.
@@ -26,10 +31,6 @@ class SuccessRate(Stage):
     """Largest position error (m) of a good frame."""
     within_deg: Annotated[float, Bounds(gt=0, le=180)] = 35.0
     """Largest heading error (degrees) of a good frame."""
-    unimodal_share: Annotated[float, Bounds(gt=0, le=1)] = 0.5
-    """Share of the belief that its heaviest mode must hold to be the only one; from a half on no other is as heavy."""
-    kidnapped_m: Annotated[float, Bounds(gt=0)] = 1.0
-    """Distance (m) between true motion and odometry that counts as a kidnapping."""
 
     class Out(Outputs):
         """`metrics`: the entry `success` of metrics.json; absent without ground truth."""
@@ -70,13 +71,13 @@ class SuccessRate(Stage):
         truth, estimate, frames = drive.truth[scored], drive.estimate[scored], np.flatnonzero(scored)
         position, heading = position_errors(estimate, truth), heading_errors_deg(estimate, truth)
         good = (position <= self.within_m) & (heading <= self.within_deg)  # a frame without estimate is not
-        single = good & (drive.mode_weight[scored] >= self.unimodal_share)
+        single = good & (drive.mode_weight[scored] >= UNIMODAL_SHARE)
         result: dict[str, Any] = {
             "within_rate": float(good.mean()),
             "at_end": float(good[-1]),
             "unimodal_after_frames": int(frames[np.argmax(single)]) if single.any() else None,
         }
-        kidnapped = kidnapped_before(drive, self.kidnapped_m)
+        kidnapped = kidnapped_before(drive, KIDNAPPED_M)
         if len(kidnapped):
             at = int(kidnapped[-1])
             later = int(np.searchsorted(frames, at))

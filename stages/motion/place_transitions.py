@@ -12,6 +12,9 @@ from omninav.stages.values.topological_map import TopologicalMap
 
 Array = npt.NDArray[np.float64]
 
+TELEPORT_PROBABILITY = 0.01
+"""Probability of being at any place next, so that a robot that was carried is found."""
+
 
 class PlaceTransitions(Stage):
     """Predicts the place: near ones are more probable than far ones, by a Gaussian over the links between them.
@@ -23,8 +26,6 @@ class PlaceTransitions(Stage):
 
     sigma_links: Annotated[float, Bounds(gt=0)] | None = None
     """sigma; null: the standard deviation of dist over the map, as in the paper."""
-    teleport_probability: Annotated[float, Bounds(ge=0, le=1)] = 0.01
-    """Of being at any place next, so that a robot that was carried is found."""
 
     class Out(Outputs):
         """What is believed before the present view is looked at."""
@@ -41,7 +42,7 @@ class PlaceTransitions(Stage):
         if self._map is not map:
             self._map = map
             self._probabilities = transitions(
-                links_between(map.links, len(map)), self.sigma_links, self.teleport_probability
+                links_between(map.links, len(map)), self.sigma_links, TELEPORT_PROBABILITY
             )
         return self.Out(belief=PlaceBelief(belief.probabilities @ self._probabilities, belief.poses))
 

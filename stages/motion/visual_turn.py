@@ -16,6 +16,11 @@ from omninav.stages.values.pose import GuessedMotion, Motion
 
 from .odometry_noise import OdometryNoiseModel
 
+FLOOR_DEG = 0.02
+"""Smallest standard deviation of a turn seen in the images, degrees."""
+EXPLAINED_SIGMAS = 2.0
+"""Gap between the two turns that odometry explains, in its standard deviations."""
+
 
 class VisualTurnState(State):
     """The last panorama in grey (rows, columns)."""
@@ -36,13 +41,9 @@ class VisualTurn(OdometryNoiseModel, Stage):
 
     scale: Annotated[float, Bounds(ge=1)] = 3.0
     """Factor on the standard deviation of a visual turn that the scatter of the flow alone would tell."""
-    floor_deg: Annotated[float, Bounds(gt=0)] = 0.02
-    """Its smallest standard deviation."""
     max_sigma_deg: Annotated[float, Bounds(ge=0)] = 2.0
     """Its largest one, beyond which odometry alone counts; 0: always."""
 
-    explained_sigmas: Annotated[float, Bounds(gt=0)] = 2.0
-    """Gap between the two turns that odometry explains, in its standard deviations."""
     max_smoothness: Annotated[float, Bounds(gt=0, le=4)] = 2.7
     """Mean squared difference of pixels two columns apart over that of neighbours, above which odometry alone counts:
     some 2 where each column has detail of its own, towards 4 where columns are interpolated."""
@@ -66,13 +67,13 @@ class VisualTurn(OdometryNoiseModel, Stage):
         model = self.model(motion)
         direction = model.steps[0] if abs(model.steps[1]) > 1e-9 else 0.0
         seen = turn_by_flow(last, grey, motion.turn, direction)
-        sigma = math.hypot(self.scale * seen.sigma, math.radians(self.floor_deg))
+        sigma = math.hypot(self.scale * seen.sigma, math.radians(FLOOR_DEG))
         if not sigma <= math.radians(self.max_sigma_deg):
             ctx.count("turn_not_seen")
             return self.Out(motion=motion)
         variance = model.sigmas[0] ** 2 + model.sigmas[2] ** 2
         gap = float(wrap(seen.turn - motion.turn))
-        change = gap * variance / max(variance + sigma**2, (gap / self.explained_sigmas) ** 2)
+        change = gap * variance / max(variance + sigma**2, (gap / EXPLAINED_SIGMAS) ** 2)
         cos, sin = math.cos(change / 2.0), math.sin(change / 2.0)
         turned = replace(
             motion,

@@ -11,6 +11,9 @@ from omninav.stages.values.image import Panorama
 Mask = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
 
+WIDTH_DEG = 40.0
+"""Mean width of a segment, degrees."""
+
 
 def random_parts(rng: np.random.Generator, whole: int, parts: int) -> Ints:
     """Split `whole` at random into `parts` integers >= 0, all splits equally likely: (parts,).
@@ -68,8 +71,6 @@ class ColourNoise(Stage):
     """Share of the image that is covered."""
     shape: Literal["sectors", "rectangles"] = "sectors"
     """`sectors`: over the full height, like people close to the camera, and as the paper uses the word segment."""
-    width_deg: Annotated[float, Bounds(gt=0, le=360)] = 40.0
-    """Mean width of a segment."""
     mean: float = 128.0
     """Mean of each pixel's blue, green and red (0..255)."""
     sigma: Annotated[float, Bounds(ge=0)] = 64.0
@@ -91,7 +92,7 @@ class ColourNoise(Stage):
         rng = ctx.rng if self.pattern is None else np.random.default_rng([self.pattern, tick.log, tick.frame])
         rows, columns = panorama.pixels.shape[:2]
         shape = sectors if self.shape == "sectors" else rectangles
-        mask = shape(rng, rows, columns, self.share, self.width_deg / 360.0)
+        mask = shape(rng, rows, columns, self.share, WIDTH_DEG / 360.0)
         pixels = panorama.pixels.copy()
         noise = rng.normal(self.mean, self.sigma, (int(mask.sum()), 3))
         pixels[mask] = np.clip(np.rint(noise), 0, 255).astype(np.uint8)

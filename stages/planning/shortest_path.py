@@ -21,6 +21,11 @@ Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.int64]
 
+MAX_VISUAL_DISTANCE = 0.5
+"""Largest visual distance between a goal's image and its place: the paper's size of places."""
+MIN_PROBABILITY = 0.5
+"""Smallest probability of the most probable place to plan from it."""
+
 
 class ShortestPathPlannerState(State):
     """The route so far: its number and places, and how many of its views lead to each place.
@@ -64,12 +69,8 @@ class ShortestPathPlanner(Stage):
     goal: str | int | None = None
     """A place's number or name (of several of that name the nearest), or an image file: the place that looks most like
     it."""
-    max_visual_distance: Annotated[float, Bounds(gt=0)] = 0.5
-    """Between a goal's image and its place: the paper's size of places."""
     cost: Literal["links", "views"] = "links"
     """Of a link: one (the paper's), or as many as views have to be driven to."""
-    min_probability: Annotated[float, Bounds(gt=0, le=1)] = 0.5
-    """Of the most probable place, to plan from it."""
     settle_s: Annotated[float, Bounds(ge=0)] = 1.0
     """Time for which the robot looks before it plans, even if it is sure."""
     locate_timeout_s: Annotated[float, Bounds(gt=0)] = 5.0
@@ -109,7 +110,7 @@ class ShortestPathPlanner(Stage):
             medoids = map.poses[map.places][:, :2]
             state.asked = int(np.argmin(np.hypot(*(medoids - (point.x, point.y)).T)))
             state.renewed, state.ended, state.waiting_since = True, "", None
-        pictured = None if image is None else place_in_image(self.goal, image, self.max_visual_distance, map)
+        pictured = None if image is None else place_in_image(self.goal, image, MAX_VISUAL_DISTANCE, map)
         goals = places_called(self.goal, map) if pictured is None else pictured
         goals = goals if state.asked < 0 else np.array([state.asked], np.int64)
         if state.ended or not self._must_plan(state, tick, belief, status, progress):
@@ -148,9 +149,9 @@ class ShortestPathPlanner(Stage):
         failing = _failing(state, progress.at, lost=True) if progress is not None and state.number >= 0 else None
         if failing is not None and status is not None and status.state == "lost" and _same(state, failing).any():
             place, _ = _likeliest(belief.probabilities, state)
-            elsewhere = place not in failing and belief.probabilities[place] >= self.min_probability
+            elsewhere = place not in failing and belief.probabilities[place] >= MIN_PROBABILITY
             return bool(elsewhere and waited_s >= self.settle_s) or waited_s >= self.search_s
-        sure = belief.probabilities.max() >= self.min_probability and waited_s >= self.settle_s
+        sure = belief.probabilities.max() >= MIN_PROBABILITY and waited_s >= self.settle_s
         return bool(sure) or waited_s >= self.locate_timeout_s
 
     def _plan(

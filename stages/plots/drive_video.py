@@ -22,6 +22,9 @@ from .target_images import target_of
 from .video import encoded
 from .video_frames import FrameState, VideoFrames
 
+AROUND_M = 2.5
+"""Distance around the robot that the lower plan shows, metres."""
+
 
 class DriveVideo(Stage):
     """Writes `drive.mp4`: a frame for every snapshot of homing.
@@ -37,8 +40,6 @@ class DriveVideo(Stage):
     """Largest number of frames, some 40 kB and 0.3 s each; of a long drive every second snapshot, or every third."""
     after_s: Annotated[float, Bounds(ge=0)] = 1.5
     """Seconds that are shown after the robot has arrived or given up."""
-    around_m: Annotated[float, Bounds(gt=0)] = 2.5
-    """Metres around the robot that the lower plan shows."""
 
     class Out(Outputs):
         """`figure`: the video for the report; absent where nothing was seen."""
@@ -86,7 +87,7 @@ class DriveVideo(Stage):
                     statuses[row],
                 )
             )
-        frames = VideoFrames(states, path, plan, map, self.around_m)
+        frames = VideoFrames(states, path, plan, map, AROUND_M)
         ctx.doing(f"drawing a video of {len(frames)} frames")
         video = encoded(frames, self.per_second)
         name = f"drive{video.suffix}"

@@ -13,6 +13,9 @@ from omninav.stages.values.visual_words import WordSimilarities
 
 Array = npt.NDArray[np.float64]
 
+MIN_LIKELIHOOD = 0.001
+"""Smallest likelihood of a place, over that of one that looks the same: views are blocked."""
+
 
 class PlaceLikelihood(Stage):
     """Computes the likelihood of each place: it falls with the visual distance of its view to the present one.
@@ -25,8 +28,6 @@ class PlaceLikelihood(Stage):
 
     sigma: Annotated[float, Bounds(gt=0)] | None = None
     """Of visual distance; null: the spread that the map was measured to have within its places."""
-    min_likelihood: Annotated[float, Bounds(gt=0, le=1)] = 0.001
-    """Of a place, over that of one that looks the same: views are blocked."""
     tail: Literal["gaussian", "heavy"] = "heavy"
     """`gaussian`: the paper's; `heavy`: 1 / (1 + diss^2 / sigma^2)."""
 
@@ -43,9 +44,9 @@ class PlaceLikelihood(Stage):
     ) -> Out:
         """Weigh all places."""
         sigma = map.spread if self.sigma is None else self.sigma
-        values = place_likelihoods(distances.distances, sigma, self.min_likelihood, self.tail)
+        values = place_likelihoods(distances.distances, sigma, MIN_LIKELIHOOD, self.tail)
         if words is not None:
-            values = values * word_likelihoods(words.values, self.word_contrast, self.min_likelihood)
+            values = values * word_likelihoods(words.values, self.word_contrast, MIN_LIKELIHOOD)
         return self.Out(likelihood=Likelihood(values))
 
 
