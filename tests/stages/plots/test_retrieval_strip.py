@@ -6,7 +6,6 @@ from small_run import collected, small_run
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
 from omninav.stages.mapping.thumbnails import CollectThumbnails, ReferenceSnapshot, ThumbnailsState
-from omninav.stages.plots.feature_matrix import FeatureMatrix
 from omninav.stages.plots.frame_by_frame import FrameByFrame
 from omninav.stages.plots.panorama_snapshot import PanoramaSnapshot
 from omninav.stages.plots.retrieval_strip import RetrievalStrip
@@ -94,15 +93,3 @@ def test_a_drive_without_answers_has_no_strip() -> None:
     run = small_run()
     nothing = [None] * len(run.ticks)
     assert RetrievalStrip().step(CTX, run.drive, nothing, nothing, run.map).figure is None
-
-
-@pytest.mark.parametrize("kind", ["panorama", "windows"])
-def test_the_feature_matrix_of_one_frame_is_drawn(kind: str) -> None:
-    pixels = np.random.default_rng(0).integers(0, 256, (60, 80, 3), dtype=np.uint8)
-    seen = Windows(pixels[None], np.zeros(1), 1.0) if kind == "windows" else Panorama(np.hstack([pixels] * 3))
-    stage = FeatureMatrix(frame=5)
-    assert stage.step(CTX, Tick(4, 4, frame=4), seen).figure is None
-    figure = stage.step(CTX, Tick(5, 5, frame=5), seen).figure
-    assert figure is not None
-    assert "frame 5" in figure.caption
-    assert cv2.imdecode(np.frombuffer(figure.content, np.uint8), cv2.IMREAD_COLOR).std() > 5
