@@ -18,7 +18,7 @@ DISK = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)
 SUM = "sha256"
 """The key of a JSON file's own checksum."""
 PART = f"@{re.sub(r'[^A-Za-z0-9-]', '_', os.uname().nodename)}.part"
-"""How the name of a file ends that a process of this machine is writing: others may share its disk."""
+"""Ending of a file's name that a process of this machine is writing: others may share its disk."""
 
 
 class Damaged(ValueError):

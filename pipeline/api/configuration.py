@@ -24,7 +24,7 @@ class Configuration:
     """
 
     words: tuple[str, ...]
-    """What it was composed of, as on the command line."""
+    """Words of the command line that it was composed of."""
     settings: Mapping[str, Any]
     """All of it as plain data, written out: what a run's `config.yaml` holds."""
 

@@ -29,7 +29,7 @@ from .overrides import invalid_overrides, with_unlisted_parameters
 from .words import read_flags
 
 OF_THE_VARIANT = ("variant", "inputs", "nodes", "wires", "artifacts", "saves")
-"""What a variant's file says of itself; everything else in a configuration is a setting."""
+"""Keys that a variant's file sets; everything else in a configuration is a setting."""
 OF_THE_RUN = ("seed", "runs", "cache", "checkpoint_s", "validate", "record", "objective", "plots")
 """Settings that every run reads, whatever its graph is."""
 UNSET = "(unset)"

@@ -8,7 +8,7 @@ from .config_groups import CONF, group_files, group_options
 
 FLAGS = ("-h", "--help")
 BLOCKS = ("defaults", "variant", "inputs", "nodes", "wires", "artifacts", "saves")
-"""What stands at the top of a variant's file and is no setting."""
+"""Keys at the top of a variant's file that are no settings."""
 
 
 def asks_for_help(words: Sequence[str]) -> bool:

@@ -39,7 +39,7 @@ OF_HYDRA = ("mode", "overrides", "runtime")
 OF_A_JOB = ("name", "override_dirname", "id", "num", "config_name")
 """Parts of `hydra.job.` that Hydra fills in itself."""
 OWN_WORDS = ("hydra/job_logging=disabled", "hydra/hydra_logging=disabled", "hydra.output_subdir=null")
-"""What config.yaml sets of those parts that a configuration cannot set."""
+"""Values that config.yaml gives to those parts that a configuration cannot set."""
 CALLED_BY_NAME = ("custom_search_space",)
 """Parameters of a sweeper that name a function to call."""
 

@@ -49,7 +49,7 @@ class JobEnd:
     code: int = 0
     """Its exit code."""
     error: str = ""
-    """What went wrong, in one line."""
+    """Error, in one line."""
     objective: float | None = None
     log: str = ""
     """The file with the traceback."""

@@ -28,7 +28,7 @@ from .jobs import JobEnd, SweepJob, ended, leave_outcome, note_end, report_end, 
 
 NAME = "omninav"
 LOGS = ".jobs"
-"""In a sweep's folder: what its jobs print."""
+"""Folder in a sweep's folder that holds what its jobs print."""
 SCHEME = f"{CheckedFolder.scheme()}://"
 
 

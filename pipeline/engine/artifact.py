@@ -28,7 +28,7 @@ FORMAT = 2
 OWN_PACKAGE = __name__.partition(".")[0]
 _HEADER, _SUM = "header.json", "sha256:"
 UNPACKED_BYTES, UNPACKED_RATIO = 1 << 26, 64
-"""How many bytes a file may unpack to: that many, or that many times its own."""
+"""Largest unpacked size of a file: that many bytes, or that many times its own."""
 _FRONT, _SUMS = "front:", "chunk_sums"
 _SUM_BYTES, _FRONT_BYTES = len(_SUM) + 64, len(_FRONT) + 16
 _NPY_HEAD, _STEP, _ROWS = 1 << 16, 1 << 20, 1 << 12

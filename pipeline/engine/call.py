@@ -15,8 +15,8 @@ from omninav.pipeline.graph.stage import Context, State
 from .channel import channel_key, held_key
 
 CHECKED_TICKS = 10
-"""Of so many first calls of a stage every output is checked against what its type states: enough for a mistake in the
-stage itself, and without a price later."""
+"""First calls of a stage whose outputs are checked against what their types state: enough for a mistake in the stage
+itself, and without a price later."""
 
 
 class StageFailed(Exception):

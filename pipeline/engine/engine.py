@@ -33,13 +33,13 @@ class EngineOptions:
     """Where and how a graph runs; nothing here changes what it gives, but for the seed."""
 
     seed: int = 0
-    """Of all randomness."""
+    """Seed of all randomness."""
     folder: Path | None = None
-    """Where "after" stages may write."""
+    """Folder in which "after" stages may write."""
     memory: Path | None = None
-    """Where checkpoints and sequences lie; None: nothing is kept, and nothing can be collected."""
+    """Folder of checkpoints and sequences; None: nothing is kept, and nothing can be collected."""
     identity: str = ""
-    """Of the run, so that no other run goes on from its checkpoint."""
+    """Identity of the run, so that no other run goes on from its checkpoint."""
     checkpoint_s: float = 5.0
     """Seconds between checkpoints."""
     on_tick: Callable[[int, int | None], None] = lambda done, total: None
@@ -57,11 +57,11 @@ class PrefixReplay:
     nodes: frozenset[str]
     """Its nodes."""
     ticks: Sequence[Mapping[str, Any]]
-    """What other nodes read of it, tick by tick."""
+    """Values that other nodes read of it, tick by tick."""
     notes: Mapping[str, Mapping[str, Any]]
-    """What its nodes counted and stated."""
+    """Counts and facts of its nodes."""
     before: Mapping[str, Any]
-    """What its nodes gave before the loop."""
+    """Values that its nodes gave before the loop."""
 
 
 class Engine:

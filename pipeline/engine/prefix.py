@@ -33,7 +33,7 @@ class CachedPrefix:
     nodes: frozenset[str]
     frontier: tuple[str, ...]
     key: str
-    """Under what it lies in the cache; '' where it is too large to be kept."""
+    """Cache key; '' where it is too large to be kept."""
     reason: str
     """Why it was found, or why not."""
     replay: PrefixReplay | None = None

@@ -24,9 +24,9 @@ class ListedClaim:
     """What a paper says, and one of three: which verdict judges it, what an experiment of it needs, why none can be."""
 
     claim: str
-    """In our words, with the paper's figure."""
+    """The paper's statement in our words, with its figure."""
     where: str
-    """Where the paper says it: section, figure, table, equation."""
+    """Place in the paper: section, figure, table, equation."""
     experiment: str = ""
     """The page that judges it, without `.md`."""
     statement: str = ""
@@ -34,7 +34,7 @@ class ListedClaim:
     case: str = ""
     """Labels of the cases that count (`second, 60`), as the file has them; '' where all do."""
     needs: str = ""
-    """What an experiment of it would need; there is none."""
+    """Missing part of an experiment of it; there is none yet."""
     not_here: str = ""
     """Why no experiment of ours can judge it."""
 

@@ -39,7 +39,7 @@ class ConditionRun:
     key: str = ""
     """The hash of everything but the seed that decides the results."""
     results: dict[int, dict[str, Any]] = field(default_factory=dict)
-    """By seed."""
+    """Results by seed."""
     error: str = ""
 
     @property

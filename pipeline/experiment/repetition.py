@@ -42,7 +42,7 @@ from omninav.pipeline.run.timing import stage_times
 SHARED = "shared"
 """The sequence that the first repetition writes for the others."""
 BASE_SEED = 0
-"""Of artifacts and whatever else the repetitions share."""
+"""Seed of artifacts and whatever else the repetitions share."""
 
 
 def measured(graph: Graph) -> Graph:

@@ -38,7 +38,7 @@ from .specification import FULL, Experiment, read_experiment
 from .verdicts import Verdict, judge
 
 STATE = "experiment.json"
-"""In an experiment's folder: with what it was started, and how far it is."""
+"""File in an experiment's folder that says with what it was started, and how far it is."""
 
 
 @dataclass

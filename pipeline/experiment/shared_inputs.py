@@ -26,7 +26,7 @@ from .conditions import ConditionRun
 from .repetition import BASE_SEED, artifact_key
 
 FACTS = "facts.json"
-"""In a recording's folder: of what it is, what its source stated of it, and the hashes of its files."""
+"""File in a recording's folder that says of what it is, what its source stated of it, and the hashes of its files."""
 
 
 @dataclass

@@ -41,7 +41,7 @@ class Measure:
     digits: int = 1
     """Decimals that are shown."""
     aggregate: Aggregate = "mean"
-    """How a series (`laps.*.error_m.mean`) becomes one figure."""
+    """Rule by which a series (`laps.*.error_m.mean`) becomes one figure."""
     window: tuple[float, float] = (0.0, 1.0)
     """The share of the series that counts."""
     stages: tuple[str, ...] = ()
@@ -53,7 +53,7 @@ class Measure:
 
 
 Other = float | str | Mapping[str, Any]
-"""What a claim's figure is compared with: a number, `published`, or the labels of another condition."""
+"""The other side of a claim's comparison: a number, `published`, or the labels of another condition."""
 
 
 @dataclass(frozen=True)

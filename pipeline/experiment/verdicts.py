@@ -18,7 +18,8 @@ Samples = Mapping[Repetition, float]
 """A measure's figure in each repetition."""
 
 MIN_SCENARIOS = 6
-"""With fewer nothing says what the next one would give, however many seeds there are of each."""
+"""Smallest number of scenarios that decide a claim: fewer do not say what the next one would give, however many seeds
+there are of each."""
 ROUNDING = 1e-9
 MARGIN = 0.05
 """Share of the other side by which `not_above` may be above it: no amount of data shows that two figures are equal."""

@@ -21,10 +21,10 @@ MAX_MAGNITUDE = 1e15
 """No number of a field with a `Shape` or `Bounds` is larger: sums of its squares stay finite in single precision."""
 
 MAX_SUM_ERROR = 1e-4
-"""By how much the sum of shares may differ from 1: many in single precision."""
+"""Largest difference of the sum of shares from 1: many in single precision."""
 
 MAX_LENGTH_ERROR = 1e-3
-"""By how much the length of a unit vector may differ from 1."""
+"""Largest difference of a unit vector's length from 1."""
 
 
 class Shape:

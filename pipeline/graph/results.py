@@ -11,7 +11,7 @@ class Quantity(Value):
     """How one entry of the metrics is read. Whatever is not stated follows from the entry's name."""
 
     title: str | None = None
-    """What it is called. None: its name in words (`position_error_m` is `Position error`)."""
+    """Label. None: its name in words (`position_error_m` is `Position error`)."""
     unit: str | None = None
     """Its unit as shown: shares are shown in `%` (times 100), bytes in `kB`. None: from the end of its name."""
     better: Literal["lower", "higher"] | None = None
@@ -52,8 +52,9 @@ class Metrics(Value):
     values: dict[str, Any]
     """Nested mappings of numbers, texts, None and lists."""
     quantities: dict[str, Quantity] = field(default_factory=dict)
-    """By path (`success.at_end`), or by name for all entries of that name (`position_error_m`). The title of a path is
-    shown as it stands, that of a name with its groups (`Position error, after convergence`). Tables keep this order."""
+    """Quantities by path (`success.at_end`), or by name for all entries of that name (`position_error_m`). The title of
+    a path is shown as it stands, that of a name with its groups (`Position error, after convergence`). Tables keep
+    this order."""
     headlines: tuple[str, ...] = ()
     """Paths of what one looks for first, with the statistic of a distribution: what a run prints, tiles of a report,
     columns of a sweep. Those that are not among the values are passed over."""

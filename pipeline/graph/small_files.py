@@ -12,7 +12,7 @@ import yaml
 from .problems import BadInput, shown
 
 MAX_BYTES = 1_000_000
-"""Of a YAML file. The longest of ours has 9 kB, a run's configuration some 20."""
+"""Largest accepted YAML file, bytes. The longest of ours has 9 kB, a run's configuration some 70."""
 MAX_DEPTH = 40
 """Mappings and lists within each other."""
 MAX_VALUES = 50_000
@@ -74,7 +74,7 @@ class _Reader:
     events: Iterator[Any]
     values: int = 0
     anchors: dict[str, tuple[Any, int]] = field(default_factory=dict)
-    """By name: the value, and how many values it is made of."""
+    """Anchors by name: the value, and how many values it is made of."""
 
     def document(self) -> Any:
         found, documents = None, 0

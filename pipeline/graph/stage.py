@@ -177,7 +177,7 @@ class Stage:
     """
 
     on_request: ClassVar[bool] = False
-    """Of a stage that only draws: whether it is left out unless all plots are asked for (`plots=all`)."""
+    """True for a stage that only draws, and is left out unless all plots are asked for (`plots=all`)."""
 
     if TYPE_CHECKING:
         step: ClassVar[Callable[..., Any]]

@@ -15,14 +15,14 @@ from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, su
 from .executors import EngineSettings
 
 START_S = 60.0
-"""How long it waits for a scheduler to answer."""
+"""Longest wait for a scheduler's answer, seconds."""
 WORKER_MEMORY = 1_000_000_000
-"""What a worker takes beside its job (bytes)."""
+"""Memory of a worker beside its job, bytes."""
 JOB_MEMORY = 4_000_000_000
-"""What a batch system is asked for where nobody says how much a job takes (bytes)."""
+"""Memory asked of a batch system where nobody says how much a job takes, bytes."""
 T = TypeVar("T")
 WORD = re.compile(r"[\w.,:@/+-]{1,200}")
-"""What may be written into a batch script."""
+"""Pattern of what may be written into a batch script."""
 
 
 class DaskExecutor(Executor):

@@ -33,7 +33,7 @@ class EngineSettings:
     options: Mapping[str, Any] = field(default_factory=dict)
     """Whatever else stands there, for the engine itself."""
     folder: Path | None = None
-    """Where an engine may leave what its workers print; all machines see it."""
+    """Folder for what an engine's workers print; all machines see it."""
 
 
 Factory = Callable[[EngineSettings], Executor]

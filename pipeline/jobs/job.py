@@ -69,10 +69,10 @@ class Outcome:
     """How an attempt at a job ended."""
 
     error: str | None = None
-    """What went wrong, in one line."""
+    """Error, in one line."""
     died: bool = False
     """Whether its process was ended from outside: then it is worth another attempt."""
     value: Any = None
-    """What its function returned."""
+    """Result of its function."""
     memory: int = 0
     """The most that it took (bytes)."""

@@ -16,9 +16,9 @@ from typing import Any
 from .job import ONE_THREAD
 
 LOOK_S = 0.5
-"""How often a running job is looked at."""
+"""Time between looks at a running job, seconds."""
 LEASE_S = 60.0
-"""For how long a job goes on whose client gives no sign of life."""
+"""Time after which a job ends whose client gives no sign of life, seconds."""
 MAX_LEFT = 1_000_000_000
 """A process that keeps more than this after a job (bytes) does not get another one."""
 

@@ -21,11 +21,11 @@ from .perform import perform, release
 from .throttle import Throttle
 
 ATTEMPTS = 3
-"""How often a job is started whose process dies."""
+"""Largest number of starts of a job whose process dies."""
 RENEW_S = 5.0
-"""How often the client says that it lives."""
+"""Time between signs of life of the client, seconds."""
 LOOK_S = 0.2
-"""How often messages are looked for."""
+"""Time between looks for messages, seconds."""
 Ends = queue.SimpleQueue[tuple[Job, int, Future[dict[str, Any]]]]
 """Jobs that have ended, each with the number of the attempt."""
 

@@ -16,9 +16,9 @@ RECORD_HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQII")
 _LENGTH = struct.Struct("<Q")
 MAX_BYTES = 1 << 27
-"""Of a record, and of an unpacked chunk: a raw frame of 40 megapixels in colour fits."""
+"""Largest record and largest unpacked chunk, bytes: a raw frame of 40 megapixels in colour fits."""
 MAX_RATIO = 256
-"""How many times as long as packed a chunk of more than 4 MB may be unpacked."""
+"""Largest ratio of unpacked to packed length of a chunk of more than 4 MB."""
 
 
 MAX_BYTES_IN_ALL, MAX_RATIO_IN_ALL = 1 << 26, 128

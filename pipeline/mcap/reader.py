@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _MESSAGE = struct.Struct("<HIQQ")
 _STAMP_LITTLE, _STAMP_BIG = struct.Struct("<iI").unpack_from, struct.Struct(">iI").unpack_from
 _BYTES_IN_MEMORY = 32_000_000
-"""Of unpacked chunks, beside the last one used: logs up to that size are unpacked once."""
+"""Unpacked chunks kept beside the last one used, bytes: logs up to that size are unpacked once."""
 
 _BYTES_OF_ATTACHMENTS = 32_000_000
 """That are kept: descriptions of sensors are far shorter."""

@@ -31,7 +31,7 @@ COLOURS: dict[Colour, str] = {
 }
 """Okabe & Ito's (2008), as they are on white."""
 BEGINNING = '<svg class="chart"'
-"""Of every chart, and of no other drawing."""
+"""First characters of every chart, and of no other drawing."""
 LEFT, RIGHT, TOP, BOTTOM, ROW = 64.0, 12.0, 30.0, 50.0, 24.0
 """Pixels around the axes, and of a row of the legend; wide enough for the larger letters of a narrow page."""
 

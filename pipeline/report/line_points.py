@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 STRETCHES = 1000
-"""Of a line that has more than four points for each."""
+"""Stretches of a line that has more than four points for each."""
 
 
 def drawn_points(pixels: Array) -> Array:

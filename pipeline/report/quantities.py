@@ -24,7 +24,7 @@ UNITS = {
 }
 """The unit that the end of a name stands for."""
 SCALES = {"%": 100.0, "kB": 1e-3}
-"""What a value is multiplied by to be shown in a unit."""
+"""Factor by which a value is multiplied to be shown in a unit."""
 
 
 @dataclass(frozen=True)

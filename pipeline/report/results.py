@@ -14,7 +14,7 @@ class ResultRow:
     condition: str
     cells: tuple[str, ...]
     plain: bool
-    """Whether it is of all that was measured, under no condition."""
+    """True for a figure of all that was measured, under no condition."""
 
 
 @dataclass(frozen=True)

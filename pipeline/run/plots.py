@@ -6,7 +6,7 @@ from omninav.pipeline.graph.graph import Graph, Node
 from omninav.pipeline.graph.results import Figure
 
 PLOTS = ("auto", "few", "all", "none")
-"""What `plots` may be: `auto` draws few, and a sweep takes it for `none`."""
+"""Values of `plots`: `auto` draws few, and a sweep takes it for `none`."""
 
 
 def with_plots(graph: Graph, plots: str, keep: Iterable[str]) -> Graph:

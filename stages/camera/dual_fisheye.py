@@ -28,7 +28,7 @@ class DualFisheye(Camera, projection="dual_fisheye"):
     back_x: Annotated[Place, Key("back", "x")]
     back_y: Annotated[Place, Key("back", "y")]
     outer_radius_px: Annotated[float, Key("mask", "outer_radius_px"), Bounds(gt=0, le=FAR_PX)]
-    """Of both circles."""
+    """Radius of both circles (pixels)."""
     ahead_roll: Annotated[float, Key("ahead", "roll")] = 0.0
     """Radians, clockwise on the screen, by which the image of the lens that looks ahead is turned."""
     back_roll: Annotated[float, Key("back", "roll")] = 0.0

@@ -25,7 +25,8 @@ from .model import (
 from .rays import normalised, turned
 
 HalfAxis = Bounds(ge=1e-5, le=1e5)
-"""From a mirror of a tenth of a millimetre in metres to one of a hundred metres in millimetres."""
+"""Bounds of a half axis: from a mirror of a tenth of a millimetre in metres to one of a hundred metres in
+millimetres."""
 
 
 class HyperbolicMirror(Camera, projection="hyperbolic"):

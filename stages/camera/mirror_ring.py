@@ -19,8 +19,8 @@ class RingNotFound(ValueError):
 
 
 MIN_SCORE = 1.0
-"""Below it no ring was found. Over 27 images of three real and rendered mirrors rings score 1.03 to 1.37; parts of
-these images without a whole ring, panoramas and noise score 0.49 to 0.99."""
+"""Score below which no ring was found. Over 27 images of three real and rendered mirrors rings score 1.03 to 1.37;
+parts of these images without a whole ring, panoramas and noise score 0.49 to 0.99."""
 
 
 def radial_edges(grey: Grey, centre: tuple[float, float], radii: int, rays: int = 90) -> Array:

@@ -41,7 +41,7 @@ class OCamCalib(Camera, projection="ocamcalib"):
     e: Annotated[float, Key("ocamcalib", "e"), Affine] = 0.0
     """Shear of columns by rows."""
     looks: Annotated[Literal["up", "down"], Key("ocamcalib", "looks")] = "up"
-    """Where the image's centre looks: up through a lens, or down by way of a mirror above the camera."""
+    """Direction of the image's centre: up through a lens, or down by way of a mirror above the camera."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -23,7 +23,7 @@ class Strip(Camera):
     wraps = True
 
     column_of_forward: Annotated[float, Bounds(ge=-FAR_PX, le=FAR_PX)]
-    """Where the robot's forward is: edges of columns count from 0, so the middle is width / 2 (pixels)."""
+    """Column of the robot's forward: edges of columns count from 0, so the middle is width / 2 (pixels)."""
     _: KW_ONLY
     sense: Sense = "clockwise"
     """Clockwise: what is right of forward follows at higher columns."""

@@ -26,13 +26,13 @@ MAX_SIDE = 4096
 Side = Annotated[int, Bounds(ge=1, le=MAX_SIDE)]
 
 MAX_MODEL_BYTES = 1 << 30
-"""Of a network's file."""
+"""Largest accepted model file, bytes."""
 WEIGHTS_ELSEWHERE = b"\x0a\x08location\x12"
-"""What an ONNX file holds (as protobuf writes it) that names a file of weights. No hash would cover that one."""
+"""Bytes by which an ONNX file (as protobuf writes it) names a file of weights. No hash would cover that one."""
 MAX_MAGNITUDE = 1e15
-"""Of a number of a vector."""
+"""Largest accepted number of a vector."""
 MAX_NUMBERS = 1 << 20
-"""Of the vector of an image."""
+"""Largest accepted vector of an image, numbers."""
 LOOPS, RANDOM = (
     ("Loop",),
     (

@@ -22,7 +22,7 @@ Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 
 SAMPLES = 8
-"""Of a segment's intensity profile: the paper's 8-point cosine transform."""
+"""Samples of a segment's intensity profile: the paper's 8-point cosine transform."""
 BLUR_PX = 1.0
 """Standard deviation of the smoothing before edges are searched, pixels."""
 MIN_GRADIENT = 0.25
@@ -231,7 +231,7 @@ class FindVerticalSegments(Stage):
     max_pixels: Annotated[int, Bounds(ge=1024)] = 76800
     """Larger images are made smaller; 320 x 240 is the paper's size."""
     margin: Annotated[float, Bounds(ge=0)] = 0.2
-    """Of its length, by which a segment is widened at both ends for its colours."""
+    """Share of its length by which a segment is widened at both ends for its colours."""
     cluster_distance: Annotated[float, Bounds(gt=0)] = 2.0
     """Mahalanobis distance within which neighbours become one."""
 

@@ -20,7 +20,7 @@ Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 
 LOG_STEP = 0.112
-"""Of the logarithm of the tangent of elevation from row to row, and of the magnification from plane to plane."""
+"""Step of the logarithm of the tangent of elevation from row to row, and of the magnification from plane to plane."""
 MAX_SHIFT = 8
 """Planes for magnification, and as many for its inverse: up to 2.4 times."""
 NEARNESSES = np.array([0.0, 0.03, 0.07, 0.12, 0.18, 0.25, 0.33, 0.42, 0.52, 0.64, 0.78, 0.95, 1.2])

@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.float32]
 HISTOGRAM_BINS = 16
-"""Of the intensities around a point."""
+"""Bins of the histogram of the intensities around a point."""
 
 
 def trackability(image: WorkingImage) -> Floats:

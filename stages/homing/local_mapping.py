@@ -75,7 +75,8 @@ class LocalMapping(Stage):
     tracked: until the target is lost, which is a new start."""
 
     solver: Solver = "planar"
-    """Of the first relative pose; `eight_point` is the paper's. `planar` keeps the robot on the floor later too."""
+    """Solver of the first relative pose; `eight_point` is the paper's. `planar` keeps the robot on the floor later
+    too."""
     refine: bool = True
     """Whether poses that samples agree on are brought to their local optimum; the paper keeps the best sample's."""
     min_inliers: Annotated[int, Bounds(ge=4)] = 6
@@ -83,7 +84,8 @@ class LocalMapping(Stage):
     max_false_alarms: Annotated[float, Bounds(gt=0)] = 0.01
     """Expected number of wrong relative poses with which as many features agree by chance."""
     min_rebuild_distance: Annotated[float, Bounds(ge=0)] = 0.1
-    """To the target, over the features' typical distance: closer, the baseline is too short for a new map."""
+    """Distance to the target, over the features' typical distance, below which the baseline is too short for a new
+    map."""
 
     class Out(Outputs):
         """Absent where there is no target; `tracks` are those of the tracker, with what the map says of them."""

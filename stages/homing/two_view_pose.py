@@ -23,7 +23,7 @@ class TwoViewPose(Stage):
     """`planar`: two pairs in a sample, for a robot on a floor; `five_point`; `eight_point`, the paper's;
     `generate_and_select`, which draws no samples and refines nothing."""
     confidence: Annotated[float, Bounds(gt=0, lt=1)] = 0.9999
-    """With which a sample without a wrong pair is among those that are drawn."""
+    """Probability that a sample without a wrong pair is among those that are drawn."""
     max_samples: Annotated[int, Bounds(ge=1)] = 5000
     """That are drawn at most."""
     refine: bool = True

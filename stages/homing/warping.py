@@ -44,7 +44,8 @@ class WarpingVector(Stage):
     columns: Annotated[int, Bounds(ge=24, le=720)] = 180
     """Columns that an image is brought to; a multiple of 4."""
     max_turn_deg: Annotated[float, Bounds(ge=0, le=180)] = 180.0
-    """To both sides, by which the target's heading may differ from the robot's; 180: by any. With a compass less."""
+    """Largest turn to both sides by which the target's heading may differ from the robot's; 180: any. With a compass
+    less."""
     min_columns: Annotated[int, Bounds(ge=1)] = 20
     """That match better than by chance; with fewer the local map's vector stays, or the target is lost."""
 

@@ -17,7 +17,7 @@ from omninav.stages.values.maps import ReferenceGraph
 Array = npt.NDArray[np.float64]
 
 HEADINGS = 36
-"""At which references are compared."""
+"""Headings at which references are compared."""
 MIN_EXCESS = 0.7
 """Share of the similarity above the background that two references keep where they close a loop."""
 MIN_GAP = 5.0
@@ -27,7 +27,7 @@ CLOSURE_SIGMA, CLOSURE_SIGMA_DEG = 0.5, 5.0
 SAMPLES = 1000
 """References that look for a partner."""
 MIN_WEIGHT = 0.1
-"""Of a closure, below which the others have contradicted it."""
+"""Weight of a closure below which the others have contradicted it."""
 
 
 class Alignment(NamedTuple):

@@ -21,7 +21,7 @@ from omninav.stages.values.thumbnails import Thumbnails
 from .saved import MapOfPlaces, SavedMap, read_saved
 
 BESIDE = "thumbnails.omap"
-"""Where the run that learned a map leaves its images."""
+"""File in which the run that learned a map leaves its images."""
 
 
 class ExportMap(Stage):

@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 OTHER_VIEW = math.radians(30.0)
-"""Of views in one direction only: those whose directions differ by more show something else."""
+"""Difference in direction (rad) from which views in one direction only show something else."""
 
 
 def joined_references(maps: Sequence[ReferenceGraph], pose_source: PoseSource) -> ReferenceGraph:

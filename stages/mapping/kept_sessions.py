@@ -18,7 +18,7 @@ from .unimodality import unimodal_state
 
 Array = npt.NDArray[np.float64]
 MAX_SIGMA_DEG = 45.0
-"""Of a believed heading; an unknown one has 104 degrees."""
+"""Largest standard deviation of a believed heading, degrees; an unknown one has 104."""
 
 
 class KeepSessions(Stage):

@@ -33,12 +33,13 @@ class LoopClosure(Stage):
     """Which views stand for two subclusters: the `nearest` two, or the paper's `medoids`, which lie apart where a drive
     returns between its images."""
     min_share: Annotated[float, Bounds(ge=0, le=1)] = 0.4
-    """Of the features that match, for two views to be similar: a wall that repeats itself matches exactly, but only on
-    one side of the robot."""
+    """Share of the features that match, for two views to be similar: a wall that repeats itself matches exactly, but
+    only on one side of the robot."""
     similarity: Literal["ratio", "exponential", "gaussian"] = "gaussian"
-    """How a visual distance becomes a similarity, scaled by the root mean square distance within subclusters."""
+    """Function that turns a visual distance into a similarity, scaled by the root mean square distance within
+    subclusters."""
     ignorance: Annotated[float, Bounds(ge=0.01, le=1)] = 0.25
-    """Of a hypothesis before its neighbours have spoken."""
+    """Ignorance of a hypothesis before its neighbours have spoken."""
     neighbour_distance: Annotated[float, Bounds(gt=0)] = 20.0
     """Views along the drive within which another hypothesis is a neighbour."""
     min_support: Annotated[float, Bounds(ge=0, le=1)] = 0.5

@@ -24,7 +24,7 @@ class MergePlaces(Stage):
     min_spacing: Annotated[float, Bounds(ge=0)] = 0.1
     """Visual distance along the drive, of the medoids of two places that are not merged; 0: all stay as they are."""
     min_share: Annotated[float, Bounds(ge=0, le=1)] = 0.4
-    """Of the features that match, for views of two passes to show one spot."""
+    """Share of the features that match, for views of two passes to show one spot."""
     neighbour_distance: Annotated[float, Bounds(gt=0)] = 20.0
     """Views along the drive, on both passes together, within which an accepted hypothesis speaks for such a pair."""
 

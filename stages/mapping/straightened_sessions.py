@@ -29,7 +29,7 @@ QUANTITIES = {
     "straightened.moved_max_m": Quantity(title="Views moved by, largest", context=True),
 }
 MIN_WEIGHT = 0.1
-"""Of a closure, below which the others have contradicted it."""
+"""Weight of a closure below which the others have contradicted it."""
 
 
 class StraightenSessions(Stage):

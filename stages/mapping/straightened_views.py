@@ -15,7 +15,7 @@ from omninav.stages.values.compared_views import ComparedViews
 Array = npt.NDArray[np.float64]
 
 MIN_WEIGHT = 0.1
-"""Of a closure, below which the others have contradicted it."""
+"""Weight of a closure below which the others have contradicted it."""
 QUANTITIES = {
     "straightened.closures": Quantity(title="Loop closures found", context=True),
     "straightened.rejected": Quantity(title="Loop closures rejected, as the others contradict them", context=True),

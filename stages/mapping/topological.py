@@ -36,9 +36,9 @@ class TopologicalMapping(Stage):
     max_path_step: Annotated[int, Bounds(ge=1)] = 5
     """Views of the drive from one path image to the next, the paper's 1 to 5 m."""
     max_patches: Annotated[int, Bounds(ge=1)] = 80
-    """Of a view that the map keeps."""
+    """Patches of a view that the map keeps."""
     max_segments: Annotated[int, Bounds(ge=0)] = 60
-    """Of a view that the map keeps."""
+    """Vertical segments of a view that the map keeps."""
     window: Annotated[int, Bounds(ge=1)] = 3
     """Views before and after, in which a patch should be found again."""
 

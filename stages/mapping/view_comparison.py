@@ -25,7 +25,7 @@ from .pose_of_view import Supervised
 
 Array = npt.NDArray[np.float64]
 ORDER_GAP = 1000
-"""Between the orders of the last view of a tour and the first of the next: they do not follow each other."""
+"""Gap between the numbers of the last view of a tour and the first of the next: they do not follow each other."""
 
 
 class View(NamedTuple):
@@ -52,19 +52,19 @@ class ViewComparison(Stage):
     every_s: Annotated[float, Bounds(ge=0)] = 1.0
     """Shortest time between two views; images in between are passed over."""
     max_global_distance: Annotated[float, Bounds(gt=0)] = 0.5
-    """Between the global colours of two views, for their local features to be compared."""
+    """Largest distance between the global colours of two views, for their local features to be compared."""
     ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
-    """Of a match's distance to that of the second nearest of either patch."""
+    """Largest ratio of a match's distance to that of the second nearest of either patch."""
     segment_ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
     """The same of vertical segments."""
     max_colour_distance: Annotated[float, Bounds(gt=0)] = 0.5
-    """Between the colours of two patches (Euclidean, of three correlations)."""
+    """Largest distance between the colours of two patches (Euclidean, of three correlations)."""
     min_matches: Annotated[int, Bounds(ge=2)] = 8
-    """With fewer two views have nothing in common."""
+    """Smallest number of matches with which two views have something in common."""
     min_angle_deg: Annotated[float, Bounds(ge=0)] = 0.5
     """Smallest mean angle between matches that counts."""
     supervised: Supervised = "auto"
-    """Where poses come from: the tour's `truth`, its `odometry`, or `auto`: the truth where there is one."""
+    """Source of poses: the tour's `truth`, its `odometry`, or `auto`: the truth where there is one."""
 
     class Out(Outputs):
         views: ComparedViews

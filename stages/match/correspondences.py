@@ -23,11 +23,11 @@ class MatchFeatures(Stage):
     """
 
     ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
-    """Of a match's distance to that of the second nearest of either patch."""
+    """Largest ratio of a match's distance to that of the second nearest of either patch."""
     segment_ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
     """The same of columns."""
     max_colour_distance: Annotated[float, Bounds(gt=0)] = 0.5
-    """Between the colours of two patches (Euclidean, of three correlations)."""
+    """Largest distance between the colours of two patches (Euclidean, of three correlations)."""
     search: Literal["all", "kd_tree"] = "all"
     """Through all descriptors, or by kd-trees, which find the same pairs."""
 

@@ -23,15 +23,15 @@ class MatchPlaces(Stage):
     """
 
     max_global_distance: Annotated[float, Bounds(gt=0)] = 0.5
-    """Between the global colours of two views (Euclidean, of three correlations)."""
+    """Largest distance between the global colours of two views (Euclidean, of three correlations)."""
     ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
-    """Of a match's distance to that of the second nearest of either patch."""
+    """Largest ratio of a match's distance to that of the second nearest of either patch."""
     segment_ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
     """The same of vertical segments."""
     max_colour_distance: Annotated[float, Bounds(gt=0)] = 0.5
-    """Between the colours of two patches (Euclidean, of three correlations)."""
+    """Largest distance between the colours of two patches (Euclidean, of three correlations)."""
     min_matches: Annotated[int, Bounds(ge=2)] = 8
-    """With fewer two views have nothing in common."""
+    """Smallest number of matches with which two views have something in common."""
     min_angle_deg: Annotated[float, Bounds(ge=0)] = 0.5
     """Smallest mean angle between matches that counts."""
 

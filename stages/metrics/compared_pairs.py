@@ -39,7 +39,7 @@ class ComparedPairs(Stage):
     """
 
     max_global_distance: Annotated[float, Bounds(gt=0)] = 0.5
-    """Between the global colours of two views, for their local features to be compared."""
+    """Largest distance between the global colours of two views, for their local features to be compared."""
     within_m: Annotated[float, Bounds(gt=0)] = 8.0
     """Distance of views (m) up to which visual distances are looked at."""
 

@@ -74,13 +74,13 @@ class FirstMatches(Stage):
     pairs: Annotated[int, Bounds(ge=1)] = 30
     """Pairs for each distance."""
     by: Literal["patches", "columns", "both"] = "patches"
-    """What is matched: patches, vertical segments, or both."""
+    """Features that are matched: patches, vertical segments, or both."""
     search: Literal["both_ways", "one_way"] = "both_ways"
     """`both_ways` (the paper, section 3.4): each other's nearest, clearly nearer than the second of either; `one_way`
     (Lowe): the second view's nearest, clearly nearer than its second."""
     best: Literal["clearest", "nearest"] = "clearest"
-    """What comes first: the clearest match by that ratio, or the nearest descriptors (not to be compared between two
-    kinds)."""
+    """Order of the matches: the clearest by that ratio first, or the nearest descriptors (not to be compared between
+    two kinds)."""
     ratio: Annotated[float, Bounds(gt=0, le=1)] = 0.8
     """Largest ratio of the nearest to the second nearest patch."""
     colour: Annotated[float, Bounds(gt=0)] = 0.5

@@ -28,7 +28,7 @@ class RankReferences(Stage):
     """Ranks references by their similarity to the present image at the heading at which that is largest."""
 
     best: Annotated[int, Bounds(ge=1)] = 10
-    """How many are kept."""
+    """References that are kept."""
 
     class Out(Outputs):
         """`ranked`: the most similar references."""

@@ -44,7 +44,7 @@ class ViewSpacing(Stage):
     """
 
     max_views: Annotated[int, Bounds(ge=3)] = 500
-    """Of a larger map so many views are measured, evenly picked by age."""
+    """Views that are measured of a larger map, evenly picked by age."""
 
     class Out(Outputs):
         """`metrics`: the entry `spacing` of metrics.json."""

@@ -43,7 +43,7 @@ class ChangedLight(Stage):
     side: Annotated[float, Bounds(ge=0, le=1)] = 0.0
     """Share by which light from one side exceeds the mean."""
     direction_deg: Annotated[float, Bounds(ge=-360, le=360)] = 90.0
-    """Where it comes from, counter-clockwise from forward."""
+    """Direction it comes from, counter-clockwise from forward."""
 
     class Out(Outputs):
         """The panorama in other light."""

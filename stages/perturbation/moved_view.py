@@ -42,11 +42,11 @@ class MovedView(Stage):
     """
 
     shift: Annotated[float, Bounds(gt=-1, lt=1)] = 0.0
-    """To the right, as a share of the window's width."""
+    """Shift to the right, as a share of the window's width."""
     turn_deg: Annotated[float, Bounds(ge=-180, le=180)] = 0.0
     """Counter-clockwise, about the window's middle."""
     scale: Annotated[float, Bounds(gt=0, le=10)] = 1.0
-    """How much larger things look."""
+    """Factor by which things look larger."""
     shear: Annotated[float, Bounds(ge=-2, le=2)] = 0.0
     """A distortion: columns to the right for each row above the window's middle."""
     part: Annotated[float, Bounds(gt=0, le=1)] = 1.0

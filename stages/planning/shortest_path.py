@@ -70,7 +70,7 @@ class ShortestPathPlanner(Stage):
     """A place's number or name (of several of that name the nearest), or an image file: the place that looks most like
     it."""
     cost: Literal["links", "views"] = "links"
-    """Of a link: one (the paper's), or as many as views have to be driven to."""
+    """Cost of a link: one (the paper's), or as many as views have to be driven to."""
     settle_s: Annotated[float, Bounds(ge=0)] = 1.0
     """Time for which the robot looks before it plans, even if it is sure."""
     locate_timeout_s: Annotated[float, Bounds(gt=0)] = 5.0
@@ -79,9 +79,9 @@ class ShortestPathPlanner(Stage):
     """Time for which a robot that is lost again on the same link, or again as it sets out from the same place, looks
     around (it stands, then wanders) before it plans; sure of another place, it plans at once."""
     max_failures: Annotated[int, Bounds(ge=1)] = 3
-    """Of a link, after which it is closed."""
+    """Failures of a link after which it is closed."""
     max_routes: Annotated[int, Bounds(ge=1)] = 20
-    """After which the planner gives up."""
+    """Routes after which the planner gives up."""
 
     class Out(Outputs):
         """`path`: the views, in the tick in which they are planned. `route`: through which places, at every tick."""

@@ -15,7 +15,7 @@ from omninav.stages.values.view_mixtures import ViewEvent
 from .panorama_snapshot import EncodedPanorama
 
 COLUMNS = 240
-"""Of a picture (px): a page holds one for each of its frames."""
+"""Width of a picture, pixels: a page holds one for each of its frames."""
 
 
 def first_seen(events: Sequence[ViewEvent | None]) -> dict[int, int]:

@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 Points = npt.NDArray[np.float32]
 
 NEAREST_M, MIN_LENGTH_M, MAX_LENGTH_M, UNKNOWN_LENGTH_M = 0.35, 0.7, 6.0, 1.5
-"""Where a homing vector begins on the floor, its least and greatest length, and its length where that is unknown."""
+"""Start of a homing vector on the floor, its least and greatest length, and its length where that is unknown (m)."""
 
 
 class EncodedHomingView(Value):

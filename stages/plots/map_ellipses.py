@@ -16,7 +16,7 @@ from .drawing import extent_of
 from .plan_chart import draw_surroundings, plan_chart
 
 MAX_ELLIPSES = 3000
-"""Of a larger map the heaviest are drawn."""
+"""Largest number of ellipses: of a larger map the heaviest are drawn."""
 
 
 class MapEllipses(Stage):

@@ -11,7 +11,7 @@ from omninav.stages.values.image import Panorama, Windows
 from .snapshot_times import is_snapshot_frame
 
 COLUMNS, QUALITY = 480, 80
-"""Of a kept image: largest width (px), and JPEG quality; some 15 kB."""
+"""Largest width (px) and JPEG quality of a kept image; some 15 kB."""
 
 
 class EncodedPanorama(Value):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 NEAR_M, NEAR_DEG = 2.0, 35.0
-"""Within these of the true pose an answer is right, as a run's estimate is (section VI-D)."""
+"""Distance and angle from the true pose within which an answer is right, as a run's estimate is (section VI-D)."""
 
 WIDTH, LINE = 10.0, 0.17
 """Inches: of the page, and of a line of text."""

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 HUES = (ESTIMATE, MARK, ODOMETRY, "#CC79A7")
-"""Of a view's areas, in turns."""
+"""Colours of a view's areas, in turns."""
 
 
 class ShowVisibilityAreas(Stage):

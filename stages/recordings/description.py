@@ -17,14 +17,15 @@ from .recording import UnreadableRecording
 from .tables import Delimiter, Length, Time
 
 MAX_PATTERN, MAX_REPEATS, MAX_ALTERNATIVES = 200, 2, 4
-"""Of a regular expression: with few repeats, none of them of a group, no name takes it long."""
+"""Largest regular expression: characters, repeats (none of a group) and alternatives, with which no name takes it
+long."""
 MAX_NAME = 255
 """Characters of a file's name, as file systems have it."""
 FAR = 1e9
 """Metres or seconds that an offset does not exceed."""
 Offset = Annotated[float, Bounds(ge=-FAR, le=FAR)]
 _SINGLE = re.compile(r"\\.|\[\^?\]?(?:\\.|[^\]\\])*\]")
-"""In a regular expression: an escaped character or a set of characters."""
+"""Pattern of an escaped character or a set of characters in a regular expression."""
 _REPEAT = re.compile(r"[*+?][+?]?|\{\d*,\d*\}[+?]?")
 _REPEATED_GROUP = re.compile(r"\)\s*[*+?{]")
 _MANY_TIMES = re.compile(r"\{\d{3,}|,\d{3,}\}")

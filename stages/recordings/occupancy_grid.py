@@ -20,7 +20,7 @@ from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 
 MAX_CELLS = 25_000_000
-"""Of a grid: 250 m x 250 m in cells of 5 cm."""
+"""Largest grid, cells: 250 m x 250 m in cells of 5 cm."""
 Far = Annotated[float, Bounds(ge=-1e6, le=1e6)]
 Share = Annotated[float, Bounds(ge=0, le=1)]
 

@@ -15,7 +15,7 @@ Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
 Rows = npt.NDArray[np.int64]
 MAX_STAMP = 2**63 - 1
-"""In ns: the year 2262. What comes later is out of order in any log."""
+"""Largest time stamp, ns: the year 2262. A later one is out of order in any log."""
 NOWHERE = (float("nan"),) * 3
 
 

@@ -89,7 +89,7 @@ class OpenOptions:
     layout_folders: tuple[str, ...] = ()
     """Folders with further descriptions of folders of images."""
     limits: MotionLimits = field(default_factory=MotionLimits)
-    """What the robot can do."""
+    """Limits of the robot's motion."""
     rate: float | None = None
     """Images per second of a folder of images that says no times."""
 
@@ -102,9 +102,9 @@ class Format(ABC):
     """A kind of log. A subclass is a format: which names it opens, and how."""
 
     names: ClassVar[str]
-    """What to name, for people: "a .mcap file"."""
+    """Name for people: "a .mcap file"."""
     suffixes: ClassVar[tuple[str, ...]] = ()
-    """Of files that can be nothing else."""
+    """Endings of files that can be nothing else."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)

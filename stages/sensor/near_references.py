@@ -28,7 +28,7 @@ Shorts = npt.NDArray[np.int32]
 
 CELLS_PER_LENGTH_SCALE = 4
 CUTOFF_SIGMAS = 3.0
-"""Beyond this many fading distances a reference keeps less than 1.2 % of its influence."""
+"""Fading distances beyond which a reference keeps less than 1.2 % of its influence."""
 
 
 @compiled(nogil=True, error_model="numpy")

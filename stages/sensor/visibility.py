@@ -26,7 +26,7 @@ from .visibility_similarity import CUTOFF_SIGMAS, Window, mean_seen, sums_by_tur
 Array = npt.NDArray[np.float64]
 
 BACKGROUND_WEIGHT = math.exp(-0.5)
-"""Of what is not known, with a `calibration`: as much as a view taken one sigma away."""
+"""Weight of what is not known, with a `calibration`: as much as a view taken one sigma away."""
 
 
 class Visibility(Stage):
@@ -47,11 +47,11 @@ class Visibility(Stage):
     """
 
     field_of_view: Literal["auto", "forward", "panoramic"] = "auto"
-    """What the camera sees; `auto`: panoramic where the match compares several headings."""
+    """Field of view of the camera; `auto`: panoramic where the match compares several headings."""
     window_deg: Annotated[float, Bounds(gt=0, le=180)] = 5.0
     """Deviation of the heading from a view's point with a forward-looking camera; 5 degrees in the paper."""
     window_shape: Window = "step"
-    """How the weight falls over the window: step, triangle, or gaussian (the window is its sigma)."""
+    """Fall of the weight over the window: step, triangle, or gaussian (the window is its sigma)."""
     distance_sigma_m: Annotated[float, Bounds(gt=0)] | None = 1.0
     """Sigma of the Gaussian by which a view's weight falls with the distance from where it was taken; null: all views
     of the area weigh the same, as in the paper. Not in length scales, which differ between cameras in one place."""

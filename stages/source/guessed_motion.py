@@ -18,7 +18,7 @@ from omninav.stages.values.image import Image, column_azimuths
 from omninav.stages.values.pose import GuessedMotion, Motion
 
 COLUMNS, ROWS = 360, 24
-"""Of the panoramas that the compass compares."""
+"""Size of the panoramas that the compass compares, pixels."""
 BAND = math.radians(30.0)
 """Elevation (rad) above and below the horizon that they reach: what stands around turns, floor and sky do not."""
 BLUR_PX = 1.0

@@ -29,7 +29,7 @@ from .outputs import DriveOutputs, motion_of, pose_of
 
 Row = npt.NDArray[np.float64]
 INTERVAL_NS = 100_000_000
-"""Between images that come without a time stamp."""
+"""Time between images that come without a time stamp, ns."""
 MAX_STAMP_NS = 1 << 62
 """A stamp lies within 146 years of 1970."""
 MAX_NUMBER = 1e8
@@ -37,7 +37,8 @@ MAX_NUMBER = 1e8
 MAX_READINGS = 100_000
 """Of a ring of ranges."""
 MAX_MOTION_M = 1000.0
-"""Between two images: more than any robot drives unseen. A drive that begins elsewhere is a `new_log`."""
+"""Largest motion between two images, m: more than any robot drives unseen. A drive that begins elsewhere is a
+`new_log`."""
 
 
 class PushedFrame(NamedTuple):

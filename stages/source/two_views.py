@@ -31,7 +31,7 @@ class TwoViews(Source):
     noise_deg: Annotated[float, Bounds(ge=0)] = 0.1
     """Standard deviation of each bearing's error, along each of two directions across it."""
     max_elevation_deg: Annotated[float, Bounds(gt=0, le=90)] = 90.0
-    """How far from the horizon points may lie."""
+    """Largest elevation of points above or below the horizon, degrees."""
     min_distance: Annotated[float, Bounds(gt=0)] = 1.5
     """Smallest distance of a point from view 1, in baselines."""
     max_distance: Annotated[float, Bounds(gt=0)] = 6.0

@@ -22,9 +22,9 @@ SHAPES = (1.02, 1.08, 1.2, 1.5, 2.0)
 TOP_DEG = (0.0, 10.0, 20.0, 30.0, 45.0)
 """Mirrors that are tried as a start: `k` of `mirror_camera`, and the elevation of the image's rim."""
 REFINED = 2
-"""How many of them, the best, are refined."""
+"""Number of the best candidates that are refined."""
 MAX_STEPS = 60
-"""Of a refinement."""
+"""Largest number of steps of a refinement."""
 FAR_PX = 1e3
 """Residual of a corner that a camera does not show at all."""
 OUTLIER_PX = 1.0

@@ -54,7 +54,7 @@ class Drive(Value):
     visual_distance: Array
     """Its distance to the image in the unit of the comparison, 0 is equal; NaN where there is none."""
     reference_turn: Array
-    """How far the robot stood turned against it (rad, counter-clockwise); NaN where there is none."""
+    """Turn of the robot against it (rad, counter-clockwise); NaN where there is none."""
     confidence: Array
     """Probability that the estimate is right, as a monitor tells it; NaN where there is none."""
 

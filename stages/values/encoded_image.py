@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 MAX_PIXELS = 1 << 25
-"""Of an image that is decoded, 33 megapixels: an equirectangular image of 8000 x 4000."""
+"""Largest decoded image, pixels: an equirectangular image of 8000 x 4000 fits."""
 MAX_FILE_BYTES = 100_000_000
-"""Of such an image."""
+"""Largest encoded image, bytes."""
 MAX_SCANS = 64
-"""Of a JPEG: a progressive one has some ten, and each costs as much as decoding the whole."""
+"""Largest number of scans of a JPEG: a progressive one has some ten, and each costs as much as decoding the whole."""
 
 
 EXIF_BYTES = 4096

@@ -16,7 +16,7 @@ FREE, OCCUPIED, UNKNOWN = 0, 1, 2
 """States of a cell."""
 
 GridSource = Literal["map", "world", "tour"]
-"""Where a grid comes from: a map file, the built-in world, or a stand-in made from the free path of a tour."""
+"""Origin of a grid: a map file, the built-in world, or a stand-in made from the free path of a tour."""
 
 
 class OccupancyGrid(Value):

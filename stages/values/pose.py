@@ -65,7 +65,7 @@ class GuessedPose(Pose):
 
 
 PoseSource = Literal["truth", "odometry", "guess", "estimate"]
-"""Where a stored pose comes from: the log's ground truth, its odometry, a guess, or the system's own estimate."""
+"""Origin of a stored pose: the log's ground truth, its odometry, a guess, or the system's own estimate."""
 SOURCE_WORDS: dict[PoseSource, str] = {
     "truth": "ground truth",
     "odometry": "odometry",

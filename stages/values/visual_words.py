@@ -16,7 +16,7 @@ Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 
 MIN_SIMILARITY = 0.01
-"""Of references that share no word with a view: they may be right all the same, and are not ruled out."""
+"""Similarity assigned to references without a common word, above 0 so that they stay candidates."""
 
 
 class VisualWords(Value):

@@ -8,7 +8,7 @@ from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.run.plan import Plan, plan
 
 SETTINGS = ("source=live", "publish=ros2", "log=live")
-"""What makes a run live, each where nothing else is typed."""
+"""Settings that make a run live, each where nothing else is typed."""
 
 
 def command(arguments: list[str]) -> int:

@@ -27,7 +27,7 @@ from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.run.plan import Plan, plan
 
 LAUNCHER = "hydra/launcher=omninav"
-"""How the jobs of a sweep go to the engine that was typed."""
+"""Word that sends the jobs of a sweep to the engine that was typed."""
 
 
 def command(arguments: list[str], check: Callable[[Mapping[str, Any]], Plan] = plan) -> int:

@@ -24,7 +24,7 @@ MAX_COLOUR_DISTANCE = float(np.sqrt(3.0) * 255.0)
 """Distance of black and white in blue-green-red 0..255."""
 
 FeatureKind = Literal["histograms", "colours", "descriptors"]
-"""What segments are described by: histograms that sum to 1, colours in 0..255, or vectors of length 1."""
+"""Descriptions of segments: histograms that sum to 1, colours in 0..255, or vectors of length 1."""
 
 MAX_DISTANCES: dict[FeatureKind, float] = {
     "histograms": float(np.sqrt(2.0)),

@@ -11,9 +11,9 @@ Array = npt.NDArray[np.float64]
 Grey = npt.NDArray[np.uint8]
 
 MAX_POINTS, POINT_QUALITY, POINT_DISTANCE_PX = 400, 0.003, 5
-"""Of the corners that are tracked: how many, against the best one, and how far apart."""
+"""Corners that are tracked: how many, their quality against the best one, and their distance (pixels)."""
 WINDOW_PX, LEVELS = 13, 3
-"""Of Lucas and Kanade's tracker."""
+"""Window (pixels) and pyramid levels of Lucas and Kanade's tracker."""
 MAX_RETURN_PX = 0.5
 """A point that is tracked to the other image and back ends this close to where it began."""
 EXPONENT = 12
@@ -21,7 +21,7 @@ EXPONENT = 12
 MIN_POINTS = 10
 """Points that must be tracked there."""
 ROUNDS = 10
-"""Of the robust fit."""
+"""Iterations of the robust fit."""
 
 
 class FlowTurn(NamedTuple):

@@ -9,7 +9,7 @@ Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
 
 ITERATIONS = 8
-"""Of k-means; more change the nearest image by less than a centimetre."""
+"""Iterations of k-means; more change the nearest image by less than a centimetre."""
 
 
 def root_descriptors(descriptors: npt.ArrayLike) -> Floats:

@@ -18,7 +18,7 @@ SIGMAS_PER_METRE = (0.02, 0.02, 0.02)
 TURN_SIGMA = 0.05
 """The same of a turn, per radian."""
 MIN_SIGMAS = (0.005, 0.005, 0.0025)
-"""Of the shortest motion (m, m, rad): poses in a map are samples of a drive."""
+"""Standard deviations of the shortest motion (m, m, rad): poses in a map are samples of a drive."""
 MIN_CLOSURES = 3
 """Closures that agree on where a drive began, to join it to others."""
 HEADING_SCALE = math.radians(20.0)

@@ -13,7 +13,7 @@ Ints = npt.NDArray[np.int64]
 PRIOR = 1e-9
 """Weight of each pose staying where it is, which keeps parts without a measurement in place."""
 EASING = 1.4
-"""By what c falls in a step."""
+"""Factor by which the Cauchy scale shrinks per iteration."""
 CONVERGED = 1e-6
 """Largest change (m, rad) of a step at which it ends."""
 

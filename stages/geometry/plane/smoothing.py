@@ -21,7 +21,7 @@ MIN_TRUST = 0.01
 ODOMETRY_SIGMA, TURN_SIGMA = 0.02, 0.05
 """Standard deviation of odometry per metre (m and rad), and of its heading per radian of a turn."""
 OFF_SCALE, SPAN = 0.08, 10
-"""By how much of itself odometry's length may differ from that of trusted estimates so many poses apart, and be
+"""Largest share by which odometry's length may differ from that of trusted estimates so many poses apart, and be
 believed as above: filters that lag behind make up to 0.07 of it."""
 STEP_SIGMAS = np.array([0.005, 0.005, 0.0025])
 """Standard deviation of odometry where the robot stands (m, m, rad)."""

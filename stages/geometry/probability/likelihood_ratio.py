@@ -11,7 +11,7 @@ Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 
 RIDGE = 1e-3
-"""Of the logistic regression: holds the slope finite where a score separates all examples."""
+"""Ridge of the logistic regression: it holds the slope finite where a score separates all examples."""
 MAX_LOG_ODDS = 30.0
 TAIL = 0.4
 """Share of the slope that is left above the largest ratio that the examples show."""

@@ -11,7 +11,7 @@ from omninav.stages.geometry.probability.small_systems import solve
 Array = npt.NDArray[np.float64]
 Refinement = Callable[[Array, Array, Array, Array, float, int, int], tuple[Array, Array]]
 MAX_DAMPING = 1e6
-"""Beyond it no step leads further down."""
+"""Damping beyond which no step leads further down."""
 
 
 def refinement(

@@ -9,7 +9,7 @@ from .triangulation import depths, parallax
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 Motion = tuple[float, float, float]
-"""Where the second view was taken, seen from the first: x forward, y left (m), turn (rad)."""
+"""Pose of the second view seen from the first: x forward, y left (m), turn (rad)."""
 
 
 def right_by_depth(
