@@ -1,4 +1,4 @@
-"""What a third party tests its stages with: `from omninav.testing import check_stage`."""
+"""Checks for a third party's stages: `from omninav.testing import check_stage`."""
 
 from omninav.pipeline.api.stage_check import check_stage
 

@@ -1,4 +1,4 @@
-"""What a user can mend, raised as `BadInput`, whatever has met it."""
+"""Errors that a user can mend, raised as `BadInput` whatever has met them."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

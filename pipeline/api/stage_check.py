@@ -1,4 +1,4 @@
-"""What every stage promises, as one check that a stage's own tests call."""
+"""One check of everything that a stage promises, for a stage's own tests."""
 
 import inspect
 import types

@@ -1,4 +1,4 @@
-"""What `omninav --help` and `omninav COMMAND --help` print: texts in `omninav.conf`, and what a tool's file says."""
+"""Texts of `omninav --help` and `omninav COMMAND --help`: those in `omninav.conf`, and a tool's file."""
 
 import re
 from collections.abc import Sequence

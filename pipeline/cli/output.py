@@ -1,4 +1,4 @@
-"""What is printed, where it cannot be written: the work goes on, and it is said at the end."""
+"""Output that cannot be written: the work goes on, and the end of the run reports it."""
 
 import io
 import os

@@ -1,4 +1,4 @@
-"""What lies among a tick's values beside the outputs: delayed values, and values that are held."""
+"""Delayed and held values, which lie among a tick's values beside the outputs."""
 
 from collections import deque
 from typing import Any

@@ -1,4 +1,4 @@
-"""What was found damaged and is made again: said once, on the terminal and in the run's log."""
+"""Reports damaged files that are made again, once, on the terminal and in the run's log."""
 
 import logging
 import sys

@@ -1,4 +1,4 @@
-"""What papers claim, in one list: beside each claim the experiment that judges it, with its verdict and figure."""
+"""The list of papers' claims: beside each the experiment that judges it, with its verdict and figure."""
 
 import os
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What several conditions of an experiment read, made once: recordings of sources that compute, and artifacts."""
+"""Inputs that several conditions of an experiment read, made once: recordings of computed sources, and artifacts."""
 
 import math
 import re

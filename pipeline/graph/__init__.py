@@ -1,1 +1,1 @@
-"""What can be wired: stages, values, ports, and the graph that is built and checked from a configuration."""
+"""Stages, values and ports, and the graph that is built and checked from a configuration."""

@@ -1,4 +1,4 @@
-"""What the fields of a value hold (shape, range, what they count), stated at each field.
+"""Contents of a value's fields (shape, range, what they count), stated at each field.
 
 It is checked where a value is read from a file, and where a stage gives it (see `engine.call`).
 """

@@ -1,4 +1,4 @@
-"""What is wrong with a configuration: where, what, and what to type. All of it at once."""
+"""Problems of a configuration: where, what, and what to type. All of them at once."""
 
 import difflib
 import errno

@@ -1,4 +1,4 @@
-"""How a source that computes what it gives is recorded once and replayed by whoever needs the same again."""
+"""Protocol of a source that computes its values: it is recorded once and replayed by whoever needs the same again."""
 
 from collections.abc import Mapping
 from pathlib import Path

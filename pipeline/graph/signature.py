@@ -1,4 +1,4 @@
-"""What a stage class says of itself: its ports and parameters, read off the class and nowhere else."""
+"""Ports and parameters of a stage, read off its class and nowhere else."""
 
 import ast
 import dataclasses

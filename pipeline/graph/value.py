@@ -1,4 +1,4 @@
-"""What travels on a wire: small frozen dataclasses, each an array (or a few) and what it means."""
+"""Values that travel on wires: small frozen dataclasses, each an array (or a few) and what it means."""
 
 import dataclasses
 import reprlib

@@ -1,4 +1,4 @@
-"""What an executor calls, wherever it places a job: hand it to a process of this machine, and watch that process."""
+"""Runs a job in a process of this machine and watches it: called by an executor, wherever it places the job."""
 
 import json
 import os

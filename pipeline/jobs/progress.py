@@ -1,4 +1,4 @@
-"""How far jobs are: what each one sends of its frames, added up."""
+"""Progress of jobs: the frames that each one reports, added up."""
 
 from collections.abc import Mapping
 from typing import Any

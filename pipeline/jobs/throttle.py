@@ -1,4 +1,4 @@
-"""What may take long, done seldom enough."""
+"""Calls an expensive function at limited rate."""
 
 import time
 from collections.abc import Callable

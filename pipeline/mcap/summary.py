@@ -1,4 +1,4 @@
-"""What an MCAP file says of itself at its end: its channels, its chunks, and how many messages it holds."""
+"""Summary at the end of an MCAP file: its channels, its chunks, and how many messages it holds."""
 
 import os
 import zlib

@@ -1,1 +1,1 @@
-"""What people look at: report pages, tables, the drawn graph, plots and progress."""
+"""Report pages, tables, the drawn graph, plots and progress."""

@@ -1,4 +1,4 @@
-"""What a drawing needs to know of a graph."""
+"""A graph as it is drawn: its boxes, ports and wires."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol

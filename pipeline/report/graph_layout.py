@@ -1,4 +1,4 @@
-"""Where the boxes and wires of a drawn graph stand.
+"""Positions of the boxes and wires of a drawn graph.
 
 Wires go from left to right: layers by the longest path, ordered by barycentres. What runs before the loop stands left
 of what runs every tick. A wire that is longer than a layer passes between the boxes of those that it crosses.

@@ -1,4 +1,4 @@
-"""How every plot is drawn: one look, units on axes, the same bytes every time, no state of pyplot's."""
+"""One look for every plot: units on axes, the same bytes every time, no state of pyplot's."""
 
 import io
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""How far a run is: one live line in a terminal, JSON lines elsewhere. Both on stderr, so that stdout stays clean."""
+"""Progress of a run: one live line in a terminal, JSON lines elsewhere. Both on stderr, so that stdout stays clean."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""How a configuration says where an artifact comes from: its block `artifacts`, typed and checked."""
+"""The block `artifacts` of a configuration, typed and checked: where each artifact comes from."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field

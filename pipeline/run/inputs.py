@@ -1,4 +1,4 @@
-"""What a run is of: the settings that a variant takes, and whether they are given."""
+"""Inputs of a run: the settings that a variant takes, and whether they are given."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass

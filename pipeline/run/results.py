@@ -1,4 +1,4 @@
-"""What the stages of a graph that has run gave: metrics, figures, tables, and what they counted and stated."""
+"""Results of a graph that has run: metrics, figures, tables, counts and facts."""
 
 from collections.abc import Container, Iterator
 from typing import Any

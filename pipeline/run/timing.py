@@ -1,4 +1,4 @@
-"""How long stages took, from the times that their calls wrote down."""
+"""Times of stages, from the times that their calls wrote down."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""What every camera model answers: where a ray is seen, where a pixel looks, and what of the image shows the world.
+"""Interface of every camera model: where a ray is seen, where a pixel looks, and what of the image shows the world.
 
 A model is one file in this folder. Everything else (panoramas, windows, bearings, thumbnails, the simulator's rays,
 camera.yaml) follows from what it says here.

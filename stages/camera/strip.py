@@ -1,4 +1,4 @@
-"""What images that show the full circle side by side have in common: one azimuth per column."""
+"""Images that show the full circle side by side: one azimuth per column."""
 
 import math
 from abc import abstractmethod

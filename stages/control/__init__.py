@@ -1,1 +1,1 @@
-"""From a homing vector or a ring of ranges to velocity commands."""
+"""Velocity commands from a homing vector or a ring of ranges."""

@@ -1,4 +1,4 @@
-"""Whole views as an averaged strip, without compression."""
+"""Describes whole views by an averaged strip, without compression."""
 
 from typing import Annotated
 

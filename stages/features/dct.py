@@ -1,4 +1,4 @@
-"""Whole views as the low frequencies of their cosine transform."""
+"""Describes whole views by the low frequencies of their cosine transform."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""Whole views as spectra around the robot."""
+"""Describes whole views by spectra around the robot."""
 
 from typing import Annotated
 

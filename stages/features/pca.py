@@ -1,4 +1,4 @@
-"""Whole views as a projection learned from a tour."""
+"""Describes whole views by a projection learned from a tour."""
 
 import numpy as np
 

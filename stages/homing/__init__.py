@@ -1,1 +1,1 @@
-"""From what is seen now and what was seen at a target to where the target lies."""
+"""Direction to a target from what is seen now and what was seen there."""

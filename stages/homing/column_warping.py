@@ -1,4 +1,4 @@
-"""Where a second panorama was taken, by warping the columns of a first one: min-warping and its kin, on arrays.
+"""Min-warping and its kin on arrays: the place of a second panorama, by warping the columns of a first one.
 
 Möller, Krzykawski & Gerstmayr 2010 (Three 2D-warping schemes for visual robot navigation) compare every column of one
 view with every column of the other at several magnifications ("scale planes"), and search the direction and the turn

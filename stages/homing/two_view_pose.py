@@ -1,4 +1,4 @@
-"""Where a second view was taken, seen from the first."""
+"""Relative pose of a second view, seen from the first."""
 
 import math
 from typing import Annotated, Literal

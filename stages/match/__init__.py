@@ -1,1 +1,1 @@
-"""How similar the present view and the views of the map are."""
+"""Similarity of the present view to the views of the map."""

@@ -1,4 +1,4 @@
-"""What all comparisons of a view with the references of a map have in common."""
+"""Base of all comparisons of a view with the references of a map."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace

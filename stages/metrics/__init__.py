@@ -1,1 +1,1 @@
-"""How good a run was: errors against ground truth, trajectory errors, size of the map."""
+"""Measures of a run: errors against ground truth, trajectory errors, size of the map."""

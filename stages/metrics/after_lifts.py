@@ -1,4 +1,4 @@
-"""How long the estimate stays wrong after the robot was lifted."""
+"""Time until the estimate is right again after the robot was lifted."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""How many of the most similar images were taken near by."""
+"""Share of the most similar images that were taken near by."""
 
 from collections.abc import Sequence
 from typing import Annotated

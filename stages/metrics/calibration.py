@@ -1,4 +1,4 @@
-"""Whether a localisation knows how good it is: its confidence and its ellipses against ground truth."""
+"""Calibration of a localisation: its confidence and its ellipses against ground truth."""
 
 import math
 from typing import Annotated, Any

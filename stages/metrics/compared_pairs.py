@@ -1,4 +1,4 @@
-"""What the comparison of views tells of how far apart they were taken."""
+"""Accuracy with which the comparison of views tells how far apart they were taken."""
 
 from collections.abc import Sequence
 from itertools import pairwise

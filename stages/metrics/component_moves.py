@@ -1,4 +1,4 @@
-"""How far an update moves a place in the map that has had so many before."""
+"""Distance that an update moves a place in the map that has had so many before."""
 
 from collections.abc import Sequence
 from typing import Annotated

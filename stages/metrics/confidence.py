@@ -1,4 +1,4 @@
-"""What a run tells of itself where no ground truth says how right it was."""
+"""Summary of a run's confidence where no ground truth says how right it was."""
 
 from typing import Annotated, Any
 

@@ -1,4 +1,4 @@
-"""How a robot fared that drove by itself."""
+"""Outcome of a drive in which the robot drove by itself."""
 
 from typing import Any
 

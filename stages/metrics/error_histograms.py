@@ -1,4 +1,4 @@
-"""How position errors are distributed, log by log."""
+"""Distribution of position errors, log by log."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""How well a robot found back to where its run began."""
+"""Homing error: the distance to the target at the end of a drive."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""How well homing vectors point at their target, by how far away it is."""
+"""Angular error of homing vectors, by the distance to their target."""
 
 import math
 from collections.abc import Sequence

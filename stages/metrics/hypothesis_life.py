@@ -1,4 +1,4 @@
-"""How long a wrong hypothesis stays in the belief."""
+"""Time that a wrong hypothesis stays in the belief."""
 
 from collections.abc import Sequence
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""What the field asks of a localisation: shares within its thresholds, and how soon a lost robot finds itself again."""
+"""Shares of images within thresholds that the field reports, and how soon a lost robot finds itself again."""
 
 from typing import Annotated, Any
 

@@ -1,4 +1,4 @@
-"""How a map of views grew, and what odometry put into it at first."""
+"""Growth of a map of views, and what odometry put into it at first."""
 
 from collections.abc import Sequence
 from typing import Annotated, Any

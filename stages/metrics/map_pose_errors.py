@@ -1,4 +1,4 @@
-"""How far the poses of a map's references are from where their views were taken."""
+"""Errors of the poses of a map's references."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""How much a map takes."""
+"""Size of a map."""
 
 from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
 from omninav.stages.values.maps import ReferenceGraph

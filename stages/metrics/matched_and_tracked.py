@@ -1,4 +1,4 @@
-"""How many features two images of a homing drive share, and how exactly: matched, or tracked from one to the other."""
+"""Number and accuracy of the features that two images of a homing drive share, matched anew or tracked."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""How far the belief's mean lies from the middle of the free space at first."""
+"""Distance of the belief's mean from the middle of the free space at first."""
 
 import numpy as np
 

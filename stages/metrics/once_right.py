@@ -1,4 +1,4 @@
-"""How often the estimate is right from the first time on that it was."""
+"""Success rate after the first correct estimate."""
 
 from typing import Annotated
 

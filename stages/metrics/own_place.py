@@ -1,4 +1,4 @@
-"""How alike a view still is to the map's view of its own place, and whether it is told from other places."""
+"""Similarity of a view to the map's view of its own place, and how well it is told from other places."""
 
 from collections.abc import Sequence
 from typing import Annotated

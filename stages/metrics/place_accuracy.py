@@ -1,4 +1,4 @@
-"""How often the most probable place is the right one."""
+"""Share of images whose most probable place is the right one."""
 
 from collections.abc import Sequence
 from typing import Annotated, Any

@@ -1,4 +1,4 @@
-"""How much of column segments' profiles a few cosine coefficients keep, beside as many principal components."""
+"""Variance of column segments' profiles that a few cosine coefficients keep, beside as many principal components."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""What resampling does to the spread of the particles."""
+"""Spread of the particles before and after resampling."""
 
 from collections.abc import Sequence
 from typing import Annotated

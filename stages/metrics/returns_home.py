@@ -1,4 +1,4 @@
-"""How wrong the estimate is each time the robot comes back to where it began."""
+"""Error each time the robot comes back to where it began."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""How often the estimate is good enough, and how soon after it was not."""
+"""Share of images with a good estimate, and how soon one follows a bad one."""
 
 from typing import Annotated, Any
 

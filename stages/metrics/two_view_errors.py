@@ -1,4 +1,4 @@
-"""How well relative poses of two views were found."""
+"""Errors of relative poses of two views."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""How much a map of views takes, and how densely it covers what was visited."""
+"""Size of a map of views, and how densely it covers what was visited."""
 
 import dataclasses
 from typing import Annotated

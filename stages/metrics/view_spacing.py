@@ -1,4 +1,4 @@
-"""How evenly the views of a map lie, among views and on the floor."""
+"""Spacing of the views of a map, among views and on the floor."""
 
 import dataclasses
 from typing import Annotated, Any

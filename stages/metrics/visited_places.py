@@ -1,4 +1,4 @@
-"""How the error at a place follows from the odometry of its first visit, and falls with further visits."""
+"""Error at a place by the odometry of its first visit, and by the number of visits."""
 
 from typing import Annotated, Any
 

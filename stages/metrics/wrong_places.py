@@ -1,4 +1,4 @@
-"""What became of references that were learned at a wrong place."""
+"""Fate of references that were learned at a wrong place."""
 
 from collections.abc import Sequence
 from typing import Annotated, Any

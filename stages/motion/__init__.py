@@ -1,1 +1,1 @@
-"""How a belief moves when the robot does."""
+"""Motion models: the belief after the robot has moved."""

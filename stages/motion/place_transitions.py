@@ -1,4 +1,4 @@
-"""How the belief over places spreads from one image to the next."""
+"""Spreads the belief over places from one image to the next."""
 
 from typing import Annotated
 

@@ -1,1 +1,1 @@
-"""What a run looks like: figures for the report, videos, trajectories and logs for other tools."""
+"""Figures for the report, videos, trajectories and logs for other tools."""

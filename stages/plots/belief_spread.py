@@ -1,4 +1,4 @@
-"""How far a belief is spread."""
+"""Spread of a belief over time."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Where a robot truly was, and at which place of its map it thought to be."""
+"""True place of a robot and the place of its map that it believed in."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""What describes a folder of images: found by name, read from YAML, checked."""
+"""Description of a folder of images: found by name, read from YAML, checked."""
 
 import re
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""From what a user names to a recording, by the format that opens it."""
+"""Opens what a user names as a recording, by the format that fits."""
 
 import importlib
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What no robot does: poses of a track that cannot be true, and jumps in it."""
+"""Detects poses of a track that no robot can have, and jumps in it."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What every recording offers to the source stage (frames with stamps, odometry, perhaps truth), and what opens one."""
+"""Interface of every recording (frames with stamps, odometry, perhaps truth), and of the formats that open one."""
 
 from abc import ABC, abstractmethod
 from collections import Counter

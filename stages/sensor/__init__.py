@@ -1,1 +1,1 @@
-"""How well poses explain what is seen."""
+"""Likelihoods of poses, given what is seen."""

@@ -1,4 +1,4 @@
-"""Where each of many things is among the few that are looked at now."""
+"""Index from a reference to its row among the candidates."""
 
 import numpy as np
 import numpy.typing as npt

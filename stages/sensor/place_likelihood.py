@@ -1,4 +1,4 @@
-"""How well each place of a topological map explains the view."""
+"""Likelihood of each place of a topological map, given the view."""
 
 from typing import Annotated, Literal
 

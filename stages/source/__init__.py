@@ -1,1 +1,1 @@
-"""Where ticks come from: recorded drives and the simulator; and what is known of the place they are in."""
+"""Sources of ticks: recorded drives and the simulator; and what is known of the place they are in."""

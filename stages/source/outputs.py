@@ -1,4 +1,4 @@
-"""What a source of drives gives at every tick, whether they are recorded, happen now or are pushed."""
+"""Outputs of a source of drives at every tick, whether they are recorded, happen now or are pushed."""
 
 import numpy as np
 import numpy.typing as npt

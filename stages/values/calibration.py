@@ -1,4 +1,4 @@
-"""What a similarity says of the place, as a map's own views show it."""
+"""Relation of similarity and place that a map's own views show."""
 
 from typing import Annotated
 

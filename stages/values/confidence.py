@@ -1,4 +1,4 @@
-"""How far an estimate is to be trusted."""
+"""Confidence in an estimate."""
 
 from typing import Annotated, ClassVar
 

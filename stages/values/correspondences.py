@@ -1,4 +1,4 @@
-"""What in one view is what in another."""
+"""Correspondences between two views."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""How far away the things are that features show."""
+"""Depths of the things that features show."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""What was collected over a run, as arrays: a row for every tick."""
+"""A whole drive as arrays: a row for every tick."""
 
 import dataclasses
 from collections.abc import Sequence

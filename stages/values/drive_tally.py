@@ -1,4 +1,4 @@
-"""What became of a robot that drives by itself."""
+"""Per-tick statistics of a closed-loop drive."""
 
 from typing import Annotated
 

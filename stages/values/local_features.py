@@ -1,4 +1,4 @@
-"""What is kept of a view to find it again from elsewhere: patches, vertical segments, and a global descriptor."""
+"""Local features of a view: patches, vertical segments, and a global descriptor."""
 
 from dataclasses import replace
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""What somebody asks of a robot while it runs."""
+"""Requests to a robot while it runs."""
 
 from omninav.pipeline import Value
 

@@ -1,4 +1,4 @@
-"""What people call the parts of a place."""
+"""Names of the parts of a place."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""How far the present view is from the places of a map, by what is seen."""
+"""Visual distance of the present view to the places of a map."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""How far a robot has turned, from the optical flow ahead of it and behind it."""
+"""Turn of a robot from the optical flow ahead of it and behind it."""
 
 import math
 from typing import NamedTuple

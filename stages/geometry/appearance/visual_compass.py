@@ -1,4 +1,4 @@
-"""How far a robot has turned, from two panoramas: a visual compass."""
+"""Turn of a robot from two panoramas: a visual compass."""
 
 import math
 

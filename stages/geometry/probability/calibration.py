@@ -1,4 +1,4 @@
-"""Whether stated probabilities hold: reliability, calibration error, separation."""
+"""Calibration of stated probabilities: reliability, calibration error, separation."""
 
 from typing import NamedTuple
 

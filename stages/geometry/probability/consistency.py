@@ -1,4 +1,4 @@
-"""Whether the places that images look like lie where an estimate says that they were taken."""
+"""Consistency of an estimate with the places that images look like."""
 
 import numpy as np
 import numpy.typing as npt

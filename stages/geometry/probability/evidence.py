@@ -1,4 +1,4 @@
-"""From similarities to evidence: its contrast, and the novelty of an image."""
+"""Evidence from similarities: its contrast, and the novelty of an image."""
 
 import math
 

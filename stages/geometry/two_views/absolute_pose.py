@@ -1,4 +1,4 @@
-"""Where a camera is, from bearings of points whose positions are known: three at a time, then all that agree.
+"""Absolute pose of a camera from bearings of known points: three at a time, then all that agree.
 
 Convention as in `epipolar`: X = R Xc + t takes the camera's coordinates to those of the points' frame, so `rotation`
 (3, 3) and `translation` (3,) are the camera seen from there. Goedemé et al. 2007, section 7.2.3: three points in a
