@@ -109,7 +109,7 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """What `write_json` wrote, without the checksum. Raises `Damaged` where it is anything else."""
+    """Reads what `write_json` wrote, without the checksum. Raises `Damaged` where it is anything else."""
     if not path.is_file():
         raise Damaged(f"{path}: there is no such file")
     try:

@@ -18,7 +18,7 @@ from .words import words_of
 
 @dataclass(frozen=True, repr=False)
 class Configuration:
-    """What will run: a variant with all its settings, composed and checked.
+    """A variant with all its settings, composed and checked.
 
     In a notebook it shows its graph.
     """

@@ -50,13 +50,13 @@ class Run:
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.folder = Path(os.path.realpath(folder))
-        """Where its files lie."""
+        """Folder of its files."""
         if not (self.folder / MANIFEST).is_file():
             raise BadInput(f"{folder}: not a run folder (no {MANIFEST}); `ls runs` shows what there is")
 
     @property
     def manifest(self) -> dict[str, Any]:
-        """How it came about: command, versions, inputs, seed, status, what was skipped."""
+        """Manifest: command, versions, inputs, seed, status, skipped data."""
         try:
             return read_json(self.folder / MANIFEST)
         except Damaged as damaged:

@@ -97,7 +97,7 @@ class Session(AbstractContextManager["Session"]):
 
     @property
     def folder(self) -> Path:
-        """Where its files lie."""
+        """Folder of its files."""
         return self._run.folder
 
     @property

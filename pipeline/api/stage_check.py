@@ -40,7 +40,7 @@ def check_stage(
 
 
 def broken_promises(cls: type[Stage]) -> Iterator[str]:
-    """What is wrong with a stage class, as it is written."""
+    """Lists the faults of a stage class, as it is written."""
     try:
         read = signature(cls)
     except BadStage as error:

@@ -24,7 +24,7 @@ class Sweep:
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.folder = Path(os.path.realpath(folder))
-        """Where its jobs' folders lie."""
+        """Folder of its jobs' folders."""
         if not (self.folder / "sweep.parquet").is_file():
             raise BadInput(f"{folder}: not a sweep's folder (no sweep.parquet); `ls runs` shows what there is")
 

@@ -47,7 +47,7 @@ def write_artifact(path: Path, value: Value, facts: dict[str, Any] | None = None
 
 
 def artifact_bytes(value: Value, facts: dict[str, Any] | None = None) -> bytes:
-    """What `write_artifact` would write."""
+    """Bytes that `write_artifact` would write."""
     buffer = io.BytesIO()
     _write(buffer, value, facts)
     return buffer.getvalue()
@@ -258,7 +258,7 @@ def _opened(path: Path) -> Iterator[tuple[zipfile.ZipFile, int]]:
 
 
 def _checked_sum(path: Path, file: BinaryIO) -> tuple[int, int]:
-    """Where an artifact file's front ends, and its size. Raises `BadInput` where the sum of the rest is wrong."""
+    """End of an artifact file's front, and the file's size. Raises `BadInput` where the sum of the rest is wrong."""
     size = file.seek(0, io.SEEK_END)
     file.seek(max(0, size - _SUM_BYTES - _FRONT_BYTES))
     front, stated = (ends := file.read())[:-_SUM_BYTES], ends[-_SUM_BYTES:]

@@ -24,7 +24,7 @@ class Cache:
         self.folder = folder
 
     def path(self, key: str, suffix: str) -> Path:
-        """Where the result with this key lies, or would lie."""
+        """Path of the result with this key, made or not."""
         return self.folder / f"{key[:32]}{suffix}"
 
     def find(self, key: str, suffix: str) -> tuple[Path, Any] | None:

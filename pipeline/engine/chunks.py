@@ -34,7 +34,7 @@ Ints = npt.NDArray[np.int64]
 
 
 class Unfit(Exception):
-    """What is wrong with an artifact's content, without its file's name."""
+    """Fault of an artifact's content, without its file's name."""
 
 
 def parse_npy_head(head: io.BytesIO, length: int) -> tuple[tuple[int, ...], np.dtype[Any]]:

@@ -31,7 +31,7 @@ def encode(thing: Any) -> bytes:
 
 
 def decode(content: bytes | memoryview) -> Any:
-    """What `encode` was given. Raises `BadEncoding` where the bytes are damaged or name something that is no value."""
+    """Decodes what `encode` wrote. Raises `BadEncoding` where the bytes are damaged or name no value."""
     view = memoryview(content)
     try:
         (size,) = _LENGTH.unpack_from(view)

@@ -18,6 +18,6 @@ def compile_notice(say: Callable[[str], None]) -> Iterator[None]:
 
 
 def compiling() -> None:
-    """To be called before a function is compiled."""
+    """Prints the notice once, before a function is compiled."""
     while _say:
         _say.pop()(WORDS)

@@ -48,7 +48,7 @@ class CompiledCache(FunctionCache):  # type: ignore[misc]
         self._cache_file = Index(self._cache_path, self._impl.filename_base, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """What was kept for a signature; None where that is nothing, or damaged."""
+        """Machine code that was kept for a signature; None where there is none, or it is damaged."""
         found = None
         try:
             found = super().load_overload(sig, target_context)

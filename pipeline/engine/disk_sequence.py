@@ -30,7 +30,7 @@ class DiskSequence(Sequence[Any]):
     """
 
     def __init__(self, path: Path, append: bool = True) -> None:
-        """With `append` the file is made where it is not there; without, it is only read."""
+        """Opens a sequence. With `append` the file is made where it does not exist; without, it is only read."""
         self.path = path
         if append:
             path.parent.mkdir(parents=True, exist_ok=True)

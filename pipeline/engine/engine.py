@@ -30,7 +30,7 @@ from .grown_rows import GrownRows
 
 @dataclass(frozen=True)
 class EngineOptions:
-    """Where and how a graph runs; nothing here changes what it gives, but for the seed."""
+    """Options of a run of a graph; none of them changes its results but the seed."""
 
     seed: int = 0
     """Seed of all randomness."""
@@ -215,7 +215,7 @@ class Engine:
         return True
 
     def finish(self) -> dict[str, Any]:
-        """What comes after the loop. Returns the last value of each wanted output."""
+        """Runs the stages after the loop. Returns the last value of each wanted output."""
         if not self.ended:
             self.ended = True
             self.save()

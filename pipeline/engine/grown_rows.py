@@ -18,7 +18,7 @@ _STEP = 1 << 22
 
 @dataclasses.dataclass
 class _Written:
-    """What has been written of a value: rows by field. Another value in its place is another generation, of new files:
+    """Written part of a value: rows by field. Another value in its place is another generation, of new files:
     the last checkpoint knows the old ones until the next is there."""
 
     value: Value | None = None

@@ -39,7 +39,7 @@ class CachedPrefix:
     replay: PrefixReplay | None = None
 
     def recorded(self) -> dict[str, Sequence[str]]:
-        """What an engine has to write down so that it can be kept: for `Engine(recorded=…)`."""
+        """Outputs that an engine has to record so that it can be kept: for `Engine(recorded=…)`."""
         return {SEQUENCE: self.frontier} if self.key and self.replay is None else {}
 
 
@@ -74,7 +74,7 @@ def prefix_nodes(graph: Graph, artifacts: bool = False, without: Collection[str]
 
 
 def frontier_of(graph: Graph, nodes: frozenset[str], wanted: Collection[str] = ()) -> list[str]:
-    """What other nodes read of a prefix, what is `wanted` or reported of it, and the source's tick."""
+    """Outputs of a prefix that other nodes read, that are `wanted` or reported, and the source's tick."""
     read = {wire.origin for wire in graph.wires if wire.from_node in nodes and wire.to_node not in nodes}
     read |= {origin for origin in wanted if origin.partition(".")[0] in nodes} | graph.reported(nodes)
     return sorted(read | ({f"{graph.source.name}.tick"} if graph.source else set()))

@@ -21,7 +21,7 @@ UNRUN, UNJUDGED, NOT_HERE = "not run yet", "no experiment", "not testable here"
 
 @dataclass(frozen=True)
 class ListedClaim:
-    """What a paper says, and one of three: which verdict judges it, what an experiment of it needs, why none can be."""
+    """A paper's statement, and one of three: which verdict judges it, what an experiment needs, why none can be."""
 
     claim: str
     """The paper's statement in our words, with its figure."""
@@ -41,7 +41,7 @@ class ListedClaim:
 
 @dataclass(frozen=True)
 class ClaimList:
-    """What `claims.yaml` holds."""
+    """Content of `claims.yaml`."""
 
     page: str
     """The page that the tables are written into, from the list's folder."""
@@ -143,7 +143,7 @@ def _figure(value: float) -> str:
 
 
 def _counts(verdicts: Sequence[str]) -> str:
-    """How many claims there are, and what they come to."""
+    """Counts the claims by verdict."""
     words = [in_words(held) for held in (True, False, None)]
     judged = [f"{word}: {verdicts.count(word)}" for word in (*words, UNRUN)]
     beside = [verdicts.count(kind) for kind in (UNJUDGED, NOT_HERE)]

@@ -99,7 +99,7 @@ def number(value: float | None, digits: int) -> str:
 
 
 def made_with(version: str, commit: str | None) -> str:
-    """At which version and commit a page was made: in 12 digits, and whether it had changes."""
+    """Version and commit at which a page was made: in 12 digits, and whether it had changes."""
     known, dirty, _ = (commit or "").partition("-dirty")
     at = f", commit {known[:12]}" + (" with changes that are not committed" if dirty else "") if known else ""
     return f"Made with omninav {version}{at}"
@@ -116,7 +116,7 @@ def summary(measure: Measure, values: Sequence[float]) -> str:
 
 
 def beyond_the_mean(measure: Measure, values: Sequence[float], ran: int) -> list[str]:
-    """What it does not show: the median where it differs, and how many of those that ran have a figure at all."""
+    """Note under a mean: the median where it differs, and how many of those that ran have a figure at all."""
     shown, median = (
         (number(of, measure.digits) for of in (over_runs(measure, values), float(np.median(values))))
         if values
@@ -214,7 +214,7 @@ def _in_words(name: str, value: Any) -> str:
 
 
 def _tiles(content: PageContent, verdicts: Sequence[Verdict]) -> list[dict[str, str]]:
-    """How many claims hold, and how much has run."""
+    """Tiles: how many claims hold, and how much has run."""
     done = sum(len(run.results) for run in content.conditions)
     total = sum(len(run.seeds) for run in content.conditions)
     holding = sum(verdict.holds is True for verdict in verdicts)

@@ -113,7 +113,7 @@ def _curve(experiment: Experiment, results: Results, curve: Curve) -> bytes:
 
 
 def series_of(runs: Sequence[Mapping[str, Any]], path: str, at_path: str = "") -> tuple[Array, Array]:
-    """Where the entries of a series lie (N,), and the series of all runs that have it (runs, N); NaN where one ends.
+    """Positions of the entries of a series (N,), and the series of all runs that have it (runs, N); NaN where one ends.
 
     Entries that no run has a figure for are left out.
     """
@@ -277,7 +277,7 @@ def _legend_above(canvas: Any, grid: Any) -> None:
 
 
 def _scale(axes: Any, figures: Sequence[float], ratio: float = 20.0, axis: Literal["x", "y"] = "y") -> None:
-    """From zero up; in powers of ten where the highest is more than `ratio` times the lowest above zero.
+    """Scales an axis from zero up; in powers of ten where the highest is more than `ratio` times the lowest above zero.
 
     Where one is zero, the axis is linear up to the lowest above zero, so that a line at zero is seen.
     """

@@ -119,7 +119,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 
 def _results(folder: Path, key: str, seed: int, cache: Cache | None) -> list[Path]:
-    """Where a repetition's result lies."""
+    """Path of a repetition's result."""
     kept = [] if cache is None else [cache.path(digest_text("repetition", key, str(seed)), ".json")]
     return [folder / f"seed_{seed}.json", *kept]
 

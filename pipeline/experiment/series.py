@@ -11,7 +11,7 @@ line that fits best (per entry), `largest_rise` the largest step upwards from on
 
 
 def at(result: Any, path: str) -> Any:
-    """What lies at a path of names joined by points, None where there is nothing.
+    """Value at a path of names joined by points, None where there is nothing.
 
     In a list a number counts its entries (`logs.0`, `laps.-1`), and `*` stands for each of them
     (`laps.*.position_error_m.mean`): the result is a list then, with None where an entry has nothing there.

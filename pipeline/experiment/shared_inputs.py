@@ -31,7 +31,7 @@ FACTS = "facts.json"
 
 @dataclass
 class Recording:
-    """What a source computes, recorded for all runs that read it."""
+    """A source's computed values, recorded for all runs that read them."""
 
     name: str
     key: str
@@ -49,7 +49,7 @@ class Recording:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What was stated when it was recorded."""
+        """Facts that were stated when it was recorded."""
         return dict(_stated(self.folder).get("facts", {}))
 
     def job(self, folder: Path) -> Job:
@@ -77,7 +77,7 @@ class Recording:
 
 
 def recordings_of(runs: Sequence[ConditionRun], folder: Path) -> list[Recording]:
-    """What the runs' sources would compute, each once; `folder` is where recordings lie without a cache."""
+    """Records what the runs' sources would compute, each once; recordings lie in `folder` without a cache."""
     found: dict[str, Recording] = {}
     for run in runs:
         assert run.planned is not None
@@ -156,7 +156,7 @@ class SharedArtifact:
 
     @property
     def file(self) -> Path:
-        """Where it lies once it is made."""
+        """Its path once it is made."""
         return self.folder / f"{self.readers[0][1]}.omap"
 
     @property

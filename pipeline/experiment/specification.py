@@ -88,7 +88,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class PageLayout:
-    """How results stand on the page."""
+    """Layout of the results on the page."""
 
     rows: tuple[str, ...]
     """Factors of the table's rows."""
@@ -189,7 +189,7 @@ class Experiment:
 
     @property
     def runs_of_a_condition(self) -> int:
-        """How many repetitions of each condition count: every seed in every scenario."""
+        """Number of repetitions of each condition that count: every seed in every scenario."""
         return self.repetitions * max(1, len(self.scenarios))
 
     @property
@@ -339,7 +339,7 @@ def _contradictions(experiment: Experiment) -> "list[Problem]":
 
 
 def _faults(experiment: Experiment, claim: Claim) -> "list[str]":
-    """What is wrong with a claim as it is written."""
+    """Lists the faults of a claim as it is written."""
     sides = [side for side in SIDES if getattr(claim, side) is not None]
     faults = []
     if len(sides) + claim.lowest != 1:
@@ -382,7 +382,7 @@ def figure_of(measure: Measure, result: Mapping[str, Any]) -> float | None:
 
 
 def space_of(result: Mapping[str, Any]) -> dict[str, Any]:
-    """Where paths lead through a repetition's result: its metrics, `timing` and `facts`."""
+    """Results of a repetition that paths lead through: its metrics, `timing` and `facts`."""
     return {**result["metrics"], "timing": result["timing"], "facts": result["facts"]}
 
 

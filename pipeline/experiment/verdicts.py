@@ -68,7 +68,7 @@ class Verdict:
         return None if None in found or not found else True
 
     def plain(self) -> dict[str, Any]:
-        """As verdicts.json holds it: the figures themselves where there is one case, else one entry for each."""
+        """Form of verdicts.json: the figures themselves where there is one case, else one entry for each."""
         cases = [asdict(case) for case in self.cases]
         head = {"claim": self.claim, "measure": self.measure, "paper": self.paper, "holds": self.holds}
         if len(cases) == 1:
@@ -87,12 +87,12 @@ def verdict_of(plain: Mapping[str, Any]) -> Verdict:
 
 
 def in_words(holds: bool | None) -> str:
-    """What a claim or a case comes to."""
+    """Verdict on a claim or a case in words."""
     return {True: "holds", False: "does not hold", None: "undecided"}[holds]
 
 
 def headline(verdicts: Sequence[Verdict]) -> str:
-    """What the claims of a page come to together: it holds where every claim does."""
+    """Verdict on the claims of a page together: it holds where every claim does."""
     found = [verdict.holds for verdict in verdicts]
     if len(set(found)) == 1 and (found[0] is not False or len(found) == 1):
         return in_words(found[0])
@@ -272,7 +272,7 @@ def _changed(labels: Labels, facing: Labels) -> str:
 
 
 def _ran(results: Results, labels: Labels, facing: Labels) -> int:
-    """How many repetitions of both conditions have run."""
+    """Number of repetitions of both conditions that have run."""
     return len(set(results.get(key_of(labels), {})) & set(results.get(key_of(facing), {})))
 
 

@@ -282,7 +282,7 @@ class _Builder:
         return sorted(origin for origin, kind in kinds.items() if compatible(kind, wanted.type))
 
     def _to_wire(self, where: str, port: Port) -> str:
-        """What to type for a port that nothing is wired to."""
+        """Text to type for a port that nothing is wired to."""
         own = f"{where.split('.')[1]}."
         fitting = [] if port.collects or self.prefix else self._fitting(port)
         found = [origin for origin in fitting if not origin.startswith(own)]

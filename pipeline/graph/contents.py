@@ -50,7 +50,7 @@ class RowsOf:
 
 @dataclasses.dataclass(frozen=True)
 class Starts:
-    """Where parts of something begin, and the end of the last: from 0, never descending, to the size of that name."""
+    """Starts of the parts of something, and the end of the last: from 0, never descending, to the size of that name."""
 
     size: str
 
@@ -68,12 +68,12 @@ class Covariances:
 
 
 def misfit(value: Value) -> str | None:
-    """What is wrong with the first field that does not hold what it states; None where each does."""
+    """Describes the first field that does not hold what it states; None where each does."""
     return next(_wrong_fields(value), None)
 
 
 def wrong_output(thing: Any, kind: Any, optional: bool) -> str | None:
-    """What is wrong with what a stage gave at an output of this type; None where it is as stated."""
+    """Describes why an output violates its declared type; None where it does not."""
     if thing is None:
         return None if optional else f"is missing, expected {type_name(kind)}; write `{type_name(kind)} | None`"
     if not _is(thing, kind):

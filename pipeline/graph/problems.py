@@ -85,7 +85,7 @@ HINTS = {
 
 
 def as_bad_input(error: BaseException) -> BadInput | None:
-    """What a user can do about an error that no reader has put into words; None where it is a defect of ours."""
+    """Advice on an error that no reader has put into words; None where it is a defect of ours."""
     if isinstance(error, OSError):
         where = "" if error.filename is None else f"{error.filename}: "
         number = error.errno or 0

@@ -18,7 +18,7 @@ class Recordable(Protocol):
         """The hash of everything that decides the recording; None where there is nothing to record."""
 
     def recording_name(self) -> str:
-        """What is recorded, for people to read."""
+        """Description of the recording, for people to read."""
 
     def record(self, ctx: Context, folder: Path) -> None:
         """Write the recording into a folder, which exists. `ctx` takes progress and facts; nothing random is drawn."""

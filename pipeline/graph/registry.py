@@ -165,7 +165,7 @@ def _load_file(path: Path) -> ModuleType:
 
 @functools.cache
 def _installed(path: tuple[str, ...]) -> tuple[Entry, ...]:
-    """What installed distributions offer; looking through them takes as long as everything else, so once will do."""
+    """Stages of installed distributions; looking through them takes as long as everything else, so once will do."""
     points = importlib.metadata.entry_points(group=ENTRY_POINTS)
     return tuple(Entry(point.name, point.value, "installed") for point in sorted(points, key=lambda point: point.name))
 

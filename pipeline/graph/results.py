@@ -8,7 +8,7 @@ from .value import Value
 
 
 class Quantity(Value):
-    """How one entry of the metrics is read. Whatever is not stated follows from the entry's name."""
+    """Presentation of one entry of the metrics. Whatever is not stated follows from the entry's name."""
 
     title: str | None = None
     """Label. None: its name in words (`position_error_m` is `Position error`)."""

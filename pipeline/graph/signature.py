@@ -44,7 +44,7 @@ class Parameter:
 
     @property
     def meaning(self) -> str:
-        """What it means, in one line: its attribute docstring, '' where it has none."""
+        """Meaning in one line: its attribute docstring, '' where it has none."""
         return attribute_docs(self.owner).get(self.name, "") if self.owner is not None else ""
 
 

@@ -42,12 +42,12 @@ def read_small(path: Path, max_bytes: int = MAX_BYTES) -> bytes:
 
 
 def read_yaml(path: Path) -> Any:
-    """What a YAML file holds: mappings, lists, texts, finite numbers, booleans and null. Raises `BadInput`."""
+    """Reads a YAML file: mappings, lists, texts, finite numbers, booleans and null. Raises `BadInput`."""
     return parse_yaml(read_small(path), str(path))
 
 
 def parse_yaml(content: bytes | str, where: str) -> Any:
-    """What a YAML text holds, as `read_yaml`. `where` names it in messages.
+    """Reads a YAML text as `read_yaml` does. `where` names it in messages.
 
     As YAML 1.1, without tags; what looks like a date stays a text. Raises `BadInput` with the line.
     """

@@ -68,7 +68,7 @@ class State:
 
 
 class Context:
-    """What a stage may know beside its inputs.
+    """Context of a stage: all that it may know beside its inputs.
 
     `rng` is the only source of randomness, seeded by the run's seed and the node's name. `tick` is the current
     turn of the loop. `folder` is the run's folder, where an "after" stage may put files (through `files.write_whole`).

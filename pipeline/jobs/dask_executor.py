@@ -34,11 +34,11 @@ class DaskExecutor(Executor):
 
     @property
     def workers(self) -> int:
-        """How many jobs run at a time, by what is connected now."""
+        """Number of jobs that run at a time, by the workers that are connected now."""
         return sum(int(each["nthreads"]) for each in self._client.scheduler_info(n_workers=-1)["workers"].values())
 
     def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> "Future[T]":
-        """As every executor's. Raises `RuntimeError` where the scheduler is gone."""
+        """Submits a job, as every executor does. Raises `RuntimeError` where the scheduler is gone."""
         if self._client.status != "running":
             raise RuntimeError("its scheduler is gone")
         future: Future[T] = self._executor.submit(fn, *args, **kwargs)

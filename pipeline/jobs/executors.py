@@ -23,7 +23,7 @@ BUILT_IN = {
 
 @dataclass(frozen=True)
 class EngineSettings:
-    """What `engine.…` says."""
+    """Settings under `engine.…`."""
 
     name: str = "local"
     workers: int | None = None
@@ -85,7 +85,7 @@ def _factories() -> dict[str, str]:
 
 
 def cores() -> int:
-    """How many this process may use."""
+    """Number of processors that this process may use."""
     return len(os.sched_getaffinity(0))
 
 

@@ -40,7 +40,7 @@ class Job:
 
     @property
     def messages(self) -> Path:
-        """Where what it sends can be read, a line for each message."""
+        """File of its messages, one a line."""
         return self.log.with_name(f"{self.log.name}.messages")
 
     def text(self, attempt: int, lease: Path, token: str, memory: int | None) -> str:
@@ -66,7 +66,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How an attempt at a job ended."""
+    """End of an attempt at a job."""
 
     error: str | None = None
     """Error, in one line."""

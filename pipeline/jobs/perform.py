@@ -156,7 +156,7 @@ def release() -> None:
 
 
 def _memory(process: int) -> int:
-    """What a process takes now (bytes); 0 where it cannot be known."""
+    """Memory of a process now (bytes); 0 where it cannot be known."""
     try:
         pages = Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()[1]
     except (OSError, IndexError):

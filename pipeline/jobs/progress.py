@@ -26,7 +26,7 @@ class Heartbeat:
 
 
 class JobProgress:
-    """How many frames jobs have done, of how many: the last message of each one, added up."""
+    """Frames that jobs have done, and those that they have: the last message of each one, added up."""
 
     def __init__(self, jobs: int) -> None:
         self._jobs = jobs
@@ -47,7 +47,7 @@ class JobProgress:
 
     @property
     def ended(self) -> int:
-        """How many jobs have come to their end."""
+        """Number of jobs that have ended."""
         return len(self._ended)
 
     @property

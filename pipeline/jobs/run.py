@@ -57,7 +57,7 @@ class Workers:
 
     @property
     def number(self) -> int:
-        """How many jobs run at a time, as far as it is known before they start."""
+        """Number of jobs that run at a time, as far as it is known before they start."""
         default = {"local": cores(), "slurm": 4}.get(self.settings.name, 8)
         return self.settings.workers or int(getattr(self._executor, "workers", 0)) or default
 
@@ -131,7 +131,7 @@ def _outcome(future: Future[dict[str, Any]]) -> Outcome:
 
 
 class _Mailbox:
-    """What jobs send, as it comes."""
+    """Reads the messages of jobs as they come."""
 
     def __init__(self, on_message: Callable[[Job, Any], None]) -> None:
         self._on_message = on_message

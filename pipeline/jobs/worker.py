@@ -86,7 +86,7 @@ def _begin_peak() -> None:
 
 
 def _memory() -> tuple[int, int]:
-    """What this process takes now, and the most it took (bytes)."""
+    """Memory of this process now, and at most so far (bytes)."""
     status = Path("/proc/self/status").read_text(encoding="utf-8")
     now, peak = (re.search(rf"{name}:\s+(\d+) kB", status) for name in ("VmRSS", "VmHWM"))
     return (int(now[1]) * 1024 if now else 0), (int(peak[1]) * 1024 if peak else 0)

@@ -50,7 +50,7 @@ class Allowance:
 
 
 class Place(NamedTuple):
-    """Where a record lies in its file, with its head: first byte and length."""
+    """Position of a record in its file, with its head: first byte and length."""
 
     start: int
     length: int
@@ -102,13 +102,13 @@ def unpack(content: bytes, whole: bool, check: bool = True) -> bytes:
 
 
 def unpack_zstd(packed: memoryview | bytes, size: int) -> bytes:
-    """At most one byte more than `size`, so that more is noticed."""
+    """Unpacks at most one byte more than `size`, so that more is noticed."""
     with zstandard.ZstdDecompressor(max_window_size=MAX_BYTES).stream_reader(packed) as stream:
         return stream.read(size + 1)
 
 
 def unpack_lz4(packed: memoryview | bytes, size: int) -> bytes:
-    """At most one byte more than `size`, so that more is noticed."""
+    """Unpacks at most one byte more than `size`, so that more is noticed."""
     return bytes(lz4.LZ4FrameDecompressor().decompress(bytes(packed), max_length=size + 1))  # type: ignore[no-untyped-call]
 
 

@@ -26,7 +26,7 @@ class Message:
 
 
 class Location(NamedTuple):
-    """Where a message's bytes lie: number of its chunk (-1: directly in the file), first byte, length."""
+    """Position of a message's bytes: number of its chunk (-1: directly in the file), first byte, length."""
 
     chunk: int
     start: int

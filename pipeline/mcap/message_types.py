@@ -71,7 +71,7 @@ def make_message(msgtype: str, fields: Mapping[str, Any], stamp: int | None = No
 
 @cache
 def _maker(msgtype: str) -> Callable[[Mapping[str, Any]], Any]:
-    """What makes messages of a type: its definition is gone through once, and not for every message."""
+    """Makes messages of a type: its definition is gone through once, and not for every message."""
     store = standard_types()
     if msgtype not in store.fielddefs:
         raise LogError(f"{msgtype}: no such message type{_nearest(msgtype, store.fielddefs)}")

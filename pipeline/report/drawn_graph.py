@@ -10,7 +10,7 @@ LIFETIMES = {"before": "before the loop", "tick": "every tick", "after": "after 
 
 
 class DrawnNode(Protocol):
-    """What a drawing needs to know of a node."""
+    """A node as it is drawn."""
 
     @property
     def name(self) -> str: ...
@@ -25,7 +25,7 @@ class DrawnNode(Protocol):
 
 
 class DrawnWire(Protocol):
-    """What a drawing needs to know of a wire."""
+    """A wire as it is drawn."""
 
     @property
     def to_node(self) -> str: ...
@@ -46,7 +46,7 @@ class DrawnWire(Protocol):
 
 
 class DrawnGraph(Protocol):
-    """What a drawing needs to know of a graph."""
+    """A graph as it is drawn."""
 
     @property
     def nodes(self) -> Mapping[str, DrawnNode]: ...

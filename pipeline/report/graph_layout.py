@@ -41,7 +41,7 @@ class Box:
 
     @property
     def rows(self) -> int:
-        """How many rows of ports it has."""
+        """Number of its rows of ports."""
         return (
             len(self.inputs) + len(self.outputs)
             if self.lifetime == "after"
@@ -54,17 +54,17 @@ class Box:
         return TITLE + ROW * self.rows + (PAD if self.rows else 0)
 
     def input_y(self, port: str) -> float:
-        """Where a wire enters."""
+        """Point at which a wire enters."""
         return self.y + TITLE + ROW * (next(i for i, row in enumerate(self.inputs) if row.name == port) + 0.5)
 
     def output_y(self, port: str) -> float:
-        """Where a wire leaves."""
+        """Point at which a wire leaves."""
         return self.y + TITLE + ROW * (next(i for i, row in enumerate(self.outputs) if row.name == port) + 0.5)
 
 
 @dataclass
 class Passage:
-    """Where a long wire goes through a layer between boxes. All readers of one output share it."""
+    """Point at which a long wire goes through a layer between boxes. All readers of one output share it."""
 
     origin: str
     x: float = 0.0
@@ -160,12 +160,12 @@ class Link:
 
     @property
     def start_y(self) -> float:
-        """Where it begins."""
+        """Its first point."""
         return self.start.y if isinstance(self.start, Passage) else self.start.output_y(self.origin.partition(".")[2])
 
     @property
     def end_y(self) -> float:
-        """Where it ends."""
+        """Its last point."""
         return self.end.y if isinstance(self.end, Passage) else self.end.input_y(self.port)
 
 

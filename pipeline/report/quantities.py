@@ -52,7 +52,7 @@ class Entry:
 
     @property
     def title(self) -> str:
-        """What it is called, without its groups."""
+        """Its name without its groups."""
         return self.quantity.title or title(self.name)
 
     @property

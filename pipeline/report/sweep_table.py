@@ -63,7 +63,7 @@ class Condition:
 
 
 def settings_of(overrides: str) -> dict[str, str]:
-    """What a job overrides, as name and value."""
+    """Overrides of a job, as name and value."""
     return {name.lstrip("+~"): value for name, _, value in (word.partition("=") for word in overrides.split())}
 
 

@@ -11,7 +11,7 @@ from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 
 @dataclass(frozen=True)
 class ArtifactSpecification:
-    """Where an artifact comes from: a file, or an output of another variant's graph."""
+    """Origin of an artifact: a file, or an output of another variant's graph."""
 
     file: str | None = None
     """The file it is loaded from; none: it is made, where it can be."""

@@ -25,7 +25,7 @@ from .run_folder import RunFolder
 
 
 class ProgressDisplay(Protocol):
-    """Who shows how far a run is."""
+    """Shows the progress of a run."""
 
     def update(self, name: str, done: int, total: int | None = None) -> None:
         """`done` ticks of `total` have gone through the graph `name`."""
@@ -36,7 +36,7 @@ class ProgressDisplay(Protocol):
 
 @dataclass(frozen=True)
 class Execution:
-    """With what a run's graphs are run."""
+    """Options with which a run's graphs are run."""
 
     run: RunFolder
     seed: int
@@ -178,7 +178,7 @@ def _make(
 
 
 def provenance(graph: Graph, engine: Engine, variant: str) -> dict[str, Any]:
-    """How an artifact was made, for its file's header: what was dropped and stated, the variant, and its stages.
+    """Provenance of an artifact for its file's header: what was dropped and stated, the variant, and its stages.
 
     Of a source that gives other ticks in every run only the facts: what it counted is of that run, and the same ticks
     from a record make the same file.

@@ -22,7 +22,7 @@ from .plots import PLOTS, with_plots
 
 @dataclass(frozen=True)
 class ArtifactPlan:
-    """Where an artifact comes from: a file, or a graph whose output `origin` is taken.
+    """Origin of an artifact: a file, or a graph whose output `origin` is taken.
 
     `graph` is the part of the `whole` that this output depends on.
     """
@@ -160,7 +160,7 @@ def load_stages(config: Mapping[str, Any]) -> None:
 
 
 def _plan_artifact(name: str, spec: ArtifactSpecification, graph: Graph | None) -> ArtifactPlan:
-    """Where an artifact comes from. `graph`: that makes it, where another's plan has it: so its log is opened once."""
+    """Origin of an artifact. `graph`: that makes it, where another's plan has it: so its log is opened once."""
     if spec.file is not None:
         file = Path(spec.file)
         try:
@@ -199,7 +199,7 @@ def stages_of(graph: Graph) -> dict[str, Any]:
 
 
 def mismatches(name: str, made_by: Mapping[str, Any], graph: Graph, must_match: Sequence[str]) -> Iterator[Problem]:
-    """Where an artifact's file was made by other stages than this graph has, among the nodes that must match.
+    """Reports an artifact's file that was made by other stages than this graph has, among the nodes that must match.
 
     `made_by` is what `stages_of` gave then. A node that it does not know is not compared.
     """

@@ -33,7 +33,7 @@ def _flat(value: Any) -> Iterator[Any]:
 
 
 def notes_of(engine: Engine, only: Container[str] | None = None) -> dict[str, Any]:
-    """What the stages, or only these, counted, stated and warned of, as the manifest holds it."""
+    """Counts, facts and warnings of the stages, or only of these, as the manifest holds them."""
     dropped: dict[str, Any] = {}
     facts: dict[str, Any] = {}
     warnings: list[str] = []

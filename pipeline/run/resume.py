@@ -25,7 +25,7 @@ from .run_folder import CONFIG, RunFolder
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a run goes on by."""
+    """State that a run goes on from."""
 
     status: str
     argv: tuple[str, ...]
@@ -51,7 +51,7 @@ def resume(folder: Path, display: ProgressDisplay | None = None) -> tuple[RunFol
 
 
 def reopened(run: RunFolder, folder: Path) -> Plan | None:
-    """What was stopped, ready to be executed in its folder, from the directory in which it was started.
+    """Prepares a stopped run to be executed in its folder, from the directory in which it was started.
 
     None where it is complete. Raises `BadInput` as `resume` does.
     """

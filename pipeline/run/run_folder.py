@@ -46,7 +46,7 @@ class RunFolder:
 
     @property
     def memory(self) -> Path:
-        """Where checkpoints and sequences lie."""
+        """Folder of checkpoints and sequences."""
         return self.folder / "checkpoints"
 
     @property

@@ -35,7 +35,7 @@ class Donut(Camera, projection="donut"):
 
     @property
     def ring(self) -> Ring | None:
-        """Between the two radii; None where one of the four numbers is not known."""
+        """Pixels between the two radii; None where one of the four numbers is not known."""
         x, y, inner, outer = self.centre_x, self.centre_y, self.inner_radius_px, self.outer_radius_px
         if x is None or y is None or inner is None or outer is None:
             return None

@@ -35,7 +35,7 @@ class DoubleSphere(Camera, projection="double_sphere"):
 
     @property
     def ring(self) -> Ring:
-        """Between the two radii around the principal point."""
+        """Pixels between the two radii around the principal point."""
         return Ring(self.centre_x, self.centre_y, self.inner_radius_px, self.outer_radius_px)
 
     def project(self, rays: Array) -> tuple[Array, Bools]:
@@ -54,7 +54,7 @@ class DoubleSphere(Camera, projection="double_sphere"):
         return pixels, self.shows(pixels)
 
     def unproject(self, pixels: Array) -> tuple[Array, Bools]:
-        """From the pinhole back to the second sphere (m_z), and from there to the first; valid iff both roots exist."""
+        """Unprojects from the pinhole to the second sphere (m_z), and on to the first; valid iff both roots exist."""
         mx, my = (pixels[..., 0] - self.centre_x) / self.focal_x, (pixels[..., 1] - self.centre_y) / self.focal_y
         square = mx * mx + my * my
         with np.errstate(divide="ignore", invalid="ignore"):

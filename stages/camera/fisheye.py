@@ -28,7 +28,7 @@ class Fisheye(Camera, projection="fisheye"):
 
     @property
     def ring(self) -> Ring:
-        """Between the two radii."""
+        """Pixels between the two radii."""
         return Ring(self.centre_x, self.centre_y, self.inner_radius_px, self.outer_radius_px)
 
     @classmethod

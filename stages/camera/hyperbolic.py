@@ -57,7 +57,7 @@ class HyperbolicMirror(Camera, projection="hyperbolic"):
 
     @property
     def ring(self) -> Ring:
-        """Between the camera's own reflection and the mirror's rim."""
+        """Pixels between the camera's own reflection and the mirror's rim."""
         return Ring(self.centre_x, self.centre_y, self.inner_radius_px, self.outer_radius_px)
 
     def project(self, rays: Array) -> tuple[Array, Bools]:
@@ -95,7 +95,7 @@ class HyperbolicMirror(Camera, projection="hyperbolic"):
 
     @classmethod
     def from_camera_info(cls, model: str, size: tuple[int, int], k: Sequence[float], d: Sequence[float]) -> Self | None:
-        """Of `hyperbolic_mirror` with d = [a, b]: the whole circle that fits the image is used, and yaw is 0."""
+        """Camera of `hyperbolic_mirror` with d = [a, b]: the whole circle that fits the image is used, and yaw is 0."""
         if model != "hyperbolic_mirror" or len(d) < 2:
             return None
         outer = min(k[2], size[0] - 1 - k[2], k[5], size[1] - 1 - k[5])

@@ -28,7 +28,7 @@ mirror, has u along x and v along y, so its bearings atan2(v, u) grow clockwise 
 
 
 class Key(NamedTuple):
-    """Where `camera.yaml` holds a parameter: a section and a name in it, or the matrix K and a place in it (row-major).
+    """Place of a parameter in `camera.yaml`: a section and a name in it, or the matrix K and a place in it (row-major).
 
     A parameter without one stands at the top under its own name; of several the first is written, any is read.
     """
@@ -169,7 +169,7 @@ class Camera(Value, ABC):
         return np.stack([columns, rows], axis=-1)
 
     def camera_info(self) -> dict[str, Any]:
-        """What a CameraInfo message can say of it besides its size."""
+        """Fields of a CameraInfo message that describe it besides its size."""
         return {}
 
     @classmethod

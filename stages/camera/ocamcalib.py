@@ -52,7 +52,7 @@ class OCamCalib(Camera, projection="ocamcalib"):
 
     @property
     def ring(self) -> Ring:
-        """Between the two radii around the centre."""
+        """Pixels between the two radii around the centre."""
         return Ring(self.centre_x, self.centre_y, self.inner_radius_px, self.outer_radius_px)
 
     def project(self, rays: Array) -> tuple[Array, Bools]:

@@ -49,7 +49,7 @@ class Perspective(Camera, projection="perspective"):
 
     @classmethod
     def from_camera_info(cls, model: str, size: tuple[int, int], k: Sequence[float], d: Sequence[float]) -> Self | None:
-        """Of an undistorted image."""
+        """Camera of an undistorted image."""
         if model not in ("", "plumb_bob", "rational_polynomial") or any(d):
             return None
         return cls(*size, k[0], k[4], k[2], k[5], skew=k[1])

@@ -35,7 +35,7 @@ class Strip(Camera):
 
     @abstractmethod
     def level(self, elevations: Array) -> Array:
-        """What grows by equal steps from row to row, of elevations."""
+        """Coordinate of elevations that grows by equal steps from row to row."""
 
     @abstractmethod
     def elevation_of(self, levels: Array) -> Array:
@@ -43,7 +43,7 @@ class Strip(Camera):
 
     @property
     def elevations(self) -> tuple[float, float]:
-        """Of the upper and of the lower edge."""
+        """Elevations of the upper and of the lower edge."""
         if self.elevation_top is None or self.elevation_bottom is None:
             half = min(math.pi * self.height_px / self.width, math.pi / 2)
             return half, -half

@@ -11,7 +11,7 @@ from .inverted_file import build, faiss_or_none
 
 
 class BuildReferenceIndexState(State):
-    """How many references the index was built from."""
+    """Number of references that the index was built from."""
 
     references: int = 0
 

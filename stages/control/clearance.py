@@ -7,14 +7,14 @@ F64 = npt.NDArray[np.float64]
 
 
 def free_ahead(ranges: F64, azimuths: F64, radius: float, margin: float) -> float:
-    """How far (m) a disc of `radius` m can go straight on, `margin` m clear on both sides; (N,) ranges and azimuths."""
+    """Distance (m) that a disc of `radius` m can go straight on, `margin` m clear to both sides, by ranges (N,)."""
     ahead, beside = ranges * np.cos(azimuths), np.abs(ranges * np.sin(azimuths))
     in_the_way = (np.cos(azimuths) > 0.1) & (beside < radius + margin)
     return float(ahead[in_the_way].min(initial=float(ranges.max()))) - radius
 
 
 def roomier_side(ranges: F64, azimuths: F64) -> float:
-    """Where there is more room in front: the mean distance (m) to the left of (N,) ranges, negative to the right."""
+    """Side with more room in front: the mean distance (m) to the left of (N,) ranges, negative to the right."""
     front = np.cos(azimuths) > -0.1
     return float((ranges * np.sin(azimuths))[front].mean())
 

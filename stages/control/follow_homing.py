@@ -114,7 +114,7 @@ class FollowHoming(Stage):
         return self.Out(command=Command(speed, self._turn(direction)), status=DrivingStatus("driving"))
 
     def _free_direction(self, vector: HomingVector, scan: Scan | None, left: float) -> tuple[float | None, float]:
-        """Where to drive (rad), None where nothing is free, and how fast at most."""
+        """Direction to drive (rad), None where nothing is free, and the largest speed."""
         if scan is None:
             return float(wrap(vector.direction)), self.max_speed
         ranges, room = np.minimum(scan.ranges, scan.farthest), min(self.lookahead_m, left)

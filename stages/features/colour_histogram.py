@@ -107,7 +107,7 @@ class ColourHistogram(UnderGreyWorld, Stage):
         features: SegmentHistograms
 
     def __post_init__(self) -> None:
-        """At least one channel must be left, and each range go upwards."""
+        """Refuses settings that leave no channel, and ranges that do not go upwards."""
         if not any(self.bins):
             raise ValueError("bins: at least one channel needs bins; write bins: [8, 8, 8]")
         if any(low >= high for low, high in self.ranges or ()):

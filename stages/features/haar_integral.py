@@ -26,7 +26,7 @@ Borders = Literal["crop", "wrap"]
 
 
 class Binning(NamedTuple):
-    """How values in [0, 1] of three channels are counted.
+    """Counts values in [0, 1] of three channels.
 
     `bins` per channel; `joint`: one histogram over all channels (bins^3, the first slowest), else one for each, behind
     one another and with equal shares of the mass. `weighted`: a value counts for the two bins whose middles it lies
@@ -149,7 +149,7 @@ class HaarIntegral(UnderGreyWorld, Stage):
         metrics: Metrics | None = None
 
     def __post_init__(self) -> None:
-        """At least one kernel and one scale are needed."""
+        """Refuses settings without a kernel or a scale."""
         if not self.kernels:
             raise ValueError("kernels: at least one is needed; write kernels: [[3, 4]]")
         if not self.scales:

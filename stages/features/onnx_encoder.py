@@ -212,5 +212,5 @@ def _session(path: Path) -> Any:
 
 
 def _line(error: Exception) -> str:
-    """What onnxruntime says, which may name what is in the file."""
+    """Message of onnxruntime, which may name what is in the file."""
     return " ".join("".join(c if c.isprintable() else " " for c in str(error)[:200]).split())

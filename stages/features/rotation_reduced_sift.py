@@ -45,7 +45,7 @@ class RotationReducedSift(Stage):
     """Blur of the first octave (px)."""
 
     class Out(Outputs):
-        """What was found, the strongest first; it may be none."""
+        """Features that were found, the strongest first; there may be none."""
 
         features: LocalFeatures
 

@@ -236,7 +236,7 @@ class FindVerticalSegments(Stage):
     """Mahalanobis distance within which neighbours become one."""
 
     class Out(Outputs):
-        """What was found, the heaviest first; it may be none."""
+        """Segments that were found, the heaviest first; there may be none."""
 
         vertical_segments: VerticalSegments
 

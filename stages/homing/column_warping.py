@@ -117,7 +117,7 @@ def likelihood_ratios(distances: Floats, noise: float) -> Floats:
 
 
 def places_of_columns(count: int) -> tuple[Ints, Ints]:
-    """Where a column is seen from the target, by the angle from the target's direction: two (C, nearnesses).
+    """Bearing of a column seen from the target, by the angle from the target's direction: two (C, nearnesses).
 
     Columns of azimuth (of the target's view, turned to the first one's heading), and planes of `column_distances`, -1
     where there is none. A thing at azimuth x from the target's direction and distance r is at azimuth y and distance

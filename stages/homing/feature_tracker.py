@@ -171,5 +171,5 @@ class FeatureTracker(Stage):
 def _expected(
     state: FeatureTrackerState, image: WorkingImage, local_map: LocalMap, rows: Ints | slice = slice(None)
 ) -> Array:
-    """Where the tracked points of some rows are in an image taken from the robot's pose in the map: (N, 2)."""
+    """Predicts the tracked points of some rows in an image taken from the robot's pose in the map: (N, 2)."""
     return image.points((state.places[rows] - local_map.translation) @ local_map.rotation)

@@ -60,7 +60,7 @@ def histograms(image: WorkingImage, points: Array, radius: int) -> Floats:
 def track(
     before: Grey, image: WorkingImage, points: Array, guesses: Array, window: int, levels: int, max_error: float
 ) -> tuple[Array, Bools]:
-    """Where points (N, 2) of the image before are now, and whether they were tracked: (N, 2) and (N,).
+    """Tracks points (N, 2) of the image before: where they are now, and whether they were tracked: (N, 2) and (N,).
 
     Forward from `guesses` (N, 2) by Lucas and Kanade in windows of `window` pixels over `levels` halvings, and backward
     again: a point that does not come back within `max_error` pixels is lost.

@@ -250,7 +250,7 @@ class LocalMapping(Stage):
 
 
 def matches_with(target: HomingTarget, features: LocalFeatures, pairs: Correspondences | None) -> Matches:
-    """What of the present view is in the target view. Raises BadInput where the pairs are of other features."""
+    """Matches of the present view in the target view. Raises BadInput where the pairs are of other features."""
     if pairs is None or not len(pairs):
         return NO_MATCHES
     here, there = features.point_bearings(), target.features.point_bearings()

@@ -9,7 +9,7 @@ from omninav.stages.values.local_features import LocalFeatures
 
 
 class WaypointImagesState(State):
-    """Where on which path the robot is.
+    """Place of the robot on its path.
 
     `path`, `target`: their numbers; `reached`: views so far; `docking`: only a turn is left; `arrived`.
     """

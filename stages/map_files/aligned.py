@@ -40,7 +40,7 @@ class Alignment(NamedTuple):
 
 
 def aligned(maps: Sequence[ReferenceGraph]) -> Alignment | None:
-    """Where the references of all maps lie in the frame of the first; None where nothing can be told.
+    """Poses of the references of all maps in the frame of the first; None where nothing can be told.
 
     References of two maps that look alike join them; a pose graph of the ways along each map and of all such pairs,
     within maps and between, gives the poses, as `StraightenMap` does for one. Maps of true poses are moved as a whole.

@@ -50,7 +50,7 @@ class CutMap(Stage):
 
 
 def poses_of(map: MapOfPlaces) -> npt.NDArray[np.float64]:
-    """Where references, or places, were taken: (N, 3)."""
+    """Poses of references, or places: (N, 3)."""
     return map.poses if isinstance(map, ReferenceGraph) else map.poses[map.places]
 
 

@@ -119,7 +119,7 @@ def _has_panoramas(map: MapOfPlaces) -> bool:
 
 
 def _in_order(map: MapOfPlaces) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
-    """Where views were taken, and their rows in the order of the tour."""
+    """Poses of views, and their rows in the order of the tour."""
     if isinstance(map, ReferenceGraph):
         return map.poses, np.arange(len(map))
     return map.poses, np.argsort(map.frames, kind="stable")

@@ -59,7 +59,7 @@ class CorrectPastStates(Stage):
     odometry_gate: Annotated[float, Bounds(ge=0)] = 16.3
     """Squared Mahalanobis distance, 3 degrees of freedom, up to which odometry explains a state; 16.3: 99.9 %."""
     min_improvement: Annotated[float, Bounds(gt=1)] = 2.0
-    """How much more certain a state must become to be propagated: the root of the determinants' ratio."""
+    """Gain in certainty from which a state is propagated: the root of the determinants' ratio."""
     max_views: Annotated[int, Bounds(ge=0)] = 500
     """Past views that are kept."""
 

@@ -127,7 +127,7 @@ class MapCalibration:
     def of(
         self, ctx: Context, map: ReferenceGraph, compare: Compare, length_scale: LengthScale | None
     ) -> SimilarityCalibration | None:
-        """As `calibrated` gives it; what it found is told in the manifest."""
+        """Calibration as `calibrated` gives it; its result stands in the manifest."""
         if map is not self._map or len(map) != self._length:
             self._map, self._length = map, len(map)
             found = self._found = calibrated(map, compare, 0.0 if length_scale is None else length_scale.metres)

@@ -21,7 +21,7 @@ class MatchPlaceWords(Stage):
     """
 
     class Out(Outputs):
-        """By place, and the most similar views of the tour; absent where the map came without its words."""
+        """Similarities by place, and the most similar views of the tour; absent where the map has no words."""
 
         similarities: WordSimilarities | None = None
         answers: Answers | None = None

@@ -36,7 +36,7 @@ class MatchPlaces(Stage):
     """Smallest mean angle between matches that counts."""
 
     class Out(Outputs):
-        """How far each place is."""
+        """Visual distance to each place."""
 
         distances: VisualDistances
 

@@ -79,7 +79,7 @@ class ComparedPairs(Stage):
     def _two_lights(
         self, views: ComparedViews, colours: Array, other_light: Sequence[GlobalDescriptor | None], of_two_rooms: Array
     ) -> dict[str, float | None]:
-        """Of the views that are of this tour and not of a known map."""
+        """Numbers of the views that are of this tour and not of a known map."""
         new = np.flatnonzero(views.owners < 0)
         first = 1 + int(views.frames[views.owners >= 0].max(initial=-1))
         seen = [(view, other_light[views.frames[view] - first]) for view in new]

@@ -48,7 +48,7 @@ class ComponentMoves(Stage):
 
 
 def moves(mixtures: Sequence[MixturesNow | None], near_m: float) -> list[list[float]]:
-    """Of each component the distances (m) that updates moved it by, one after the other."""
+    """Distances (m) that updates moved each component by, one after the other."""
     found: list[list[float]] = []
     places: dict[int, tuple[Array, list[list[float]]]] = {}  # of a view: means of its components, moves of each
     for now in mixtures:

@@ -37,7 +37,7 @@ class Judged(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What is known of an image: its pose, its features, and their depths."""
+    """An image's pose, its features, and their depths."""
 
     pose: Array
     patches: LocalFeatures | None
@@ -222,13 +222,13 @@ def half_widths(features: LocalFeatures, camera: Camera) -> Array:
 
 
 def run_of_right(right: Bools) -> int:
-    """How many are right before the first wrong one; all, where none is wrong."""
+    """Number of right ones before the first wrong one; all, where none is wrong."""
     wrong = np.flatnonzero(~right)
     return int(wrong[0]) if len(wrong) else len(right)
 
 
 def summary(pairs: Sequence[Judged]) -> dict[str, float | int | None]:
-    """What is judged of some pairs; None where there is none."""
+    """Judgement of some pairs; None where there are none."""
     if not pairs:
         names = ("matched", "first_right", "right", "right_share", "found_again", "by_chance")
         return {"pairs": 0, **dict.fromkeys(names)}

@@ -57,7 +57,7 @@ class LocalisedShare(Stage):
 
 
 def relocalisations(position_m: Array, heading_deg: Array, truth: Array, lost_m: float) -> dict[str, Any]:
-    """How often a robot was lost and what it took to find itself, from its errors (N,) and true poses (N, 3)."""
+    """Times that a robot was lost and what it took to find itself, from its errors (N,) and true poses (N, 3)."""
     path = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth[:, :2], axis=0).T))])
     frames, metres, begins, never = [], [], 0, 0
     while (lost := np.flatnonzero(position_m[begins:] > lost_m)).size:

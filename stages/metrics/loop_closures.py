@@ -122,7 +122,7 @@ def counted(accepted: npt.NDArray[np.bool_], gaps: Array | None, near: float) ->
 
 
 def neighbours(initial: Array, masses: Array, gaps: Array | None, near: float) -> dict[str, float | None]:
-    """What the evidence of neighbouring hypotheses brings, of masses (H, 3) before it and after.
+    """Gain by the evidence of neighbouring hypotheses, of masses (H, 3) before it and after.
 
     `area_gain`: by how much the area under the precision-recall curve grows; `wrong_without`: how many wrong ones have
     a support above one half before; `right_alone`: the share of right ones of which no neighbour has spoken. None where
@@ -184,14 +184,14 @@ def _drawn(support: Array, right: npt.NDArray[np.bool_]) -> Figure | None:
 
 
 def at_supports(support: Array, gaps: Array | None, near: float) -> dict[str, list[float | int | None]]:
-    """What `counted` says of hypotheses with `support` (H,) above each of 0.05, 0.1 … 0.95: a list for each figure."""
+    """Figures of `counted` for hypotheses with `support` (H,) above each of 0.05, 0.1 … 0.95: a list for each."""
     thresholds = [round(0.05 * k, 2) for k in range(1, 20)]
     counts = [counted(support > threshold, gaps, near) for threshold in thresholds]
     return {"support": list(thresholds), **{name: [count[name] for count in counts] for name in counts[0]}}
 
 
 def hypothesis_gaps(found: LoopHypotheses) -> Array:
-    """How far apart the two subclusters of each hypothesis came: (H,) metres, between their nearest images."""
+    """Distance between the two subclusters of each hypothesis: (H,) metres, between their nearest images."""
     members = {number: found.poses[found.subcluster == number] for number in np.unique(found.subcluster).tolist()}
     gaps = np.empty(len(found.pairs))
     for row, (one, other) in enumerate(found.subcluster[found.pairs].tolist()):
@@ -201,7 +201,7 @@ def hypothesis_gaps(found: LoopHypotheses) -> Array:
 
 
 def path_steps(map: TopologicalMap) -> Array:
-    """How far apart neighbouring views on all paths between places were taken: metres, by the map's poses."""
+    """Distances between neighbouring views on all paths between places: metres, by the map's poses."""
     steps = [np.empty(0)]
     for link, (one, other) in enumerate(map.links):
         path = map.poses[[map.places[one], *map.path_of(link), map.places[other]], :2]

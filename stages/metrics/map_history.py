@@ -108,7 +108,7 @@ def counted(events: Sequence[ViewEvent | None], after_last: ViewEvent | None = N
 
 
 def parts_of(logs: Sequence[Drive], home_m: float) -> Ints:
-    """How many frames each lap of the first log has, and each later log."""
+    """Number of frames of each lap of the first log, and of each later log."""
     first = logs[0]
     rows = np.flatnonzero(known(first.truth))
     ends = lap_ends(first.truth[rows], first.truth[rows[0]], home_m) if len(rows) else []

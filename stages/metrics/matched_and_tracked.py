@@ -160,7 +160,7 @@ def spans(maps: Sequence[LocalMap | None], tracks: Sequence[TrackedFeatures | No
 
 
 def metres(motion: Array) -> float:
-    """How far a motion (3,) leads."""
+    """Length of a motion (3,)."""
     return math.hypot(motion[0], motion[1])
 
 

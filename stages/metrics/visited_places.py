@@ -83,7 +83,7 @@ def visit_numbers(cells: Ints, ways: Array, away_m: float) -> Ints:
 
 
 def over_visits(cells: Ints, numbers: Ints, errors: Array) -> dict[str, Any]:
-    """What `visits` holds, of frames (N,) with their cell (0, 1, 2 …), the number of the visit and the error."""
+    """Table `visits`, of frames (N,) with their cell (0, 1, 2 …), the number of the visit and the error."""
     shape = int(cells.max()) + 1, int(numbers.max())
     frames, summed = np.zeros(shape, np.int64), np.zeros(shape)
     np.add.at(frames, (cells, numbers - 1), 1)
@@ -100,7 +100,7 @@ def over_visits(cells: Ints, numbers: Ints, errors: Array) -> dict[str, Any]:
 
 
 def first_against_later(cells: Ints, numbers: Ints, errors: Array, odometry: Array) -> dict[str, Any]:
-    """What `first_visits` holds; empty where no place was visited again, or without odometry."""
+    """Table `first_visits`; empty where no place was visited again, or without odometry."""
     again = np.unique(cells[numbers > 1])
     if not len(again) or not np.isfinite(odometry).all():
         return {}

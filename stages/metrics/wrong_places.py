@@ -75,7 +75,7 @@ class WrongPlaces(Stage):
 def wrong_shares(
     events: Sequence[ViewEvent | None], mixtures: Sequence[MixturesNow | None], path: Array, wrong_m: float
 ) -> tuple[Ints, Ints, Array]:
-    """Of the references that came at a wrong place: in which frame each was seen and came, and its share in each frame.
+    """References that came at a wrong place: the frames in which each was seen and came, and its share in each frame.
 
     (R,), (R,) and (R, N), in the order in which they were seen. `path`: true positions (N, 2), NaN where there is none.
     """

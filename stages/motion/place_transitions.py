@@ -28,7 +28,7 @@ class PlaceTransitions(Stage):
     """sigma; null: the standard deviation of dist over the map, as in the paper."""
 
     class Out(Outputs):
-        """What is believed before the present view is looked at."""
+        """Belief before the present view is looked at."""
 
         belief: PlaceBelief
 
@@ -48,7 +48,7 @@ class PlaceTransitions(Stage):
 
 
 def transitions(links: Array, sigma_links: float | None, teleport_probability: float) -> Array:
-    """From each place (rows) to each (columns) the probability to go there, from the links between them: (P, P)."""
+    """Probability to go from each place (rows) to each (columns), from the links between them: (P, P)."""
     known = links[np.isfinite(links)]
     sigma = (float(known.std()) if sigma_links is None else sigma_links) or 1.0
     probabilities: Array = np.exp(-np.square(links / sigma))

@@ -239,7 +239,7 @@ def shortest_route(
 
 
 def _likeliest(probabilities: Array, state: ShortestPathPlannerState) -> tuple[int, int]:
-    """Where the robot most probably is, and how often it was lost as it set out from there."""
+    """Most probable place of the robot, and how often it was lost as it set out from there."""
     missed = np.zeros(len(probabilities), np.int64)
     own = state.failed_links[:, 0] == state.failed_links[:, 1]
     missed[state.failed_links[own, 0]] = state.failures[own]

@@ -110,5 +110,5 @@ def _last(poses: Array, drive: Drive) -> float:
 
 
 def _floor(errors: Array) -> float:
-    """Where a logarithmic axis begins: below nearly all errors, without following single zeros down."""
+    """Start of a logarithmic axis: below nearly all errors, without following single zeros down."""
     return max(float(np.percentile(errors, 2)) / 2, 1e-4) if len(errors) else 1e-2

@@ -29,7 +29,7 @@ def plan_chart(extent: Extent | None, height: tuple[float, float] = (190.0, 520.
 
 
 def draw_surroundings(chart: Chart, map: AnyMap | None, grid: OccupancyGrid | None, plan: FloorPlan | None) -> None:
-    """What stands on the floor, by the grid or else the plan, and the map's references or places over it."""
+    """Draws what stands on the floor, by the grid or else the plan, and the map's references or places over it."""
     if grid is not None:
         chart.base.raster(tinted(np.where(grid.cells[::-1] == OCCUPIED, 190, 0).astype(np.uint8)), grid_extent(grid))
         chart.name("occupied", "grey", "square")

@@ -106,7 +106,7 @@ def farthest_moved(events: Sequence[ViewEvent | None]) -> int | None:
 
 
 def lives_of(snapshots: Sequence[Snapshot], same_m: float) -> list[Array]:
-    """What became of each place over the snapshots: (n, 4) frame, x, y, weight; the one that weighed most comes first.
+    """Each place over the snapshots: (n, 4) frame, x, y, weight; the one that weighed most comes first.
 
     From snapshot to snapshot the closest pair is taken for one place first, none that is further apart than `same_m`.
     """

@@ -71,7 +71,7 @@ def _read(file: Path) -> AnyMap:
 
 
 def described(file: Path, map: AnyMap) -> Iterator[tuple[str, Any]]:
-    """What a map holds: names and facts."""
+    """Content of a map: names and facts."""
     yield "map", f"{file} ({type(map).__name__}, {file.stat().st_size / 1e6:.2f} MB)"
     if isinstance(map, ReferenceGraph):
         segments, bins = map.features.shape[1:]

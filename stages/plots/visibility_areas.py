@@ -84,7 +84,7 @@ class ShowVisibilityAreas(Stage):
 
 
 def views_by_cell(areas: VisibilityAreas) -> npt.NDArray[np.int64]:
-    """Of how many views the area holds a cell: (rows, columns)."""
+    """Number of views whose area holds a cell: (rows, columns)."""
     views = np.bincount(areas.target[areas.target >= 0], minlength=len(areas.points))
     steps = np.zeros((areas.shape[0], areas.shape[1] + 1), np.int64)
     each = np.repeat(views, np.diff(areas.starts))

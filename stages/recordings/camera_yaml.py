@@ -58,7 +58,7 @@ def write_camera(camera: Camera) -> str:
 
 
 def camera_section(camera: Camera) -> dict[str, Any]:
-    """What a `camera.yaml` holds."""
+    """Content of a `camera.yaml`."""
     content: dict[str, Any] = {"projection": camera.projection}
     for name, parameter in read_parameters(type(camera)).items():
         value, key = getattr(camera, name), keys_of(parameter)[0]
@@ -95,13 +95,13 @@ def camera_from_info(info: Any, where: str) -> Camera:
 
 
 def keys_of(parameter: Parameter) -> list[Key]:
-    """Where camera.yaml may hold a parameter of a camera."""
+    """Places in camera.yaml that may hold a parameter of a camera."""
     found = [extra for extra in _annotations(parameter.type) if isinstance(extra, Key)]
     return found or [Key("", parameter.name)]
 
 
 def _annotations(kind: Any) -> list[Any]:
-    """What is annotated to a type, or to a part of it (`Annotated[float, …] | None`)."""
+    """Annotations of a type, or of a part of it (`Annotated[float, …] | None`)."""
     arguments = get_args(kind)
     if get_origin(kind) is Annotated:
         return list(arguments[1:])
@@ -168,7 +168,7 @@ def _known_keys(model: type[Camera]) -> Keys:
 
 
 def _missing(content: dict[str, Any], key: Key, known: Keys) -> str:
-    """What to say of a key that is not there, or whose section is not."""
+    """Message about a key that is missing, or whose section is."""
     if key.section and content.get(key.section) is None:
         key = Key("", key.section)
     part, prefix = (content[key.section], f"{key.section}.") if key.section else (content, "")

@@ -70,7 +70,7 @@ def _check_pattern(pattern: str, by: str) -> None:
 
 @dataclass(frozen=True)
 class Frames:
-    """Where the images are and when they were taken.
+    """Images and their times.
 
     `csv`: a table with one row per image, its path relative to the recording's folder and with wildcards; without
     one, `images` names the images by wildcards, in the order of the numbers in their names. `file`: the column with
@@ -90,7 +90,7 @@ class Frames:
 
 @dataclass(frozen=True)
 class Positions:
-    """Where the camera was. `csv` null: columns of the frames' own table, row by row.
+    """Positions of the camera. `csv` null: columns of the frames' own table, row by row.
 
     A table of its own is joined by time, interpolated linearly: an image taken at t is looked up at
     t + `clock_offset` (seconds). An image further than `max_gap` seconds from both neighbours' time, or outside the

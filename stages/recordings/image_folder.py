@@ -253,7 +253,7 @@ class DescribedFolder(Format):
     names = "LAYOUT:FOLDER, a description .yaml, or a folder with recording.yaml"
 
     def opens(self, log: str) -> bool:
-        """Where a description is named, or lies in the folder."""
+        """True where a description is named, or lies in the folder."""
         path = user_path(log)
         if path.is_dir():
             return (path / "recording.yaml").is_file()
@@ -278,7 +278,7 @@ class DescribedFolder(Format):
         return ImageFolder(log, folder, description, str(file), options)
 
     def hint(self, folder: str, options: OpenOptions) -> str:
-        """What to type for a folder that nothing describes."""
+        """Advice for a folder that nothing describes."""
         layouts = ", ".join(sorted(known_layouts(options.layout_folders)))
         return f"for images with CSVs type log=LAYOUT:{folder} (layouts: {layouts})"
 

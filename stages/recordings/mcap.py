@@ -84,7 +84,7 @@ class SplitLog:
 
     @property
     def dropped(self) -> Counter[str]:
-        """What was lost in any part."""
+        """Data lost in any part."""
         return sum((part.dropped for part in self._parts), self._dropped.copy())
 
     @property

@@ -27,7 +27,7 @@ Share = Annotated[float, Bounds(ge=0, le=1)]
 
 @dataclass(frozen=True)
 class MapServer:
-    """What is read of a map_server file."""
+    """Keys read from a map_server file."""
 
     image: str
     resolution: Annotated[float, Bounds(ge=0.001, le=100)]
@@ -125,7 +125,7 @@ def coarser(grid: OccupancyGrid, resolution: float) -> OccupancyGrid:
 
 
 def read_grid(file: Path) -> FloorPlan:
-    """What is occupied in a map_server pair, as boxes. Raises BadInput as `read_occupancy`."""
+    """Occupied cells of a map_server pair, as boxes. Raises BadInput as `read_occupancy`."""
     grid = read_occupancy(file)
     rows, columns = grid.cells.shape
     cells, (x, y) = boxes(grid.cells == OCCUPIED), grid.origin

@@ -26,7 +26,7 @@ MIN_STRETCH = 1.5
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """What a robot can do at most. Poses of odometry and ground truth that need more are not believed."""
+    """Largest speeds of a robot. Poses of odometry and ground truth that need more are not believed."""
 
     speed: Annotated[float, Bounds(gt=0)] = 15.0
     """Metres per second: a car in a town. A robot indoors makes 2, one outdoors seldom 5."""

@@ -44,7 +44,7 @@ class PoseTopic:
         self._poses.extend(pose)
 
     def track(self, feed: Feed, name: str, limits: MotionLimits, jumps: bool) -> Track | None:
-        """What is believed of it; None where nothing is. What is left out is counted with `feed`.
+        """The believed part of a message; None where nothing is. Skipped data is counted with `feed`.
 
         `jumps`: the track may jump, as the true pose of a robot does that is carried; else it is joined where it does.
         """

@@ -81,7 +81,7 @@ class Topics:
 
 @dataclass(frozen=True)
 class OpenOptions:
-    """What a user says besides the recording's name."""
+    """Settings of a user besides the recording's name."""
 
     topics: Topics = Topics()
     camera: str | None = None
@@ -119,5 +119,5 @@ class Format(ABC):
         """The recording. Raises `UnreadableRecording` or another `BadInput`."""
 
     def hint(self, folder: str, options: OpenOptions) -> str:
-        """What to type for a folder that no format opens; '' where this one has nothing to say."""
+        """Advice for a folder that no format opens; '' where this one has nothing to say."""
         return ""

@@ -24,7 +24,7 @@ def poses_at(times: Stamps, poses: Array, stamps: Stamps) -> Array:
 
 
 def poses_near(times: Stamps, poses: Array, stamps: Stamps, max_gap_s: float) -> Array:
-    """As `poses_at`, with NaN where the nearest of `times` is more than `max_gap_s` away."""
+    """Interpolates as `poses_at`, with NaN where the nearest of `times` is more than `max_gap_s` away."""
     at = poses_at(times, poses, stamps)
     after = np.clip(np.searchsorted(times, stamps), 1, len(times) - 1)
     gap = np.minimum(np.abs(stamps - times[after - 1]), np.abs(times[after] - stamps))

@@ -67,7 +67,7 @@ class TopicRecording:
 
     @property
     def dropped(self) -> Counter[str]:
-        """What was left out, by kind."""
+        """Skipped data, by kind."""
         return self._feed.dropped
 
     @property

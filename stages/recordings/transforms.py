@@ -13,7 +13,7 @@ MAX_FRAMES = 20
 
 
 class TransformTopic(PoseTopic):
-    """Of a topic of transforms (`/tf`) those of `child` in `parent`, in the order of their own stamps."""
+    """Transforms of `child` in `parent` from a topic (`/tf`), in the order of their own stamps."""
 
     def __init__(self, name: str) -> None:
         self.name = name

@@ -36,7 +36,7 @@ class UndescribedFolder(Format):
 
 
 def _suffixes(folder: Path) -> Counter[str]:
-    """How many images of each kind are in a folder, in the order of their names."""
+    """Number of images of each kind in a folder, in the order of their names."""
     if not folder.is_dir():
         return Counter()
     return Counter(path.suffix for path in sorted(folder.iterdir()) if path.suffix.lower() in SUFFIXES)

@@ -149,7 +149,7 @@ class Video(Format):
         return Path(log).suffix.lower() in self.suffixes and not user_path(log).is_dir()
 
     def open(self, log: str, options: OpenOptions) -> VideoRecording:
-        """With OpenCV's FFmpeg. Raises `UnreadableRecording`."""
+        """Opens a video with OpenCV's FFmpeg. Raises `UnreadableRecording`."""
         return VideoRecording(log, user_path(log), options)
 
 

@@ -18,7 +18,7 @@ class ComparedRows:
         self._written: Ints = self._all[:0]
 
     def of(self, compared: Ints | None) -> tuple[Ints, Ints]:
-        """What was compared (None: all), and each thing's row among it. Valid until the next call."""
+        """Compared references (None: all), and each one's row among them. Valid until the next call."""
         self._rows[self._written] = -1
         self._written = self._all if compared is None else compared
         self._rows[self._written] = self._all[: len(self._written)]

@@ -38,7 +38,7 @@ HEADING_BINS = 360
 
 
 class Sight(NamedTuple):
-    """What rays hit: `cells` (N, 2), row and column of the occupied cell, -1 where none; `faces` (N,), of `FACES`."""
+    """Hits of rays: `cells` (N, 2), row and column of the occupied cell, -1 where none; `faces` (N,), of `FACES`."""
 
     cells: Ints
     faces: Ints

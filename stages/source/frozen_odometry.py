@@ -17,7 +17,7 @@ that was lifted."""
 
 
 def frozen_steps(odometry: Array, truth: Array) -> tuple[int, float]:
-    """Between how many images odometry stood still while the truth moved on, and how far that went (m).
+    """Number of images between which odometry stood still while the truth moved on, and how far that went (m).
 
     Both are poses (N, 3) at the images; a row of truth that is NaN moves nothing.
     """

@@ -41,7 +41,7 @@ class VisualCompass:
         self._table: RemapTable | None = None
 
     def view(self, image: Image, camera: Camera) -> Strip | None:
-        """What is kept of an image: (rows, columns) grey levels about the horizon; None without the full circle."""
+        """Part of an image that is kept: (rows, columns) grey about the horizon; None without the full circle."""
         if camera is not self._camera:
             self._camera, self._table = camera, _table(camera)
         if self._table is None:
@@ -53,7 +53,7 @@ class VisualCompass:
 
 
 class Reckoned(Protocol):
-    """Where a source is by guesses (m, rad), and what the compass keeps of the last image."""
+    """Guessed pose of a source (m, rad), and what the compass keeps of the last image."""
 
     x: float
     y: float

@@ -26,7 +26,7 @@ Array = npt.NDArray[np.float64]
 
 
 class HomingGridState(State):
-    """How many views there have been."""
+    """Number of views so far."""
 
     views: int = 0
 

@@ -11,7 +11,7 @@ from omninav.stages.values.two_views import BearingPairs, RelativeView
 
 
 class TwoViewsState(State):
-    """How many problems there have been."""
+    """Number of problems so far."""
 
     problems: int = 0
 

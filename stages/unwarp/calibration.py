@@ -179,7 +179,7 @@ def _rotations(vectors: Array) -> Array:
 
 
 def _placed(camera: Camera, found: Array, board: Array) -> Array | None:
-    """Where each board is by linear equations: ray x (r1 x + r2 y + t) = 0. None where a corner has no ray."""
+    """Pose of each board by linear equations: ray x (r1 x + r2 y + t) = 0. None where a corner has no ray."""
     from scipy.spatial.transform import Rotation
 
     rays, looks = camera.unproject(found)

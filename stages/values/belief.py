@@ -31,7 +31,7 @@ class PoseEstimate(Value):
 
 
 class Belief(Value):
-    """What is believed of the robot's pose."""
+    """A belief about the robot's pose."""
 
     @abstractmethod
     def estimate(self) -> PoseEstimate:
@@ -104,7 +104,7 @@ class PlaceBelief(Belief):
 
 
 class Likelihood(Value):
-    """How well each particle, or each place, explains the present view. `values`: (N,), not negative, any scale.
+    """Likelihood of the present view for each particle, or each place. `values`: (N,), not negative, any scale.
 
     `mean_likelihood`: on the same scale, the mean over all poses of the map: what a pose drawn uniformly would get.
     None where it is not known. `novelty`: the share of the image's evidence that is new, in [0, 1]; below 1 where the

@@ -6,7 +6,7 @@ from omninav.pipeline import Bounds, Value
 
 
 class SimilarityCalibration(Value):
-    """How the similarity of a view to a reference becomes a likelihood ratio of the right against a wrong place.
+    """Relation of a view's similarity to a reference and the likelihood ratio of the right against a wrong place.
 
     The logarithm of the ratio is `slope` (z - `middle`), saturated at both ends; z is log S in standard deviations
     from the mean over the references at their best headings, so that light or a day that lowers all similarities

@@ -49,7 +49,7 @@ class ComparedViews(Value):
         return view_features(self.features[view])
 
     def comparison_options(self) -> ComparisonOptions:
-        """How the views were compared."""
+        """Name of the comparison."""
         ratio, segment_ratio, max_colour_distance, min_matches, min_angle = self.options
         return ComparisonOptions(
             ratio, segment_ratio, max_colour_distance, min_matches=min_matches, min_angle=min_angle

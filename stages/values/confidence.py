@@ -18,7 +18,7 @@ class PoseConfidence(Value):
 
 
 class WrongPoseAgreement(Value):
-    """How often the best match of an image of the map lies where a robot wrongly believes to be: a share in [0, 1]."""
+    """Share in [0, 1] of the map's images whose best match lies where a robot wrongly believes to be."""
 
     costly: ClassVar[bool] = True
 

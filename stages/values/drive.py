@@ -98,7 +98,7 @@ class Drive(Value):
         return chain(moved)
 
     def odometry_alone(self) -> Array | None:
-        """Where odometry alone would have led in one log, from the first true pose on; (N, 3), None without any motion.
+        """Path by odometry alone in one log, from the first true pose on; (N, 3), None without any motion.
 
         Without any truth the path is laid through the last estimate, so that its shape can be compared.
         """

@@ -6,7 +6,7 @@ from omninav.pipeline import Bounds, Value
 
 
 class DriveTally(Value):
-    """How often a simulated robot came into contact with something so far, and how far it drove (m): truth."""
+    """Contacts of a simulated robot with something so far, and the distance it drove (m): truth."""
 
     is_truth = True
     collisions: Annotated[int, Bounds(ge=0)]

@@ -41,7 +41,7 @@ class HomingTarget(Value):
 
 
 class HomingVector(Value):
-    """Where the target view was taken, seen from the robot.
+    """Pose of the target view, seen from the robot.
 
     `direction`: where to go (rad, counter-clockwise from forward); `turn`: how far to turn, in all, to have the
     target's heading (rad, counter-clockwise). `distance`: in units of the first baseline, the way from where the local
@@ -128,7 +128,7 @@ class LocalMap(Value):
         return float(np.median(np.linalg.norm(self.places - self.translation, axis=1)))
 
     def to_target(self) -> Array:
-        """From the robot to where the target view was taken, in the robot's frame: (3,)."""
+        """Vector from the robot to the place of the target view, in the robot's frame: (3,)."""
         return np.asarray(self.rotation.T @ (self.goal_translation - self.translation))
 
     def distance(self) -> float:
@@ -151,7 +151,7 @@ class LocalMap(Value):
 
 
 class PathProgress(Value):
-    """How far along an image path the robot is: `at` of `of` views reached. `path`: the path's number.
+    """Progress of the robot along an image path: `at` of `of` views reached. `path`: the path's number.
 
     `target`: the number of the view it goes to now, `last` where the path ends there. `docking`: it is where that was
     taken, and has only to turn; `arrived`: it has turned.
@@ -167,7 +167,7 @@ class PathProgress(Value):
 
 
 class DrivingStatus(Value):
-    """What a robot that follows a homing vector does, and why it does not do more.
+    """Action of a robot that follows a homing vector, and why it does not do more.
 
     `waiting`: it has no target; `driving`; `docking`: it turns to the last view's heading; `arrived`; `lost`: it does
     not know where the target is; `blocked`: there is no way through what stands around it.

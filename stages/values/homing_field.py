@@ -9,7 +9,7 @@ Array = npt.NDArray[np.float64]
 
 
 class HomingField(Value):
-    """Where views were taken, and where homing would go from each.
+    """Poses of views, and the homing vector from each.
 
     `target` (3,) and `poses` (N, 3): m, m, rad on the map. `directions` (N,): of the homing vectors on the map (rad);
     `errors` (N,): how far (rad) they miss the target's direction. Both NaN where the target was not found. `inliers`
@@ -24,5 +24,5 @@ class HomingField(Value):
 
     @property
     def metres(self) -> Array:
-        """How far away the target is: (N,)."""
+        """Distance to the target: (N,)."""
         return np.asarray(np.hypot(*(self.poses[:, :2] - self.target[:2]).T))

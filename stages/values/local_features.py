@@ -83,7 +83,7 @@ class LocalFeatures(Value):
         )
 
     def patches(self) -> Patches:
-        """What they are matched by."""
+        """Vectors that they are matched by."""
         return patches(self.descriptors, self.colours, self.bearings)
 
     def point_bearings(self) -> Array:

@@ -68,7 +68,7 @@ class ReferenceGraph(GrowableArrays, Value):
 
 
 class ReferenceEvent(Value):
-    """What a tick did to a reference graph: the index of the reference it added, and why."""
+    """Change of a reference graph in a tick: the index of the reference it added, and why."""
 
     inserted: int
     reason: Literal["first", "far", "unlike"]

@@ -12,7 +12,7 @@ class Restart(Value):
 
 
 class GoalPoint(Value):
-    """Where the robot is to go: a point in the map frame (m)."""
+    """Goal of the robot: a point in the map frame (m)."""
 
     x: float
     y: float

@@ -25,6 +25,6 @@ class Scan(Value):
     farthest: Annotated[float, Bounds(ge=0)]
 
     def azimuths(self) -> Array:
-        """Where the readings look: (N,) radians."""
+        """Directions of the readings: (N,) radians."""
         azimuths: Array = self.first + self.step * np.arange(len(self.ranges), dtype=np.float64)
         return azimuths

@@ -67,7 +67,7 @@ class Sessions(GrowableArrays, Value):
 
     @property
     def values(self) -> Floats:
-        """What a map keeps of each view: (N, D)."""
+        """Vectors that a map keeps of each view: (N, D)."""
         return self.views[:, 0]
 
     @property

@@ -62,7 +62,7 @@ class Answers(Value):
 
 
 class BestMatch(Value):
-    """What of a map looks most like the current view.
+    """The part of a map that looks most like the current view.
 
     `reference`: its number in the map; of a map that forgets views the view's lasting number, of a topological map the
     place. `turn`: how far the robot stands turned against it (radians, counter-clockwise). `similarity` in [0, 1], 1 is

@@ -27,7 +27,7 @@ DRIVEN, LOOP = 0, 1
 
 
 class StoredViews(Value):
-    """What is kept of views, small: for each its patches, its columns and its colours. No pixel of any picture.
+    """Compact views: for each its patches, its columns and its colours. No pixel of any picture.
 
     Of view v the patches are rows `starts[v]` to `starts[v + 1]`: `directions` (F, 2) int16, azimuth and elevation in
     steps of `ANGLE`; `descriptors` (F, D) uint8; `colours` (F, 3) int8, in 127ths; `sizes` (F,) uint8, pixels. Its
@@ -146,7 +146,7 @@ class TopologicalMap(Value):
         return len(self.places)
 
     def nearest_places(self, spots: Array) -> Ints:
-        """Of spots (N, 2 or more) in the frame of `poses`, m: the place whose medoid was taken closest (N,)."""
+        """Places (N,) whose medoids were taken closest to spots (N, 2 or more) in the frame of `poses`, m."""
         gaps = spots[:, None, :2] - self.poses[self.places][None, :, :2]
         return np.asarray(np.hypot(gaps[..., 0], gaps[..., 1]).argmin(axis=1), np.int64)
 
@@ -181,7 +181,7 @@ class TopologicalMap(Value):
 
 
 class LoopHypotheses(Value):
-    """What a map was made of: the tour's pictures, what they were taken for, and which of them were thought the same.
+    """Origin of a map: the tour's pictures, what they were taken for, and which of them were thought the same.
 
     `poses` (N, 3): of all pictures, from the map's `pose_source`. `cluster`, `subcluster` and `place` (N,): what each
     belongs to, subclusters numbered along the drive. `tour` (N,): which tour it is from. `pairs` (H, 2): the pictures

@@ -12,7 +12,7 @@ Array = npt.NDArray[np.float64]
 
 
 class BearingPairs(Value):
-    """What in one view is what in another. `first`, `second`: (N, 3) unit vectors in the robot's frame of each view."""
+    """Correspondences of two views. `first`, `second`: (N, 3) unit vectors in the robot's frame of each view."""
 
     first: Annotated[Array, Shape("N", 3)]
     second: Annotated[Array, Shape("N", 3)]

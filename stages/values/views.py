@@ -40,7 +40,7 @@ class WholeView(Value):
 
     @abstractmethod
     def turns(self, kept: FloatArray) -> Array:
-        """How far the robot stands turned, counter-clockwise, from its heading in each kept view (R, D): (R,) rad."""
+        """Turn of the robot, counter-clockwise, against its heading in each kept view (R, D): (R,) rad."""
 
 
 class Coefficients(WholeView):

@@ -21,7 +21,7 @@ AngularWeights = Literal["equal", "linear"]
 
 
 class Taps(NamedTuple):
-    """Where a factor of the kernel is read at each angle: four pixels and their bilinear weights.
+    """Positions of a factor of the kernel at each angle: four pixels and their bilinear weights.
 
     `rows`, `columns` (angles, 4): offsets from the pixel that the kernel turns around. `weights` (angles, 4).
     """
@@ -163,7 +163,7 @@ class Kernel(NamedTuple):
 
     @property
     def margin(self) -> int:
-        """How many pixels around one it reads."""
+        """Number of pixels around one that it reads."""
         return math.ceil(max(self.radii))
 
     def _taps(self, stride: int, channels: int) -> tuple[Ints, Floats, Ints, Floats]:

@@ -41,7 +41,7 @@ def excess_by_distance(distances: Array, similarity: Array, bins: int = 30) -> t
 
 
 def compared_with(poses: Array, samples: npt.NDArray[np.int64]) -> npt.NDArray[np.int64] | None:
-    """With which references each of the samples (S,) of a large map is compared: (S, C). None: with all of them.
+    """References with which each of the samples (S,) of a large map is compared: (S, C). None: with all of them.
 
     Those nearest to it, for the similarity over short distances, and more of them evenly over the map, for the
     background.

@@ -38,7 +38,7 @@ class ManyViews:
         return found
 
     def _angles(self, chosen: Ints, own: Patches, other: Patches, by: ComparisonOptions) -> list[Array]:
-        """By how much the patches of each chosen view are turned against those that they match, the clearest first."""
+        """Turns of the patches of each chosen view against those that they match, the clearest first."""
         rows = np.concatenate([np.arange(self._starts[n], self._starts[n + 1]) for n in chosen])
         squares = own.descriptors[rows] @ other.descriptors.T
         squares *= -2.0

@@ -71,7 +71,7 @@ def medoids(distances: Array, labels: Ints) -> Ints:
 
 
 def nearest_views(distances: Array, subcluster: Ints, pairs: Ints) -> Ints:
-    """Of each two subclusters (H, 2) the two views, one of each, with the least distance: (H, 2)."""
+    """Closest two views, one of each, of each two subclusters (H, 2): (H, 2)."""
     members = [np.flatnonzero(subcluster == number) for number in range(int(subcluster.max()) + 1)]
     nearest = np.empty((len(pairs), 2), np.int64)
     for row, (one, other) in enumerate(pairs):

@@ -9,7 +9,7 @@ Ints = npt.NDArray[np.int64]
 
 
 def links_between(links: Ints, places: int) -> Array:
-    """How many links the shortest way between any two of so many places has: (P, P), inf where there is none.
+    """Number of links of the shortest path between any two of so many places: (P, P), inf where there is none.
 
     `links` (L, 2): neighbouring places, whichever way round.
     """

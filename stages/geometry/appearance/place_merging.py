@@ -35,7 +35,7 @@ def same_spots(shares: Array, orders: Ints, accepted: Ints, min_share: float, re
 
 
 def distances_along(distances: Array, edges: Ints, views: Ints) -> Array:
-    """From some views (M,) to all (N,), the least sum of visual distances on a way over `edges` (E, 2): (M, N).
+    """Least sum of visual distances from some views (M,) to all (N,) on a path over `edges` (E, 2): (M, N).
 
     inf where there is no way.
     """

@@ -18,7 +18,7 @@ def packed(spectrum: Complex) -> FloatArray:
 
 
 def unpacked(vectors: FloatArray, channels: int) -> Complex:
-    """What `packed` made vectors (..., D) of: (..., channels, frequencies)."""
+    """Inverse of `packed`: vectors (..., D) to spectra (..., channels, frequencies)."""
     half = vectors.shape[-1] // 2
     values = vectors[..., :half].astype(np.float64) + 1j * vectors[..., half:].astype(np.float64)
     return values.reshape(*vectors.shape[:-1], channels, half // channels)

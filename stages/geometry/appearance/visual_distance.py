@@ -15,7 +15,7 @@ Floats = npt.NDArray[np.float32]
 
 
 class ComparisonOptions(NamedTuple):
-    """How two views are compared.
+    """Settings of the comparison of two views.
 
     `ratio`, `segment_ratio`: a match's distance over that of the second nearest, of patches and of vertical segments.
     `max_colour_distance`: of the colours of two matching patches (Euclidean, three correlations). `search`: through all
@@ -48,7 +48,7 @@ class Segments(NamedTuple):
 
 
 class ViewFeatures(NamedTuple):
-    """What a view is compared by; None for a kind of features that was not looked for."""
+    """Features that a view is compared by; None for a kind that was not looked for."""
 
     patches: Patches | None
     segments: Segments | None

@@ -58,7 +58,7 @@ def optimised_poses(
 
 
 def _jacobian(poses: Array, one: Ints, other: Ints, rows: Ints, scale: Array) -> Any:
-    """Of `between`, times `scale` (E, 3), with respect to all poses but the first: (3 E, 3 N - 3)."""
+    """Jacobian of `between`, times `scale` (E, 3), with respect to all poses but the first: (3 E, 3 N - 3)."""
     from scipy import sparse
 
     cos, sin = np.cos(poses[one, 2]), np.sin(poses[one, 2])

@@ -55,8 +55,10 @@ def smoothed(estimates: Array, covariances: Array, trust: Array, motions: Array)
 def smoothed_with_lag(
     estimates: Array, covariances: Array, trust: Array, motions: Array, lag: int, window: int
 ) -> Array:
-    """As `smoothed`, but each pose from the `window` frames up to it and `lag` frames after it: what a run could say
-    `lag` frames late; NaN where none of them has an estimate."""
+    """Smooths as `smoothed`, but each pose from the `window` frames up to it and `lag` frames after it.
+
+    A run could say as much `lag` frames late. NaN where none of these frames has an estimate.
+    """
     found = np.full_like(estimates, np.nan)
     there: Flags = np.asarray(np.isfinite(estimates).all(axis=1))
     for frame in range(len(estimates)):
@@ -120,7 +122,7 @@ def contradicted(estimates: Array, trust: Array, motions: Array) -> Flags:
 
 
 def _carried(estimates: Array, path: Array, rows: npt.NDArray[np.int64], there: Array) -> Array:
-    """Where odometry leads from estimates, in the middle: (3,)."""
+    """Median pose to which odometry leads from estimates: (3,)."""
     poses = compose(estimates[rows], between(path[rows], there))
     heading = np.arctan2(np.median(np.sin(poses[:, 2])), np.median(np.cos(poses[:, 2])))
     return np.array([*np.median(poses[:, :2], axis=0), heading])

@@ -9,7 +9,7 @@ Array = npt.NDArray[np.float64]
 
 
 def consistency(places: Array, pose: Array, metres: float, radians: float) -> Array:
-    """How far places (N, 3) agree with a pose (3,), in [0, 1]: a Gaussian of these widths; (N,)."""
+    """Agreement of places (N, 3) with a pose (3,), in [0, 1]: a Gaussian of these widths; (N,)."""
     squares = (np.square(places[:, :2] - pose[:2]).sum(axis=1)) / metres**2
     share: Array = np.exp(-0.5 * (squares + np.square(wrap(places[:, 2] - pose[2]) / radians)))
     return share

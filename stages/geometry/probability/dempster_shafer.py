@@ -13,7 +13,7 @@ SUREST = 0.99
 
 
 def masses(similarity: npt.ArrayLike, confidence: npt.ArrayLike) -> Array:
-    """What a similarity in [0, 1] says with a confidence in [0, 1]: (..., 3).
+    """Masses of a similarity in [0, 1] with a confidence in [0, 1]: (..., 3).
 
     m(H) = s xi, m(not H) = (1 - s) xi, m(H or not H) = 1 - xi (Goedeme et al. 2007, equation 9 as erratum 29 reads it).
     Confidence is capped below 1.
@@ -24,7 +24,7 @@ def masses(similarity: npt.ArrayLike, confidence: npt.ArrayLike) -> Array:
 
 
 def confidence(distance: npt.ArrayLike, reach: float) -> Array:
-    """How much a neighbour's evidence weighs: xi = 1 - sin(pi d / (2 reach)), 0 beyond the reach.
+    """Weight of a neighbour's evidence: xi = 1 - sin(pi d / (2 reach)), 0 beyond the reach.
 
     Equation 8, called an ignorance function there: ignorance is 1 - xi (erratum 29). `distance` and
     `reach` are in any one unit.
@@ -50,18 +50,18 @@ def combine(one: Array, other: Array) -> Array:
 
 
 def support(mass: Array) -> Array:
-    """How much at least speaks for the hypothesis: Spt(H) = m(H) (equation 7)."""
+    """Support of the hypothesis: Spt(H) = m(H) (equation 7)."""
     return mass[..., 0]
 
 
 def plausibility(mass: Array) -> Array:
-    """How much at most speaks for it: Pls(H) = m(H) + m(H or not H) (equation 7)."""
+    """Plausibility of the hypothesis: Pls(H) = m(H) + m(H or not H) (equation 7)."""
     whole: Array = mass[..., 0] + mass[..., 2]
     return whole
 
 
 def unknown(mass: Array) -> Array:
-    """How much says nothing: m(H or not H), the ignorance."""
+    """Ignorance: m(H or not H)."""
     return mass[..., 2]
 
 

@@ -325,7 +325,7 @@ def inverse_into(matrix: Array, out: Array) -> float:
 def intersect_into(
     mean_a: Array, cov_a: Array, mean_b: Array, cov_b: Array, alpha: float, mean: Array, covariance: Array
 ) -> bool:
-    """What `intersected` gives, into `mean` and `covariance`. False where a covariance is not positive definite."""
+    """Writes what `intersected` gives into `mean` and `covariance`; False where one is not positive definite."""
     information, other = np.empty((3, 3)), np.empty((3, 3))
     if np.isnan(inverse_into(cov_a, information)) or np.isnan(inverse_into(cov_b, other)):
         return False

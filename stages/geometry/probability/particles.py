@@ -158,7 +158,7 @@ def _climb(poses: Array, weights: Array, sines: Array, cosines: Array, centre: A
 
 
 def effective_size(weights: Array) -> float:
-    """How many equal particles carry as much information as these weights: (sum w)^2 / sum w^2."""
+    """Number of equal particles with as much information as these weights: (sum w)^2 / sum w^2."""
     return float(weights.sum() ** 2 / np.square(weights).sum())
 
 

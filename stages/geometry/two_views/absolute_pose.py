@@ -32,7 +32,7 @@ def three_point_pose(
     refine: bool = True,
     planar: bool = False,
 ) -> AgreedPose | None:
-    """Where the camera is that sees most of the points (N, 3) along its unit bearings (N, 3), within `threshold` (rad).
+    """Pose of the camera that sees most of the points (N, 3) along its unit bearings (N, 3), within `threshold` (rad).
 
     Samples of three are drawn until one without a wrong point is among them with `confidence`, but at most
     `max_samples`. `refine`: the best is brought to its local optimum. `planar`: its height and tilt are those of the

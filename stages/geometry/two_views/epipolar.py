@@ -45,7 +45,7 @@ def turn_about_vertical(angle: float) -> Array:
 
 
 def yaw_of(rotation: Array) -> float:
-    """How far (rad, counter-clockwise) a rotation (3, 3) turns about the vertical."""
+    """Turn of a rotation (3, 3) about the vertical (rad, counter-clockwise)."""
     return math.atan2(rotation[1, 0] - rotation[0, 1], rotation[0, 0] + rotation[1, 1])
 
 

@@ -16,7 +16,7 @@ MIN_PAIRS = 8
 def generate_and_select(
     first: npt.ArrayLike, second: npt.ArrayLike, threshold: float, rounds: int = 20, min_share: float = 0.3
 ) -> AgreedPose | None:
-    """Where view 2 was taken, seen from view 1, by Svoboda's algorithm as Goedemé et al. 2007, section 7.1.1, tell it.
+    """Pose of view 2 seen from view 1, by Svoboda's algorithm as Goedemé et al. 2007, section 7.1.1, tell it.
 
     An overdetermined system is solved again and again, built from the pairs of unit bearings (N, 3) and (N, 3) that
     missed the essential matrix before by the least, fewer in each of the `rounds`, down to `min_share` of all; that

@@ -37,7 +37,7 @@ def relative_pose(
     max_samples: int = 5000,
     refine: bool = True,
 ) -> AgreedPose | None:
-    """Where view 2 was taken, seen from view 1, by what most pairs of unit bearings (N, 3) and (N, 3) agree on.
+    """Pose of view 2 seen from view 1, by what most pairs of unit bearings (N, 3) and (N, 3) agree on.
 
     `threshold` (rad): see `agreement`. Samples are drawn until one without a wrong pair is among them with
     `confidence`, judged by the share that agrees, but at `most` so many. `planar`: a robot on a floor, upright.
@@ -80,7 +80,7 @@ def relative_pose(
 
 
 def false_alarms(pose: AgreedPose, first: npt.ArrayLike, second: npt.ArrayLike, threshold: float) -> float:
-    """How many poses that as many pairs agree on are to be expected among wrong pairs alone: above 1 says nothing.
+    """Expected number of poses that as many pairs agree on among wrong pairs alone: above 1 says nothing.
 
     How often a wrong pair agrees with the pose is counted on these bearings, each with all others' partners: where many
     look along the horizon, or along the way, that is often. As many poses are tried as there are samples of two pairs,

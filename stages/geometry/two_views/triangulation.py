@@ -11,7 +11,7 @@ Array = npt.NDArray[np.float64]
 
 
 def depths(first: npt.ArrayLike, second: npt.ArrayLike, rotation: Array, translation: Array) -> tuple[Array, Array]:
-    """How far along the bearings of view 1 and of view 2 the two lines come closest to each other: (N,) and (N,).
+    """Distances along the bearings of view 1 and view 2 at which the two lines come closest: (N,) and (N,).
 
     `first`, `second`: (N, 3) unit bearings of the same points. A negative depth lies behind, and the pair cannot be one
     point: this, and not a coordinate's sign, tells the right one of the poses that an essential matrix allows
