@@ -42,7 +42,7 @@ def ink(colour: Colour) -> str:
 
 
 class Scale:
-    """Maps values `low` to `high` onto pixels `start` to `end`, linearly or logarithmically."""
+    """Scales values `low` to `high` to pixels `start` to `end`, linearly or logarithmically."""
 
     def __init__(self, low: float, high: float, start: float, end: float, log: bool = False) -> None:
         self.low, self.high, self.start, self.end, self.log = low, high, start, end, log
