@@ -32,7 +32,9 @@ def suggest_option(group: str, option: str, options: Iterable[str], kind: str, p
 def _replaced() -> dict[str, str]:
     import yaml
 
-    found: dict[str, str] = yaml.load(files(CONF).joinpath("help/replaced.txt").read_text("utf-8"), yaml.CSafeLoader)
+    found: dict[str, str] = yaml.load(
+        files(CONF).joinpath("help/replaced.txt").read_text(encoding="utf-8"), yaml.CSafeLoader
+    )
     return found
 
 
@@ -80,8 +82,9 @@ def refuse_null_groups(words: Sequence[str]) -> None:
     for word in words:
         name, _, value = word.partition("=")
         if value == "null" and name.isidentifier() and is_group(name):
-            heads = [file.read_text("utf-8").partition("\n")[0] for file in group_files(name)]
-            what = f"'~nodes.{name}' '~wires.{name}'" if f"# @package nodes.{name}" in heads else f"'~{name}'"
+            heads = [file.read_text(encoding="utf-8").partition("\n")[0] for file in group_files(name)]
+            one_node = is_role(name) or f"# @package nodes.{name}" in heads
+            what = f"'~nodes.{name}' '~wires.{name}'" if one_node else f"'~{name}'"
             raise ProblemsFound([Problem(name, "it cannot be swapped for nothing", f"to take it out, type {what}")])
 
 
