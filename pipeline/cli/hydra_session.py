@@ -28,7 +28,7 @@ from omegaconf.errors import OmegaConfBaseException
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, shown
 from omninav.pipeline.graph.small_files import read_yaml
 
-from .config_groups import CONF
+from .config_groups import CONF, listed_groups, stage_option, stage_options
 from .interpolations import interpolations_limited
 
 FOLDERS_OF_JOBS = ("run", "sweep")
