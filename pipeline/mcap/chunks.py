@@ -24,8 +24,8 @@ MAX_RATIO = 256
 MAX_BYTES_IN_ALL, MAX_RATIO_IN_ALL = 1 << 26, 128
 """All that is unpacked of a file has at most so many bytes, and so many times its own."""
 MAX_MESSAGES, BYTES_PER_MESSAGE = 100_000, 8
-"""A file holds at most so many messages, and one more for each so many of its bytes: packed as well as can be, a
-message of a robot takes more."""
+"""A file holds at most so many messages, and one more for each so many of its bytes: packed as well as can be, a real
+message takes more."""
 
 
 class Allowance:
