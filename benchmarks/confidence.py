@@ -28,8 +28,8 @@ from omninav.stages.geometry.probability.calibration import (
 )
 
 Array = npt.NDArray[np.float64]
-CUTS = {"house": (45, 90), "Sussex": (40, 90), "AntWorld": (150, 330)}
-"""Kidnappings: after so many images it goes on with which; in worlds of the simulator after 40 with image 85."""
+CUTS, KIDNAPPED_AT = {"house": (45, 90), "Sussex": (40, 90), "AntWorld": (150, 330)}, (40, 85)
+"""Kidnappings: after so many images it goes on with which, and in worlds of the simulator."""
 LOST_M, WITHIN_M, WITHIN_DEG = 2.5, 0.5, 10.0
 TRUTH_DEG = {"Sussex": 20.0}
 """Tolerance in heading where the true one is known to ten degrees only."""
@@ -65,7 +65,7 @@ def run(variant: str, on: DataSet, condition: str, seed: int, runs: Path) -> Fra
     if not (folder / "report.html").exists():
         words = ["plots=none", f"cache={runs / 'cache'}"]
         if condition == "kidnapped":
-            first, then = CUTS.get(on.name, (40, 85))
+            first, then = CUTS.get(on.name, KIDNAPPED_AT)
             words.append(f"cuts=[[{first},{then}]]")
         elif LIGHTS[condition]:
             words += ["+wires.perturbation={panorama: unwarp.panorama}", "perturbation=changed_light"]
@@ -116,6 +116,20 @@ def told(runs: Sequence[Frames]) -> str:
     return " | ".join(cells)
 
 
+def after_kidnapping(each: Frames) -> tuple[float, float, float, float] | None:
+    """Of a kidnapped run: images until it is right again, until the confidence is below a half (all of them where it
+    never is), its mean meanwhile, and images that are right until it is above a half again; None: found at once."""
+    cut, wrong = CUTS.get(each.place, KIDNAPPED_AT)[0], ~each.right
+    if not wrong[cut : cut + 3].any():
+        return None
+    begin = cut + int(wrong[cut:].argmax())
+    length = int(np.append(~wrong[begin:], True).argmax())
+    meanwhile, then = each.confidence[begin : begin + length], each.confidence[begin + length :]
+    doubted = int(np.append(meanwhile < 0.5, True).argmax())
+    trusted = float(np.append(then >= 0.5, True).argmax()) if len(then) else np.nan
+    return length, doubted, float(meanwhile.mean()), trusted
+
+
 def by_smoothing(runs: Sequence[Frames], some: Sequence[Frames]) -> str:
     """Cells of the second table: median / 90 % (share lost) of the filter, in the end, and `some` a few images late."""
     given = [(each.estimate, each.covariance, each.confidence, each.motion) for each in runs]
@@ -142,6 +156,14 @@ def tables(variant: str, runs: Mapping[int, Sequence[Frames]]) -> list[str]:
     lines += [f"| {name} | {told(some)} |" for name, some in groups.items()]
     lines += [f"| seed {seed} | {told(of_seed)} |" for seed, of_seed in runs.items()]
     lines += [f"| **all** | {told(every)} |", ""]
+    lines += ["| kidnapped | images wrong | until below 0.5 | mean meanwhile | right until above 0.5 |"]
+    lines += ["|---|---:|---:|---:|---:|"]
+    for place in places:
+        some = [after_kidnapping(r) for r in every if (r.place, r.condition) == (place, "kidnapped")]
+        if found := [figures for figures in some if figures]:
+            means = np.ma.masked_invalid(found).mean(axis=0).filled(np.nan)
+            lines.append("| {} | {:.1f} | {:.1f} | {:.2f} | {:.1f} |".format(place, *means).replace("nan", "–"))
+    lines.append("")
     first, *_ = runs
     lines += [f"| | filter | smoothed in the end | {LAG} images late, seed {first} |", "|---|---:|---:|---:|"]
     for place in places:

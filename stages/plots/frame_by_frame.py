@@ -5,12 +5,14 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, Outputs, Stage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.graph.results import Slide
 from omninav.pipeline.report.chart import Chart, Layer, broken
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
+from omninav.stages.geometry.probability.calibration import ELLIPSE_95, squared_mahalanobis
 from omninav.stages.values.belief import GaussianMixture, Particles, PlaceBelief
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.floor_plan import FloorPlan
@@ -27,6 +29,7 @@ from .panorama_snapshot import EncodedPanorama
 from .plan_chart import draw_surroundings, jumps, plan_chart
 from .snapshot_times import even_frames
 
+Flags = npt.NDArray[np.bool_]
 Shown = Particles | GaussianMixture | PlaceBelief
 MAX_DOTS = 150
 """Particles that are drawn of a belief at most."""
@@ -87,10 +90,10 @@ class FrameByFrame(Stage):
                 photographs.append(("best match in the map", picture))
             label = f"frame {int(last.frames[n])} · {last.seconds[n]:.1f} s"
             slides.append(Slide(label, layer.svg, tuple(photographs), tuple(_facts(last, n, belief, spot))))
-        words = [shown_frames(last.frames[rows].tolist(), len(last))]
+        words = [shown_frames(last.frames[rows].tolist(), len(last)), *_ellipses_held(last)]
         if beliefs is not None:
             chart.name("belief", "pink", "dot")
-            chart.name("estimate", "blue", "line")
+            chart.name("estimate, 95 % ellipse" if _doubted(last).any() else "estimate", "blue", "line")
         if (ticks or not isinstance(map, ViewMixtures)) and (last.reference >= 0).any():
             chart.name("best reference", "green", "ring")
         words += _what_images_show(snapshots[int(last.row[rows[0]])])
@@ -167,7 +170,24 @@ def _draw_now(layer: Layer, belief: Shown | None, drive: Drive, path: Array, n: 
     if spot is not None:
         layer.ring(spot, "green")
     layer.dart(path[n] if not known(drive.estimate).any() or drive.has_truth else np.full(3, np.nan), "ink")
+    if _doubted(drive)[n]:
+        one = slice(n, n + 1)
+        layer.ellipses(drive.estimate[one], drive.covariance[one], np.array([0.5]), "blue", math.sqrt(ELLIPSE_95))
     layer.dart(drive.estimate[n], "blue")
+
+
+def _doubted(drive: Drive) -> Flags:
+    """Which estimates have a covariance that is not zero: (N,)."""
+    spread = drive.covariance[:, 0, 0] + drive.covariance[:, 1, 1]
+    return np.asarray(known(drive.estimate) & (np.nan_to_num(spread) > 0.0))
+
+
+def _ellipses_held(drive: Drive) -> list[str]:
+    squares = squared_mahalanobis((drive.estimate - drive.truth)[:, :2], drive.covariance[:, :2, :2])
+    squares = squares[np.isfinite(squares)]
+    if not len(squares):
+        return []
+    return [f"The 95 % ellipse holds {100 * (squares <= ELLIPSE_95).mean():.0f} % of the true positions."]
 
 
 def _spot(drive: Drive, n: int, map: AnyMap | None) -> Array | None:

@@ -1,5 +1,6 @@
 """Calibration of stated probabilities: reliability, calibration error, separation."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -7,6 +8,9 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
+
+ELLIPSE_95 = -2.0 * math.log(0.05)
+"""Squared error of a position, in units of its covariance, at the edge of the 95 % ellipse (chi squared, 2 degrees)."""
 
 
 class Reliability(NamedTuple):

@@ -9,9 +9,12 @@ Array = npt.NDArray[np.float64]
 
 
 def consistency(places: Array, pose: Array, metres: float, radians: float) -> Array:
-    """Agreement of places (N, 3) with a pose (3,), in [0, 1]: a Gaussian of these widths; (N,)."""
+    """Agreement of places (N, 3) with a pose (3,), in [0, 1]: 1 well within these widths, 0 well beyond; (N,).
+
+    exp(-d^4 / 2) of the distance d in widths: a Gaussian would take from places that agree as well as matches can.
+    """
     squares = (np.square(places[:, :2] - pose[:2]).sum(axis=1)) / metres**2
-    share: Array = np.exp(-0.5 * (squares + np.square(wrap(places[:, 2] - pose[2]) / radians)))
+    share: Array = np.exp(-0.5 * np.square(squares + np.square(wrap(places[:, 2] - pose[2]) / radians)))
     return share
 
 
@@ -32,7 +35,7 @@ def log_odds_of_right(
     right, wrong = (1.0, 1.0), (when_wrong * strength, (1.0 - when_wrong) * strength)
     before = [_log_likelihood(agree, other, prior) for prior in (right, wrong)]
     since = [_log_likelihood(agree[-1] - agree, other[-1] - other, prior) for prior in (right, wrong)]
-    change = np.log(kidnapping * novelties[1:]) if kidnapping > 0.0 else np.full(max(len(novelties) - 1, 0), -np.inf)
+    change = np.log(np.maximum(kidnapping * novelties[1:], 1e-300))
     inner = slice(1, len(agree) - 1)
     stayed_right, stayed_wrong = before[0][-1], before[1][-1]
     recovered, kidnapped = before[1][inner] + since[0][inner] + change, before[0][inner] + since[1][inner] + change

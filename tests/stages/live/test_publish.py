@@ -60,8 +60,8 @@ def test_a_robot_publishes_the_pose_that_its_variant_is_measured_by(
     for module in (live, publish):
         monkeypatch.setattr(module, "connect", lambda name, domain: robot)
     monkeypatch.setattr(live, "disconnect", lambda: None)
-    settings = ["source=live", "publish=ros2", "log=live", "nodes.source.seconds=8", f"nodes.estimate.taken={taken}"]
-    settings += ["nodes.publish.tf_tolerance_s=0.3", "nodes.prior.number=300"]
+    settings = ["source=live", "publish=ros2", "log=live", "nodes.source.seconds=8"]
+    settings += [f"nodes.belief_estimate.taken={taken}", "nodes.publish.tf_tolerance_s=0.3", "nodes.prior.number=300"]
     words = {"camera": CAMERA, "cache": shared_cache, "progress": False, "plots": "none", "tour": TOUR}
     run = omninav.run("omniview_mcl", *settings, folder=tmp_path / "run", **words)
     with (run.folder / "frames.csv").open() as file:
@@ -74,6 +74,7 @@ def test_a_robot_publishes_the_pose_that_its_variant_is_measured_by(
     for row, pose, transform in zip(rows, poses, transforms, strict=True):
         where = [pose.pose.pose.position.x, pose.pose.pose.position.y]
         assert where == pytest.approx([float(row["estimate_x"]), float(row["estimate_y"])], abs=1e-6)
+        assert pose.pose.covariance[0] == pytest.approx(float(row["covariance_xx"]), rel=1e-3)
         assert stamp_of(transform) == stamp_of(pose) + 300_000_000
         at, turn = transform.transform.translation, heading(transform.transform.rotation)
         x, y = (np.interp(stamp_of(pose) / 1e9, seconds, [getattr(each, axis) for each in odom]) for axis in "xy")

@@ -7,14 +7,13 @@ import pytest
 
 from omninav.pipeline import Context, Tick
 from omninav.stages.monitor.confidence_monitor import (
-    MIN_NOVELTY,
     ConfidenceMonitor,
     ConfidenceMonitorState,
     best_place,
     mass_within,
 )
 from omninav.stages.monitor.wrong_pose_agreement import LearnWrongPoseAgreement
-from omninav.stages.values.belief import Particles
+from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.confidence import WrongPoseAgreement
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
@@ -31,21 +30,31 @@ LINE = ReferenceGraph(
 )
 
 
-def drive(matches: list[int], at: float = 0.0, step: float = 1.0, spread: float = 0.05) -> list[float]:
-    """Confidences along a line; the best match of each image is given, and the estimate follows odometry."""
+def drive(
+    matches: list[int | None],
+    at: float = 0.0,
+    step: float = 1.0,
+    spread: float = 0.05,
+    novelty: float = 1.0,
+    elsewhere: float = 0.0,
+) -> list[float]:
+    """Confidences along a line; the best match of each image is given (None: no image), `elsewhere` the similarity of
+    every fifth reference, and the estimate follows odometry."""
     monitor, recent, rng = ConfidenceMonitor(), ConfidenceMonitorState(), np.random.default_rng(1)
     told = []
     for n, match in enumerate(matches):
         values = np.zeros((len(LINE), 36), np.float32)
-        values[match, 0] = 0.9
+        values[::5, 0] = elsewhere
+        values[0 if match is None else match, 0] = 0.9
         poses = np.array([at + step * n, 0.0, 0.0]) + rng.normal(0.0, spread, (500, 3))
         belief = Particles(poses, np.full(500, 1 / 500))
         ctx = Context("monitor")
         ctx.tick = Tick(n, n * 10**9, first_of_log=n == 0)
+        seen = None if match is None else Similarities(values)
+        likelihood = None if match is None else Likelihood(np.ones(500), novelty=novelty if n else 1.0)
         motion = Motion(step, 0.0, 0.0) if n else None
-        out = monitor.step(
-            ctx, recent, belief, belief.estimate(), LINE, SCALE, WrongPoseAgreement(0.02), Similarities(values), motion
-        )
+        wrong = WrongPoseAgreement(0.02)
+        out = monitor.step(ctx, recent, belief, belief.estimate(), LINE, SCALE, wrong, seen, likelihood, motion)
         told.append(out.confidence.probability)
     return told
 
@@ -69,9 +78,34 @@ def test_a_wide_belief_is_less_sure_than_a_narrow_one():
 
 
 def test_a_robot_that_stands_gains_little_from_the_same_image_again():
-    once, standing = drive([0])[-1], drive([0] * 6, step=0.0)[-1]
+    once, standing = drive([0])[-1], drive([0] * 6, step=0.0, novelty=0.05)[-1]
     assert standing < drive(list(range(6)))[-1] - 0.02
     assert standing == pytest.approx(once, abs=0.15)
+
+
+def test_a_kidnapped_robot_is_doubted_after_few_images_and_trusted_again_with_the_first_right_one():
+    told = drive([*range(15), *range(25, 29), *range(19, 21)])  # four images see other places
+    assert told[14] > 0.99
+    assert told[18] < 0.5
+    assert told[19] > 0.5
+
+
+def test_images_that_resemble_many_places_neither_convince_nor_cast_doubt():
+    away = list(range(39, 27, -1))
+    agreed = drive([*range(12), *range(12, 24)], elsewhere=0.0)
+    unclear = drive([*range(12), *away], elsewhere=0.89)
+    assert unclear[-1] == pytest.approx(drive([0], elsewhere=0.89)[-1], abs=0.15)
+    assert agreed[-1] > 0.95
+    assert drive(list(range(12)), elsewhere=0.89)[-1] < 0.8
+
+
+def test_a_way_without_images_lowers_the_confidence_and_standing_does_not():
+    sure = list(range(15))
+    blind, standing = drive([*sure, *[None] * 20]), drive([*sure[:1], *[None] * 20], step=0.0)
+    assert blind[14] > 0.99
+    assert (np.diff(blind[14:30]) < 0.0).all()
+    assert blind[-1] < 0.9
+    assert standing[-1] == pytest.approx(standing[0], abs=0.01)
 
 
 def test_chance_is_small_where_images_are_taken_everywhere_and_large_where_all_look_like_one():
@@ -101,18 +135,18 @@ def test_images_are_forgotten_as_new_ones_come_and_hardly_while_the_robot_stands
     values = np.zeros((len(LINE), 36), np.float32)
     values[0, 0] = 0.9
 
-    def weight_of_first(images: int, step: float) -> float:
+    def weight_of_first(images: int, novelty: float) -> float:
         for _ in range(images):
-            motion = Motion(step, 0.0, 0.0) if len(recent.places) else None
+            likelihood = Likelihood(np.ones(1), novelty=novelty)
             monitor.step(
                 Context("monitor"), recent, belief, belief.estimate(), LINE, SCALE, WrongPoseAgreement(0.02),
-                Similarities(values), motion,
+                Similarities(values), likelihood,
             )  # fmt: skip
         return float(recent.weights[0])
 
-    assert weight_of_first(1, 0.0) == 1.0
-    assert weight_of_first(50, 0.0) == pytest.approx(math.exp(-50 * MIN_NOVELTY / 20.0))
-    assert weight_of_first(20, 5.0) == pytest.approx(math.exp(-(50 * MIN_NOVELTY + 20) / 20.0))
+    assert weight_of_first(1, 1.0) == pytest.approx(1.0, abs=1e-3)
+    assert weight_of_first(50, 0.05) == pytest.approx(math.exp(-50 * 0.05 / 20.0), abs=1e-3)
+    assert weight_of_first(20, 1.0) == pytest.approx(math.exp(-(50 * 0.05 + 20) / 20.0), abs=1e-3)
 
 
 def test_images_taken_close_by_do_not_tell_how_often_a_wrong_place_looks_right():

@@ -112,6 +112,21 @@ def test_a_slide_shows_image_error_belief_and_best_match_of_its_frame():
     assert slides[4].overlay != slides[5].overlay
 
 
+def test_the_estimates_ellipse_is_drawn_and_how_many_true_positions_such_hold_is_said_beside_it():
+    run = small_run(frames=20)
+    truth = run.drive.truth.copy()
+    truth[:5, 0] += 3.0
+    drive = dataclasses.replace(run.drive, estimate=run.drive.truth.copy(), truth=truth)
+    sure = dataclasses.replace(drive, covariance=np.zeros((20, 3, 3)))
+    drive = dataclasses.replace(drive, covariance=np.repeat(np.diag((1.0, 0.25, 0.1))[None], 20, axis=0))
+    figure, point = (
+        FrameByFrame().step(CTX, each, list(panoramas(run)), None, run.map).figure for each in (drive, sure)
+    )
+    assert "The 95 % ellipse holds 75 % of the true positions." in figure.caption
+    assert "ellipse" not in point.caption
+    assert ["<ellipse" in slide.overlay for slide in (figure.slides[7], point.slides[7])] == [True, False]
+
+
 def test_the_best_match_in_a_map_that_is_learned_on_the_way_is_an_image_of_the_drive():
     run = small_run(frames=30)
     drive = dataclasses.replace(run.drive, reference=np.full(30, 7), reference_turn=np.full(30, np.pi / 2))

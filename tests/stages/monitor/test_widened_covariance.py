@@ -1,0 +1,64 @@
+"""What leaves the system is as wide as errors are, and as wide as the map where the estimate is probably wrong."""
+
+import math
+
+import numpy as np
+import pytest
+
+import omninav
+from omninav.pipeline import Context
+from omninav.stages.monitor.widened_covariance import WidenCovariance
+from omninav.stages.values.belief import PoseEstimate
+from omninav.stages.values.confidence import PoseConfidence
+from omninav.stages.values.length_scale import LengthScale
+from omninav.stages.values.maps import ReferenceGraph
+from omninav.stages.values.pose import Pose
+
+MAP = ReferenceGraph(
+    np.column_stack([np.linspace(-10.0, 10.0, 41), np.zeros((41, 2))]),
+    np.zeros((41, 8, 20), np.float32),
+    "histograms",
+    np.zeros((0, 2), np.int64),
+    "truth",
+)
+OWN = np.diag((0.01, 0.02, 0.003))
+POSE = Pose(10.0, 0.0, 0.0)
+
+
+def widened(confidence: float, length_scale: float = 0.5, floor: float = 0.4) -> PoseEstimate:
+    estimate = PoseEstimate(POSE, OWN, 0.9, POSE)
+    told = PoseConfidence(confidence)
+    return WidenCovariance(floor=floor).step(Context("wide"), estimate, told, LengthScale(length_scale), MAP).estimate
+
+
+def test_a_share_of_the_length_scale_is_added_to_the_position_alone():
+    found = widened(0.9)
+    assert found.covariance == pytest.approx(OWN + np.diag((0.04, 0.04, 0.0)))
+    assert (found.pose, found.mode_weight) == (POSE, 0.9)
+    assert widened(0.9, floor=0.0).covariance == pytest.approx(OWN)
+
+
+def test_an_estimate_that_is_more_probably_wrong_than_right_may_be_anywhere_in_the_map():
+    found = widened(0.49).covariance
+    far = np.array([-20.0, 0.0])
+    assert math.sqrt(found[0, 0]) == pytest.approx(11.6, abs=0.1)  # 5.9 m about the middle, which is 10 m away
+    assert far @ np.linalg.inv(found[:2, :2]) @ far < 5.991  # the map's other end is within the 95 % ellipse
+    assert math.sqrt(found[2, 2]) > 1.8  # of any heading
+    assert widened(0.51).covariance[0, 0] < 0.1
+
+
+def test_an_estimate_that_is_off_by_less_than_a_length_scale_is_within_the_95_percent_ellipse():
+    errors = np.random.default_rng(0).normal(
+        0.0, 0.4, (1000, 2)
+    )  # length scales, as where the drive is beside the tour
+    covariance = widened(0.9, length_scale=1.0).covariance[:2, :2]
+    squares = (errors @ np.linalg.inv(covariance) * errors).sum(axis=1)
+    assert 0.9 < (squares <= 5.991).mean() < 0.98
+
+
+@pytest.mark.parametrize("variant", ["omninav", "omniview_mcl", "retrieval_mcl", "retrieval_mcl_as_printed"])
+def test_what_is_published_drawn_and_measured_is_the_widened_estimate(variant):
+    wires = omninav.compose(variant, "publish=ros2").settings["wires"]
+    assert {node for node, ports in wires.items() if "belief_estimate." in str(ports)} == {"estimate", "monitor"}
+    taken = {node for node, ports in wires.items() if "'estimate.estimate'" in str(ports)}
+    assert {"publish", "messages", "drive"} <= taken
