@@ -77,7 +77,7 @@ def test_a_confidence_that_falls_where_the_robot_is_lost_tells_all_of_it():
     drawn = ReliabilityDiagram().step(Context("plot"), out.reliability).figure
     assert drawn is not None
     assert b"confidence" in drawn.content
-    assert "0.5 m and 10 degrees" in drawn.caption
+    assert "0.5 m and 10°" in drawn.caption
     blind = Calibration().step(Context("calibration"), made([0.9] * 100 + [0.1] * 300)).metrics.values["calibration"]
     assert blind["lost_auroc"] < 0.9
     assert blind["expected_error"] > found["expected_error"]
