@@ -49,11 +49,11 @@ class WidenCovariance(Stage):
         variance = (self.floor * length_scale.metres) ** 2
         covariance = estimate.covariance + np.diag((variance, variance, 0.0))
         if confidence.probability < self.min_confidence:
-            covariance = covariance + anywhere(np.array(pose_row(estimate.pose)), map)
+            covariance = covariance + map_covariance(np.array(pose_row(estimate.pose)), map)
         return self.Out(estimate=replace(estimate, covariance=covariance))
 
 
-def anywhere(pose: Array, map: ReferenceGraph) -> Array:
+def map_covariance(pose: Array, map: ReferenceGraph) -> Array:
     """The covariance (3, 3) about a pose (3,) of a robot that stands at any reference, turned anyhow."""
     covariance = np.zeros((3, 3))
     if len(map):
