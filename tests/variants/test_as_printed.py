@@ -1,16 +1,15 @@
 """The variants of the papers as printed hold nothing of ours: every addition is off, and its stage left out or idle."""
 
 import pytest
-from hydra import compose, initialize_config_module
 
-from omninav.pipeline.cli.composition import complete
+from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.run.plan import plan
 
 
 def graph_of(variant: str) -> Graph:
-    with initialize_config_module("omninav.conf", version_base="1.3"):
-        return plan(complete(compose("config", overrides=[f"variant={variant}"]))).graph
+    with composed([f"variant={variant}"]) as config:
+        return plan(complete(config)).graph
 
 
 @pytest.fixture(scope="module")

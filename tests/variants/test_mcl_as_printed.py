@@ -1,9 +1,8 @@
 """What the two papers on Monte Carlo localisation print, and nothing else."""
 
 import pytest
-from hydra import compose, initialize_config_module
 
-from omninav.pipeline.cli.composition import complete
+from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.run.plan import plan
 from omninav.stages.fusion.importance_resampling import ImportanceResampling
 from omninav.stages.fusion.uniform_recovery import UniformRecovery
@@ -17,8 +16,8 @@ from omninav.stages.unwarp.window import PerspectiveWindow
 
 @pytest.fixture
 def printed(request):
-    with initialize_config_module("omninav.conf", version_base="1.3"):
-        planned = plan(complete(compose("config", overrides=[f"variant={request.param}_as_printed"])))
+    with composed([f"variant={request.param}_as_printed"]) as config:
+        planned = plan(complete(config))
     graph = planned.graph
     maps = [artifact for artifact in planned.artifacts if artifact.name == "map"]
     return graph, maps[0].graph
@@ -45,7 +44,7 @@ def test_gross_and_koenig(printed):
     assert (fusion.number, fusion.resample_below, fusion.adapt) == (5000, 1.0, "none")
     assert (fusion.recovery_share, fusion.kidnapping_probability) == (0.0, 0.0)
     assert stages["prior"].number == 5000
-    assert stages["estimate"].taken == "mode"
+    assert stages["belief_estimate"].taken == "mode"
     # References by distance or dissimilarity: both rules are on, and of the same views.
     mapping = map.nodes["mapping"].stage
     assert mapping.distance_m > 0.1
@@ -75,5 +74,5 @@ def test_wolf_burgard_and_burkhardt(printed):
     assert type(stages["unwarp"]) is PerspectiveWindow
     assert stages["unwarp"].directions == 1
     assert map.nodes["unwarp"].stage.directions == 8
-    assert stages["estimate"].taken == "mean"
+    assert stages["belief_estimate"].taken == "mean"
     assert map.nodes["features"].parameters == graph.nodes["features"].parameters

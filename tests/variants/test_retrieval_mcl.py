@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 from conftest import DATA, DRIVE, GRID, TOUR, needs_data
-from hydra import compose, initialize_config_module
 
-from omninav.pipeline.cli.composition import complete
+from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.graph.problems import ProblemsFound
 from omninav.pipeline.run.plan import plan
 
@@ -15,8 +14,8 @@ HOUSE = DATA / "photoreal-house"
 
 
 def planned(*words: str):
-    with initialize_config_module("omninav.conf", version_base="1.3"):
-        return plan(complete(compose("config", overrides=list(words))))
+    with composed(words) as config:
+        return plan(complete(config))
 
 
 @pytest.mark.parametrize("variant", ["retrieval_mcl", "omniview_mcl"])
@@ -52,8 +51,8 @@ def test_what_is_proposed_is_drawn_anew_at_each_image():
 
 
 def test_who_is_carried_on_its_drive_is_not_carried_on_its_tour():
-    with initialize_config_module("omninav.conf", version_base="1.3"):
-        config = complete(compose("config", overrides=["variant=retrieval_mcl", "cuts=[[3,6]]"]))
+    with composed(["variant=retrieval_mcl", "cuts=[[3,6]]"]) as config:
+        config = complete(config)
     assert config["nodes"]["source"]["cuts"] == [[3, 6]]
     for name in ("map", "thumbnails"):
         assert config["artifacts"][name]["graph"]["nodes"]["source"]["cuts"] == []

@@ -87,13 +87,12 @@ def test_without_a_goal_it_is_said_before_anything_runs(omninav):
 
 
 def test_nothing_that_steers_the_robot_knows_the_truth():
-    from hydra import compose, initialize_config_module
 
-    from omninav.pipeline.cli.composition import complete
+    from omninav.pipeline.cli.composition import complete, composed
     from omninav.pipeline.run.plan import plan
 
-    with initialize_config_module("omninav.conf", version_base="1.3"):
-        graph = plan(complete(compose("config", overrides=[*WORDS, "goal=3"]))).graph
+    with composed([*WORDS, "goal=3"]) as config:
+        graph = plan(complete(config)).graph
     assert list(truth_in_the_loop(graph)) == []
 
 

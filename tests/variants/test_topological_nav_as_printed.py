@@ -1,9 +1,8 @@
 """What a variant `…_as_printed` may not contain: nothing that Goedemé et al. 2007 do not print."""
 
 import pytest
-from hydra import compose, initialize_config_module
 
-from omninav.pipeline.cli.composition import complete
+from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.graph.graph import Graph
 from omninav.pipeline.run.plan import Plan, plan
 from omninav.stages.features.sift_and_columns import SiftAndColumns
@@ -13,8 +12,8 @@ from omninav.stages.sensor.place_likelihood import PlaceLikelihood
 
 
 def planned(*words: str) -> Plan:
-    with initialize_config_module("omninav.conf", version_base="1.3"):
-        return plan(complete(compose("config", overrides=list(words))))
+    with composed(words) as config:
+        return plan(complete(config))
 
 
 def map_graph(whole: Plan) -> Graph:
