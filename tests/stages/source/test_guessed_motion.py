@@ -58,12 +58,12 @@ def test_a_video_drives_straight_at_the_stated_speed_and_turns_as_it_is_seen(tur
         assert out.motion.sigma_m == pytest.approx(0.8)
     assert math.degrees(outs[-1].odometry.heading) == pytest.approx(sum(TURNS_DEG), abs=1.0)
     assert ctx.facts["odometry"] == "guessed"
-    assert any("0.8 m/s are guessed" in sentence for sentence in ctx.warnings)
+    assert any("guessed from a speed of 0.8 m/s" in sentence for sentence in ctx.warnings)
 
 
 def test_who_reads_motion_is_refused_by_name_until_a_speed_is_stated(turning: str) -> None:
     with pytest.raises(
-        UnreadableRecording, match=r"turn.avi: .*neither odometry nor positions.*'motion'.*type speed=0.5"
+        UnreadableRecording, match=r"turn.avi has neither odometry nor a position.*'motion'.*type speed=0.5"
     ):
         LogSource(log=turning).setup(context(motion=["motion", "sensor"]))
     with pytest.raises(UnreadableRecording, match=r"speed=0 .*'mapping' makes a map of positions"):
