@@ -28,7 +28,7 @@ def test_overrides_may_be_a_list_of_words():
         "common": ["seed=1"],
         "sweep": {"method": {"a": ["x=1", "z=2"], "b": "x=2"}, "data": {"first": [], "second": "y=2"}},
     }
-    found = read_experiment(FILE | listed, "paper")
+    found = read_experiment(FILE | listed, "full")
     assert (found.set, found.common) == ("start=truth 'x.y=[1, 2]'", "seed=1")
     assert [condition.overrides.strip() for condition in found.conditions()] == [
         "x=1 z=2",
@@ -38,7 +38,7 @@ def test_overrides_may_be_a_list_of_words():
     ]
     for wrong in ({"set": {"start": "truth"}}, {"set": [{"start": "truth"}]}):
         with pytest.raises(ProblemsFound, match=r"experiment\.set: .*\n.*write what one would type: set: start=truth"):
-            read_experiment(FILE | wrong, "paper")
+            read_experiment(FILE | wrong, "full")
 
 
 def test_a_profile_changes_mappings_key_by_key_and_null_takes_a_label_out():
