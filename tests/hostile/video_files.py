@@ -2,6 +2,7 @@
 
 import functools
 import tempfile
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -79,7 +80,7 @@ class _Images:
 
     def __init__(self, stamps: Any) -> None:
         self.stamps = stamps
-        self.dropped: dict[str, int] = dict.fromkeys(("no_truth", "impossible_motion"), 0)
+        self.dropped: Counter[str] = Counter()
         self.details: dict[str, str] = {}
 
 
