@@ -28,7 +28,7 @@ from .named_camera import assumed_camera, named_camera
 from .positions import frame_poses
 from .recording import Format, OpenOptions, UnreadableRecording
 from .stamps import ascending, lone
-from .tables import CsvTable, Delimiter, read_table
+from .tables import NO_TIME, CsvTable, Delimiter, read_table
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -72,7 +72,7 @@ class ImageFolder:
         self.turned = sum(map(_is_turned, self._paths_kept))
         """How many of its images are turned as their EXIF orientation says."""
         self._images = DecodeAhead(lambda frame: partial(_image_at, self._paths_kept[frame]))
-        self.stamps: Stamps = np.array([times[row] for row in keep], dtype=np.int64)
+        self.stamps: Stamps = times[keep]
         self.truth: Array | None = None if truth is None else truth[keep]
         self.camera = self._find_camera(options.camera)
 
@@ -155,7 +155,7 @@ class ImageFolder:
             raise UnreadableRecording(f"{self._where}: frames.file is missing: the column with file names")
         base = self._folder if frames.images.startswith("/") else table.path.parent
         base /= frames.images.lstrip("/")
-        names = table.texts(frames.file)
+        names = table.texts(frames.file).to_pylist()
         self._rows = [f"{table.path.name}, line {line}" for line in table.lines]
         return [self._inside(base / self._renamed(name, row), row) for name, row in zip(names, self._rows, strict=True)]
 
@@ -173,18 +173,18 @@ class ImageFolder:
             raise UnreadableRecording(f"{self._folder}: {row}: {error}") from None
         return name
 
-    def _times(self, table: CsvTable | None, count: int) -> list[int | None]:
+    def _times(self, table: CsvTable | None, count: int) -> Stamps:
         frames = self._description.frames
         if table is not None and frames.time is not None:
             return table.nanoseconds(frames.time)
         if frames.period is None:
             raise UnreadableRecording(f"{self._where}: frames need a time column or a period (frames.period: seconds)")
-        return [round(number * frames.period * 1e9) for number in range(count)]
+        return np.array([round(number * frames.period * 1e9) for number in range(count)], dtype=np.int64)
 
-    def _usable(self, paths: list[Path], times: list[int | None], truth: Array | None) -> npt.NDArray[np.int64]:
+    def _usable(self, paths: list[Path], times: Stamps, truth: Array | None) -> npt.NDArray[np.int64]:
         rows = []
         for row, path in enumerate(paths):
-            if times[row] is None:
+            if times[row] == NO_TIME:
                 self._drop("no_time", f"{self._rows[row]}: no time")
             elif not _is_file(path):
                 self._drop("missing_image", f"{self._rows[row]}: no file {path}")
@@ -192,12 +192,12 @@ class ImageFolder:
                 self._drop("no_position", f"{self._rows[row]} ({path.name}): no position")
             else:
                 rows.append(row)
-        kept, repeated, backward = ascending([times[row] or 0 for row in rows])
+        kept, repeated, backward = ascending(times[rows].tolist())
         for number in repeated:
             self._drop("duplicate_frame", f"{paths[rows[number]].name} repeats a time")
         for number in backward:
             self._drop("backward_stamp", f"{paths[rows[number]].name} goes back in time")
-        apart = lone(np.array([times[rows[number]] for number in kept], dtype=np.int64))
+        apart = lone(times[[rows[number] for number in kept]])
         for number in np.array(kept, dtype=np.int64)[apart]:
             self._drop("lone_stamp", f"{paths[rows[number]].name} was taken hours from all others")
         kept = [number for number, alone in zip(kept, apart, strict=True) if not alone]

@@ -10,8 +10,8 @@ from omninav.stages.geometry.plane.se2 import wrap
 from .description import Description
 from .plausibility import MotionLimits, believed
 from .recording import UnreadableRecording
-from .stamps import ascending, poses_near
-from .tables import Angle, CsvTable
+from .stamps import ascending_rows, poses_near
+from .tables import NO_TIME, Angle, CsvTable
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -22,7 +22,7 @@ def frame_poses(
     where: str,
     frames: CsvTable | None,
     own: CsvTable | None,
-    times: list[int | None],
+    times: Stamps,
     limits: MotionLimits,
 ) -> tuple[Array, list[str]]:
     """Poses (N, 3) of all frames at their `times` (ns), NaN where there is none, and which rows are not believed.
@@ -43,10 +43,9 @@ def frame_poses(
         raise UnreadableRecording(f"{where}: positions.time is missing: {own.path.name} is joined by time")
     else:
         track_times = own.nanoseconds(positions.time)
-    known = [row for row, time in enumerate(track_times) if time is not None and np.isfinite(x[row] + y[row])]
-    kept, _, _ = ascending([track_times[row] or 0 for row in known])
-    rows = np.array([known[number] for number in kept], dtype=np.int64)
-    stamps = np.array([track_times[row] for row in rows], dtype=np.int64)
+    known = np.flatnonzero((track_times != NO_TIME) & np.isfinite(x + y))
+    rows = known[ascending_rows(track_times[known])]
+    stamps = track_times[rows]
     likely = np.arange(len(rows))
     if own is not None or description.frames.time is not None:  # else nothing says how fast the robot was
         likely = believed(stamps, np.column_stack([x[rows], y[rows], np.zeros(len(rows))]), limits).rows
@@ -59,8 +58,8 @@ def frame_poses(
     if own is None:
         poses[rows] = track
         return poses, said
-    timed = [row for row, time in enumerate(times) if time is not None]
-    shifted = np.array([times[row] for row in timed], dtype=np.int64) + round(positions.clock_offset * 1e9)
+    timed = np.flatnonzero(times != NO_TIME)
+    shifted = times[timed] + round(positions.clock_offset * 1e9)
     sure = np.isfinite(track).all(axis=1)
     if sure.sum() < 2:
         raise UnreadableRecording(f"{table.path}: fewer than two rows with a heading")

@@ -62,6 +62,14 @@ def ascending(stamps: Sequence[int]) -> tuple[list[int], list[int], list[int]]:
     return kept, repeated, sorted(set(left) - set(kept))
 
 
+def ascending_rows(stamps: Stamps) -> Stamps:
+    """The records that `ascending` keeps of many stamps (N,): (K,), in a fraction of its memory."""
+    firsts = np.sort(np.unique(stamps, return_index=True)[1])
+    if (np.diff(stamps[firsts]) > 0).all():
+        return firsts
+    return firsts[ascending(stamps[firsts].tolist())[0]]
+
+
 def within(stamps: Stamps, times: Stamps) -> npt.NDArray[np.bool_]:
     """Which stamps lie in the range of `times`."""
     inside: npt.NDArray[np.bool_] = (stamps >= times[0]) & (stamps <= times[-1])

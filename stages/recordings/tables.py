@@ -3,11 +3,13 @@
 import csv
 import io
 import re
-from collections.abc import Callable, Iterator
+from array import array
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
+from itertools import chain
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -18,8 +20,7 @@ from omninav.pipeline.graph.small_files import read_small
 from .recording import UnreadableRecording
 
 Array = npt.NDArray[np.float64]
-
-T = TypeVar("T")
+Stamps = npt.NDArray[np.int64]
 PI = Decimal("3.14159265358979323846264338328")
 _LENGTHS = {"m": Decimal(1), "cm": Decimal("0.01"), "mm": Decimal("0.001"), "in": Decimal("0.0254")}
 _TIMES = {
@@ -35,6 +36,19 @@ MAX_EXPONENT = 40
 """Powers of ten of a number in a cell."""
 _MAX_MAGNITUDE = {"m": Decimal(10**9), "ns": Decimal(2**62), "rad": Decimal(10**6)}
 """Of a family, by its base unit: a million kilometres, the year 2116 as ROS counts, many turns."""
+_PLAIN = {
+    **{unit: (rf"^-?\d{{1,{9 + power}}}(\.\d{{0,12}})?$", -power) for unit, power in (("m", 0), ("cm", 2), ("mm", 3))},
+    **{
+        unit: (rf"^-?([1-3]?\d{{1,{18 - power}}})(\.\d{{0,{power}}})?$", power)
+        for unit, power in (("ns", 0), ("us", 3), ("ms", 6), ("s", 9))
+    },
+    "rad": (r"^-?\d{1,6}(\.\d{0,12})?$", 0),
+}
+"""By unit: numbers that are within all bounds by their digits, and the power of ten that brings the base unit."""
+_BLOCK = 100_000
+"""Cells that are kept as Python's texts, before they are packed."""
+NO_TIME = np.iinfo(np.int64).min
+"""Nanoseconds that stand for no time at all."""
 Delimiter = Literal[",", ";", "\t", " ", "|", ":"]
 _CELL = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s]*)\s*$")
 _SPELLINGS = {
@@ -75,13 +89,16 @@ class Angle:
 
 @dataclass(frozen=True)
 class CsvTable:
-    """A CSV file as texts: `names` of the columns (their numbers where there is no header), `rows`, and their lines."""
+    """A CSV file as texts, row after row: `names` of its columns (their numbers where there is no header)."""
 
     path: Path
     names: tuple[str, ...]
-    rows: list[list[str]]
-    lines: list[int]
-    """The line of the file on which each row ends, from 1."""
+    cells: Any
+    """Cells of all rows, one after the other, without the spaces around them: a `pyarrow.StringArray`."""
+    starts: npt.NDArray[np.int32]
+    """Number of the cell at which each row begins, and how many there are: (rows + 1,)."""
+    lines: npt.NDArray[np.int32]
+    """The line of the file on which each row ends, from 1: (rows,)."""
 
     def index(self, column: str | int) -> int:
         """The number of a column. Raises `UnreadableRecording` naming the file, the column and what there is."""
@@ -96,45 +113,109 @@ class CsvTable:
             raise UnreadableRecording(f"{self.path}: no column '{column:.60}'; {hint}columns: {known:.300}")
         return self.names.index(column)
 
-    def texts(self, column: str | int) -> list[str]:
-        """The cells of a column, '' where a row is too short."""
-        number = self.index(column)
-        return [row[number].strip() if number < len(row) else "" for row in self.rows]
+    def texts(self, column: str | int) -> Any:
+        """The cells of a column as a `pyarrow.StringArray`, '' where a row is too short."""
+        import pyarrow as pa
+
+        cells = self.starts[:-1] + np.int32(self.index(column))
+        inside = cells < self.starts[1:]
+        return self.cells.take(pa.array(cells, mask=None if inside.all() else ~inside)).fill_null("")
 
     def numbers(self, column: Length | Angle) -> Array:
         """A column in metres or radians: (rows,), NaN where a cell holds no number."""
-        return np.array(list(self._cells(column, float, float("nan"))))
+        return self._column(column, np.float64, float, float("nan"))
 
-    def nanoseconds(self, column: Time) -> list[int | None]:
-        """A column of times in whole nanoseconds, None where a cell holds no number."""
-        return list(self._cells(column, lambda value: int(value.to_integral_value()), None))
+    def nanoseconds(self, column: Time) -> Stamps:
+        """A column of times in whole nanoseconds: (rows,), `NO_TIME` where a cell holds no number."""
+        return self._column(column, np.int64, lambda value: int(value.to_integral_value()), NO_TIME)
 
-    def _cells(self, column: Length | Time | Angle, finish: Callable[[Decimal], T], missing: T) -> Iterator[T]:
-        for line, text in zip(self.lines, self.texts(column.column), strict=True):
+    def _column(
+        self, column: Length | Time | Angle, kind: type, finish: Callable[[Decimal], float], missing: float
+    ) -> npt.NDArray[Any]:
+        """Plain numbers are read at once, and what else may be a number one by one: the result is the same."""
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        texts = self.texts(column.column)
+        found: npt.NDArray[Any] = np.full(len(texts), missing, kind)
+        left = pc.match_substring_regex(texts, r"[0-9]|[^\x00-\x7f]").to_numpy(zero_copy_only=False)
+        if column.unit in _PLAIN:
+            plain, values = _plain_numbers(texts, column.unit)
+            found[plain] = values
+            left = left & ~plain
+        rows = np.flatnonzero(left)
+        for row, text in zip(rows, _one_by_one(texts.filter(pa.array(left))), strict=True):
             try:
                 value = _in_base_unit(text, column.unit)
             except UnreadableRecording as error:
-                raise UnreadableRecording(f"{self.path}, line {line}: column '{column.column}': {error}") from None
-            yield missing if value is None else finish(value)
+                where = f"{self.path}, line {self.lines[row]}: column '{column.column}'"
+                raise UnreadableRecording(f"{where}: {error}") from None
+            if value is not None:
+                found[row] = finish(value)
+        return found
 
 
 def read_table(path: Path, header: bool = True, delimiter: Delimiter = ",") -> CsvTable:
     """A CSV file; empty lines are skipped. Raises `BadInput`."""
-    text = io.StringIO(read_small(path, MAX_TABLE_BYTES).decode("utf-8-sig", errors="replace"), newline="")
-    reader = csv.reader(text, delimiter=delimiter, skipinitialspace=True)
-    rows, lines = [], []
+    reader = csv.reader(text_lines(path, newline=""), delimiter=delimiter, skipinitialspace=True)
+    rows = ((reader.line_num, row) for row in reader)
     try:
-        for row in reader:
-            if any(cell.strip() for cell in row):
-                rows.append(row)
-                lines.append(reader.line_num)
+        first = next(((line, row) for line, row in rows if any(map(str.strip, row))), None)
+        if first is None:
+            raise UnreadableRecording(f"{path}: an empty table")
+        if header:
+            return table_of(path, tuple(cell.strip() for cell in first[1]), rows)
+        return table_of(path, tuple(map(str, range(len(first[1])))), chain([first], rows))
     except csv.Error as error:
         raise UnreadableRecording(f"{path}, line {reader.line_num}: not readable as CSV ({error})") from None
-    if not rows:
-        raise UnreadableRecording(f"{path}: an empty table")
-    if header:
-        return CsvTable(path, tuple(cell.strip() for cell in rows[0]), rows[1:], lines[1:])
-    return CsvTable(path, tuple(str(number) for number in range(len(rows[0]))), rows, lines)
+
+
+def table_of(path: Path, names: tuple[str, ...], rows: Iterable[tuple[int, list[str]]]) -> CsvTable:
+    """A table of rows with their lines; rows without content, and cells beyond the last name, are left out."""
+    import pyarrow as pa
+
+    lines, ends, blocks = array("i"), array("i", [0]), []
+    block: list[str] = []
+    done = 0
+    for line, row in rows:
+        cells = [cell.strip() for cell in row]
+        if any(cells):
+            block += cells[: len(names)]
+            lines.append(line)
+            ends.append(done + len(block))
+            if len(block) > _BLOCK:
+                blocks.append(pa.array(block, pa.string()))
+                done, block = done + len(block), []
+    cells = pa.concat_arrays([*blocks, pa.array(block, pa.string())])
+    return CsvTable(path, names, cells, np.array(ends, np.int32), np.array(lines, np.int32))
+
+
+def text_lines(path: Path, newline: str | None = None) -> Iterator[str]:
+    """The lines of a table's file, one by one. Raises `BadInput` where it is none or too long."""
+    content = io.BytesIO(read_small(path, MAX_TABLE_BYTES))
+    return io.TextIOWrapper(content, "utf-8-sig", errors="replace", newline=newline)
+
+
+def _one_by_one(texts: Any) -> Iterator[str]:
+    for start in range(0, len(texts), _BLOCK):
+        yield from texts.slice(start, _BLOCK).to_pylist()
+
+
+def _plain_numbers(texts: Any, unit: str) -> tuple[npt.NDArray[np.bool_], npt.NDArray[Any]]:
+    """Which cells are plain numbers, within all bounds, of a unit of `_PLAIN`; and their values in its base unit."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    pattern, power = _PLAIN[unit]
+    chosen = pc.match_substring_regex(texts, pattern)
+    cells = texts.filter(chosen)
+    if unit in _TIMES:
+        whole = pc.replace_substring_regex(cells, r"\..*", "")
+        fraction = pc.replace_substring_regex(cells, r"^[^.]*\.?", "")
+        values = pc.binary_join_element_wise(whole, pc.utf8_rpad(fraction, power, "0"), "").cast(pa.int64())
+    else:
+        values = pc.binary_join_element_wise(cells, f"e{power}", "").cast(pa.float64())
+    return chosen.to_numpy(zero_copy_only=False), values.to_numpy(zero_copy_only=False)
 
 
 def _in_base_unit(text: str, unit: str) -> Decimal | None:

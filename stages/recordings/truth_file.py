@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,8 +15,8 @@ from omninav.pipeline.graph.small_files import read_small
 from .plausibility import MotionLimits, believed
 from .positions import track_directions
 from .recording import Recording, UnreadableRecording
-from .stamps import ascending, poses_near
-from .tables import MAX_TABLE_BYTES, Angle, CsvTable, Length, Time, read_table
+from .stamps import ascending_rows, poses_near
+from .tables import MAX_TABLE_BYTES, NO_TIME, Angle, CsvTable, Length, Time, read_table, table_of, text_lines
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
@@ -36,7 +37,7 @@ MAX_TILT_DEG, MAX_TILTED = 60.0, 0.05
 """Tilt that no robot on a floor or a hillside has (degrees), and the share of a file's orientations that may have it.
 With w first, headings become tilts, so that a drive in all directions has it in half of them."""
 NO_ROTATION = "whose quaternion is shorter than 0.5 or longer than 2"
-Rows = tuple[list[int | None], Array, int, list[str]]
+Rows = tuple[Stamps, Array, int, list[str]]
 """Of a file: times (ns), poses (N, 3), how many of them are impossible, and doubts."""
 TANGENT_S = 1.0
 """Standard deviation of the window over which a table without headings is read for the track's direction."""
@@ -89,10 +90,9 @@ def read_trajectory(file: Path) -> Trajectory:
         times, poses, impossible, doubts = _tum(file)
     else:
         times, poses, impossible, doubts = _csv(file)
-    known = [row for row, time in enumerate(times) if time is not None and np.isfinite(poses[row, :2]).all()]
-    kept, _, _ = ascending([times[row] or 0 for row in known])
-    rows = [known[number] for number in kept]
-    stamps, poses = np.array([times[row] for row in rows], np.int64), poses[rows]
+    known = np.flatnonzero((times != NO_TIME) & np.isfinite(poses[:, :2]).all(axis=1))
+    rows = known[ascending_rows(times[known])]
+    stamps, poses = times[rows], poses[rows]
     if len(rows) < 2:
         without = f"; {counted(impossible, 'orientation')} {NO_ROTATION}" if impossible else ""
         raise UnreadableRecording(f"{file}: fewer than two rows with a time and a pose{without}")
@@ -103,12 +103,18 @@ def read_trajectory(file: Path) -> Trajectory:
 
 def _tum(file: Path) -> Rows:
     """Rows of `timestamp x y z qx qy qz qw`, with lines of comments."""
-    content = read_small(file, MAX_TABLE_BYTES).decode("utf-8-sig", errors="replace").splitlines()
-    lines = {n: line.split() for n, line in enumerate(content, 1) if line.strip() and not line.lstrip().startswith("#")}
-    for number, cells in lines.items():
-        if len(cells) != 8:
-            raise UnreadableRecording(f"{file}, line {number}: {len(cells)} numbers, expected time x y z qx qy qz qw")
-    table = CsvTable(file, tuple(map(str, range(8))), list(lines.values()), list(lines))
+
+    def rows() -> Iterator[tuple[int, list[str]]]:
+        for number, line in enumerate(text_lines(file), 1):
+            cells = line.split()
+            if not cells or cells[0].startswith("#"):
+                continue
+            if len(cells) != 8:
+                what = f"{len(cells)} numbers, expected time x y z qx qy qz qw"
+                raise UnreadableRecording(f"{file}, line {number}: {what}")
+            yield number, cells
+
+    table = table_of(file, tuple(map(str, range(8))), rows())
     return _poses(table, {"time": 0, "x": 1, "y": 2, "qx": 4, "qy": 5, "qz": 6, "qw": 7}, DEFAULT_UNITS)
 
 

@@ -14,6 +14,7 @@ from omninav.pipeline.cli.main import main
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.rosbag import _Limits, _Sqlite
+from omninav.stages.recordings.truth_file import read_trajectory
 
 NEW = DATA / "hostile" / "new"
 COMMAND_S = 8.0
@@ -158,3 +159,20 @@ def test_the_example_of_empty_messages_is_read_to_its_limit():
     with within(cpu_s=2.0):
         assert sum(1 for _ in reader.scan()) == 100_000 + (NEW / "empty_messages.mcap").stat().st_size // 8
     assert "these are more messages than a log of" in reader.details["bad_chunk"]
+
+
+@pytest.mark.parametrize("kind", ["poses", "words", "commas"])
+def test_a_large_table_is_read_by_columns(tmp_path: Path, kind: str):
+    rows = {
+        "poses": [f"{1_700_000_000 + n / 100:.2f},{n % 1000 / 100:.6f},{n // 1000:.6f},0.5" for n in range(250_000)],
+        "words": ["a,b,c"] * 1_600_000,
+        "commas": [4000 * ","] * 2500,
+    }[kind]
+    (tmp_path / "truth.csv").write_text("t,x,y,yaw\n" + "\n".join(rows))
+    del rows
+    with within(4.0, 250_000_000):
+        if kind == "poses":
+            assert len(read_trajectory(tmp_path / "truth.csv").stamps) == 250_000
+        else:
+            with pytest.raises(BadInput, match="fewer than two rows with a time and a pose"):
+                read_trajectory(tmp_path / "truth.csv")
