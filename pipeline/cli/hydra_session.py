@@ -98,8 +98,11 @@ class OwnFiles(ImportlibResourcesConfigSource):
     def list(self, config_path: str, results_filter: ObjectType | None) -> list[str]:
         """The options of a group, those within folders of it apart."""
         found = super().list(config_path, results_filter) if super().is_group(config_path) else []
-        stages = stage_options(config_path) if results_filter in (None, ObjectType.CONFIG) else []
-        return sorted({*found, *stages})
+        if config_path == "":
+            named = listed_groups() if results_filter in (None, ObjectType.GROUP) else ()
+        else:
+            named = stage_options(config_path) if results_filter in (None, ObjectType.CONFIG) else []
+        return sorted({*found, *named})
 
     def _read_config(self, res: Any) -> ConfigResult:
         text = res.read_text(encoding="utf-8")

@@ -9,8 +9,8 @@ from omegaconf import Container, Node
 from omegaconf.errors import InterpolationResolutionError
 
 MAX_REPEATED = 10_000
-"""Values that the interpolations of a configuration repeat, 100 characters of a text counted as one: ours
-count 3,000 at most."""
+"""Largest number of values that the interpolations of a configuration repeat, 100 characters of a text counted as one.
+Every variant and experiment that omninav brings stays below it."""
 _CHARACTERS = 100
 _SPENT = "_repeated"
 _limited: ContextVar[bool] = ContextVar("_limited", default=False)

@@ -56,7 +56,7 @@ class _Limits:
 
     def __init__(self, files: Sequence[Path]) -> None:
         self._size = sum(file.stat().st_size for file in files)
-        self._longest = self._size * (MAX_RATIO if any(file.suffix == ".zstd" for file in files) else 1)
+        self._max_value_bytes = self._size * (MAX_RATIO if any(file.suffix == ".zstd" for file in files) else 1)
         self.begin()
 
     def begin(self) -> None:
@@ -80,7 +80,7 @@ class _Limits:
         """A connection to a file of SQLite that holds no longer value than the file, and that works no longer on a
         question than it takes to look at every row, some times over."""
         limit = getattr(connection, "setlimit", None) or connection.limit  # of sqlite3; of apsw, which rosbags has now
-        limit(sqlite3.SQLITE_LIMIT_LENGTH, min(MAX_BYTES, max(self._longest, MIN_VALUE_BYTES)))
+        limit(sqlite3.SQLITE_LIMIT_LENGTH, min(MAX_BYTES, max(self._max_value_bytes, MIN_VALUE_BYTES)))
         limit(sqlite3.SQLITE_LIMIT_LIKE_PATTERN_LENGTH, 100)
         connection.set_progress_handler(self._works_on, STEPS)
         for table in ("messages", "topics"):

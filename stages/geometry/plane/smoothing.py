@@ -17,8 +17,8 @@ CORRELATED = 10.0
 MIN_SIGMAS = np.array([0.05, 0.05, np.radians(2.0)])
 """Smallest standard deviation of an estimate (m, m, rad)."""
 MAX_SIGMAS = np.array([1.0, 1.0, np.radians(30.0)])
-"""Largest standard deviation of an estimate (m, m, rad), the radii of a mode: beyond them the trust tells how wrong it
-may be."""
+"""Largest standard deviation of an estimate with a stated trust (m, m, rad), the radii of a mode: beyond them the trust
+tells how wrong it may be. Without one (a trust of 1) the covariance alone does."""
 MIN_TRUST = 0.01
 """Smallest probability at which an estimate still counts."""
 ODOMETRY_SIGMA, TURN_SIGMA = 0.02, 0.05
@@ -77,7 +77,8 @@ def _optimised(estimates: Array, covariances: Array, trust: Array, motions: Arra
     if number == 1:
         return estimates.copy()
     variances = np.nan_to_num(np.diagonal(covariances, axis1=1, axis2=2)) * CORRELATED
-    spread = np.clip(np.sqrt(variances), MIN_SIGMAS, MAX_SIGMAS) / np.sqrt(np.maximum(trust, MIN_TRUST))[:, None]
+    largest = np.where(trust[:, None] < 1.0, MAX_SIGMAS, np.inf)
+    spread = np.clip(np.sqrt(variances), MIN_SIGMAS, largest) / np.sqrt(np.maximum(trust, MIN_TRUST))[:, None]
     drift = STEP_SIGMAS + odometry_sigma(estimates, trust, motions) * np.hypot(motions[:, 0], motions[:, 1])[:, None]
     drift[:, 2] += TURN_SIGMA * np.abs(motions[:, 2])
     frames = np.arange(1, number + 1)  # pose 0 is the map's origin, from which estimates are measured
