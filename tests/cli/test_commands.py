@@ -193,7 +193,8 @@ def test_a_map_of_other_features_is_refused_before_a_folder_is_made(
     assert what in ended.stderr
     assert type_ in ended.stderr
     assert list(tmp_path.iterdir()) == []
-    ended = omninav("check", f"map={demo / 'map.omap'}", *words, "artifacts.map.must_match=[]")
+    drive = Path(__file__).resolve().parents[1] / "data" / "drive.mcap"
+    ended = omninav("check", f"map={demo / 'map.omap'}", f"log={drive}", *words, "artifacts.map.must_match=[]")
     assert "learn the map again with these features" in ended.stderr
 
 

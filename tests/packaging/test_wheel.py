@@ -80,7 +80,7 @@ def test_the_wheel_holds_every_module_every_option_and_the_templates_and_no_test
     }
     assert "omninav/conf/config.yaml" in expected
     assert set(content(wheel)) == expected | {
-        f"omninav/{name}" for name in ("__init__.py", "__main__.py", "testing.py", "py.typed")
+        f"omninav/{name}" for name in ("__init__.py", "__main__.py", "testing.py", "working_directory.py", "py.typed")
     }
 
 
