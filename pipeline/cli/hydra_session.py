@@ -99,7 +99,7 @@ class OwnFiles(ImportlibResourcesConfigSource):
         """The options of a group, those within folders of it apart."""
         found = super().list(config_path, results_filter) if super().is_group(config_path) else []
         if config_path == "":
-            named = listed_groups() if results_filter in (None, ObjectType.GROUP) else ()
+            named = [*listed_groups()] if results_filter in (None, ObjectType.GROUP) else []
         else:
             named = stage_options(config_path) if results_filter in (None, ObjectType.CONFIG) else []
         return sorted({*found, *named})
