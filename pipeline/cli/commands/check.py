@@ -1,4 +1,4 @@
-"""`omninav check`: everything that is wrong with a configuration; nothing is run."""
+"""`omninav check`: everything that is wrong with a configuration; nothing is left behind."""
 
 import math
 import tempfile
