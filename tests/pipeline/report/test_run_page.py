@@ -227,3 +227,21 @@ def test_a_figure_that_is_not_as_it_should_be_is_a_tile_in_another_colour(tmp_pa
     for share, style in ((0.36, "tile off"), (0.95, "tile")):
         page = report(tmp_path, metrics=Metrics({"held": share}, described, ("held",)))
         assert f'<div class="{style}"><b>{100 * share:.1f} <small>%</small></b><span>95 % ellipse holds' in page
+
+
+def test_what_files_name_is_text_on_the_page(tmp_path):
+    evil = "<script>alert(1)</script><img src=x onerror=alert(2)>"
+    manifest = MANIFEST | {
+        "variant": evil,
+        "argv": ["omninav", f"topics.image={evil}"],
+        "dropped": {f"source.{evil}": {"count": 7, "first": evil}},
+        "facts": {f"camera {evil}": evil},
+        "warnings": [evil],
+        "inputs": {evil: "ab" * 32},
+        "libraries": {evil: evil},
+        "error": evil,
+    }
+    page = report(tmp_path, manifest=manifest, figures=(Figure(evil, evil, evil, b"\x89PNG", order=1),))
+    assert "alert(1)" in page
+    assert "<script>alert" not in page
+    assert "<img src=x" not in page
