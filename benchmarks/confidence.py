@@ -117,7 +117,7 @@ def told(runs: Sequence[Frames]) -> str:
 
 
 def after_kidnapping(each: Frames) -> tuple[float, float, float, float] | None:
-    """Of a kidnapped run: images until it is right again, until the confidence is below a half (all of them where it
+    """Kidnapped run: images until it is right again, until the confidence is below a half (all of them where it
     never is), its mean meanwhile, and images that are right until it is above a half again; None: found at once."""
     cut, wrong = CUTS.get(each.place, KIDNAPPED_AT)[0], ~each.right
     if not wrong[cut : cut + 3].any():

@@ -19,7 +19,7 @@ READERS = {
 """Module that reads the working directory, or (cv2) makes processes that are started later look for libraries there:
 how its source says so, and what is put in its place."""
 VARIABLES = ("SKIP_DEFAULT_XML", "SKIP_DEFAULT_XML_FILE")
-"""Whether Fast DDS, below and from version 3, leaves its XML profiles in the working directory unread."""
+"""Reports whether Fast DDS, below and from version 3, leaves XML profiles in the working directory unread."""
 
 
 def ignore_working_directory() -> None:
@@ -42,7 +42,7 @@ class _Readers(MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Where Python would find the module, with our loader."""
+        """Finds the module where Python would, with our loader."""
         spec = PathFinder.find_spec(fullname, path, target) if fullname in READERS else None
         if spec is None or not isinstance(spec.loader, SourceFileLoader):
             return None

@@ -1,4 +1,4 @@
-"""What leaves a run for a program to look at: a run that goes on must not change because its looker wrote to it."""
+"""Read-only views of a run's values: a run that goes on must not change because a program wrote to them."""
 
 import dataclasses
 from typing import Any

@@ -102,7 +102,7 @@ def _config_file() -> dict[str, Any]:
 
 
 def options_with(entry: Entry) -> list[str]:
-    """What to type so that a graph has this stage: `match=l2`, and the options whose file names it."""
+    """Lists the options that put this stage into a graph: `match=l2`, and those whose file names it."""
     role, _, name = entry.name.partition(".")
     if entry.origin != "built in":  # offered to Hydra under its own name
         return [f"{'' if is_group(role) else '+'}{role}={name}"]

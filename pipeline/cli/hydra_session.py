@@ -88,11 +88,11 @@ class OwnFiles(ImportlibResourcesConfigSource):
         )
 
     def is_config(self, config_path: str) -> bool:
-        """Whether an option is a file, or a stage's name."""
+        """Tells whether an option is a file, or a stage's name."""
         return super().is_config(config_path) or _stage_of(config_path) is not None
 
     def is_group(self, config_path: str) -> bool:
-        """Whether a path is a folder, or the name of a group whose options are stages alone."""
+        """Tells whether a path is a folder, or the name of a group whose options are stages alone."""
         return super().is_group(config_path) or config_path in listed_groups()
 
     def list(self, config_path: str, results_filter: ObjectType | None) -> list[str]:

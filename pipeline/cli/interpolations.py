@@ -1,4 +1,4 @@
-"""How much of a configuration its interpolations (`${name}`) may repeat: counted as what YAML's aliases repeat is."""
+"""Limits what the interpolations of a configuration (`${name}`) repeat, counted as YAML's aliases are."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -51,7 +51,7 @@ for _method, _cost in (
 
 
 def _number(value: Any, most: int) -> int:
-    """How many values a value is, counted up to a little more than `most`."""
+    """Counts the values in a value, up to a little more than `most`."""
     number, waiting = 0, [value]
     while waiting and number <= most:
         each = waiting.pop()

@@ -1,4 +1,4 @@
-"""What is printed to a terminal: tables, results, and folders as one would type them."""
+"""Tables and results on a terminal, and folders as one would type them."""
 
 import sys
 from collections.abc import Mapping

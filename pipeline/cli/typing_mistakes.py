@@ -35,7 +35,7 @@ def _with_home(word: str) -> str:
 
 
 def mistyped_word(arguments: Sequence[str]) -> str:
-    """What to type instead of the first word that cannot be meant as it stands; '' where there is none."""
+    """Advice on the first word that cannot be meant as it stands; '' where there is none."""
     for number, word in enumerate(arguments):
         before = arguments[number - 1] if number else ""
         after = arguments[number + 1] if number + 1 < len(arguments) else ""

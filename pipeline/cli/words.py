@@ -122,7 +122,7 @@ def word_of(value: Any, depth: int = 0) -> str:
 
 
 def number_of(values: Sized) -> int:
-    """How many values there are, of a range of any length too."""
+    """Counts the values, of a range of any length too."""
     if isinstance(values, range):
         return max(0, -((values.start - values.stop) // values.step))
     return len(values)

@@ -170,7 +170,7 @@ def _header(archive: zipfile.ZipFile) -> dict[str, Any]:
 
 
 def _counts(found: Any) -> bool:
-    """Whether it is what was dropped: by kind how many, or how many (`count`) and the first case (`first`)."""
+    """Tells whether it is what was dropped: by kind how many, or how many (`count`) and the first case (`first`)."""
 
     def is_count(one: Any) -> bool:
         whole = one.get("count") if isinstance(one, dict) else one

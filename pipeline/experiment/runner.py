@@ -83,7 +83,7 @@ class ExperimentRun:
         return well
 
     def verdicts(self) -> list[Verdict]:
-        """What each claim comes to as things stand."""
+        """Lists the verdict on each claim."""
         return judge(self.experiment, results_by_condition(self.conditions))
 
     def write_page(self) -> Path:

@@ -21,7 +21,7 @@ DEVELOPMENT = "development"
 TYPED = ("common", "set", "scenarios", "development", "sweep")
 """Entries of a file that are overrides, or labels of overrides."""
 NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
-"""Of an experiment: its pages and its folder are named after it."""
+"""Pattern of an experiment's name: its pages and its folder are named after it."""
 MAX_RUNS = 100_000
 """Conditions of an experiment, and repetitions of each."""
 Labels = dict[str, str]
@@ -139,7 +139,7 @@ class ReferenceRun:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What an experiment's file holds. Overrides are written as one would type them, or as a list of such words."""
+    """Content of an experiment's file. Overrides are written as one would type them, or as a list of such words."""
 
     name: str
     title: str

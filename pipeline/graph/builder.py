@@ -37,7 +37,7 @@ def build(
 
 
 WIRE_OPTIONS = ("from", "delay", "initial", "hold", "collect", "optional")
-"""What a wire may say. One that is `optional` is left out where the graph has not both its ends, and so is a node that
+"""Options of a wire. One that is `optional` is left out where the graph has not both its ends, and so is a node that
 needs it."""
 
 
@@ -136,7 +136,7 @@ class _Builder:
                 del self.nodes[name]
 
     def _lacks(self, node: Node, wires: Any) -> bool:
-        """Whether an input that a node needs is wired, optionally, to what the graph has not."""
+        """Tells whether an input that a node needs is wired, optionally, to what the graph has not."""
         return isinstance(wires, Mapping) and any(
             _is_optional(spec) and not self._given(spec)
             for name, spec in wires.items()

@@ -208,7 +208,7 @@ def built_in() -> Iterator[Entry]:
 
 
 def is_role(name: str) -> bool:
-    """Whether omninav itself has stages of that role."""
+    """Tells whether omninav itself has stages of that role."""
     return name.isidentifier() and importlib.util.find_spec(f"{BUILT_IN}.{name}") is not None
 
 

@@ -16,7 +16,7 @@ from omninav.stages.geometry.probability.calibration import (
 from omninav.stages.values.confidence import ConfidenceReliability
 from omninav.stages.values.drive import Drive, known
 
-LEAST_IN_ELLIPSE = 0.85
+MIN_SHARE_IN_ELLIPSE = 0.85
 """Share of true positions in 95 % ellipses below which these are too small: of 20 frames that are independent of each
 other (in a drive, those some metres apart) right ellipses hold 17 or more with a probability of 0.98."""
 MOST_MISCALIBRATED = 0.1
@@ -28,7 +28,7 @@ QUANTITIES = {
         title="Calibration error of the confidence (ECE)", unit="%", better="lower", most=MOST_MISCALIBRATED
     ),
     "calibration.ellipse_50": Quantity(title="50 % ellipse holds", unit="%"),
-    "calibration.ellipse_95": Quantity(title="95 % ellipse holds", unit="%", least=LEAST_IN_ELLIPSE),
+    "calibration.ellipse_95": Quantity(title="95 % ellipse holds", unit="%", least=MIN_SHARE_IN_ELLIPSE),
     "calibration.nees": Quantity(title="Squared error over covariance (NEES, 2 is right)"),
 }
 
@@ -83,7 +83,7 @@ class Calibration(Stage):
                 title=f"Frames within {self.within_m:g} m and {self.within_deg:g}°", unit="%", better="higher"
             )
         }
-        too_small = values.get("ellipse_95", 1.0) < LEAST_IN_ELLIPSE
+        too_small = values.get("ellipse_95", 1.0) < MIN_SHARE_IN_ELLIPSE
         headlines = (*(("calibration.ellipse_95",) if too_small else ()), "calibration.expected_error")
         return self.Out(metrics=Metrics({"calibration": values}, quantities, headlines), reliability=held)
 

@@ -80,7 +80,7 @@ def _try_first_tick(planned: Plan) -> None:
 
 
 def _is_simulated(graph: Graph) -> bool:
-    """Whether the ticks of a graph have yet to be computed: one of them may take minutes."""
+    """Tells whether the ticks of a graph have yet to be computed: one of them may take minutes."""
     source = graph.source
     return source is not None and isinstance(source.stage, Recordable) and source.stage.recording_key() is not None
 
