@@ -21,6 +21,7 @@ from omninav.stages.recordings.pose_messages import (
 )
 from omninav.stages.values.belief import GaussianMixture, Particles, PoseEstimate
 from omninav.stages.values.command import Command
+from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.ros_messages import RosMessages
 
@@ -44,7 +45,8 @@ class Publish(Stage):
 
     The command is published as it was computed in this tick, zero where there was none, once more zero when the run
     ends, and by a watchdog thread when no tick has ended within two periods. A topic whose parameter is null is not
-    published; one whose type the transport does not have is left out and said in diagnostics.
+    published; one whose type the transport does not have is left out and said in diagnostics, as are inputs that do not
+    fit each other, for as long as they do not.
     """
 
     transport: TransportName = "dds"
@@ -84,6 +86,7 @@ class Publish(Stage):
         estimate: PoseEstimate | None = None,
         odometry: Pose | None = None,
         command: Command | None = None,
+        conflicts: Conflicts | None = None,
     ) -> Out:
         """Publish what there is. Nothing while a record is made again."""
         if not self._transport.status.live:
@@ -92,6 +95,8 @@ class Publish(Stage):
             self._drive(tick.stamp, command or Command(0.0, 0.0))
         if estimate is not None:
             self._publish_estimate(tick.stamp, estimate, odometry)
+        if conflicts is not None:
+            self._transport.status.note("conflicts", "; ".join(conflicts.standing))
         self._transport.status.published(tick.stamp)
         return self.Out()
 

@@ -14,6 +14,7 @@ from omninav.stages.geometry.probability.consistency import consistency, log_odd
 from omninav.stages.geometry.probability.evidence import best_headings
 from omninav.stages.values.belief import Likelihood, Particles, PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence, WrongPoseAgreement
+from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.drive import pose_row
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
@@ -72,6 +73,10 @@ class ConfidenceMonitor(Stage):
     """Probability per independent image, or per length scale driven without one, that the robot was carried elsewhere,
     or found itself again."""
 
+    right_in_conflict: Annotated[float, Bounds(ge=0, le=1)] = 0.4
+    """Factor of the confidence while inputs do not fit each other: images and odometry then agree on what may be wrong.
+    """
+
     class Out(Outputs):
         """The probability that the estimate is right."""
 
@@ -89,6 +94,7 @@ class ConfidenceMonitor(Stage):
         similarities: Similarities | None = None,
         likelihood: Likelihood | None = None,
         motion: Motion | None = None,
+        conflicts: Conflicts | None = None,
         restart: Restart | None = None,
     ) -> Out:
         """One image, or a tick without one. `likelihood`: of the same image, for its novelty."""
@@ -110,6 +116,8 @@ class ConfidenceMonitor(Stage):
             when_wrong.share, self.strength, self.kidnapping_probability,
         )  # fmt: skip
         probability = mass_within(belief, pose, self.within_m, radians) / (1.0 + math.exp(-odds))
+        if conflicts is not None and conflicts.standing:
+            probability *= self.right_in_conflict
         return self.Out(confidence=PoseConfidence(probability))
 
     def _remember(self, recent: ConfidenceMonitorState, place: Array, novelty: float, distinct: float) -> None:

@@ -12,8 +12,10 @@ from omninav.pipeline import Context, Outputs, Stage, State, Tick
 from omninav.stages.geometry.appearance.turn_fit import clipped, explained, turn_fit
 from omninav.stages.geometry.appearance.visual_compass import turn_and_correlation
 from omninav.stages.geometry.plane.se2 import between, compose, wrap
-from omninav.stages.geometry.plane.track_fit import track_fit
+from omninav.stages.geometry.plane.track_fit import agreement, track_fit
+from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.conflicts import Conflicts
+from omninav.stages.values.drive import pose_row
 from omninav.stages.values.image import Strip
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
@@ -31,25 +33,28 @@ WINDOW = 128
 """Images that are remembered."""
 EVERY = 8
 """Images between two judgements; a finding is said once two in a row agree."""
-COLUMNS = 10
+STANDS = 2
+"""Judgements in a row that do not find it again, after which a finding holds no longer."""
+COLUMNS = 11
 """Numbers that are remembered of an image."""
 
 
 class Watched(NamedTuple):
     """The last images, N rows: `times` (s), `odometry` (N, 3) with headings that are not wrapped, best `matches` (N, 3)
-    in the map (NaN without one), and against the image before: the turn `seen` (rad), its `correlation`, and whether
-    the images are `same`."""
+    in the map (NaN without one), whether that lies `at_estimate` (NaN without one), and against the image before: the
+    turn `seen` (rad), its `correlation`, and whether the images are `same`."""
 
     times: Array
     odometry: Array
     matches: Array
+    at_estimate: Array
     seen: Array
     correlation: Array
     same: Array
 
     @classmethod
     def of(cls, rows: Array) -> "Watched":
-        """From rows (N, 10)."""
+        """From rows (N, 11)."""
         return cls(rows[:, 0], rows[:, 1:4], rows[:, 4:7], *rows[:, 7:].T)
 
     def last(self, number: int) -> "Watched":
@@ -74,8 +79,9 @@ class Watched(NamedTuple):
 
 
 class InputConflictsState(State):
-    """`strip` (rows, columns), `stamp` (ns) and `pose` (3,) of the last watched image; `rows` (N, 10) of `Watched`;
-    what was found by the last judgement, and all that was said."""
+    """`strip` (rows, columns), `stamp` (ns) and `pose` (3,) of the last watched image; `rows` (N, 11) of `Watched`; the
+    kind that the last judgement found; what was said, by its kind, and how many judgements ago each that stands was
+    found last."""
 
     strip: npt.NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 0), np.float32))
     stamp: int = 0
@@ -83,22 +89,23 @@ class InputConflictsState(State):
     rows: Array = field(default_factory=lambda: np.zeros((0, COLUMNS)))
     judged: int = 0
     suspected: str = ""
-    found: tuple[str, ...] = ()
-    sentences: tuple[str, ...] = ()
+    said: dict[str, str] = field(default_factory=dict)
+    standing: dict[str, int] = field(default_factory=dict)
 
 
 class InputConflicts(Stage):
-    """Says which inputs do not fit each other, without ground truth; it changes nothing.
+    """Says which inputs do not fit each other, without ground truth, for as long as they do not.
 
     Motion seen in the images (turns between panoramas, and whether anything changes) is compared with odometry's, over
     the last `WINDOW` images; the track of single images' best matches in the map, without any belief, with odometry's
-    track. A finding needs two judgements in a row and is said once, as a warning, with what to check. Where nothing
-    measured the motion, nothing is said of it. Which conflicts are noticed after how many images, where the limits are
-    from, and what cannot be noticed: docs/conflicts.md.
+    track and with the estimate. A finding needs two judgements in a row, is said once, as a warning, with what to
+    check, and stands until two judgements in a row do not find it. Where nothing measured the motion, nothing is said
+    of it. Which conflicts are noticed after how many images, where the limits are from, and what cannot be noticed:
+    docs/conflicts.md.
     """
 
     class Out(Outputs):
-        """All that was found so far."""
+        """All that was found so far, and what of it stands."""
 
         conflicts: Conflicts
 
@@ -113,40 +120,47 @@ class InputConflicts(Stage):
         map: ReferenceGraph | None = None,
         length_scale: LengthScale | None = None,
         map_conflicts: Conflicts | None = None,
+        estimate: PoseEstimate | None = None,
         restart: Restart | None = None,
     ) -> Out:
         """One image, or a tick without one."""
         of_map = () if map_conflicts is None else map_conflicts.sentences
         if ctx.tick.first_of_log or restart is not None:
             recent.rows, recent.pose, recent.judged = np.zeros((0, COLUMNS)), np.full(3, np.nan), 0
-            recent.suspected = ""
-        if (sentence := leap(recent, ctx.tick, odometry)) and "leap" not in recent.found:
+            recent.suspected, recent.standing = "", {}
+        if sentence := leap(recent, ctx.tick, odometry):
             self._say(ctx, recent, "leap", sentence)
         recent.pose = pose_now(recent.pose, odometry, motion)
         if strip is not None and np.isfinite(recent.pose).all() and self._due(ctx, recent):
-            match = np.full(3, np.nan)
+            # nothing is compared with a map that is wrong by itself
+            metres = math.inf if length_scale is None or of_map else length_scale.metres
+            match = np.full(4, np.nan)
             if similarities is not None and map is not None and min(similarities.values.shape) > 1:
-                match = best_place(similarities, map)
+                match[:3] = best_place(similarities, map)
+                match[3] = lies_at(match[:3], estimate, metres)
             remember(recent, ctx.tick.stamp, strip.pixels, match)
             recent.judged += 1
             if not recent.judged % EVERY:
-                # nothing is compared with a map that is wrong by itself
-                self._judge(ctx, recent, math.inf if length_scale is None or of_map else length_scale.metres)
-        return self.Out(conflicts=Conflicts(of_map + recent.sentences))
+                self._judge(ctx, recent, metres)
+        standing = tuple(recent.said[kind] for kind in recent.standing)
+        return self.Out(conflicts=Conflicts(of_map + tuple(recent.said.values()), of_map + standing))
 
     def _due(self, ctx: Context, recent: InputConflictsState) -> bool:
         return not len(recent.rows) or not 0 <= ctx.tick.stamp - recent.stamp < INTERVAL_S * 1e9
 
     def _judge(self, ctx: Context, recent: InputConflictsState, length_scale_m: float) -> None:
         kind, sentence = judge(Watched.of(recent.rows), length_scale_m)
-        if kind and kind == recent.suspected and not set(recent.found) - {"leap"}:
+        recent.standing = {each: ago + 1 for each, ago in recent.standing.items() if ago + 1 < STANDS or each == kind}
+        others = set(recent.standing) - {"leap", kind}
+        if kind and (kind in recent.standing or (kind == recent.suspected and not others)):
             self._say(ctx, recent, kind, sentence)
         recent.suspected = kind
 
     def _say(self, ctx: Context, recent: InputConflictsState, kind: str, sentence: str) -> None:
-        recent.found += (kind,)
-        recent.sentences += (sentence,)
-        ctx.warn(sentence)
+        recent.standing[kind] = 0
+        if kind not in recent.said:
+            recent.said[kind] = sentence
+            ctx.warn(sentence)
 
 
 def leap(recent: InputConflictsState, tick: Tick, odometry: Pose | None) -> str:
@@ -186,8 +200,16 @@ def pose_now(before: Array, odometry: Pose | None, motion: Motion | None) -> Arr
     return np.array((moved[0], moved[1], start[2] + motion.turn))
 
 
+def lies_at(match: Array, estimate: PoseEstimate | None, length_scale_m: float) -> float:
+    """Whether a match (3,) lies where the robot is believed to be: 1 or 0, NaN without an estimate."""
+    if estimate is None:
+        return math.nan
+    away = match - np.array(pose_row(estimate.pose))
+    return float(math.hypot(*away[:2]) < NEAR_SCALES * length_scale_m and abs(wrap(away[2])) < NEAR_RAD)
+
+
 def remember(recent: InputConflictsState, stamp: int, pixels: npt.NDArray[np.float32], match: Array) -> None:
-    """Add a row for an image."""
+    """Add a row for an image; `match` (4,): where its best match lies, and whether that is at the estimate."""
     turn, correlation, same, time = math.nan, math.nan, 0.0, 0.0
     if recent.strip.shape == pixels.shape and len(recent.rows):
         turn, correlation = turn_and_correlation(recent.strip, pixels)
@@ -216,18 +238,23 @@ STILL_M, STILL_RAD = 1e-3, 1e-3
 NO_HEADING, WILD_TURNS, MIN_WILD_TURN = 0.05, 6.0, 4.0 * math.pi
 """Odometry's turning as a share of the seen one: below the first it has no heading, above the second (and so much
 turning, rad) its headings are something else."""
-EXPLAINED, REVERSED_AS_IS, DELAY_GAIN, MIN_DELAY_S = 0.5, 0.0, 0.1, 0.4
+EXPLAINED, REVERSED_AS_IS, DELAY_GAIN, MIN_DELAY_S = 0.5, 0.0, 0.1, 0.25
 """Share of the seen turning that must be explained; at most so much as it is where turns are reversed; so much more
 than as it is where images are late, by at least so many seconds."""
 TRACK_SCALES, MIN_PAIRS, SHARE, GAIN = 3.0, 40, 0.45, 0.25
 """Matches must move so many length scales to say anything, in so many pairs, of which this share agrees on one relation
-of the tracks, and so much less on the right one."""
+of the tracks, and so much less on the right one where that is mirrored."""
 REVERSED = (np.array((1.0, 1.0, -1.0)), np.array((1.0, -1.0, -1.0)))
 """Factors that put right an odometry whose heading has the wrong sign, and one whose left is its right."""
 CHANGING = 0.97
 """Images of a robot that drives correlate less with the ones before."""
-MISSCALED_OCTAVES, MISTURNED = 0.6, math.radians(35.0)
+MISSCALED_OCTAVES, MISTURNED = 0.4, math.radians(20.0)
 """A relation of tracks is a wrong one beyond these."""
+NEAR_SCALES, NEAR_RAD = 2.0, math.radians(30.0)
+"""A match lies at the estimate within so many length scales, turned by less than this (rad)."""
+SCATTERED, ELSEWHERE = 0.05, 0.1
+"""Of a whole window less than this share of pairs of matches lies to each other as odometry says, and less than this
+share of matches at the estimate, where images fit no place of the map."""
 
 
 def judge(watched: Watched, length_scale_m: float) -> tuple[str, str]:
@@ -344,10 +371,10 @@ def tracked(watched: Watched, length_scale_m: float) -> str:
     """The track of best matches against odometry's."""
     odometry, matches = watched.placed
     fit = track_fit(odometry, matches, TRACK_SCALES * length_scale_m)
-    if fit is None or fit.pairs < MIN_PAIRS or fit.share < SHARE or fit.share - fit.as_is < GAIN:
+    if fit is None or fit.pairs < MIN_PAIRS or fit.share < SHARE:
         return ""
     agree = f"{100 * fit.share:.0f} % of {fit.pairs} pairs of images agree, as it is {100 * fit.as_is:.0f} %"
-    if fit.mirrored and not turns_fit(watched):
+    if fit.mirrored and (fit.share - fit.as_is < GAIN or not turns_fit(watched)):
         return ""
     if fit.mirrored == "poses":
         return (
@@ -382,10 +409,27 @@ def tracked(watched: Watched, length_scale_m: float) -> str:
     return ""
 
 
+def foreign(watched: Watched, length_scale_m: float) -> str:
+    """Images of another place than the map's."""
+    odometry, matches = watched.placed
+    believed = watched.at_estimate[np.isfinite(watched.at_estimate)]
+    if len(believed) < WINDOW:
+        return ""
+    there, fit = float(believed.mean()), agreement(odometry, matches, length_scale_m)
+    if fit.pairs < WINDOW or fit.share > SCATTERED or there > ELSEWHERE:
+        return ""
+    return (
+        f"the images fit no place of the map: of {len(believed)} best matches {100 * there:.0f} % lie at the estimate, "
+        f"and {100 * fit.share:.0f} % of {fit.pairs} pairs lie to each other as odometry says: check that the map is of"
+        " this place, made with this camera, and that the light is like then"
+    )
+
+
 JUDGEMENTS: dict[str, Callable[[Watched, float], str]] = {
     "frozen": frozen,
     "blind": blind,
     "turned": turned,
     "tracked": tracked,
+    "foreign": foreign,
 }
 """In the order in which causes hide each other."""

@@ -4,6 +4,10 @@ from omninav.pipeline import Value
 
 
 class Conflicts(Value):
-    """Which inputs do not fit each other, as found so far: a sentence each, with its figures."""
+    """Which inputs do not fit each other, a sentence each, with its figures.
+
+    `sentences`: all that was found so far; `standing`: those of them that still hold.
+    """
 
     sentences: tuple[str, ...]
+    standing: tuple[str, ...]

@@ -10,7 +10,7 @@ Array = npt.NDArray[np.float64]
 
 MAX_TURN = math.radians(60.0)
 """Turns count up to this: one wrong turn must not outweigh the others."""
-MAX_DELAY_S, DELAY_STEPS = 4.0, 0.5
+MAX_DELAY_S, DELAY_STEPS = 4.0, 0.125
 """Delays that are tried, and their step as a share of the time between images."""
 
 

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .se2 import wrap
+from .se2 import between, wrap
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -20,6 +20,9 @@ ANGLES = 18
 """Bins of the angle between tracks, 20 degrees each."""
 NEAR_OCTAVES, NEAR_RAD = 0.5, math.radians(30.0)
 """How far a pair may lie from a relation that it agrees with."""
+
+PAIR_MOVED, PAIR_ALIKE = 2.0, 1.5
+"""Length scales by which a pair must have moved to count, and within which it lies alike in two tracks."""
 
 
 class TrackFit(NamedTuple):
@@ -59,6 +62,30 @@ def track_fit(track: Array, other: Array, min_metres: float) -> TrackFit | None:
     ]
     best = max(fits, key=lambda fit: fit.share)  # the first of equals: a straight track is its own mirror image
     return best._replace(as_is=fits[0].as_is)
+
+
+class Agreement(NamedTuple):
+    """The `share` of `pairs` of poses that lie to each other alike in two tracks."""
+
+    share: float
+    pairs: int
+
+
+def agreement(track: Array, other: Array, length_scale_m: float) -> Agreement:
+    """How many pairs of poses of `other` (N, 3) lie to each other as those of `track` (N, 3) do, as they are.
+
+    Pairs count where `track` moved by two length scales; they agree within one and a half, turned by less than 30
+    degrees. Matches that are drawn by chance agree in some hundredths.
+    """
+    first, second = pairs_of(len(track))
+    moved = between(track[first], track[second])
+    kept = np.hypot(*moved[:, :2].T) > PAIR_MOVED * length_scale_m
+    moved = moved[kept]
+    if not len(moved):
+        return Agreement(0.0, 0)
+    off = between(other[first[kept]], other[second[kept]]) - moved
+    alike = (np.hypot(*off[:, :2].T) < PAIR_ALIKE * length_scale_m) & (np.abs(wrap(off[:, 2])) < NEAR_RAD)
+    return Agreement(float(alike.mean()), len(moved))
 
 
 def pairs_of(number: int) -> tuple[Ints, Ints]:
