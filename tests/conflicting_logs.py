@@ -1,6 +1,6 @@
 """Logs whose inputs do not fit each other, each made from a sound one: what is wrong, and what must be said of it.
 
-python tests/conflicting_logs.py TOUR DRIVE FOLDER    # runs them all, and prints the table of docs/conflicts.md
+python tests/conflicting_logs.py TOUR DRIVE FOLDER [OTHER_TOUR]    # whole runs: the table of docs/conflicts.md
 """
 
 import math
@@ -13,7 +13,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+import omninav
 from omninav.pipeline import Context
+from omninav.pipeline.engine.artifact import read_header, write_artifact
 from omninav.pipeline.mcap.message import Message
 from omninav.pipeline.mcap.message_types import make_message
 from omninav.pipeline.mcap.reader import LogReader
@@ -136,6 +138,21 @@ def w_first(message: Message, seconds: float) -> Message:
     return message
 
 
+def upside_down(message: Message, seconds: float) -> Message:
+    """An orientation whose roll is half a turn: the same heading."""
+    if message.topic == ODOMETRY:
+        turned = message.content.pose.pose.orientation
+        turned.x, turned.y, turned.z, turned.w = turned.w, turned.z, 0.0, 0.0
+    return message
+
+
+def turned(pixels: npt.NDArray[np.uint8], degrees: float) -> npt.NDArray[np.uint8]:
+    """A mirror's image (rows, columns, 3), turned about its middle."""
+    rows, columns = pixels.shape[:2]
+    about = cv2.getRotationMatrix2D(((columns - 1) / 2.0, (rows - 1) / 2.0), degrees, 1.0)
+    return np.asarray(cv2.warpAffine(pixels, about, (columns, rows)), np.uint8)
+
+
 def carried(poses: Array) -> Array:
     """Two of the map's poses lie 1000 km away."""
     return np.concatenate([poses[:10], poses[10:12] + np.array((1e6, 0.0, 0.0)), poses[12:]])
@@ -157,9 +174,8 @@ CASES: Mapping[str, Case] = {
     "images mirrored": Case(images(lambda p: p[:, ::-1]), "the images turn against odometry's turns"),
     "images upside down": Case(images(lambda p: p[::-1]), "the images turn against odometry's turns"),
     "images turned by 180°": Case(images(lambda p: p[::-1, ::-1]), "the camera looks"),
-    "camera's yaw off by 90°": Case(
-        images(lambda p: cv2.warpAffine(p, _quarter(p), (p.shape[1], p.shape[0]))), "the camera looks"
-    ),
+    "camera's yaw off by 90°": Case(images(lambda p: turned(p, 90.0)), "the camera looks"),
+    "camera's yaw off by 25°": Case(images(lambda p: turned(p, 25.0)), "the camera looks"),
     "grey images": Case(
         images(lambda p: np.full(p.shape, 128, np.uint8) + RANDOM.integers(0, 6, p.shape, np.uint8)),
         "nothing in common",
@@ -172,12 +188,14 @@ CASES: Mapping[str, Case] = {
     "left and right": Case(odometry(lambda pose: pose * (1, -1, -1)), "the images turn against odometry's turns"),
     "y negative": Case(odometry(lambda pose: pose * (1, -1, 1)), "once that is mirrored"),
     "x and y swapped": Case(odometry(lambda pose: pose[[1, 0, 2]]), "once that is mirrored"),
+    "odometry x 1.4": Case(odometry(lambda pose: pose * (1.4, 1.4, 1)), "times as long"),
     "odometry x 2": Case(odometry(lambda pose: pose * (2, 2, 1)), "times as long"),
     "odometry x 0.1": Case(odometry(lambda pose: pose * (0.1, 0.1, 1)), "times as long"),
     "heading always 0": Case(odometry(lambda pose: pose * (1, 1, 0)), "heading does not change"),
     "quaternion w first": Case(w_first, "heading does not change"),
     "heading off by 90°": Case(odometry(lambda pose: pose + np.array((0, 0, math.pi / 2))), "the camera looks"),
     "heading off by 180°": Case(odometry(lambda pose: pose + np.array((0, 0, math.pi))), "the camera looks"),
+    "images 0.35 s late": Case(late(0.35), "s after odometry measures them"),
     "images 0.5 s late": Case(late(0.5), "s after odometry measures them"),
     "images 0.5 s early": Case(late(-0.5), "s before odometry measures them"),
     "images 3 s late": Case(late(3.0), "s after odometry measures them"),
@@ -195,13 +213,17 @@ CASES: Mapping[str, Case] = {
     "map: all poses the same": Case(as_is, "at one place", lambda poses: np.tile(poses[0], (len(poses), 1))),
     "map: two 1000 km apart": Case(as_is, "m from its middle", carried),
 }
-AT_TWO_HERTZ = ("images 0.5 s late", "images 0.5 s early", "images 3 s late")
+AT_TWO_HERTZ = ("images 0.35 s late", "images 0.5 s late", "images 0.5 s early", "images 3 s late")
 """Cases that are noticed where images come so often."""
-
-
-def _quarter(pixels: npt.NDArray[np.uint8]) -> Any:
-    rows, columns = pixels.shape[:2]
-    return cv2.getRotationMatrix2D(((columns - 1) / 2.0, (rows - 1) / 2.0), 90.0, 1.0)
+UNNOTICED: Mapping[str, Change] = {
+    "red and blue exchanged": images(lambda p: p[..., ::-1]),
+    "half of the image black": images(
+        lambda p: p * (np.arange(p.shape[1]) > p.shape[1] // 2)[:, None].astype(np.uint8)
+    ),
+    "image centre off by 60 pixels": images(lambda p: np.roll(p, 60, axis=1)),
+    "odometry's roll 180°": upside_down,
+}
+"""Changes of which nothing is said, as best matches still follow odometry."""
 
 
 class Found(NamedTuple):
@@ -259,13 +281,53 @@ def found(case: Case, map: ReferenceGraph, drive: Path, folder: Path) -> list[Fo
     return said(ReferenceGraph(poses, map.features[:], map.kind, map.edges, map.pose_source), str(log))
 
 
+def of_whole_run(change: Change, map: Path, drive: Path, folder: Path) -> list[Found]:
+    """What a whole run of `omninav` says of a changed drive: of its inputs, and of its log when that is opened."""
+    log = changed_log(drive, folder / "drive.mcap", without_truth(change))
+    run = omninav.run(
+        "omninav", map=str(map), log=str(log), runs=str(folder), cache=str(folder / "cache"), plots="none",
+        progress=False, record=["conflicts.conflicts"],
+    )  # fmt: skip
+    so_far = [each.sentences for each in run.values("conflicts.conflicts")]
+    said = [
+        Found(0 if sentence in so_far[0] else next(n for n, all in enumerate(so_far, 1) if sentence in all), sentence)
+        for sentence in so_far[-1]
+    ]
+    return said + [Found(0, sentence) for sentence in run.manifest["warnings"] if sentence not in so_far[-1]]
+
+
+def learned_map(tour: Path, folder: Path) -> Path:
+    """The file of the map that `omninav` learns from a tour."""
+    return omninav.run("omninav_map", log=str(tour), runs=str(folder), plots="none", progress=False).folder / "map.omap"
+
+
+def changed_map(sound: Path, path: Path, poses: Callable[[Array], Any]) -> Path:
+    """A map's file with other poses."""
+    map = omninav.load_map(sound)
+    others = np.array(poses(map.poses), np.float64)
+    changed = ReferenceGraph(others, map.features[:], map.kind, map.edges, map.pose_source)
+    write_artifact(path, changed, read_header(sound)["facts"])
+    return path
+
+
+def print_table(tour: Path, drive: Path, folder: Path, other_tour: Path | None) -> None:
+    """Print what whole runs say of each case, a row each."""
+    sound = learned_map(tour, folder)
+    rows: dict[str, tuple[Change, Path]] = {"nothing": (as_is, sound)}
+    for name, case in CASES.items():
+        poses, file = case.poses, folder / f"{len(rows)}.omap"
+        rows[name] = case.change, sound if poses is None else changed_map(sound, file, poses)
+    rows |= {name: (change, sound) for name, change in UNNOTICED.items()}
+    rows["odometry in mm"] = odometry(lambda pose: pose * (1e3, 1e3, 1.0)), sound
+    if other_tour is not None:
+        rows["another building"] = as_is, learned_map(other_tour, folder)
+    for name, (change, map) in rows.items():
+        found = of_whole_run(change, map, drive, folder)
+        after = ", ".join(str(each.images) for each in found) or "never"
+        print(f"| {name} | {after} | {'; '.join(each.sentence for each in found)} |", flush=True)
+
+
 if __name__ == "__main__":
     import sys
-    from tempfile import TemporaryDirectory
 
-    sound = learned(sys.argv[1])
-    for name, case in {"nothing": Case(as_is, ""), **CASES}.items():
-        with TemporaryDirectory() as folder:
-            sentences = found(case, sound, Path(sys.argv[2]), Path(folder))
-        after = ", ".join(str(each.images) for each in sentences)
-        print(f"| {name} | {after} | {'; '.join(each.sentence for each in sentences)} |", flush=True)
+    print_table(*map(Path, sys.argv[1:4]), Path(sys.argv[4]) if len(sys.argv) > 4 else None)

@@ -15,6 +15,7 @@ from omninav.stages.monitor.confidence_monitor import (
 from omninav.stages.monitor.wrong_pose_agreement import LearnWrongPoseAgreement
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.confidence import WrongPoseAgreement
+from omninav.stages.values.conflicts import Conflicts
 from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Motion
@@ -158,6 +159,23 @@ def test_images_taken_close_by_do_not_tell_how_often_a_wrong_place_looks_right()
     poses = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [10.0, 0.0, 0.0], [10.2, 0.0, 0.0]])
     pairs = ReferenceGraph(poses, np.stack([one, one, other, other]), "histograms", LINE.edges, "truth")
     assert LearnWrongPoseAgreement().step(Context("chance"), pairs, LengthScale(0.3)).when_wrong.share == 0.5
+
+
+def test_a_conflict_lowers_the_confidence_for_as_long_as_it_stands():
+    def sure(conflicts: Conflicts | None) -> float:
+        monitor, recent = ConfidenceMonitor(right_in_conflict=0.3), ConfidenceMonitorState()
+        values = np.zeros((len(LINE), 36), np.float32)
+        values[0, 0] = 0.9
+        belief = Particles(np.zeros((5, 3)), np.full(5, 0.2))
+        return monitor.step(
+            Context("monitor"), recent, belief, belief.estimate(), LINE, SCALE, WrongPoseAgreement(0.02),
+            Similarities(values), conflicts=conflicts,
+        ).confidence.probability  # fmt: skip
+
+    alone = sure(None)
+    assert alone > 0.5
+    assert sure(Conflicts(("the camera was frozen",), ())) == alone
+    assert sure(Conflicts(("the camera is frozen",), ("the camera is frozen",))) == pytest.approx(0.3 * alone)
 
 
 @pytest.mark.parametrize("column", [0, 9, 30])

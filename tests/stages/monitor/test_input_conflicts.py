@@ -6,7 +6,9 @@ from conflicting_logs import (
     AT_TWO_HERTZ,
     CASES,
     ODOMETRY,
+    UNNOTICED,
     Case,
+    Change,
     as_is,
     changed_log,
     found,
@@ -22,9 +24,12 @@ from omninav.pipeline import Context, Tick
 from omninav.pipeline.mcap.message import Message
 from omninav.stages.monitor.input_conflicts import InputConflicts, InputConflictsState
 from omninav.stages.recordings.opening import open_recording
+from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.image import Strip
+from omninav.stages.values.length_scale import LengthScale
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
+from omninav.stages.values.similarity import Similarities
 
 HOUSE = DATA / "photoreal-house"
 
@@ -78,6 +83,50 @@ def test_a_run_says_it_as_a_warning_and_keeps_it(shared_cache: Path, tmp_path: P
     counted = [len(each.sentences) for each in run.values("conflicts.conflicts")]
     assert counted == sorted(counted)
     assert (counted[0], counted[-1]) == (0, 1)
+    stands = np.array([bool(each.standing) for each in run.values("conflicts.conflicts")])
+    confidence = run.frames["confidence"].to_numpy()
+    assert confidence[stands].max() < 0.5
+    assert np.array_equal(stands, np.array(counted) > 0)
+
+
+def straight(number: int) -> list[Pose]:
+    """A robot that drives on, 0.3 m an image."""
+    return [Pose(0.3 * n, 0.0, 0.0) for n in range(number)]
+
+
+def test_a_finding_stands_for_as_long_as_it_is_found_and_is_said_once() -> None:
+    ctx, state, watch = Context("conflicts"), InputConflictsState(), InputConflicts()
+    rng, kept, standing = np.random.default_rng(0), np.zeros((8, 90), np.float32), []
+    for number, pose in enumerate(straight(100)):
+        frozen = number in range(20, 45) or number in range(70, 95)
+        kept = kept if frozen else (kept + 40.0 * rng.random((8, 90)) * np.ones(90)).astype(np.float32)
+        ctx.tick = Tick(number, number * 500_000_000, 0, number, not number)
+        standing.append(watch.step(ctx, state, Strip(kept), pose).conflicts.standing)
+    stood = [number for number, sentences in enumerate(standing, 1) if sentences]
+    assert stood[0] in range(36, 41)  # 8 images are the same from the 29th on, which two judgements have to see
+    assert not set(stood) & set(range(60, 80))
+    assert set(stood) & set(range(80, 101))
+    assert [sentence[:20] for sentence in ctx.warnings] == ["the camera is frozen"]
+
+
+@pytest.mark.parametrize("fits", [0.0, 0.25, 1.0])
+def test_images_that_fit_no_place_are_said_and_a_quarter_that_fits_is_enough(fits: float) -> None:
+    ctx, state, watch, rng = Context("conflicts"), InputConflictsState(), InputConflicts(), np.random.default_rng(1)
+    poses = np.column_stack([rng.uniform(0.0, 45.0, 300), rng.uniform(-20.0, 20.0, 300), rng.uniform(-3.1, 3.1, 300)])
+    poses[:150] = [(pose.x, pose.y, pose.heading) for pose in straight(150)]
+    map = ReferenceGraph(poses, np.zeros((300, 8, 20), np.float32), "histograms", np.zeros((0, 2), np.int64), "truth")
+    said = ()
+    for number, pose in enumerate(straight(150)):
+        values = np.zeros((300, 36), np.float32)
+        values[number if rng.random() < fits else rng.integers(150, 300), 0] = 1.0
+        ctx.tick = Tick(number, number * 500_000_000, 0, number, not number)
+        strip = Strip(
+            np.sin(np.arange(720.0).reshape(8, 90) / 9.0).astype(np.float32) + 0.05 * rng.random((8, 90), "f")
+        )
+        estimate = PoseEstimate(pose, np.eye(3), 1.0, pose)
+        seen, scale = Similarities(values), LengthScale(0.4)
+        said = watch.step(ctx, state, strip, pose, None, seen, map, scale, estimate=estimate).conflicts.sentences
+    assert [sentence[:35] for sentence in said] == (["the images fit no place of the map:"] if fits == 0.0 else [])
 
 
 def test_odometry_that_is_not_believed_says_to_check_its_unit(tmp_path: Path) -> None:
@@ -106,5 +155,8 @@ def test_without_odometry_nothing_is_said(store: ReferenceGraph, tmp_path: Path)
     assert one.sentence.startswith("No odometry in")
 
 
-def test_nothing_is_said_where_all_fits(store: ReferenceGraph, tmp_path: Path) -> None:
-    assert found(Case(as_is, ""), store, DRIVE, tmp_path) == []
+@pytest.mark.parametrize("change", [as_is, *UNNOTICED.values()], ids=["nothing", *UNNOTICED])
+def test_nothing_is_said_where_best_matches_follow_odometry(
+    change: Change, store: ReferenceGraph, tmp_path: Path
+) -> None:
+    assert found(Case(change, ""), store, DRIVE, tmp_path) == []

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omninav.stages.geometry.plane.se2 import chain, compose
-from omninav.stages.geometry.plane.track_fit import track_fit
+from omninav.stages.geometry.plane.track_fit import agreement, track_fit
 
 MOTIONS = np.column_stack([np.full(60, 0.3), np.zeros(60), 0.15 * np.sin(np.arange(60) / 5.0) + 0.05])
 TRACK = chain(MOTIONS)
@@ -56,6 +56,20 @@ def test_a_third_of_right_matches_is_enough():
     assert fit.scale == pytest.approx(2.0, rel=0.02)
     assert 0.3 < fit.share < 0.5
     assert fit.as_is < 0.1
+
+
+def test_pairs_agree_where_both_their_poses_are_right():
+    rng = np.random.default_rng(0)
+    there = placed(TRACK)
+    assert agreement(TRACK, there, 0.3).share == 1.0
+    wrong = rng.random(len(there)) < 0.5
+    there[wrong] = rng.uniform(-20.0, 20.0, (int(wrong.sum()), 3))
+    fit = agreement(TRACK, there, 0.3)
+    assert fit.share == pytest.approx(0.25, abs=0.1)
+    assert fit.pairs > 100
+    turned = placed(TRACK) + np.arange(60)[:, None] * np.array((0.0, 0.0, 0.3))
+    assert agreement(TRACK, turned, 0.3).share == 0.0  # where headings are wrong too
+    assert agreement(TRACK, there, 100.0) == (0.0, 0)
 
 
 def test_a_robot_that_stands_says_nothing():
