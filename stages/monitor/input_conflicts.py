@@ -89,7 +89,7 @@ class InputConflictsState(State):
     rows: Array = field(default_factory=lambda: np.zeros((0, COLUMNS)))
     judged: int = 0
     suspected: str = ""
-    said: dict[str, str] = field(default_factory=dict)
+    found: dict[str, str] = field(default_factory=dict)
     standing: dict[str, int] = field(default_factory=dict)
 
 
@@ -142,8 +142,8 @@ class InputConflicts(Stage):
             recent.judged += 1
             if not recent.judged % EVERY:
                 self._judge(ctx, recent, metres)
-        standing = tuple(recent.said[kind] for kind in recent.standing)
-        return self.Out(conflicts=Conflicts(of_map + tuple(recent.said.values()), of_map + standing))
+        standing = tuple(recent.found[kind] for kind in recent.standing)
+        return self.Out(conflicts=Conflicts(of_map + tuple(recent.found.values()), of_map + standing))
 
     def _due(self, ctx: Context, recent: InputConflictsState) -> bool:
         return not len(recent.rows) or not 0 <= ctx.tick.stamp - recent.stamp < INTERVAL_S * 1e9
@@ -158,8 +158,8 @@ class InputConflicts(Stage):
 
     def _say(self, ctx: Context, recent: InputConflictsState, kind: str, sentence: str) -> None:
         recent.standing[kind] = 0
-        if kind not in recent.said:
-            recent.said[kind] = sentence
+        if kind not in recent.found:
+            recent.found[kind] = sentence
             ctx.warn(sentence)
 
 
