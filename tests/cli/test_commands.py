@@ -144,10 +144,10 @@ def test_what_a_newcomer_gets_wrong_is_answered_with_what_to_type(omninav, tmp_p
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_parameter_that_the_configuration_does_not_list_is_set_like_any_other(omninav):
+def test_a_parameter_that_the_configuration_does_not_list_is_set_like_any_other(omninav_process):
     plugin = f"features.edges={ROOT / 'examples' / 'edges' / 'omninav_edges.py'}:EdgeHistogram"
-    omninav("check", "features=edges", "nodes.features.segments=18", OMNINAV_STAGES=plugin, check=True)
-    ended = omninav("check", "features=edges", "nodes.features.segmnts=18", OMNINAV_STAGES=plugin)
+    omninav_process("check", "features=edges", "nodes.features.segments=18", OMNINAV_STAGES=plugin, check=True)
+    ended = omninav_process("check", "features=edges", "nodes.features.segmnts=18", OMNINAV_STAGES=plugin)
     assert "did you mean 'nodes.features.segments=18'?" in ended.stderr
 
 

@@ -8,6 +8,8 @@ import pytest
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
+from omninav.pipeline.cli import composition_cache
+from omninav.pipeline.cli.composition import composed
 from omninav.pipeline.cli.composition_cache import compose
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.graph.problems import ProblemsFound
@@ -34,6 +36,7 @@ def test_words_give_what_hydra_makes_of_them(words: list[str]):
 
 
 def test_options_are_composed_once_and_what_was_set_is_not_kept():
+    composition_cache._of_options.cache_clear()
     with patch("omninav.pipeline.cli.composition_cache.hydra.compose", wraps=hydra.compose) as hydras:
         first, second = compose(["world=office", "seed=3"]), compose(["day=2", "world=office"])
         first.nodes.match = None
@@ -42,6 +45,19 @@ def test_options_are_composed_once_and_what_was_set_is_not_kept():
     assert [config.seed for config in (first, second, third)] == [3, 0, 0]
     assert [config.day for config in (first, second, third)] == [1, 2, 1]
     assert third.nodes.match is not None
+
+
+def test_a_later_command_of_a_process_composes_nothing_again_unless_other_stages_are_offered(monkeypatch):
+    composition_cache._of_options.cache_clear()
+    with patch("omninav.pipeline.cli.composition_cache.hydra.compose", wraps=hydra.compose) as hydras:
+        for seed in (3, 4):
+            with composed(["world=office", f"seed={seed}"]) as config:
+                assert config.seed == seed
+        assert hydras.call_count == 1
+        for name in ("One", "Other"):
+            monkeypatch.setenv("OMNINAV_STAGES", f"match.of_a_test=stages.py:{name}")
+            with composed(["world=office", "match=of_a_test"]) as config:
+                assert config.nodes.match._target_ == f"stages.py:{name}"
 
 
 @pytest.mark.parametrize("word", ["sead=3", "match=l3", "+seed=3", "++match=l2", "seed=1,2", "a@b=1", "=", "day={"])

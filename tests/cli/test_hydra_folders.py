@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-ROOT = Path(__file__).resolve().parents[2]
 VARIANT = """\
 # @package _global_
 variant: toy
@@ -30,8 +29,7 @@ def toy(omninav, tmp_path: Path):
     """Runs a variant without robots, world or map."""
     (tmp_path / "mine" / "variant").mkdir(parents=True)
     (tmp_path / "mine" / "variant" / "toy.yaml").write_text(VARIANT)
-    path = f"{ROOT}:{ROOT / 'tests'}"
-    return lambda *words, **given: omninav(*words, "variant=toy", PYTHONPATH=path, **given)
+    return lambda *words, **given: omninav(*words, "variant=toy", **given)
 
 
 def test_a_run_lies_where_hydra_run_dir_says(toy, tmp_path: Path):

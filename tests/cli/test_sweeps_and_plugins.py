@@ -44,7 +44,7 @@ def test_a_failing_job_is_named_at_once_and_the_others_finish(omninav, shared_ca
 
 
 def test_jobs_in_several_processes_give_the_same_and_leave_their_exit_code(
-    omninav, shared_cache: Path, demo: Path, tmp_path: Path
+    omninav_process, shared_cache: Path, demo: Path, tmp_path: Path
 ):
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     words = (
@@ -54,12 +54,12 @@ def test_jobs_in_several_processes_give_the_same_and_leave_their_exit_code(
         "hydra.launcher.n_jobs=2",
         f"cache={shared_cache}",
     )
-    ended = omninav("-m", *words, "features=hsv_histogram,raises_at_seed", "seed=0,1", SHORT)
+    ended = omninav_process("-m", *words, "features=hsv_histogram,raises_at_seed", "seed=0,1", SHORT)
     assert ended.returncode == 1, ended.stdout + ended.stderr
     (sweep,) = (tmp_path / "runs").glob("*_sweep")
     statuses = [json.loads((sweep / str(n) / "manifest.json").read_text())["status"] for n in range(4)]
     assert statuses == ["complete", "complete", "complete", "failed"]
-    alone = omninav("features=hsv_histogram", "seed=0", SHORT, f"cache={shared_cache}", check=True)
+    alone = omninav_process("features=hsv_histogram", "seed=0", SHORT, f"cache={shared_cache}", check=True)
     assert alone.returncode == 0
     same = tmp_path / "runs" / "latest" / "trajectory.tum"
     assert (sweep / "0" / "trajectory.tum").read_bytes() == same.read_bytes()
@@ -77,17 +77,17 @@ def test_a_stage_by_a_config_folder(omninav, tmp_path: Path):
     assert "nothing wrong" in omninav("check", *words, check=True).stdout
 
 
-def test_a_stage_by_the_environment_runs_by_name(omninav, shared_cache: Path, tmp_path: Path):
+def test_a_stage_by_the_environment_runs_by_name(omninav_process, shared_cache: Path, tmp_path: Path):
     named = f"features.edges={EDGES / 'omninav_edges.py'}:EdgeHistogram"
-    omninav("features=edges", SHORT, f"cache={shared_cache}", check=True, OMNINAV_STAGES=named)
+    omninav_process("features=edges", SHORT, f"cache={shared_cache}", check=True, OMNINAV_STAGES=named)
     config = (tmp_path / "runs" / "latest" / "config.yaml").read_text()
     assert "omninav_edges.py:EdgeHistogram" in config
-    listed = omninav("stages", "features", check=True, OMNINAV_STAGES=named).stdout
+    listed = omninav_process("stages", "features", check=True, OMNINAV_STAGES=named).stdout
     row = next(line for line in listed.split("\n") if line.startswith("features.edges"))
     assert "[environment]" in row
 
 
-def test_a_stage_of_an_installed_package_by_name(omninav, tmp_path: Path):
+def test_a_stage_of_an_installed_package_by_name(omninav_process, tmp_path: Path):
     place = tmp_path / "site"
     command = [
         sys.executable,
@@ -109,21 +109,21 @@ def test_a_stage_of_an_installed_package_by_name(omninav, tmp_path: Path):
         (info / "METADATA").write_text("Metadata-Version: 2.1\nName: omninav-edges\nVersion: 0.1.0\n")
         (info / "entry_points.txt").write_text("[omninav.stages]\nfeatures.edges = omninav_edges:EdgeHistogram\n")
         (place / "omninav_edges.py").write_text((EDGES / "omninav_edges.py").read_text())
-    listed = omninav("stages", "features", check=True, PYTHONPATH=str(place)).stdout
+    listed = omninav_process("stages", "features", check=True, PYTHONPATH=str(place)).stdout
     row = next(line for line in listed.split("\n") if line.startswith("features.edges"))
     assert "[installed]" in row
-    assert "nothing wrong" in omninav("check", "features=edges", check=True, PYTHONPATH=str(place)).stdout
+    assert "nothing wrong" in omninav_process("check", "features=edges", check=True, PYTHONPATH=str(place)).stdout
 
 
-def test_a_broken_plugin_is_a_row_and_never_a_crash(omninav, tmp_path: Path):
+def test_a_broken_plugin_is_a_row_and_never_a_crash(omninav_process, tmp_path: Path):
     (tmp_path / "broken.py").write_text("import not_there\n")
     settings = {"OMNINAV_STAGES": "features.broken=broken.py:Thing"}
-    ended = omninav("stages", "features", check=True, **settings)
+    ended = omninav_process("stages", "features", check=True, **settings)
     row = next(line for line in ended.stdout.split("\n") if line.startswith("features.broken"))
     assert "[environment] cannot be used: module 'broken.py'" in row
     assert "features.hsv_histogram" in ended.stdout
-    assert omninav("check", check=True, **settings).returncode == 0
-    used = omninav("check", "features=broken", **settings)
+    assert omninav_process("check", check=True, **settings).returncode == 0
+    used = omninav_process("check", "features=broken", **settings)
     assert used.returncode == 2
     assert "No module named 'not_there'" in used.stderr
 

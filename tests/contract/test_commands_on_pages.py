@@ -5,6 +5,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+from offenders import assert_each
 
 from omninav.pipeline.cli.commands.simulate import is_live
 from omninav.pipeline.cli.composition import complete
@@ -35,6 +36,7 @@ OTHERS = ("--config-dir", "edges", "brightness")
 """In commands with stages that are not installed here."""
 CASES = {line: page for page in PAGES for line in commands(page) if not any(word in line for word in OTHERS)}
 """Line -> a page that it is on; without those of a stage that the reader writes."""
+ON_PAGES = {page.relative_to(ROOT).as_posix(): [line for line, of in CASES.items() if of == page] for page in PAGES}
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -43,9 +45,13 @@ def hydra():
         yield
 
 
-@pytest.mark.parametrize("line", CASES)
-def test_a_command_on_a_page_composes(line: str, monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize("page", [page for page, lines in ON_PAGES.items() if lines])
+def test_the_commands_on_a_page_compose(page: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(ROOT)
+    assert_each(ON_PAGES[page], command_composes)
+
+
+def command_composes(line: str) -> None:
     words = shlex.split(line)[1:]
     command = words.pop(0) if words and words[0] in COMMANDS else ""
     if command in NO_GRAPH:

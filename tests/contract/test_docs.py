@@ -4,7 +4,7 @@ import ast
 import re
 from pathlib import Path
 
-import pytest
+from offenders import assert_each
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), ROOT / "runs/README.md", ROOT / "examples/README.md"])
@@ -16,8 +16,11 @@ def names_in(file: Path) -> set[str]:
     return {node.name for node in nodes if isinstance(node, ast.ClassDef | ast.FunctionDef)}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_links_and_paths_of_a_page_exist(page: Path) -> None:
+def test_links_and_paths_of_every_page_exist() -> None:
+    assert_each(PAGES, links_and_paths_exist)
+
+
+def links_and_paths_exist(page: Path) -> None:
     text = page.read_text()
     links = [link for link in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text) if "://" not in link]
     paths = re.findall(r"`((?:stages|pipeline|conf|docs|tests|examples|benchmarks)/[\w./]+)`", text)

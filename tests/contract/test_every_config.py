@@ -1,5 +1,6 @@
 """What every configuration file promises: it opens with what it is and a command that composes."""
 
+import itertools
 import re
 import shlex
 from collections.abc import Iterator
@@ -8,6 +9,7 @@ from typing import Any
 
 import pytest
 import yaml
+from offenders import assert_each
 from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import complete, settings_read
@@ -28,7 +30,15 @@ FILES = [
     for path in sorted(CONF.rglob("*.yaml"))
     if path.name not in ("config.yaml", "test_worlds.yaml") and path.parent.name != "recording"
 ]
-each = pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.stem}")
+
+
+def group(path: Path) -> str:
+    return path.relative_to(CONF).parts[0]
+
+
+FOLDERS = {name: [*files] for name, files in itertools.groupby(FILES, group)}
+each_folder = pytest.mark.parametrize("files", FOLDERS.values(), ids=FOLDERS)
+VARIANTS = [path.stem for path in FOLDERS["variant"]]
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -37,16 +47,16 @@ def hydra():
         yield
 
 
-def group(path: Path) -> str:
-    return path.relative_to(CONF).parts[0]
-
-
 def head(path: Path) -> list[str]:
     return path.read_text().split("\n")[:2]
 
 
-@each
-def test_its_first_line_is_its_package_and_its_second_says_what_it_is(path: Path):
+@each_folder
+def test_a_files_first_line_is_its_package_and_its_second_says_what_it_is(files: list[Path]):
+    assert_each(files, opens_as_it_should)
+
+
+def opens_as_it_should(path: Path) -> None:
     package, said = head(path)
     role = group(path)
     content = yaml.safe_load(path.read_text()) or {}
@@ -68,8 +78,12 @@ def stages_in(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
             yield where, dict(node)
 
 
-@each
-def test_the_command_in_its_head_composes(path: Path):
+@each_folder
+def test_the_command_in_a_files_head_composes(files: list[Path]):
+    assert_each(files, command_composes)
+
+
+def command_composes(path: Path) -> None:
     command = shlex.split(head(path)[1].partition("  omninav ")[2])
     option = path.relative_to(CONF / group(path)).with_suffix("")
     if group(path) != "graph":  # its files are included by variants
@@ -86,14 +100,21 @@ def graphs_of(path: Path) -> set[str]:
     return named.union(*(graphs_of(CONF / "graph" / f"{name}.yaml") for name in named))
 
 
-@pytest.mark.parametrize("path", sorted((CONF / "graph").glob("*.yaml")), ids=lambda path: path.stem)
-def test_a_shared_graph_is_included_by_the_variant_in_its_head(path: Path):
+def test_a_shared_graph_is_included_by_the_variant_in_its_head():
+    assert_each(FOLDERS["graph"], graph_is_included)
+
+
+def graph_is_included(path: Path) -> None:
     variant = shlex.split(head(path)[1].partition("  omninav ")[2])[0].removeprefix("variant=")
     assert path.stem in graphs_of(CONF / "variant" / f"{variant}.yaml")
 
 
-@each
-def test_it_states_only_what_differs_from_its_stages_defaults(path: Path):
+@each_folder
+def test_a_file_states_only_what_differs_from_its_stages_defaults(files: list[Path]):
+    assert_each(files, no_default_is_repeated)
+
+
+def no_default_is_repeated(path: Path) -> None:
     for where, stage in stages_in(path):
         parameters = signature(resolve(stage.pop("_target_"))).parameters
         assert set(stage) <= set(parameters), where
@@ -105,15 +126,18 @@ def test_it_states_only_what_differs_from_its_stages_defaults(path: Path):
             )
 
 
-@pytest.mark.parametrize("path", sorted((CONF / "variant").glob("*.yaml")), ids=lambda path: path.stem)
-def test_every_variant_builds(path: Path):
-    planned = plan(complete(compose([f"variant={path.stem}"])))
-    assert planned.variant == path.stem
+def test_every_variant_builds():
+    assert_each(VARIANTS, builds)
+
+
+def builds(variant: str) -> None:
+    planned = plan(complete(compose([f"variant={variant}"])))
+    assert planned.variant == variant
     assert planned.graph.nodes
 
 
 def test_every_variant_builds_without_what_it_is_measured_by():
-    measured = [path.stem for path in sorted((CONF / "variant").glob("*.yaml")) if "drive" in nodes_of(path.stem)]
+    measured = [variant for variant in VARIANTS if "drive" in nodes_of(variant)]
     assert len(measured) > 20
     for variant in measured:
         left = nodes_of(variant, "~evaluation")
@@ -126,25 +150,31 @@ def nodes_of(variant: str, *words: str) -> set[str]:
     return set(plan(complete(compose([f"variant={variant}", *words]))).graph.nodes)
 
 
-@pytest.mark.parametrize("path", sorted((CONF / "variant").glob("*.yaml")), ids=lambda path: path.stem)
-def test_a_variant_declares_the_inputs_that_its_graph_reads(path: Path):
-    config = compose([f"variant={path.stem}"])
+def test_a_variant_declares_the_inputs_that_its_graph_reads():
+    assert_each(VARIANTS, declares_its_inputs)
+
+
+def declares_its_inputs(variant: str) -> None:
+    config = compose([f"variant={variant}"])
     declared = {name for name, meaning in config.inputs.items() if meaning is not None}
     read = settings_read(config) & {*settings_left_open(), *declared}
     assert read <= declared
     if read != declared:  # what else it declares, it reads on a robot
-        live = compose([f"variant={path.stem}", "source=live"])
+        live = compose([f"variant={variant}", "source=live"])
         assert declared <= read | settings_read(live)
 
 
-@pytest.mark.parametrize("path", sorted((CONF / "experiment").glob("*/*.yaml")), ids=lambda path: path.stem)
-@pytest.mark.parametrize("profile", ["full", "quick"])
-def test_every_experiment_can_be_read(path: Path, profile: str):
+def test_every_experiment_can_be_read():
+    assert_each(FOLDERS["experiment"], can_be_read)
+
+
+def can_be_read(path: Path) -> None:
     option = path.relative_to(CONF / "experiment").with_suffix("")
     config = resolved_but_for_the_experiment(compose([f"+experiment={option}"]))
-    experiment = read_experiment(config["experiment"], profile)
-    assert experiment.claims or path.stem in ("home_store", "office")  # to start from
-    assert experiment.conditions()
+    for profile in ("full", "quick"):
+        experiment = read_experiment(config["experiment"], profile)
+        assert experiment.claims or path.stem in ("home_store", "office")  # to start from
+        assert experiment.conditions()
 
 
 def test_every_group_is_listed_before_the_variant():

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from offenders import assert_each
 from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import complete
@@ -24,7 +25,6 @@ NAMES = [
     for path in sorted((CONF / folder).glob("*.yaml"))
 ]
 ALL = [path.relative_to(CONF).with_suffix("").as_posix() for path in sorted(CONF.glob("*/*.yaml"))]
-each = pytest.mark.parametrize("name", NAMES)
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -45,8 +45,11 @@ def typed(found, condition):
     return with_unlisted_parameters(own if named else [f"variant={found.variant}", *own], [])
 
 
-@each
-def test_the_page_shows_how_far_odometry_alone_would_have_gone_wrong(name):
+def test_each_page_shows_how_far_odometry_alone_would_have_gone_wrong():
+    assert_each(NAMES, shows_odometry_alone)
+
+
+def shows_odometry_alone(name):
     found = experiment(name, "full")
     paths = [path for measure in found.measures.values() for path in measure.path]
     assert any(path.endswith("odometry_alone.final_error_m") for path in paths)
@@ -64,8 +67,12 @@ def with_each_level(conditions):
     return {condition.name: condition for condition in chosen.values()}.values()
 
 
-@pytest.mark.parametrize("name", ALL)
-def test_a_condition_of_each_level_of_each_factor_can_be_built(name):
+@pytest.mark.parametrize("folder", sorted({name.partition("/")[0] for name in ALL}))
+def test_a_condition_of_each_level_of_each_factor_can_be_built(folder):
+    assert_each([name for name in ALL if name.startswith(f"{folder}/")], levels_can_be_built)
+
+
+def levels_can_be_built(name):
     found = experiment(name, "full")
     for condition in with_each_level(found.conditions()):
         planned = plan(complete(compose(typed(found, condition))))
@@ -73,17 +80,22 @@ def test_a_condition_of_each_level_of_each_factor_can_be_built(name):
             assert {"errors", "error_curves", "map_history"} <= set(planned.graph.nodes)
 
 
-@pytest.mark.parametrize("name", ALL)
-def test_nothing_is_claimed_that_too_few_scenarios_leave_undecided(name):
+def test_nothing_is_claimed_that_too_few_scenarios_leave_undecided():
+    assert_each(ALL, has_enough_scenarios)
+
+
+def has_enough_scenarios(name):
     found = experiment(name, "full")
     assert not found.claims or len(found.scenarios) >= MIN_SCENARIOS
 
 
-@pytest.mark.parametrize("name", ALL)
-@pytest.mark.parametrize("profile", ["quick", "development"])
-def test_at_a_small_scale_no_test_world_is_looked_at(name, profile):
+def test_at_a_small_scale_no_test_world_is_looked_at():
+    assert_each(ALL, looks_at_no_test_world)
+
+
+def looks_at_no_test_world(name):
     config = resolved_but_for_the_experiment(compose([f"+experiment={name}"]))
-    if profile in config["experiment"].get("profiles", {}):
+    for profile in {"quick", "development"} & set(config["experiment"].get("profiles", {})):
         assert "draw" not in " ".join(read_experiment(config["experiment"], profile).all_scenarios.values())
 
 

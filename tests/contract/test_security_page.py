@@ -4,7 +4,7 @@ import ast
 import re
 from pathlib import Path
 
-import pytest
+from offenders import assert_each
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/security.md").read_text()
@@ -84,8 +84,11 @@ def test_every_item_of_the_page_has_a_test_and_every_test_its_item() -> None:
     assert re.findall(r"^\* \*\*([^*]+)\*\*", PAGE, re.MULTILINE) == list(TESTS)
 
 
-@pytest.mark.parametrize("item", TESTS)
-def test_the_test_of_an_item_exists(item: str) -> None:
+def test_the_test_of_every_item_exists() -> None:
+    assert_each(TESTS, its_test_exists)
+
+
+def its_test_exists(item: str) -> None:
     file, name = TESTS[item]
     tree = ast.parse((ROOT / file).read_text())
     assert name in {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}

@@ -25,9 +25,9 @@ def test_the_templates_own_tests_pass():
     assert ended.stdout.startswith(".. ")
 
 
-def test_its_stage_fits_into_a_variant(omninav):
+def test_its_stage_fits_into_a_variant(omninav_process):
     named = f"features.brightness={PACKAGE / 'omninav_brightness.py'}:BrightnessHistogram"
-    assert "nothing wrong" in omninav("check", "features=brightness", check=True, OMNINAV_STAGES=named).stdout
+    assert "nothing wrong" in omninav_process("check", "features=brightness", check=True, OMNINAV_STAGES=named).stdout
 
 
 class Drifts(Stage):

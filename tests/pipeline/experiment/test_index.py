@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from offenders import assert_each
 
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.experiment.index import BEGIN, END, index_table, page_of, read_verdicts, verdict_files
@@ -37,8 +38,11 @@ def test_the_committed_tables_are_what_the_command_writes(tmp_path: Path) -> Non
     assert index_table(PAGES) in (PAGES / "README.md").read_text()
 
 
-@pytest.mark.parametrize("path", verdict_files(PAGES), ids=lambda path: path.name.partition(".")[0])
-def test_a_page_says_what_its_verdict_file_does_and_which_commit_made_it(path: Path) -> None:
+def test_a_page_says_what_its_verdict_file_does_and_which_commit_made_it() -> None:
+    assert_each(verdict_files(PAGES), says_what_its_verdicts_do)
+
+
+def says_what_its_verdicts_do(path: Path) -> None:
     page, verdicts = page_of(path).read_text(), read_verdicts(path)
     said = re.findall(r"\| (holds|does not hold|undecided) \|\n", page)
     assert said == [in_words(case.holds) for verdict in verdicts for case in verdict.cases]
