@@ -52,10 +52,8 @@ fuzz: export OPENBLAS_NUM_THREADS = 1
 fuzz: $(VENV)/.installed  ## read hostile inputs of every format on all cores (SECONDS=600 SEED=1)
 	PYTHONPATH=tests $(BIN)/python -m hostile.fuzz --seconds $(SECONDS) --seed $(SEED)
 
-mutants: export OPENBLAS_NUM_THREADS = 1
-mutants: $(VENV)/.mutants  ## try small slips in the code that judges, fuses and maps (ALL=1 ONLY=stages/fusion)
-	$(BIN)/python tests/mutants/campaign.py $(ONLY) $(if $(ALL),--all) $(if $(TESTS),--tests $(TESTS)) \
-		--sample $(or $(SAMPLE),60) --seed $(SEED)
+mutants: $(VENV)/.mutants  ## try small slips in every folder, each night (MINUTES=10 of each, ONLY=stages/fusion)
+	MINUTES=$(or $(MINUTES),10) tests/mutants/nightly.sh $(ONLY)
 
 ros2: .venv-ros2/.installed  ## real rclpy, for live tests (Python 3.11)
 

@@ -25,6 +25,12 @@ needs_data = pytest.mark.skipif(not DATA.exists(), reason=f"third parties' recor
 settings.register_profile("omninav", deadline=None)  # the first call of a compiled function takes what it takes
 settings.load_profile("omninav")
 
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Whole runs first: where a long file is the last one, the other process has nothing to do."""
+    items.sort(key=lambda item: item.path.relative_to(ROOT / "tests").parts[0] in ("pipeline", "stages"))
+
+
 Command = Callable[..., subprocess.CompletedProcess[str]]
 
 
