@@ -93,6 +93,8 @@ def as_bad_input(error: BaseException) -> BadInput | None:
             return BadInput(f"{where}{error.strerror or error}")
         hint = HINTS.get(number, "name another" if where else "nothing says which file")
         return BadInput(f"{where}{error.strerror}; {hint}")
+    if isinstance(error, MemoryError):
+        return BadInput("there is no memory left; close other programs, or raise the limit (`ulimit -v`)")
     yaml, omegaconf = sys.modules.get("yaml"), sys.modules.get("omegaconf.errors")  # who met their errors has them
     if omegaconf is not None and isinstance(error, omegaconf.OmegaConfBaseException):
         return BadInput(f"{getattr(error, 'full_key', None) or 'configuration'}: {str(error).splitlines()[0]}")

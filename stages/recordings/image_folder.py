@@ -155,7 +155,7 @@ class ImageFolder:
             raise UnreadableRecording(f"{self._where}: frames.file is missing: the column with file names")
         base = self._folder if frames.images.startswith("/") else table.path.parent
         base /= frames.images.lstrip("/")
-        names = table.texts(frames.file).to_pylist()
+        names = table.texts(frames.file)
         self._rows = [f"{table.path.name}, line {line}" for line in table.lines]
         return [self._inside(base / self._renamed(name, row), row) for name, row in zip(names, self._rows, strict=True)]
 

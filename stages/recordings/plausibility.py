@@ -1,6 +1,7 @@
 """Detects poses of a track that no robot can have, and jumps in it."""
 
 import math
+from array import array
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
@@ -71,21 +72,21 @@ def _kept(stamps: Stamps, poses: Array, torn: Mask, limits: MotionLimits) -> tup
     nothing = np.empty(0, np.int64)
     if not len(splits):
         return np.arange(len(stamps)), nothing
-    firsts, ends = [0, *splits.tolist()], [*splits.tolist(), len(stamps)]
+    firsts, ends = np.append(0, splits), np.append(splits, len(stamps))
+    resumes = [_resumes(firsts, ends, back, stamps, poses, limits).tobytes() for back in range(1, LOOK_BACK + 1)]
     cost = max(MIN_STRETCH, EXCURSION_S * 1e9 / float(np.median(np.diff(stamps))))
-    score: list[float] = []
-    before: list[tuple[int, bool]] = []
+    score, before, jumped = array("d"), array("q"), bytearray()
     best = 0
-    for number, (first, end) in enumerate(zip(firsts, ends, strict=True)):
-        most, link = 0.0, (-1, False)
+    for number, length in enumerate((ends - firsts).data):
+        most, link, jump = 0.0, -1, False
         if number and score[best] > cost:
-            most, link = score[best] - cost, (best, True)
-        for earlier in range(number - 1, max(-1, number - 1 - LOOK_BACK), -1):
-            soon = earlier == number - 1 or stamps[first] - stamps[ends[earlier] - 1] <= EXCURSION_S * 1e9
-            if score[earlier] > most and soon and _resumes(ends[earlier] - 1, first, stamps, poses, limits):
-                most, link = score[earlier], (earlier, False)
-        score.append(most + end - first)
+            most, link, jump = score[best] - cost, best, True
+        for back in range(1, min(LOOK_BACK, number) + 1):
+            if score[number - back] > most and resumes[back - 1][number - back]:
+                most, link, jump = score[number - back], number - back, False
+        score.append(most + length)
         before.append(link)
+        jumped.append(jump)
         best = number if score[number] > score[best] else best
     if score[best] < MIN_STRETCH:
         return nothing, nothing
@@ -93,9 +94,8 @@ def _kept(stamps: Stamps, poses: Array, torn: Mask, limits: MotionLimits) -> tup
     begun: list[int] = []
     while best >= 0:
         rows.append(np.arange(firsts[best], ends[best]))
-        first = firsts[best]
-        best, jumped = before[best]
-        begun += [first] if jumped else []
+        begun += [int(firsts[best])] if jumped[best] else []
+        best = before[best]
     kept = np.concatenate(rows[::-1])
     return kept, np.searchsorted(kept, np.array(begun[::-1], np.int64))
 
@@ -130,9 +130,11 @@ def possible_between(before: Array, after: Array, seconds: float, limits: Motion
     return abs(math.remainder(heading - heading_then, 2 * math.pi)) <= limits.turn * max(seconds, MIN_INTERVAL_S)
 
 
-def _resumes(last: int, row: int, stamps: Stamps, poses: Array, limits: MotionLimits) -> bool:
-    """Whether a track that was at pose `last` can be at pose `row`: `_possible` of one pair, many times faster."""
-    return possible_between(poses[last], poses[row], float(stamps[row] - stamps[last]) / 1e9, limits)
+def _resumes(firsts: Rows, ends: Rows, back: int, stamps: Stamps, poses: Array, limits: MotionLimits) -> Mask:
+    """Whether a track can be at the first pose of a stretch, soon after the end of one before: (S - back,)."""
+    last, first = ends[:-back] - 1, firsts[back:]
+    possible = _possible(stamps[last], poses[last], stamps[first], poses[first], limits)
+    return possible if back == 1 else possible & (stamps[first] - stamps[last] <= EXCURSION_S * 1e9)
 
 
 def _possible(before: Stamps, start: Array, after: Stamps, end: Array, limits: MotionLimits) -> npt.NDArray[np.bool_]:

@@ -15,6 +15,8 @@ from .tables import NO_TIME, Angle, CsvTable
 
 Array = npt.NDArray[np.float64]
 Stamps = npt.NDArray[np.int64]
+MAX_FITTED = 1000
+"""Positions that the direction at a point is fitted to: of eight seconds at 125 Hz."""
 
 
 def frame_poses(
@@ -87,15 +89,16 @@ def track_directions(along: Array, positions: Array, window: float, lag: float =
 
     `along` (N,): time or way at each of the `positions` (N, 2), never falling. At each point a straight line
     p(s) = p0 + v (s - s0), s0 = `along` - `lag`, is fitted to the positions within four windows with weights
-    exp(-((s - s0) / window)^2 / 2); the direction is v's. Where nothing moves within the window, it
-    is the last one known.
+    exp(-((s - s0) / window)^2 / 2), at even steps where there are more than `MAX_FITTED`; the direction is v's. Where
+    nothing moves within the window, it is the last one known.
     """
     directions = np.full(len(along), np.nan)
     centres = np.clip(along - lag, along[0], along[-1])
     low = np.searchsorted(along, centres - 4 * window, side="left")
     high = np.searchsorted(along, centres + 4 * window, side="right")
     for point, centre in enumerate(centres):
-        near = slice(min(low[point], len(along) - 2), max(high[point], 2))
+        begin, end = min(low[point], len(along) - 2), max(high[point], 2)
+        near = slice(begin, end, 1 + (end - begin - 1) // MAX_FITTED)
         s = along[near] - centre
         weights = np.exp(-0.5 * (s / window) ** 2) + 1e-12
         s = s - (weights @ s) / weights.sum()

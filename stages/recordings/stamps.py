@@ -1,5 +1,6 @@
 """Time stamps of a log: which to keep so that they ascend, and poses at them."""
 
+from array import array
 from bisect import bisect_left
 from collections.abc import Sequence
 
@@ -38,36 +39,32 @@ def ascending(stamps: Sequence[int]) -> tuple[list[int], list[int], list[int]]:
     Of equal stamps the first is kept. Of the rest, the longest ascending sequence is kept: a single stamp that leaps
     ahead costs itself and not everything after it, and a clock that was set back costs the shorter part.
     """
-    first: dict[int, int] = {}
-    repeated = [number for number, stamp in enumerate(stamps) if first.setdefault(stamp, number) != number]
-    left = sorted(first.values())
-    tails: list[int] = []  # stamps that end the best sequences of each length
-    ends: list[int] = []
-    before: dict[int, int] = {}
-    for number in left:
-        length = bisect_left(tails, stamps[number])
-        if length == len(tails):
-            tails.append(stamps[number])
-            ends.append(number)
-        else:
-            tails[length], ends[length] = stamps[number], number
-        if length:
-            before[number] = ends[length - 1]
-    kept: list[int] = []
-    at = ends[-1] if ends else None
-    while at is not None:
-        kept.append(at)
-        at = before.get(at)
-    kept.reverse()
-    return kept, repeated, sorted(set(left) - set(kept))
+    times = np.array(stamps, np.int64)
+    kept = ascending_rows(times)
+    lost = np.setdiff1d(np.arange(len(times)), kept)
+    repeats = np.isin(lost, np.unique(times, return_index=True)[1], invert=True)
+    return kept.tolist(), lost[repeats].tolist(), lost[~repeats].tolist()
 
 
 def ascending_rows(stamps: Stamps) -> Stamps:
-    """The records that `ascending` keeps of many stamps (N,): (K,), in a fraction of its memory."""
+    """The records that `ascending` keeps of stamps (N,): (K,)."""
     firsts = np.sort(np.unique(stamps, return_index=True)[1])
     if (np.diff(stamps[firsts]) > 0).all():
         return firsts
-    return firsts[ascending(stamps[firsts].tolist())[0]]
+    tails, ends, before = array("q"), array("q"), array("q")  # stamps that end the best sequences of each length
+    for number, stamp in enumerate(stamps[firsts].data):  # as Python's own numbers
+        length = bisect_left(tails, stamp)
+        if length == len(tails):
+            tails.append(stamp)
+            ends.append(number)
+        else:
+            tails[length], ends[length] = stamp, number
+        before.append(ends[length - 1] if length else -1)
+    kept, at = array("q"), ends[-1]
+    while at >= 0:
+        kept.append(at)
+        at = before[at]
+    return firsts[np.array(kept[::-1], np.int64)]
 
 
 def within(stamps: Stamps, times: Stamps) -> npt.NDArray[np.bool_]:

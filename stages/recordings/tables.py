@@ -4,12 +4,13 @@ import csv
 import io
 import re
 from array import array
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
+from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +30,11 @@ _TIMES = {
 _ANGLES = {"rad": Decimal(1), "deg": PI / 180}
 _FAMILIES = (_LENGTHS, _TIMES, _ANGLES)
 MAX_TABLE_BYTES = 64_000_000
-"""Of a table: a million rows and more."""
+"""Largest accepted table, bytes."""
+MAX_LINES = 1_000_000
+"""Lines of a table: poses of three hours at 100 Hz. They take some 200 MB."""
+MAX_ROW = 100_000
+"""Characters of a row."""
 MAX_CELL = 100
 """Characters of a number in a cell, with its unit; what is longer is no number."""
 MAX_EXPONENT = 40
@@ -37,16 +42,17 @@ MAX_EXPONENT = 40
 _MAX_MAGNITUDE = {"m": Decimal(10**9), "ns": Decimal(2**62), "rad": Decimal(10**6)}
 """Of a family, by its base unit: a million kilometres, the year 2116 as ROS counts, many turns."""
 _PLAIN = {
-    **{unit: (rf"^-?\d{{1,{9 + power}}}(\.\d{{0,12}})?$", -power) for unit, power in (("m", 0), ("cm", 2), ("mm", 3))},
+    **{unit: (rf"^-?\d{{1,{9 + power}}}(\.\d{{0,12}})?$", -power) for unit, power in (("cm", 2), ("mm", 3))},
+    **dict.fromkeys(("m", "rad"), (r"^-?\d{1,9}(\.\d{0,18})?([eE][-+]?0?\d)?$", 0)),
     **{
         unit: (rf"^-?([1-3]?\d{{1,{18 - power}}})(\.\d{{0,{power}}})?$", power)
         for unit, power in (("ns", 0), ("us", 3), ("ms", 6), ("s", 9))
     },
-    "rad": (r"^-?\d{1,6}(\.\d{0,12})?$", 0),
 }
-"""By unit: numbers that are within all bounds by their digits, and the power of ten that brings the base unit."""
-_BLOCK = 100_000
-"""Cells that are kept as Python's texts, before they are packed."""
+"""By unit: numbers that few bounds can refuse by their digits, and the power of ten that brings the base unit."""
+_BLOCK = 1_000_000
+"""Characters and cells that are kept as Python's texts, before they are packed."""
+_TOO_LONG = f"a row of more than {MAX_ROW:,} characters; is this a table?"
 NO_TIME = np.iinfo(np.int64).min
 """Nanoseconds that stand for no time at all."""
 Delimiter = Literal[",", ";", "\t", " ", "|", ":"]
@@ -87,16 +93,21 @@ class Angle:
     unit: Literal["rad", "deg"]
 
 
+class Block(NamedTuple):
+    """Some rows in a row: their `cells` one after the other (a `pyarrow.StringArray`), and at which of them each row
+    begins, with their number: `starts` (rows + 1,)."""
+
+    cells: Any
+    starts: npt.NDArray[np.int32]
+
+
 @dataclass(frozen=True)
 class CsvTable:
-    """A CSV file as texts, row after row: `names` of its columns (their numbers where there is no header)."""
+    """A CSV file as texts: `names` of its columns (their numbers where there is no header), rows in `blocks`."""
 
     path: Path
     names: tuple[str, ...]
-    cells: Any
-    """Cells of all rows, one after the other, without the spaces around them: a `pyarrow.StringArray`."""
-    starts: npt.NDArray[np.int32]
-    """Number of the cell at which each row begins, and how many there are: (rows + 1,)."""
+    blocks: Sequence[Block]
     lines: npt.NDArray[np.int32]
     """The line of the file on which each row ends, from 1: (rows,)."""
 
@@ -113,13 +124,9 @@ class CsvTable:
             raise UnreadableRecording(f"{self.path}: no column '{column:.60}'; {hint}columns: {known:.300}")
         return self.names.index(column)
 
-    def texts(self, column: str | int) -> Any:
-        """The cells of a column as a `pyarrow.StringArray`, '' where a row is too short."""
-        import pyarrow as pa
-
-        cells = self.starts[:-1] + np.int32(self.index(column))
-        inside = cells < self.starts[1:]
-        return self.cells.take(pa.array(cells, mask=None if inside.all() else ~inside)).fill_null("")
+    def texts(self, column: str | int) -> list[str]:
+        """The cells of a column without the spaces around them, '' where a row is too short."""
+        return [text for part in self._parts(column) for text in part.to_pylist()]
 
     def numbers(self, column: Length | Angle) -> Array:
         """A column in metres or radians: (rows,), NaN where a cell holds no number."""
@@ -129,6 +136,16 @@ class CsvTable:
         """A column of times in whole nanoseconds: (rows,), `NO_TIME` where a cell holds no number."""
         return self._column(column, np.int64, lambda value: int(value.to_integral_value()), NO_TIME)
 
+    def _parts(self, column: str | int) -> Iterator[Any]:
+        """The cells of a column, block after block, each a `pyarrow.StringArray`."""
+        import pyarrow as pa
+
+        number = np.int32(self.index(column))
+        for block in self.blocks:
+            cells = block.starts[:-1] + number
+            inside = cells < block.starts[1:]
+            yield block.cells.take(pa.array(cells, mask=None if inside.all() else ~inside)).fill_null("")
+
     def _column(
         self, column: Length | Time | Angle, kind: type, finish: Callable[[Decimal], float], missing: float
     ) -> npt.NDArray[Any]:
@@ -136,69 +153,87 @@ class CsvTable:
         import pyarrow as pa
         import pyarrow.compute as pc
 
-        texts = self.texts(column.column)
-        found: npt.NDArray[Any] = np.full(len(texts), missing, kind)
-        left = pc.match_substring_regex(texts, r"[0-9]|[^\x00-\x7f]").to_numpy(zero_copy_only=False)
-        if column.unit in _PLAIN:
-            plain, values = _plain_numbers(texts, column.unit)
-            found[plain] = values
-            left = left & ~plain
-        rows = np.flatnonzero(left)
-        for row, text in zip(rows, _one_by_one(texts.filter(pa.array(left))), strict=True):
-            try:
-                value = _in_base_unit(text, column.unit)
-            except UnreadableRecording as error:
-                where = f"{self.path}, line {self.lines[row]}: column '{column.column}'"
-                raise UnreadableRecording(f"{where}: {error}") from None
-            if value is not None:
-                found[row] = finish(value)
-        return found
+        whole: npt.NDArray[Any] = np.full(len(self.lines), missing, kind)
+        first = 0
+        for texts in self._parts(column.column):
+            found = whole[first : first + len(texts)]
+            left = pc.match_substring_regex(texts, r"[0-9]|[^\x00-\x7f]").to_numpy(zero_copy_only=False)
+            if column.unit in _PLAIN:
+                plain, values = _plain_numbers(texts, column.unit)
+                found[plain] = values
+                left = left & ~plain
+            for row, text in zip(np.flatnonzero(left), texts.filter(pa.array(left)).to_pylist(), strict=True):
+                try:
+                    value = _in_base_unit(text, column.unit)
+                except UnreadableRecording as error:
+                    where = f"{self.path}, line {self.lines[first + row]}: column '{column.column}'"
+                    raise UnreadableRecording(f"{where}: {error}") from None
+                if value is not None:
+                    found[row] = finish(value)
+            first += len(texts)
+        return whole
 
 
 def read_table(path: Path, header: bool = True, delimiter: Delimiter = ",") -> CsvTable:
     """A CSV file; empty lines are skipped. Raises `BadInput`."""
-    reader = csv.reader(text_lines(path, newline=""), delimiter=delimiter, skipinitialspace=True)
-    rows = ((reader.line_num, row) for row in reader)
-    try:
-        first = next(((line, row) for line, row in rows if any(map(str.strip, row))), None)
-        if first is None:
-            raise UnreadableRecording(f"{path}: an empty table")
-        if header:
-            return table_of(path, tuple(cell.strip() for cell in first[1]), rows)
-        return table_of(path, tuple(map(str, range(len(first[1])))), chain([first], rows))
-    except csv.Error as error:
-        raise UnreadableRecording(f"{path}, line {reader.line_num}: not readable as CSV ({error})") from None
+    rows = _csv_rows(path, delimiter)
+    first = next(((line, row) for line, row in rows if any(map(str.strip, row))), None)
+    if first is None:
+        raise UnreadableRecording(f"{path}: an empty table")
+    if header:
+        return table_of(path, tuple(cell.strip() for cell in first[1]), rows)
+    return table_of(path, tuple(map(str, range(len(first[1])))), chain([first], rows))
 
 
 def table_of(path: Path, names: tuple[str, ...], rows: Iterable[tuple[int, list[str]]]) -> CsvTable:
     """A table of rows with their lines; rows without content, and cells beyond the last name, are left out."""
     import pyarrow as pa
 
-    lines, ends, blocks = array("i"), array("i", [0]), []
+    lines, starts, blocks = array("i"), array("i", [0]), []
     block: list[str] = []
-    done = 0
+    size = 0
     for line, row in rows:
-        cells = [cell.strip() for cell in row]
-        if any(cells):
-            block += cells[: len(names)]
+        cells = [cell.strip() for cell in row[: len(names)]]
+        if any(cells) or any(map(str.strip, row[len(names) :])):
+            block += cells
+            size += sum(map(len, cells))
             lines.append(line)
-            ends.append(done + len(block))
-            if len(block) > _BLOCK:
-                blocks.append(pa.array(block, pa.string()))
-                done, block = done + len(block), []
-    cells = pa.concat_arrays([*blocks, pa.array(block, pa.string())])
-    return CsvTable(path, names, cells, np.array(ends, np.int32), np.array(lines, np.int32))
+            starts.append(len(block))
+            if len(block) + size > _BLOCK:
+                blocks.append(Block(pa.array(block, pa.string()), np.array(starts, np.int32)))
+                block, size, starts = [], 0, array("i", [0])
+    blocks.append(Block(pa.array(block, pa.string()), np.array(starts, np.int32)))
+    return CsvTable(path, names, blocks, np.array(lines, np.int32))
 
 
 def text_lines(path: Path, newline: str | None = None) -> Iterator[str]:
-    """The lines of a table's file, one by one. Raises `BadInput` where it is none or too long."""
-    content = io.BytesIO(read_small(path, MAX_TABLE_BYTES))
-    return io.TextIOWrapper(content, "utf-8-sig", errors="replace", newline=newline)
+    """The lines of a table's file, one by one. Raises `BadInput` where it is none, or too long, in all or in a line."""
+    content = read_small(path, MAX_TABLE_BYTES)
+    if max(content.count(b"\n"), content.count(b"\r")) > MAX_LINES:
+        raise UnreadableRecording(f"{path}: more than {MAX_LINES:,} lines; cut it, or leave out every second one")
+    file = io.TextIOWrapper(io.BytesIO(content), "utf-8-sig", errors="replace", newline=newline)
+    for number, line in enumerate(iter(partial(file.readline, MAX_ROW + 1), ""), 1):
+        if len(line) > MAX_ROW:
+            raise UnreadableRecording(f"{path}, line {number}: {_TOO_LONG}")
+        yield line
 
 
-def _one_by_one(texts: Any) -> Iterator[str]:
-    for start in range(0, len(texts), _BLOCK):
-        yield from texts.slice(start, _BLOCK).to_pylist()
+def _csv_rows(path: Path, delimiter: Delimiter) -> Iterator[tuple[int, list[str]]]:
+    """The rows of a CSV file, and the line on which each ends; a row may be of several lines, if not of many."""
+    read = 0
+
+    def lines() -> Iterator[str]:
+        nonlocal read
+        for line in text_lines(path, newline=""):
+            read += len(line)
+            if read > MAX_ROW:
+                raise UnreadableRecording(f"{path}, line {reader.line_num + 1}: {_TOO_LONG}")
+            yield line
+
+    reader = csv.reader(lines(), delimiter=delimiter, skipinitialspace=True)
+    for row in reader:
+        read = 0
+        yield reader.line_num, row
 
 
 def _plain_numbers(texts: Any, unit: str) -> tuple[npt.NDArray[np.bool_], npt.NDArray[Any]]:
@@ -207,15 +242,18 @@ def _plain_numbers(texts: Any, unit: str) -> tuple[npt.NDArray[np.bool_], npt.ND
     import pyarrow.compute as pc
 
     pattern, power = _PLAIN[unit]
-    chosen = pc.match_substring_regex(texts, pattern)
-    cells = texts.filter(chosen)
+    matching = pc.match_substring_regex(texts, pattern)
+    cells, chosen = texts.filter(matching), matching.to_numpy(zero_copy_only=False).copy()
     if unit in _TIMES:
         whole = pc.replace_substring_regex(cells, r"\..*", "")
         fraction = pc.replace_substring_regex(cells, r"^[^.]*\.?", "")
         values = pc.binary_join_element_wise(whole, pc.utf8_rpad(fraction, power, "0"), "").cast(pa.int64())
-    else:
-        values = pc.binary_join_element_wise(cells, f"e{power}", "").cast(pa.float64())
-    return chosen.to_numpy(zero_copy_only=False), values.to_numpy(zero_copy_only=False)
+        return chosen, values.to_numpy(zero_copy_only=False)
+    joined = pc.binary_join_element_wise(cells, f"e{power}", "") if power else cells
+    values = joined.cast(pa.float64()).to_numpy(zero_copy_only=False)
+    within = np.abs(values) < float(_MAX_MAGNITUDE["rad" if unit == "rad" else "m"])
+    chosen[chosen] = within
+    return chosen, values[within]
 
 
 def _in_base_unit(text: str, unit: str) -> Decimal | None:

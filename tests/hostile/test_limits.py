@@ -2,9 +2,13 @@
 
 import bz2
 import sqlite3
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from conftest import DATA, needs_data
 
@@ -13,7 +17,10 @@ from omninav.pipeline import BadInput
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.recordings.opening import open_recording
+from omninav.stages.recordings.plausibility import MotionLimits, believed
+from omninav.stages.recordings.positions import track_directions
 from omninav.stages.recordings.rosbag import _Limits, _Sqlite
+from omninav.stages.recordings.stamps import ascending_rows
 from omninav.stages.recordings.truth_file import read_trajectory
 
 NEW = DATA / "hostile" / "new"
@@ -161,18 +168,97 @@ def test_the_example_of_empty_messages_is_read_to_its_limit():
     assert "these are more messages than a log of" in reader.details["bad_chunk"]
 
 
-@pytest.mark.parametrize("kind", ["poses", "words", "commas"])
-def test_a_large_table_is_read_by_columns(tmp_path: Path, kind: str):
-    rows = {
-        "poses": [f"{1_700_000_000 + n / 100:.2f},{n % 1000 / 100:.6f},{n // 1000:.6f},0.5" for n in range(250_000)],
-        "words": ["a,b,c"] * 1_600_000,
-        "commas": [4000 * ","] * 2500,
-    }[kind]
+TABLES: dict[str, tuple[Callable[[], str], str]] = {
+    "short rows": (lambda: "1\n" * 400_000, "fewer than two rows with a time and a pose"),
+    "words": (lambda: "a,b,c\n" * 400_000, "fewer than two rows with a time and a pose"),
+    "commas": (lambda: (4000 * "," + "\n") * 2500, "fewer than two rows with a time and a pose"),
+    "too many rows": (lambda: "1\n" * 10_000_000, "more than 1,000,000 lines"),
+    "too many rows of an old Mac": (lambda: "1\r" * 10_000_000, "more than 1,000,000 lines"),
+    "a row of commas": (lambda: "," * 60_000_000, "line 2: a row of more than 100,000 characters"),
+    "a row of lines": (lambda: '"\n",' * 900_000, "line [0-9]+: a row of more than 100,000 characters"),
+    "a column for each byte": (lambda: "t,x,y" * 12_000_000, "line 1: a row of more than 100,000 characters"),
+}
+
+
+@pytest.mark.parametrize("kind", TABLES)
+def test_a_table_of_no_use_takes_memory_in_proportion(tmp_path: Path, kind: str):
+    make, said = TABLES[kind]
+    (tmp_path / "truth.csv").write_text(("" if "column" in kind else "t,x,y,yaw\n") + make())
+    with within(4.0, 150_000_000), pytest.raises(BadInput, match=said):
+        read_trajectory(tmp_path / "truth.csv")
+
+
+def test_a_tum_file_of_one_line_takes_memory_in_proportion(tmp_path: Path):
+    (tmp_path / "truth.tum").write_text("1 1 1 0 0 0 0 1\n" + "10 " * 20_000_000)
+    with within(1.0, 100_000_000), pytest.raises(BadInput, match="line 2: a row of more than 100,000 characters"):
+        read_trajectory(tmp_path / "truth.tum")
+
+
+def test_a_large_table_is_read_by_columns(tmp_path: Path):
+    rows = (f"{1_700_000_000 + n / 100:.2f},{n % 1000 / 100:.6f},{n // 1000:.6f},0.5" for n in range(250_000))
     (tmp_path / "truth.csv").write_text("t,x,y,yaw\n" + "\n".join(rows))
-    del rows
-    with within(4.0, 250_000_000):
-        if kind == "poses":
-            assert len(read_trajectory(tmp_path / "truth.csv").stamps) == 250_000
-        else:
-            with pytest.raises(BadInput, match="fewer than two rows with a time and a pose"):
-                read_trajectory(tmp_path / "truth.csv")
+    with within(3.0, 120_000_000):
+        assert len(read_trajectory(tmp_path / "truth.csv").stamps) == 250_000
+
+
+def test_a_large_trajectory_as_numpy_writes_it_is_read_by_columns(tmp_path: Path):
+    rows = np.tile([0, 1, 2, 0, 0, 0, 0, 1.0], (60_000, 1))
+    rows[:, 0] = np.arange(60_000) / 100
+    np.savetxt(tmp_path / "truth.tum", rows)
+    with within(1.0, 60_000_000):  # as numbers one by one it takes 3 s
+        assert len(read_trajectory(tmp_path / "truth.tum").stamps) == 60_000
+
+
+def test_a_track_that_leaps_at_every_pose_is_judged_in_proportion():
+    chance, number = np.random.default_rng(0), 60_000
+    poses = chance.uniform(0, 1000, (number, 3))
+    with within(1.0):
+        kept = believed(np.arange(number) * 10**8, poses, MotionLimits())
+    assert len(kept.rows) < number / 10
+
+
+def test_stamps_in_disorder_are_put_in_order_in_proportion():
+    stamps = np.random.default_rng(0).permutation(1_000_000)
+    with within(3.0, 80_000_000):
+        kept = ascending_rows(stamps)
+    assert (np.diff(stamps[kept]) > 0).all()
+
+
+def test_positions_that_lie_close_together_have_directions_in_proportion():
+    number = 25_000
+    along = np.arange(number) * 1e-6
+    with within(3.0):
+        directions = track_directions(along, np.column_stack([along, along]), window=1.0)
+    np.testing.assert_allclose(directions, np.pi / 4)
+
+
+UNDER_A_LIMIT = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_AS, (4_000_000_000, 4_000_000_000))
+from pathlib import Path
+import numpy as np
+from omninav.pipeline.tables import read_table, write_table
+from omninav.stages.recordings.truth_file import read_trajectory
+print(len(read_trajectory(Path("truth.csv")).stamps))
+write_table(Path("frames"), {"x": np.ma.masked_invalid([1.0, np.nan])})
+print(len(read_table(Path("frames.parquet"))))
+"""
+
+
+def test_tables_are_read_and_written_under_a_limit_of_addresses(tmp_path: Path):
+    (tmp_path / "truth.csv").write_text("t,x,y,yaw\n0,0,0,0\n1,1,0,0\n")
+    done = subprocess.run(
+        [sys.executable, "-c", UNDER_A_LIMIT], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "2\n2\n", "")
+
+
+def test_a_command_without_memory_ends_in_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+    def command(arguments: list[str]) -> int:
+        raise MemoryError
+
+    monkeypatch.setattr("omninav.pipeline.cli.commands.stages.command", command)
+    assert main(["stages"]) == 2
+    assert capsys.readouterr().err == (
+        "there is no memory left; close other programs, or raise the limit (`ulimit -v`)\n"
+    )

@@ -1,7 +1,9 @@
 """Folders of images with CSVs, by configuration alone."""
 
 import math
+import random
 import textwrap
+from decimal import Decimal
 from pathlib import Path
 
 import cv2
@@ -170,7 +172,7 @@ def test_a_hostile_description_is_one_line_that_names_the_place(tmp_path: Path, 
         ),
         ("track.csv", "9e30;1;1;1", r"track\.csv, line 2: column '0': '9e30' is out of all proportion"),
         ("track.csv", "1;" + "9" * 70 + ";1;1", r"track\.csv, line 2: column '1': .* is out of all proportion"),
-        ("track.csv", '1;"' + "x" * 200_000 + '";1;1', r"track\.csv, line 2: not readable as CSV"),
+        ("track.csv", '1;"' + "x" * 200_000 + '";1;1', r"track\.csv, line 2: a row of more than 100,000"),
         (
             "frames.csv",
             "x" * 300 + ", 100",
@@ -202,6 +204,22 @@ def test_a_wrong_layout_is_refused_with_the_nearest_name(tmp_path: Path) -> None
         open_recording(f"antwrld:{tmp_path}")
     with pytest.raises(UnreadableRecording, match="type log=LAYOUT"):
         open_recording(str(tmp_path))
+
+
+def test_a_number_read_with_its_column_is_the_one_that_is_read_alone(tmp_path: Path) -> None:
+    chance = random.Random(0)
+    numbers = ["0", "-0.0", "1e5", "9.99999999e8", "-1.5e+8", "1E-09", "0e9", "123456789.123456789123456789"]
+    numbers += [f"{chance.uniform(-9, 9):.18e}" for _ in range(500)] + [repr(chance.gauss(0, 1e5)) for _ in range(500)]
+    path = tmp_path / "table.csv"
+    path.write_text("plain,alone\n" + "".join(f"{number},{number} m\n" for number in numbers))
+    table = read_table(path)
+    expected = [float(Decimal(number)) for number in numbers]
+    np.testing.assert_array_equal(table.numbers(Length("plain", "m")), expected)
+    np.testing.assert_array_equal(table.numbers(Length("alone", "m")), expected)
+    for number in ("1e9", "1000000000", "-999999999.9e1", "1e-41"):
+        path.write_text(f"a\n{number}1\n")
+        with pytest.raises(UnreadableRecording, match=r"line 2: column 'a': '.*' is out of all proportion"):
+            read_table(path).numbers(Length("a", "m"))
 
 
 def test_units_in_cells_go_before_the_columns_unit(tmp_path: Path) -> None:
