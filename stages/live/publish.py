@@ -177,14 +177,12 @@ class PublishBelief(Stage):
 
 
 class PublishMessages(Stage):
-    """Publishes what else a run shows of each tick, as its `result.mcap` has it: the path, the map, the route."""
+    """Publishes what else a run shows of each tick, latched: the path, the map, the route (`nodes.messages.topics`)."""
 
     transport: TransportName = "dds"
     """As the source's."""
     domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
     """As the source's."""
-    topics: tuple[str, ...] = ("/estimate/path", "/estimate/confidence", "/map", "/grid", "/plan", "/homing")
-    """Topics of `result.mcap` that are published, under their names there, latched."""
     grid: str = "/grid"
     """What `/grid` is published as: nav2 reads its map on `/map`."""
 
@@ -199,8 +197,7 @@ class PublishMessages(Stage):
         """One tick."""
         if self._transport.status.live:
             for topic, msgtype, data in zip(messages.topics, messages.types, messages.data, strict=True):
-                if topic in self.topics:
-                    send(self._transport, self.grid if topic == "/grid" else topic, msgtype, data, latched=True)
+                send(self._transport, self.grid if topic == "/grid" else topic, msgtype, data, latched=True)
         return self.Out()
 
 

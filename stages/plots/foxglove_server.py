@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
 from omninav.pipeline.mcap.message_types import standard_types
-from omninav.stages.values.ros_messages import RosMessages
+
+from .show_tick import ShownTick
+from .tick_messages import PathSoFar, TopicMessages, tick_messages
 
 if TYPE_CHECKING:
     import foxglove
@@ -15,11 +17,12 @@ PORT = 8765
 
 
 class FoxgloveServer(Stage):
-    """Sends every tick's messages to Foxglove: open connection, ws://localhost:8765.
+    """Sends the messages of each tick to Foxglove: open connection, ws://localhost:8765.
 
-    The topics are those of `result.mcap` (see `ResultMessages`), and `foxglove_layout.json` of any run shows them. Who
-    connects late gets the last message of each topic. Nothing that a run writes depends on it. A later run of the same
-    process goes on with the same server. Raises `BadInput` where foxglove-sdk is missing or the port is taken.
+    The topics are those of `result.mcap` (see `tick_messages`), and `foxglove_layout.json` of any run shows them. Who
+    connects late gets the last message of each topic; of topics that nobody watches no message is made. Nothing that a
+    run writes depends on it. A later run of the same process goes on with the same server. Raises `BadInput` where
+    foxglove-sdk is missing or the port is taken.
     """
 
     port: bool | Annotated[int, Bounds(ge=1, le=65535)] = False
@@ -36,32 +39,33 @@ class FoxgloveServer(Stage):
             self._server = _server(self.host, PORT if self.port is True else int(self.port))
             self._server.clear()
 
-    def step(self, ctx: Context, messages: RosMessages) -> Out:
+    def step(self, ctx: Context, before: PathSoFar, shown: ShownTick) -> Out:
         """One tick."""
         if self.port is not False:
-            self._server.send(messages)
+            self._server.send(shown.tick.stamp, tick_messages([shown], before))
         return self.Out()
 
 
 @dataclass
 class _Server:
-    """A running server, its channels and the last message on each."""
+    """A running server, its channels, and the stamp of the last message on each with what makes it."""
 
     context: Any
     channels: "dict[str, foxglove.Channel]" = field(default_factory=dict)
-    last: dict[int, tuple["foxglove.Channel", int, bytes]] = field(default_factory=dict)
+    last: dict[int, tuple["foxglove.Channel", int, TopicMessages]] = field(default_factory=dict)
     server: Any = None
 
     def clear(self) -> None:
         self.last.clear()
         self.server.clear_session()
 
-    def send(self, messages: RosMessages) -> None:
-        for topic, msgtype, data in zip(messages.topics, messages.types, messages.data, strict=True):
-            channel = self.channels.get(topic) or self._open(topic, msgtype)
-            self.last[channel.id()] = channel, messages.stamp, data
-            channel.log(data, log_time=messages.stamp)
-        self.server.broadcast_time(messages.stamp)
+    def send(self, stamp: int, messages: list[TopicMessages]) -> None:
+        for each in messages:
+            channel = self.channels.get(each.topic) or self._open(each.topic, each.msgtype)
+            self.last[channel.id()] = channel, stamp, each
+            if channel.has_sinks():
+                channel.log(each.encode()[0], log_time=stamp)
+        self.server.broadcast_time(stamp)
 
     def _open(self, topic: str, msgtype: str) -> "foxglove.Channel":
         import foxglove
@@ -78,8 +82,8 @@ class _Server:
     def on_subscribe(self, client: Any, channel: Any) -> None:
         """Called by the server where a client begins to watch a topic."""
         if channel.id in self.last:
-            known, stamp, data = self.last[channel.id]
-            known.log(data, log_time=stamp)
+            known, stamp, messages = self.last[channel.id]
+            known.log(messages.encode()[0], log_time=stamp)
 
 
 _servers: dict[tuple[str, int], _Server] = {}

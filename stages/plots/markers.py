@@ -57,12 +57,17 @@ def gaussian_markers(
     stamp: int, namespace: str, colour: Colour, means: Array, covariances: Array, weights: Array
 ) -> Fields:
     """Gaussians (K, …) as a list of lines: the two axes of each, one standard deviation to either side."""
-    spread, axes = np.linalg.eigh(covariances[:, :2, :2])
-    arms = np.swapaxes(axes * np.sqrt(np.maximum(spread, 0.0))[:, None, :], 1, 2)  # (K, axis, xy)
-    ends = means[:, None, None, :2] + np.stack([-arms, arms], axis=2)
-    lines = marker(stamp, namespace, LINES, 0.02, colour, points(ends.reshape(-1, 2)))
+    lines = marker(stamp, namespace, LINES, 0.02, colour, points(axis_ends(means, covariances)))
     lines["colors"] = _colours(colour, np.repeat(weights, 4))
     return lines
+
+
+def axis_ends(means: Array, covariances: Array) -> Array:
+    """Ends of the two axes of each Gaussian's ellipse (K, …), one standard deviation to either side: (4 K, 2)."""
+    spread, axes = np.linalg.eigh(covariances[:, :2, :2])
+    arms = np.swapaxes(axes * np.sqrt(np.maximum(spread, 0.0))[:, None, :], 1, 2)  # (K, axis, xy)
+    ends: Array = means[:, None, None, :2] + np.stack([-arms, arms], axis=2)
+    return ends.reshape(-1, 2)
 
 
 def weighted_points(stamp: int, namespace: str, colour: Colour, size: float, places: Array, weights: Array) -> Fields:
@@ -72,13 +77,17 @@ def weighted_points(stamp: int, namespace: str, colour: Colour, size: float, pla
     return shown
 
 
-def homing_arrow(stamp: int, vector: HomingVector) -> Fields:
-    """Where a homing vector points, from the robot: as long as it is far where that is known, and at most 2 m."""
-    length = 1.0 if vector.metres is None else float(np.clip(vector.metres, 0.1, 2.0))
+def homing_arrow(stamp: int, direction: float, length: float) -> Fields:
+    """Where a homing vector points (rad), from the robot, so long (m)."""
     arrow = marker(stamp, "homing", ARROW, 0.08, GREEN, [], BASE)
-    arrow["pose"] = {"orientation": quaternion(vector.direction)}
+    arrow["pose"] = {"orientation": quaternion(direction)}
     arrow["scale"]["x"] = length
     return arrow
+
+
+def arrow_length(vector: HomingVector) -> float:
+    """Length of a homing vector's arrow (m): as long as it is far where that is known, and at most 2 m."""
+    return 1.0 if vector.metres is None else float(np.clip(vector.metres, 0.1, 2.0))
 
 
 def points(places: Array) -> list[Any]:
@@ -110,4 +119,9 @@ def _text(stamp: int, number: int, text: str, place: Array) -> Fields:
 
 def _colours(colour: Colour, weights: Array) -> list[Any]:
     rgba = standard_types().types["std_msgs/msg/ColorRGBA"]
-    return [rgba(*colour, weight) for weight in np.clip(weights, 0.1, 1.0).tolist()]
+    return [rgba(*colour, weight) for weight in opacity(weights).tolist()]
+
+
+def opacity(weights: Array) -> Array:
+    """How opaque what has these weights is drawn: never so little that it cannot be seen."""
+    return np.clip(weights, 0.1, 1.0)

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from importlib.resources import files
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,21 +9,23 @@ import numpy.typing as npt
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.mcap.writer import LogWriter
-from omninav.stages.recordings.pose_messages import path_message
+from omninav.stages.recordings.pose_messages import path_bytes
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.map_places import AnyMap
-from omninav.stages.values.ros_messages import RosMessages
 
 from .markers import map_markers
-from .result_messages import VIEWS
+from .show_tick import ShownTick
+from .tick_messages import PathSoFar, by_tick, tick_messages
 
 LAYOUT = "foxglove_layout.json"
+BLOCK = 128
+"""Ticks whose messages are made together."""
 PATH_POSES = 10_000
 """Most poses in a path; of a longer one every second is kept, every third, …"""
 
 
 class ResultLog(Stage):
-    """Writes `result.mcap`: the messages of every tick (see `ResultMessages`), and what is known at the end.
+    """Writes `result.mcap`: the messages of every tick (see `tick_messages`), and what is known at the end.
 
     That is, in the map frame, per log: `/estimate/path`, its estimates (at most 10,000), and `/odometry/path`, where
     odometry alone would have led from the first true pose (without any, through the last estimate); and `/map` as it
@@ -35,19 +36,25 @@ class ResultLog(Stage):
     class Out(Outputs):
         """Nothing: the files are the result."""
 
-    def step(self, ctx: Context, drive: Drive, messages: Sequence[RosMessages], map: AnyMap | None = None) -> Out:
+    def step(self, ctx: Context, drive: Drive, shown: Sequence[ShownTick], map: AnyMap | None = None) -> Out:
         """The whole run at once."""
         if ctx.folder is None:
             return self.Out()
         with LogWriter(ctx.folder / "result.mcap") as log:
             ended = {int(part.row[-1]): part for part in drive.by_log}
-            every = messages[-1].views_every if messages else 1  # the last knows how long the run was
-            for row, tick in enumerate(messages):
-                shown = tick.without(VIEWS) if row % every else tick
-                for topic, msgtype, data in zip(shown.topics, shown.types, shown.data, strict=True):
-                    log.append(topic, msgtype, tick.stamp, data)
-                if row in ended:
-                    _write_paths(log, ended[row])
+            every = shown[-1].views_every if shown else 1  # the last knows how long the run was
+            before = PathSoFar()
+            for start in range(0, len(shown), BLOCK):
+                ticks = [
+                    tick.without_views() if row % every else tick
+                    for row, tick in enumerate(shown[start : start + BLOCK], start)
+                ]
+                made_of = by_tick(tick_messages(ticks, before, every), len(ticks))
+                for row, (tick, made) in enumerate(zip(ticks, made_of, strict=True), start):
+                    for topic, msgtype, data in made:
+                        log.append(topic, msgtype, tick.tick.stamp, data)
+                    if row in ended:
+                        _write_paths(log, ended[row])
             if map is not None and len(map) and len(drive):
                 stamp = int(drive.stamps[-1])
                 log.write("/map", "visualization_msgs/msg/MarkerArray", stamp, map_markers(map, stamp))
@@ -60,12 +67,12 @@ def _write_paths(log: LogWriter, drive: Drive) -> None:
     last, has_estimate = int(drive.stamps[-1]), known(drive.estimate)
     if has_estimate.any():
         path = _path(drive.stamps[has_estimate], drive.estimate[has_estimate], last)
-        log.write("/estimate/path", "nav_msgs/msg/Path", last, path)
+        log.append("/estimate/path", "nav_msgs/msg/Path", last, path)
     alone = drive.odometry_alone()
     if alone is not None:
-        log.write("/odometry/path", "nav_msgs/msg/Path", last, _path(drive.stamps, alone, last))
+        log.append("/odometry/path", "nav_msgs/msg/Path", last, _path(drive.stamps, alone, last))
 
 
-def _path(stamps: npt.NDArray[np.int64], poses: Array, now: int) -> dict[str, Any]:
+def _path(stamps: npt.NDArray[np.int64], poses: Array, now: int) -> bytes:
     every = -(-len(poses) // PATH_POSES)
-    return path_message(stamps[::every].tolist(), poses[::every], now)
+    return path_bytes(stamps[::every], poses[::every], now)

@@ -3,18 +3,21 @@
 Poses are x, y (m), heading (rad) on the floor; headings become quaternions about z.
 """
 
-from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline.mcap.message_types import standard_types
+from omninav.pipeline.mcap.message_rows import MessageRows, row_bytes
+from omninav.pipeline.mcap.message_types import encode_message, standard_types
 
 Array = npt.NDArray[np.float64]
 Fields = dict[str, Any]
 MAP, ODOM, BASE = "map", "odom", "base_link"
 """Frames: the map's, the odometry's, the robot's."""
+_HEAD = 4
+"""Bytes before a message's body."""
 
 
 def header(stamp: int, frame: str = MAP) -> Fields:
@@ -42,23 +45,47 @@ def pose_messages(poses: Array) -> list[Any]:
     return [pose(point(x, y, 0.0), rotation(0.0, 0.0, sin, cos)) for (x, y), sin, cos in rows]
 
 
-def path_message(stamps: Sequence[int], poses: Array, now: int) -> Fields:
-    """A nav_msgs/Path in the map frame: poses (N, 3) at stamps (N,); `now` is its own stamp (ns)."""
-    types = standard_types().types
-    stamped, head, time = (
-        types[name] for name in ("geometry_msgs/msg/PoseStamped", "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
-    )
-    heads = [head(time(*divmod(stamp, 10**9)), MAP) for stamp in stamps]
-    rows = [stamped(at, pose) for at, pose in zip(heads, pose_messages(poses), strict=True)]
-    return {"header": header(now), "poses": rows}
+def path_bytes(stamps: npt.ArrayLike, poses: Array, now: int) -> bytes:
+    """The CDR bytes of a nav_msgs/Path in the map frame: poses (N, 3) at stamps (N,); `now` is its own stamp (ns)."""
+    empty = encode_message("nav_msgs/msg/Path", {"header": header(now)})
+    if not len(poses):
+        return empty
+    rows = _stamped_poses().rows(len(poses))
+    set_stamps(rows["header"], stamps)
+    set_poses(rows["pose"], poses)
+    first, *others = (pose[_HEAD:] for pose in row_bytes(rows))
+    # Doubles lie at multiples of 8: the first pose, 20 bytes behind the head, is the only one with a gap before them.
+    gap = len(first) - 7 * 8
+    return b"".join((empty[:-4], len(poses).to_bytes(4, "little"), first[:gap], bytes(4), first[gap:], *others))
+
+
+@cache
+def _stamped_poses() -> MessageRows:
+    return MessageRows("geometry_msgs/msg/PoseStamped", {"header": header(0)})
+
+
+def set_stamps(headers: npt.NDArray[np.void], stamps: npt.ArrayLike) -> None:
+    """Assign stamps (ns) to the headers of `MessageRows.rows`."""
+    headers["stamp"]["sec"], headers["stamp"]["nanosec"] = np.divmod(np.asarray(stamps, np.int64), 10**9)
+
+
+def set_poses(rows: npt.NDArray[np.void], poses: Array) -> None:
+    """Assign poses (..., 3) to the geometry_msgs/Pose of `MessageRows.rows`."""
+    rows["position"]["x"], rows["position"]["y"] = poses[..., 0], poses[..., 1]
+    set_heading(rows["orientation"], poses[..., 2])
+
+
+def set_heading(rows: npt.NDArray[np.void], heading: Array) -> None:
+    """Assign headings to the geometry_msgs/Quaternion of `MessageRows.rows`."""
+    rows["z"], rows["w"] = np.sin(heading / 2), np.cos(heading / 2)
 
 
 def covariance_6x6(plane: Array) -> Array:
-    """ROS' row-major 6 x 6 covariance (x, y, z, roll, pitch, yaw) of a (3, 3) over (x, y, heading): (36,)."""
-    whole = np.zeros((6, 6))
+    """ROS' row-major 6 x 6 covariance (x, y, z, roll, pitch, yaw) of (..., 3, 3) over (x, y, heading): (..., 36)."""
+    whole = np.zeros((*plane.shape[:-2], 6, 6))
     axes = np.array([0, 1, 5])
-    whole[np.ix_(axes, axes)] = plane
-    return whole.ravel()
+    whole[..., axes[:, None], axes] = plane
+    return whole.reshape(*plane.shape[:-2], 36)
 
 
 def ros_point(x: float, y: float) -> Fields:

@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_places import made_map
-from result_of import messages_of, write_result
+from result_of import shown_of, write_result
 from small_run import mixture_run, small_run
 
 from omninav.pipeline import BadInput, Context
 from omninav.stages.plots.foxglove_server import FoxgloveServer
 from omninav.stages.plots.small_panorama import SmallPanorama
+from omninav.stages.plots.tick_messages import PathSoFar
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.command import Command
 from omninav.stages.values.confidence import PoseConfidence
@@ -100,12 +101,13 @@ def test_foxgloves_client_watches_a_run_and_gets_what_was_sent_before_it_came():
     run, port = small_run(frames=4), free_port()
     server, ctx = FoxgloveServer(port=port), Context("watch")
     server.setup(ctx)
-    first, *others = messages_of(run, plan=PLAN)
-    server.step(ctx, first)
+    first, *others = shown_of(run, plan=PLAN)
+    before = PathSoFar()
+    server.step(ctx, before, first)
     client = node("watch.js", str(port), "/grid,/map,/tf,/estimate/pose,/belief")
     assert json.loads(client.stdout.readline())["server"] == "omninav"
-    for messages in others:
-        server.step(ctx, messages)
+    for shown in others:
+        server.step(ctx, before, shown)
     found = json.loads(client.communicate(timeout=20)[0].splitlines()[-1])
     assert found["/grid"]["stamp"] == str(run.ticks[0].stamp)
     assert found["/grid"]["first"]["data"]["length"] == 120 * 80

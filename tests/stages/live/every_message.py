@@ -16,11 +16,10 @@ from omninav.stages.live.publish import Publish, PublishBelief, PublishMessages
 from omninav.stages.live.transport import connect
 from omninav.stages.plots.grid_message import grid_message
 from omninav.stages.plots.markers import homing_arrow, map_markers
-from omninav.stages.recordings.pose_messages import path_message
+from omninav.stages.recordings.pose_messages import path_bytes
 from omninav.stages.values.belief import Particles, PoseEstimate
 from omninav.stages.values.command import Command
 from omninav.stages.values.grid import OccupancyGrid
-from omninav.stages.values.homing import HomingVector
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.ros_messages import RosMessages
@@ -36,23 +35,23 @@ MAP = ReferenceGraph(
 )
 GRID = OccupancyGrid(np.array([[0, 1, 2]], np.uint8), 0.5, (1.0, -2.0))
 SHOWN = {
-    "/estimate/path": ("nav_msgs/msg/Path", path_message([STAMP], np.array([[3.0, 1.0, np.pi / 2]]), STAMP)),
+    "/estimate/path": ("nav_msgs/msg/Path", path_bytes([STAMP], np.array([[3.0, 1.0, np.pi / 2]]), STAMP)),
     "/estimate/confidence": ("std_msgs/msg/Float64", {"data": 0.875}),
     "/map": ("visualization_msgs/msg/MarkerArray", map_markers(MAP, STAMP)),
     "/grid": ("nav_msgs/msg/OccupancyGrid", grid_message(GRID, STAMP)),
-    "/plan": ("nav_msgs/msg/Path", path_message([STAMP] * 2, MAP.poses, STAMP)),
+    "/plan": ("nav_msgs/msg/Path", path_bytes([STAMP] * 2, MAP.poses, STAMP)),
     "/homing": (
         "visualization_msgs/msg/MarkerArray",
-        {"markers": [homing_arrow(STAMP, HomingVector(1, 0.5, 0.25, 1.0, 1.0, 0.5, 1.5, 20, "new"))]},
+        {"markers": [homing_arrow(STAMP, 0.5, 1.5)]},
     ),
 }
-"""Messages of `result.mcap` that are published, by topic: type and fields."""
+"""Messages of `result.mcap` that are published, by topic: type, and fields or bytes."""
 
 
-def messages() -> RosMessages:
-    topics, content = list(SHOWN), list(SHOWN.values())
-    data = [encode_message(msgtype, fields) for msgtype, fields in content]
-    return RosMessages(STAMP, tuple(topics), tuple(msgtype for msgtype, _ in content), tuple(data), 1)
+def messages(topics: list[str]) -> RosMessages:
+    content = [SHOWN[topic] for topic in topics]
+    data = [each if isinstance(each, bytes) else encode_message(msgtype, each) for msgtype, each in content]
+    return RosMessages(STAMP, tuple(topics), tuple(msgtype for msgtype, _ in content), tuple(data))
 
 
 class Told:
@@ -63,13 +62,14 @@ class Told:
         self.transport.status.live = True
         self.transport.status.note("/odom", "nothing on /odom")
         kinds = {"publish": Publish, "publish_belief": PublishBelief, "publish_messages": PublishMessages}
-        named = [item for each in options for item in each.items()]
-        self.stages = [kinds[name](**{**given, "transport": transport}) for name, given in named]
+        named = [(name, given, each) for each in options for name, given in each.items() if name in kinds]
+        self.stages = [kinds[name](**{**given, "transport": transport}) for name, given, _ in named]
+        self.topics = [each["messages"]["topics"] if "messages" in each else [] for _, _, each in named]
         for stage in self.stages:
             stage.setup(Context("publish"))
 
     def tell(self) -> None:
-        for stage in self.stages:
+        for stage, topics in zip(self.stages, self.topics, strict=True):
             if isinstance(stage, Publish):
                 stage.step(Context("publish"), TICK, estimate=ESTIMATE, odometry=ODOMETRY, command=COMMAND)
                 if stage._watchdog is not None:
@@ -77,7 +77,7 @@ class Told:
             elif isinstance(stage, PublishBelief):
                 stage.step(Context("publish"), TICK, belief=BELIEF)
             else:
-                stage.step(Context("publish"), messages())
+                stage.step(Context("publish"), messages(topics))
         publish_diagnostics(self.transport, "/diagnostics")
 
 

@@ -18,6 +18,7 @@ import pytest
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.stages.live.publish import register_nav2
 from omninav.stages.live.transport import connect
+from omninav.stages.plots.result_messages import ResultMessages
 
 from . import idl_types
 from .conftest import ROOT, ROS2_PYTHON, WAIT_S, OtherEnd
@@ -36,6 +37,8 @@ def options() -> list[dict[str, dict[str, Any]]]:
         with composed(words) as config:
             nodes = complete(config)["nodes"]
         found.append({name: dict(node) for name, node in nodes.items() if name.startswith("publish")})
+        if "messages" in nodes:
+            found[-1]["messages"] = {"topics": list(nodes["messages"].get("topics", ResultMessages().topics))}
     bare = {"pose": None, "tf": None, "command": "/cmd_vel_bare", "command_type": "Twist"}
     found.append({"publish": bare})
     return [{name: {k: v for k, v in node.items() if k != "_target_"} for name, node in one.items()} for one in found]
@@ -57,7 +60,7 @@ def topics_declared(told: list[dict[str, dict[str, Any]]]) -> dict[str, str]:
             packages = {"PoseArray": "geometry_msgs", "ParticleCloud": "nav2_msgs"}
             named[belief.topic] = f"{packages[belief.message]}/msg/{belief.message}"
             shown = PublishMessages(**one["publish_messages"])
-            named |= {shown.grid if name == "/grid" else name: SHOWN[name][0] for name in shown.topics}
+            named |= {shown.grid if name == "/grid" else name: SHOWN[name][0] for name in one["messages"]["topics"]}
         found |= {topic: kind for topic, kind in named.items() if topic is not None}
     return found
 

@@ -65,4 +65,4 @@ def test_what_is_published_drawn_and_measured_is_the_widened_estimate(variant):
         "monitor",
     }
     taken = {node for node, ports in wires.items() if "'estimate.estimate'" in str(ports)}
-    assert {"publish", "messages", "drive"} <= taken
+    assert {"publish", "shown", "drive"} <= taken
