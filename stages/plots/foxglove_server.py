@@ -19,7 +19,7 @@ PORT = 8765
 class FoxgloveServer(Stage):
     """Sends the messages of each tick to Foxglove: open connection, ws://localhost:8765.
 
-    The topics are those of `result.mcap` (see `tick_messages`), and `foxglove_layout.json` of any run shows them. Who
+    The topics are those of `result.mcap` (see `ResultMessages`), and `foxglove_layout.json` of any run shows them. Who
     connects late gets the last message of each topic; of topics that nobody watches no message is made. Nothing that a
     run writes depends on it. A later run of the same process goes on with the same server. Raises `BadInput` where
     foxglove-sdk is missing or the port is taken.

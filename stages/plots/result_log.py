@@ -25,7 +25,7 @@ PATH_POSES = 10_000
 
 
 class ResultLog(Stage):
-    """Writes `result.mcap`: the messages of every tick (see `tick_messages`), and what is known at the end.
+    """Writes `result.mcap`: the messages of every tick (see `ResultMessages`), and what is known at the end.
 
     That is, in the map frame, per log: `/estimate/path`, its estimates (at most 10,000), and `/odometry/path`, where
     odometry alone would have led from the first true pose (without any, through the last estimate); and `/map` as it

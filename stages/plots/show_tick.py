@@ -92,7 +92,7 @@ class ShowTick(Stage):
     """Keeps what `result.mcap` and whoever watches show of each tick, from the inputs that are wired.
 
     No message is made here but the few that come seldom: `/grid` at a log's first frame, `/map` there and whenever the
-    map has grown by a tenth, `/plan` with each new route. `TickMessages` says which messages the others become.
+    map has grown by a tenth, `/plan` with each new route. `ResultMessages` lists them all.
     """
 
     particles: Annotated[int, Bounds(ge=1)] = 100
@@ -129,7 +129,7 @@ class ShowTick(Stage):
         """One tick."""
         similar, best = None, np.nan
         if similarities is not None and map is not None:
-            similar, best = _most_similar(similarities, map)
+            similar, best = _shown_references(similarities, map)
         numbers = np.array(
             (
                 *(_ABSENT["motion"] if motion is None else (motion.x, motion.y, motion.turn)),
@@ -200,7 +200,7 @@ class ShowTick(Stage):
         return None, None, None
 
 
-def _most_similar(found: Similarities | Neighbours | VisualDistances, map: AnyMap) -> tuple[Array | None, float]:
+def _shown_references(found: Similarities | Neighbours | VisualDistances, map: AnyMap) -> tuple[Array | None, float]:
     """Where the most similar references were taken, with their similarities (M, 3); and the largest similarity.
 
     Of `VisualDistances` d the similarity is 1 / (1 + d).

@@ -73,30 +73,10 @@ class TopicMessages:
 
 
 def tick_messages(ticks: Sequence[ShownTick], before: PathSoFar, views_every: int = 1) -> list[TopicMessages]:
-    """Messages of ticks in a row, topic by topic, in the order in which a tick's are written.
-
-    | topic | message | holds |
-    |---|---|---|
-    | `/grid` | OccupancyGrid | the floor plan or the grid, at a log's first frame |
-    | `/map` | MarkerArray | references and edges, mixtures, or places with names |
-    | `/tf` | TFMessage | `map` to `odom` and `odom` to `base_link` |
-    | `/odom` | Odometry | odometry alone, from the log's first frame, in the frame `odom` |
-    | `/ground_truth/pose` | PoseStamped | where the log has it |
-    | `/estimate/pose` | PoseWithCovarianceStamped | the estimate; 6 x 6 covariance, plane entries only |
-    | `/estimate/path` | Path | the estimates so far, every 16 ticks; all of a log's at its end |
-    | `/estimate/confidence` | Float64 | probability that the estimate is right, in [0, 1] |
-    | `/belief/markers` | MarkerArray | a mixture's ellipses by their axes (one sigma), or the likely places |
-    | `/belief` | PoseArray | few particles, a mixture's means, or the likely places |
-    | `/similarity/best` | Float64 | the largest similarity, in [0, 1] |
-    | `/similarity` | MarkerArray | the most similar references, as opaque as they are similar |
-    | `/panorama/compressed` | CompressedImage | what the robot saw, small |
-    | `/plan` | Path | the places of the planned route |
-    | `/homing` | MarkerArray | the homing vector, from the robot |
-    | `/command` | TwistStamped | what was commanded |
+    """Messages of ticks in a row, topic by topic, in the order in which a tick's are written (see `ResultMessages`).
 
     The transform from `map` to `odom` is the estimate less odometry; without any estimate the first true pose is taken.
-    `/map` comes at a log's first frame, whenever it has grown by a tenth, and at the end.
-    Stamps are the tick's: the images' header stamps. With `views_every` a path so far comes at so many ticks at most.
+    With `views_every` a path so far comes at so many ticks at most.
     """
     if not ticks:
         return []
@@ -232,7 +212,7 @@ class _Block:
                 set_poses(rows["poses"], poses)
             return row_bytes(rows)
 
-        return _alike(at, [self.ticks[n].belief for n in at.tolist()], encode)
+        return _equally_long(at, [self.ticks[n].belief for n in at.tolist()], encode)
 
     def belief_markers(self, at: Ints) -> list[bytes]:
         ellipses = [n for n in at.tolist() if self.ticks[n].covariances is not None]
@@ -247,10 +227,10 @@ class _Block:
                 ends = axis_ends(shown.belief, shown.covariances)
                 points.append(np.column_stack([ends, np.repeat(shown.weights, 4)]))
         kind = _belief_ellipses if ellipses else _likely_places
-        return _alike(at, points, partial(self._points, kind))
+        return _equally_long(at, points, partial(self._points, kind))
 
     def similar_references(self, at: Ints) -> list[bytes]:
-        return _alike(at, [self.ticks[n].similar for n in at.tolist()], partial(self._points, _similar))
+        return _equally_long(at, [self.ticks[n].similar for n in at.tolist()], partial(self._points, _similar))
 
     def _points(self, of_number: Callable[[int], MessageRows], points: Array, at: Ints) -> list[bytes]:
         """Markers of points (ticks, M, 3): x, y and weight."""
@@ -284,7 +264,9 @@ class _Block:
         return row_bytes(rows)
 
 
-def _alike(at: Ints, arrays: Sequence[Array | None], encode: Callable[[Array, Ints], list[bytes]]) -> list[bytes]:
+def _equally_long(
+    at: Ints, arrays: Sequence[Array | None], encode: Callable[[Array, Ints], list[bytes]]
+) -> list[bytes]:
     """The messages of arrays, one each, encoded together where they are equally long."""
     lengths = np.array([0 if array is None else len(array) for array in arrays])
     found: dict[int, bytes] = {}
