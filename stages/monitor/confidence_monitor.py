@@ -73,9 +73,8 @@ class ConfidenceMonitor(Stage):
     """Probability per independent image, or per length scale driven without one, that the robot was carried elsewhere,
     or found itself again."""
 
-    right_in_conflict: Annotated[float, Bounds(ge=0, le=1)] = 0.4
-    """Factor of the confidence while inputs do not fit each other: images and odometry then agree on what may be wrong.
-    """
+    right_in_conflict: Annotated[float, Bounds(ge=0, le=1)] = 0.2
+    """Factor of the confidence while inputs mislead that do not fit each other: images then agree on what is wrong."""
 
     class Out(Outputs):
         """The probability that the estimate is right."""
@@ -116,7 +115,7 @@ class ConfidenceMonitor(Stage):
             when_wrong.share, self.strength, self.kidnapping_probability,
         )  # fmt: skip
         probability = mass_within(belief, pose, self.within_m, radians) / (1.0 + math.exp(-odds))
-        if conflicts is not None and conflicts.standing:
+        if conflicts is not None and conflicts.misleading:
             probability *= self.right_in_conflict
         return self.Out(confidence=PoseConfidence(probability))
 

@@ -142,8 +142,9 @@ class InputConflicts(Stage):
             recent.judged += 1
             if not recent.judged % EVERY:
                 self._judge(ctx, recent, metres)
-        standing = tuple(recent.found[kind] for kind in recent.standing)
-        return self.Out(conflicts=Conflicts(of_map + tuple(recent.found.values()), of_map + standing))
+        standing = of_map + tuple(recent.found[kind] for kind in recent.standing)
+        misleading = bool(of_map) or not recent.standing.keys() <= HARMLESS
+        return self.Out(conflicts=Conflicts(of_map + tuple(recent.found.values()), standing, misleading))
 
     def _due(self, ctx: Context, recent: InputConflictsState) -> bool:
         return not len(recent.rows) or not 0 <= ctx.tick.stamp - recent.stamp < INTERVAL_S * 1e9
@@ -241,6 +242,9 @@ turning, rad) its headings are something else."""
 EXPLAINED, REVERSED_AS_IS, DELAY_GAIN, MIN_DELAY_S = 0.5, 0.0, 0.1, 0.25
 """Share of the seen turning that must be explained; at most so much as it is where turns are reversed; so much more
 than as it is where images are late, by at least so many seconds."""
+MISPLACED_M = 0.5
+"""A robot that drives so far within the delay of its images is not where the estimate says: the confidence's tolerance
+(m)."""
 TRACK_SCALES, MIN_PAIRS, SHARE, GAIN = 3.0, 40, 0.45, 0.25
 """Matches must move so many length scales to say anything, in so many pairs, of which this share agrees on one relation
 of the tracks, and so much less on the right one where that is mirrored."""
@@ -323,14 +327,31 @@ def turned(watched: Watched, length_scale_m: float) -> str:
     if fit.sign < 0 and fit.as_is < REVERSED_AS_IS:
         blame = whose(watched, length_scale_m)
         return f"the images turn against odometry's turns (correlation {correlation:.2f} {over}): {blame}"
-    if fit.sign > 0 and abs(fit.delay_s) >= MIN_DELAY_S and fit.explained - fit.as_is > DELAY_GAIN:
-        late = "after" if fit.delay_s > 0 else "before"
-        return (
-            f"the images show turns {abs(fit.delay_s):.1f} s {late} odometry measures them (this explains "
-            f"{100 * fit.explained:.0f} % of their turning {over}, no delay {100 * max(fit.as_is, 0.0):.0f} %): check "
-            "that both are stamped by one clock, images when they are taken"
-        )
     return ""
+
+
+def late(watched: Watched, length_scale_m: float, least_m: float = 0.0) -> str:
+    """Images that show turns when odometry does not measure them; the robot drives at least so far meanwhile (m)."""
+    seen = sure_turns(watched)
+    if np.abs(clipped(seen[np.abs(seen) > SURE_TURN])).sum() < MIN_SEEN_TURN or watched.radians == 0.0:
+        return ""
+    fit = turn_fit(watched.times, watched.odometry[:, 2], seen)
+    if fit.sign < 0 or fit.explained < EXPLAINED or fit.explained - fit.as_is < DELAY_GAIN:
+        return ""
+    driven = watched.metres * abs(fit.delay_s) / max(float(np.ptp(watched.times)), 1e-9)
+    if abs(fit.delay_s) < MIN_DELAY_S or driven < least_m:
+        return ""
+    return (
+        f"the images show turns {abs(fit.delay_s):.1f} s {'after' if fit.delay_s > 0 else 'before'} odometry measures "
+        f"them, in which the robot drives {driven:.2f} m (this explains {100 * fit.explained:.0f} % of their turning "
+        f"over {len(seen)} images, no delay {100 * max(fit.as_is, 0.0):.0f} %): check that both are stamped by one "
+        "clock, images when they are taken"
+    )
+
+
+def misplacing(watched: Watched, length_scale_m: float) -> str:
+    """Images so late that the robot is elsewhere by then."""
+    return late(watched, length_scale_m, MISPLACED_M)
 
 
 def turns_fit(watched: Watched) -> bool:
@@ -429,7 +450,11 @@ JUDGEMENTS: dict[str, Callable[[Watched, float], str]] = {
     "frozen": frozen,
     "blind": blind,
     "turned": turned,
+    "misplacing": misplacing,
+    "late": late,
     "tracked": tracked,
     "foreign": foreign,
 }
 """In the order in which causes hide each other."""
+HARMLESS = frozenset(("leap", "late"))
+"""Kinds for which poses are right, and their stamps are not."""

@@ -54,14 +54,14 @@ class CheckMap(Stage):
     def step(self, ctx: Context, map: ReferenceGraph) -> Out:
         """Check one map."""
         if len(map) < MIN_REFERENCES:
-            return self.Out(conflicts=Conflicts((), ()))
+            return self.Out(conflicts=Conflicts((), (), False))
         sentence = of_poses(map.poses)
         if not sentence and map.features.shape[1] > 1:
             sentence = self._of_images(map)
         if sentence:
             ctx.warn(sentence)
         found = (sentence,) if sentence else ()
-        return self.Out(conflicts=Conflicts(found, found))
+        return self.Out(conflicts=Conflicts(found, found, bool(found)))
 
     def _of_images(self, map: ReferenceGraph) -> str:
         number = len(map)

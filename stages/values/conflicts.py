@@ -6,8 +6,10 @@ from omninav.pipeline import Value
 class Conflicts(Value):
     """Which inputs do not fit each other, a sentence each, with its figures.
 
-    `sentences`: all that was found so far; `standing`: those of them that still hold.
+    `sentences`: all that was found so far; `standing`: those of them that still hold; `misleading`: whether one stands
+    for which the estimate may be wrong, and not only its stamp.
     """
 
     sentences: tuple[str, ...]
     standing: tuple[str, ...]
+    misleading: bool

@@ -161,7 +161,7 @@ def test_images_taken_close_by_do_not_tell_how_often_a_wrong_place_looks_right()
     assert LearnWrongPoseAgreement().step(Context("chance"), pairs, LengthScale(0.3)).when_wrong.share == 0.5
 
 
-def test_a_conflict_lowers_the_confidence_for_as_long_as_it_stands():
+def test_inputs_that_mislead_lower_the_confidence():
     def sure(conflicts: Conflicts | None) -> float:
         monitor, recent = ConfidenceMonitor(right_in_conflict=0.3), ConfidenceMonitorState()
         values = np.zeros((len(LINE), 36), np.float32)
@@ -174,8 +174,10 @@ def test_a_conflict_lowers_the_confidence_for_as_long_as_it_stands():
 
     alone = sure(None)
     assert alone > 0.5
-    assert sure(Conflicts(("the camera was frozen",), ())) == alone
-    assert sure(Conflicts(("the camera is frozen",), ("the camera is frozen",))) == pytest.approx(0.3 * alone)
+    said = ("the camera is frozen",)
+    assert sure(Conflicts(said, (), False)) == alone
+    assert sure(Conflicts(said, said, False)) == alone
+    assert sure(Conflicts(said, said, True)) == pytest.approx(0.3 * alone)
 
 
 @pytest.mark.parametrize("column", [0, 9, 30])
