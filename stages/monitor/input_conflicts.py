@@ -330,7 +330,7 @@ def turned(watched: Watched, length_scale_m: float) -> str:
     return ""
 
 
-def late(watched: Watched, length_scale_m: float, least_m: float = 0.0) -> str:
+def late(watched: Watched, length_scale_m: float, min_metres: float = 0.0) -> str:
     """Images that show turns when odometry does not measure them; the robot drives at least so far meanwhile (m)."""
     seen = sure_turns(watched)
     if np.abs(clipped(seen[np.abs(seen) > SURE_TURN])).sum() < MIN_SEEN_TURN or watched.radians == 0.0:
@@ -339,7 +339,7 @@ def late(watched: Watched, length_scale_m: float, least_m: float = 0.0) -> str:
     if fit.sign < 0 or fit.explained < EXPLAINED or fit.explained - fit.as_is < DELAY_GAIN:
         return ""
     driven = watched.metres * abs(fit.delay_s) / max(float(np.ptp(watched.times)), 1e-9)
-    if abs(fit.delay_s) < MIN_DELAY_S or driven < least_m:
+    if abs(fit.delay_s) < MIN_DELAY_S or driven < min_metres:
         return ""
     return (
         f"the images show turns {abs(fit.delay_s):.1f} s {'after' if fit.delay_s > 0 else 'before'} odometry measures "
