@@ -21,7 +21,7 @@ from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import Plan, plan
 from omninav.pipeline.run.resume import resume
-from omninav.pipeline.run.run_folder import start, was_started
+from omninav.pipeline.run.run_folder import Interrupted, start, was_started
 
 from .composition import complete
 from .terminal import show, show_report, show_results, shown, terminal_width
@@ -98,9 +98,10 @@ def ended(
     except StageFailed as failed:
         of_a_file = as_bad_input(failed.__cause__) if failed.__cause__ is not None else None
         code, error = (1, str(failed)) if of_a_file is None else (2, f"{of_a_file} ({failed})")
+    except Interrupted as stopped:
+        code, error = 130, f"stopped; `omninav resume {shown(stopped.folder)}` goes on"
     except KeyboardInterrupt:
-        on = "the same command" if of_experiment else f"`omninav resume {shown(folder or Path('runs/latest'))}`"
-        code, error = 130, f"stopped; {on} goes on"
+        code, error = 130, "stopped; the same command goes on" if of_experiment else "stopped before it had begun"
     except BrokenPipeError:
         pass  # whoever read what is printed has gone
     except Exception as unknown:  # a defect of ours: one line here, the trace in run.log

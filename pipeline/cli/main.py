@@ -87,14 +87,11 @@ def _run(arguments: list[str]) -> int:
             arguments = without_flags(arguments)
         command = importlib.import_module(f"omninav.pipeline.cli.commands.{name}").command
         return int(command(arguments))
-    except KeyboardInterrupt:  # it may come before anything is imported, so it stands first
-        of_a_sweep = "-m" in arguments or "--multirun" in arguments
-        on = (
-            "the same command with hydra.sweep.dir=FOLDER of this sweep"
-            if of_a_sweep
-            else "`omninav resume runs/latest`"
-        )
-        print(f"stopped; {on} goes on", file=sys.stderr)
+    except KeyboardInterrupt as stopped:  # it may come before anything is imported, so it stands first
+        on = "the same command" if hasattr(stopped, "folder") else ""  # of a run that was resumed
+        if "-m" in arguments or "--multirun" in arguments:
+            on = "the same command with hydra.sweep.dir=FOLDER of this sweep"
+        print(f"stopped; {on} goes on" if on else "stopped", file=sys.stderr)
         return 130
     except (ProblemsFound, BadInput) as error:
         print(error, file=sys.stderr)

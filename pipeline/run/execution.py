@@ -27,7 +27,7 @@ from .costly_values import costly_values
 from .metrics_files import MANIFEST, read_metrics, write_metrics
 from .plan import Plan
 from .results import notes_of, results_of
-from .run_folder import CONFIG, RunFolder, recorded_name
+from .run_folder import CONFIG, Interrupted, RunFolder, recorded_name
 from .timing import stage_times
 
 log = logging.getLogger("omninav")
@@ -57,7 +57,7 @@ def running(run: RunFolder, planned: Plan, display: ProgressDisplay | None = Non
             yield from _running(run, planned, display)
         except KeyboardInterrupt:
             _fail(run, "interrupted", "stopped by the user")
-            raise
+            raise Interrupted(run.folder) from None
         except (StageFailed, BadInput) as error:
             _fail(run, "failed", str(error))
             raise

@@ -2,6 +2,7 @@
 
 import os
 import platform
+import shutil
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -23,6 +24,14 @@ from .plan import Plan, input_digests
 from .provenance import git_commit
 
 CONFIG = "config.yaml"
+
+
+class Interrupted(KeyboardInterrupt):
+    """A run that its user stopped. `folder`: where it can go on."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__()
+        self.folder = folder
 
 
 @dataclass
@@ -127,12 +136,17 @@ def start(
         "python": platform.python_version(),
         "libraries": {name: version(name) for name in LIBRARIES},
     }
-    with run.owned():
-        run.describe(planned)
-        for name, content in (files or {}).items():
-            write_whole(beginning / name, content)
-        run.seal_beginning(config_file)
-        run.save()
+    try:
+        with run.owned():
+            run.describe(planned)
+            for name, content in (files or {}).items():
+                write_whole(beginning / name, content)
+            run.seal_beginning(config_file)
+            run.save()
+    except BaseException:
+        if folder is None:
+            shutil.rmtree(beginning, ignore_errors=True)
+        raise
     if folder is None:
         run.folder = _named(beginning, root, named)
         _point_latest(run.folder)

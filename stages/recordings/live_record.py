@@ -61,9 +61,11 @@ def read_header(feed: Feed, name: str) -> LiveHeader:
 
 
 class Frame(NamedTuple):
-    """All but the image of a tick. `odometry` and `truth` (3,), NaN where `truth` is not known."""
+    """All but the image of a tick. Poses are (3,), NaN where `truth` is not known. `odometry` goes on over jumps,
+    `reported_odometry` is in the frame that the robot's odometry has now."""
 
     odometry: Array | None
+    reported_odometry: Array | None
     unmeasured_s: float
     truth: Array | None
     scan: Scan | None
@@ -116,6 +118,7 @@ class DriveSoFar:
             self._scans[used] = (at, scan, None)  # once in the record is enough
         frame = Frame(
             odometry=odometry,
+            reported_odometry=None if self.odometry is None or odometry is None else self.odometry.reported(odometry),
             unmeasured_s=0.0 if self.odometry is None else self.odometry.unmeasured_s(stamp),
             truth=truth if truth is not None or self.truth is None else np.full(3, np.nan),
             scan=scan,

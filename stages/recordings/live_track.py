@@ -87,6 +87,14 @@ class LiveTrack:
         pose: Array = interpolate(times, np.stack([one.pose, other.pose]), np.array([stamp - one.stamp]) / 1e9)[0]
         return pose
 
+    def reported(self, pose: Array) -> Array:
+        """A pose of the track in the frame of the newest messages that are believed: undoes what was joined."""
+        if self._origin is None:
+            return pose
+        jumped, joined = self._origin
+        theirs: Array = compose(jumped, between(joined, pose))
+        return theirs
+
     def unmeasured_s(self, stamp: int) -> float:
         """Seconds up to a stamp about which no measurement is believed."""
         gaps = np.array(self._gaps, np.int64).reshape(-1, 2)

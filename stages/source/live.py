@@ -91,12 +91,16 @@ class LiveSource(Source):
     """Ends this long after the planned route has: the robot has arrived, or given up; null: it waits for a new goal."""
 
     class Out(DriveOutputs):
-        """What is known at an image."""
+        """What is known at an image. `reported_odometry`: in the frame that the robot's odometry has now, which begins
+        anew where it is reset; None where motion is guessed."""
+
+        reported_odometry: Pose | None = None
 
     def check(self, ctx: Context) -> None:
         """Refuse a variant that needs odometry, where there is none and no speed is stated; and what is not there."""
         if self._odometry_topic() is None:
             self._settled_speed(ctx)
+        self._roles(ctx.is_read("scan"))
         self._connect()
 
     def setup(self, ctx: Context) -> None:
@@ -261,6 +265,7 @@ class LiveSource(Source):
             camera=camera,
             motion=motion,
             odometry=Pose(position.x, position.y, position.heading),
+            reported_odometry=pose_of(frame.reported_odometry),
             truth=pose_of(frame.truth),
             scan=frame.scan,
             restart=frame.restart,
@@ -297,14 +302,20 @@ class LiveSource(Source):
         return settled_speed(ctx, name, None, self.speed_m_s, has_truth=False)
 
     def _roles(self, scan: bool) -> dict[str, Role]:
-        roles: dict[str | None, Role] = dict.fromkeys(
-            [self.topics.image] if self.topics.image else IMAGE_TOPICS, "image"
-        )
-        roles[self._odometry_topic()] = "odometry"
-        roles[self.topics.truth] = "truth"
-        roles[self.topics.scan if scan else None] = "scan"
-        roles[self.initial_pose], roles[self.goal], roles[self.restart] = "initial_pose", "goal", "restart"
-        return {topic: role for topic, role in roles.items() if topic is not None}
+        wanted: list[tuple[str | None, Role]] = [
+            *((topic, "image") for topic in ([self.topics.image] if self.topics.image else IMAGE_TOPICS)),
+            (self._odometry_topic(), "odometry"),
+            (self.topics.truth, "truth"),
+            (self.topics.scan if scan else None, "scan"),
+            (self.initial_pose, "initial_pose"),
+            (self.goal, "goal"),
+            (self.restart, "restart"),
+        ]
+        roles: dict[str, Role] = {}
+        for topic, role in wanted:
+            if topic is not None and roles.setdefault(topic, role) != role:
+                raise BadInput(f"{topic}: it cannot be both {roles[topic]} and {role}; give one of them its own topic")
+        return roles
 
 
 def _recorded(path: Path) -> LiveRecording | None:

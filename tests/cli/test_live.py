@@ -1,6 +1,7 @@
 """`omninav live`: what it takes, and what it refuses in one line."""
 
 import pytest
+from conftest import TOUR
 
 from omninav.pipeline.cli.commands import live
 from omninav.pipeline.cli.composition import complete, composed
@@ -33,6 +34,18 @@ def test_a_variant_that_is_no_robots_is_refused_by_name(variant: str):
         settings = complete(config)
     with pytest.raises(BadInput, match=f"variant={variant} does not run live .*; take another: omninav variants"):
         live.plan_live(settings)
+
+
+@pytest.mark.parametrize("publish", ["ros2", "amcl"])
+@pytest.mark.parametrize(
+    "words",
+    ["omninav tour={}", "topological_localisation tour={}", "omniview_cml", "homing"],
+    ids=lambda words: words[:9],
+)
+def test_a_variant_runs_live_without_what_it_is_measured_by(words: str, publish: str):
+    typed = f"variant={words.format(TOUR)}".split()
+    with composed(["source=live", "log=live", f"publish={publish}", "~evaluation", *typed]) as config:
+        assert "publish" in live.plan_live(complete(config)).graph.nodes
 
 
 def test_a_wrong_setting_is_said_once_for_a_graph_and_those_of_its_maps():

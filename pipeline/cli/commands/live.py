@@ -10,6 +10,9 @@ from omninav.pipeline.run.plan import Plan, plan
 SETTINGS = ("source=live", "publish=ros2", "log=live")
 """Settings that make a run live, each where nothing else is typed."""
 
+RESULTS = ("estimate", "command")
+"""Ports of the node `publish`, one of which a live run has something for."""
+
 
 def command(arguments: list[str]) -> int:
     """Run a variant live. Whatever else may be typed for a run may be typed here."""
@@ -22,12 +25,15 @@ def command(arguments: list[str]) -> int:
 def plan_live(settings: Mapping[str, Any]) -> Plan:
     """Check a configuration. Raises `BadInput` where its variant is none of what runs live."""
     try:
-        return plan(settings)
+        planned = plan(settings)
+        told = {wire.to_port for wire in planned.graph.wires if wire.to_node == "publish"}
+        why_not = "it has neither an estimate nor a command to publish" if told and told.isdisjoint(RESULTS) else ""
     except ProblemsFound as found:
         if not all(problem.where.startswith("wires.") for problem in found.problems):
             raise
-        first = found.problems[0]
+        why_not = f"{found.problems[0].where}: {found.problems[0].what}"
+    if why_not:
         raise BadInput(
-            f"variant={settings.get('variant')} does not run live ({first.where}: {first.what}); "
-            "take another: omninav variants"
-        ) from None
+            f"variant={settings.get('variant')} does not run live ({why_not}); take another: omninav variants"
+        )
+    return planned

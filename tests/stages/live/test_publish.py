@@ -10,14 +10,17 @@ from conftest import DRIVE, TOUR
 
 import omninav
 from omninav.pipeline import Context, Tick
+from omninav.pipeline.mcap.message_types import standard_types
 from omninav.pipeline.mcap.reader import LogReader
+from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.live import publish
 from omninav.stages.live.publish import Publish
+from omninav.stages.live.transport import Arrival
 from omninav.stages.source import live
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.pose import Pose
 
-from .conftest import ROOT, Wire
+from .conftest import ROOT, Wire, decode
 from .test_live_map import Recorded
 
 CAMERA = ROOT / "tests/data/camera.yaml"
@@ -83,3 +86,54 @@ def test_a_robot_publishes_the_pose_that_its_variant_is_measured_by(
         assert ahead == pytest.approx(where, abs=0.01)
         apart.append(math.dist(where, [float(row["mean_x"]), float(row["mean_y"])]))
     assert (max(apart) > 0.01) == (taken == "mode")
+
+
+RESET = (20.0, -10.0, 0.7)
+"""A pose (m, rad) of the robot in its odometry's old frame, at which a new one begins."""
+
+
+class Restarted(Recorded):
+    """A robot whose odometry begins anew, at zero, in the middle of the drive."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.reported: dict[int, np.ndarray] = {}
+
+    def take(self, timeout_s: float = 0.0) -> Arrival | None:
+        arrival = super().take(timeout_s)
+        if arrival is None or arrival.topic != "/odom":
+            return arrival
+        message = decode(arrival.msgtype, arrival.data)
+        at, turned = message.pose.pose.position, message.pose.pose.orientation
+        pose = np.array([at.x, at.y, heading(turned)])
+        if len(self.reported) > 40:
+            pose = between(RESET, pose)
+            at.x, at.y = pose[:2].tolist()
+            turned.z, turned.w = math.sin(pose[2] / 2), math.cos(pose[2] / 2)
+        self.reported[stamp_of(message)] = pose
+        return arrival._replace(data=bytes(standard_types().serialize_cdr(message, arrival.msgtype)))
+
+
+def test_after_odometry_began_anew_map_to_odom_is_over_what_the_robot_reports_now(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, shared_cache: Path
+):
+    robot = Restarted()
+    for module in (live, publish):
+        monkeypatch.setattr(module, "connect", lambda name, domain: robot)
+    monkeypatch.setattr(live, "disconnect", lambda: None)
+    settings = ["source=live", "publish=ros2", "log=live", "nodes.source.seconds=9", "nodes.prior.number=300"]
+    words = {"camera": CAMERA, "cache": shared_cache, "progress": False, "plots": "none", "tour": TOUR}
+    omninav.run("omniview_mcl", *settings, folder=tmp_path / "run", **words)
+    stamps = np.array(list(robot.reported))
+    reset, poses = stamps[41], np.array(list(robot.reported.values()))
+    after = 0
+    for pose, transform in zip(robot.on("/estimate/pose"), robot.on("/tf"), strict=True):
+        stamp = stamp_of(pose)
+        correction = transform.transforms[0].transform
+        at = np.array([correction.translation.x, correction.translation.y, heading(correction.rotation)])
+        reported = poses[np.abs(stamps - stamp).argmin()]
+        estimate = pose.pose.pose.position
+        if stamp < reset - 10**9 or stamp > reset:
+            assert compose(at, reported)[:2] == pytest.approx([estimate.x, estimate.y], abs=0.05)
+        after += stamp > reset
+    assert after >= 3

@@ -16,6 +16,7 @@ from omninav.pipeline.mcap.reader import LogReader
 from omninav.stages.live import intake
 from omninav.stages.live.status import LiveStatus
 from omninav.stages.live.transport import Arrival, Transport
+from omninav.stages.recordings.recording import Topics
 from omninav.stages.recordings.topics import IMAGE_TOPICS
 from omninav.stages.source import live
 from omninav.stages.source.live import LiveSource, LiveSourceState
@@ -276,6 +277,19 @@ def test_what_is_missing_is_looked_for_under_other_names_and_since_when_is_said(
         "/camera/image": "/camera/image carries std_msgs/msg/String, not sensor_msgs/msg/Image; "
         "type topics.image=/omni",
     }
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"topics": Topics(image="/odom")}, "/odom: it cannot be both image and odometry"),
+        ({"topics": Topics(truth="/odom")}, "/odom: it cannot be both odometry and truth"),
+        ({"goal": "/initialpose"}, "/initialpose: it cannot be both initial_pose and goal"),
+    ],
+)
+def test_a_topic_for_two_things_is_refused_before_anything_runs(robot: Loopback, given: dict[str, object], said: str):
+    with pytest.raises(BadInput, match=f"{said}; give one of them its own topic"):
+        LiveSource(camera=CAMERA, **given).check(Context("source"))
 
 
 def test_images_that_odometry_never_reaches_are_a_trouble(

@@ -1,0 +1,51 @@
+"""Ctrl-C: the run that goes on is named, and no other one."""
+
+import importlib
+from pathlib import Path
+
+import pytest
+
+from omninav.pipeline.cli.main import main
+from omninav.pipeline.engine.engine import Engine
+from omninav.pipeline.run.run_folder import RunFolder
+
+from .test_hydra_folders import VARIANT
+
+RUN = ["--config-dir=mine", "variant=toy"]
+
+
+def stop(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+@pytest.fixture(autouse=True)
+def toy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "mine" / "variant").mkdir(parents=True)
+    (tmp_path / "mine" / "variant" / "toy.yaml").write_text(VARIANT)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs" / "of_yesterday").mkdir(parents=True)
+    (tmp_path / "runs" / "latest").symlink_to("of_yesterday")
+
+
+def test_in_its_loop_its_own_folder_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
+    monkeypatch.setattr(Engine, "tick", stop)
+    assert main(RUN) == 130
+    (folder,) = (tmp_path / "runs").glob("*_toy")
+    assert capsys.readouterr().err.splitlines()[-1] == f"stopped; `omninav resume runs/{folder.name}` goes on"
+    assert main(["resume", str(folder), "toys"]) == 130
+    assert capsys.readouterr().err.splitlines()[-1] == "stopped; the same command goes on"
+
+
+def test_before_its_folder_is_whole_nothing_is_named_and_nothing_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+):
+    monkeypatch.setattr(RunFolder, "describe", stop)
+    assert main(RUN) == 130
+    assert capsys.readouterr().err.splitlines()[-1] == "stopped before it had begun"
+    assert sorted(path.name for path in (tmp_path / "runs").iterdir()) == ["latest", "of_yesterday"]
+
+
+def test_a_command_that_is_no_run_names_none(monkeypatch: pytest.MonkeyPatch, capsys):
+    monkeypatch.setattr(importlib.import_module("omninav.pipeline.cli.commands.doctor"), "command", stop)
+    assert main(["doctor"]) == 130
+    assert capsys.readouterr().err == "stopped\n"
