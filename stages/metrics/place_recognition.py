@@ -37,8 +37,7 @@ class RankReferences(Stage):
 
     def step(self, ctx: Context, similarities: Similarities) -> Out:
         """One image."""
-        values = similarities.values
-        order = np.argsort(-values.max(axis=1), kind="stable")[: self.best] if len(values) else np.empty(0, np.int64)
+        order = np.argsort(-similarities.best, kind="stable")[: self.best]
         candidates = similarities.candidates
         return self.Out(ranked=RankedReferences(order if candidates is None else candidates[order]))
 

@@ -11,7 +11,7 @@ from omninav.pipeline import Bounds, Context, Outputs, Stage, State
 from omninav.stages.geometry.appearance.visual_compass import angle_of_peak
 from omninav.stages.geometry.plane.se2 import compose, wrap
 from omninav.stages.geometry.probability.consistency import consistency, log_odds_of_right
-from omninav.stages.geometry.probability.evidence import best_headings
+from omninav.stages.geometry.probability.particles import are_within
 from omninav.stages.values.belief import Likelihood, Particles, PoseEstimate
 from omninav.stages.values.confidence import PoseConfidence, WrongPoseAgreement
 from omninav.stages.values.conflicts import Conflicts
@@ -130,7 +130,7 @@ class ConfidenceMonitor(Stage):
 def best_place(similarities: Similarities, map: ReferenceGraph) -> Array:
     """The pose (3,) of a robot that stands where the most similar reference was taken, turned as the view is."""
     values = similarities.values
-    row = int(values.max(axis=1).argmax())
+    row = int(similarities.best.argmax())
     reference = row if similarities.candidates is None else int(similarities.candidates[row])
     turn = angle_of_peak(values[row]) if values.shape[1] > 1 else 0.0
     place: Array = map.poses[reference] + np.array((0.0, 0.0, turn))
@@ -141,10 +141,10 @@ def lead_of_best(similarities: Similarities, map: ReferenceGraph, elsewhere_m: f
     """The lead of the most similar reference over the best one elsewhere, in standard deviations of the similarity over
     all that were compared. Elsewhere: beyond so many metres, or seen from another heading; 0 where all show one place.
     """
-    values, weights = similarities.values, similarities.sampling_weight
-    best = best_headings(np.ascontiguousarray(values)).astype(np.float64)
+    weights, headings = similarities.sampling_weight, similarities.values.shape[1]
+    best = similarities.best.astype(np.float64)
     places = map.poses[slice(None) if similarities.candidates is None else similarities.candidates]
-    turned = places[:, 2] + values.argmax(axis=1) * (2.0 * math.pi / values.shape[1])
+    turned = places[:, 2] + similarities.best_heading * (2.0 * math.pi / headings)
     row = int(best.argmax())
     away = np.hypot(*(places - places[row])[:, :2].T)
     elsewhere = (away > elsewhere_m) | (np.abs(wrap(turned - turned[row])) > TURNED)
@@ -156,6 +156,5 @@ def lead_of_best(similarities: Similarities, map: ReferenceGraph, elsewhere_m: f
 
 def mass_within(belief: Particles, pose: Array, metres: float, radians: float) -> float:
     """The share of a belief within a tolerance of a pose (3,)."""
-    away = belief.poses - pose
-    near = (np.square(away[:, :2]).sum(axis=1) <= metres**2) & (np.abs(wrap(away[:, 2])) <= radians)
+    near = are_within(np.ascontiguousarray(belief.poses), pose, metres, radians)
     return min(1.0, float(belief.weights[near].sum() / belief.weights.sum()))

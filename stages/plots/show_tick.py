@@ -209,7 +209,7 @@ def _shown_references(found: Similarities | Neighbours | VisualDistances, map: A
         return None, float(found.similarities.max(initial=0.0))
     rows: npt.NDArray[np.int64] | None
     if isinstance(found, Similarities):
-        values, rows = found.values.max(axis=1, initial=0.0).astype(np.float64), found.candidates
+        values, rows = found.best.astype(np.float64), found.candidates
     else:
         values, rows = 1.0 / (1.0 + found.distances), map.places if isinstance(map, TopologicalMap) else None
     if not len(values):

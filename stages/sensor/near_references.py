@@ -10,7 +10,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.plane.nearest_cells import NearestCells
-from omninav.stages.geometry.probability.evidence import best_headings, contrast_power, evidence_novelty
+from omninav.stages.geometry.probability.evidence import contrast_power, evidence_novelty
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.length_scale import LengthScale
@@ -227,7 +227,7 @@ class NearReferences(Stage):
             far = self.independence_distance * calibration.correlation_m
             novelty = evidence_novelty(driven, far, self.min_novelty)
             return self._calibrated(similarities, particles, map, rows, unit, calibration, novelty)
-        best, each = best_headings(np.ascontiguousarray(values)), similarities.sampling_weight
+        best, each = similarities.best, similarities.sampling_weight
         places, distance = map.poses[candidates], self.background_distance * unit
         floor = background_similarity(best, places, distance, self.background_quantile, each)
         power = contrast_power(best, self.contrast, each) if self.power is None else self.power

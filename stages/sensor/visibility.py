@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
-from omninav.stages.geometry.probability.evidence import best_headings, contrast_power, evidence_novelty
+from omninav.stages.geometry.probability.evidence import contrast_power, evidence_novelty
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.length_scale import LengthScale
@@ -138,7 +138,7 @@ class Visibility(Stage):
             top = max(float(ratios.max()), 1.0)
             return ratios / top, 1.0 / top
         values, each = similarities.values, similarities.sampling_weight
-        best = best_headings(np.ascontiguousarray(values))
+        best = similarities.best
         power = contrast_power(best, self.contrast, each) if self.power is None else self.power
         top = max(float(best.max()), 1e-12)
         return (values.astype(np.float64) / top) ** power, (weighted_median(best, each) / top) ** power

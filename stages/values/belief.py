@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Covariances, Shape, Shares
-from omninav.stages.geometry.probability.particles import heaviest_mode, weighted_mean
+from omninav.stages.geometry.probability.particles import mode_and_mean, weighted_mean
 
 from .pose import Pose
 
@@ -50,8 +50,7 @@ class Particles(Belief):
     recovery_particles: Annotated[int, Bounds(ge=0)] = 0
 
     def estimate(self) -> PoseEstimate:
-        mode, covariance, share = heaviest_mode(self.poses, self.weights)
-        mean = weighted_mean(self.poses, self.weights)
+        mode, covariance, share, mean = mode_and_mean(self.poses, self.weights)
         return PoseEstimate(Pose(*map(float, mode)), covariance, share, Pose(*map(float, mean)))
 
 

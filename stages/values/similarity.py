@@ -1,5 +1,6 @@
 """Similarities of the current view to the views of the map."""
 
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
+from omninav.stages.geometry.probability.evidence import best_headings
 
 
 class Similarities(Value):
@@ -28,6 +30,20 @@ class Similarities(Value):
     sampling_weight: Annotated[npt.NDArray[np.float64] | None, Shape("references"), Bounds(gt=0)] = None
     exponent: float | None = None
     colour_scale: float | None = None
+
+    @property
+    def best(self) -> npt.NDArray[np.float32]:
+        """Each reference's similarity at its best heading: (references,). Not to be changed: others read it too."""
+        return self._at_best_headings[0]
+
+    @property
+    def best_heading(self) -> npt.NDArray[np.int64]:
+        """The column of each reference's best heading, of equal ones the first: (references,)."""
+        return self._at_best_headings[1]
+
+    @cached_property
+    def _at_best_headings(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int64]]:
+        return best_headings(np.ascontiguousarray(self.values))
 
 
 class SimilarityField(Value):

@@ -9,18 +9,21 @@ from omninav.pipeline.engine.compiled import compiled
 
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
+Ints = npt.NDArray[np.int64]
 
 
 @compiled(nogil=True)
-def best_headings(values: Floats) -> Floats:
-    """Each reference's similarity at its best heading: (references, headings) -> (references,)."""
-    out = np.empty(len(values), np.float32)
+def best_headings(values: Floats) -> tuple[Floats, Ints]:
+    """Each reference's similarity at its best heading, and which that is (of equal ones the first): (references,) each,
+    of (references, headings >= 1)."""
+    out, at = np.empty(len(values), np.float32), np.zeros(len(values), np.int64)
     for n in range(len(values)):  # numpy's maximum along so short an axis takes ten times as long
-        best = values[n, 0]
+        best, heading = values[n, 0], 0
         for h in range(1, values.shape[1]):
-            best = max(best, values[n, h])
-        out[n] = best
-    return out
+            if values[n, h] > best:
+                best, heading = values[n, h], h
+        out[n], at[n] = best, heading
+    return out, at
 
 
 def contrast_power(best: Floats, contrast: float, sampling_weight: Array | None = None) -> float:

@@ -71,12 +71,32 @@ def heaviest_mode(poses: Array, weights: Array, radius: float = 1.0) -> tuple[Ar
     The plane is cut into cells of `radius` / 2 (m) and 12 headings; the heaviest cell, summed with its neighbours,
     starts a mean shift with a flat kernel of `radius` metres and 30 degrees that stops when its members stay the same.
     """
+    return mode_and_mean(poses, weights, radius)[:3]
+
+
+def mode_and_mean(poses: Array, weights: Array, radius: float = 1.0) -> tuple[Array, Array, float, Array]:
+    """What `heaviest_mode` gives, and the mean (3,) of all."""
     poses, weights = np.ascontiguousarray(poses, np.float64), np.ascontiguousarray(weights, np.float64)
     sines, cosines = np.sin(poses[:, 2]), np.cos(poses[:, 2])  # numpy takes a tenth of the time that numba does
     start = _heaviest_cell(poses, weights, radius / 2)
     members = _climb(poses, weights, sines, cosines, start, radius)
-    mean, mass = _mean(poses, weights, sines, cosines, members)
-    return mean, _covariance(poses, weights, mean, members), mass / float(weights.sum())
+    mode, mass = _mean(poses, weights, sines, cosines, members)
+    mean, _ = _mean(poses, weights, sines, cosines, np.ones(len(poses), np.bool_))
+    return mode, _covariance(poses, weights, mode, members), mass / float(weights.sum()), mean
+
+
+@compiled(nogil=True)
+def are_within(poses: Array, pose: Array, metres: float, radians: float) -> Members:
+    """Whether each of poses (N, 3) is within a tolerance of a pose (3,): (N,)."""
+    out = np.zeros(len(poses), np.bool_)
+    for n in range(len(poses)):
+        x, y = poses[n, 0] - pose[0], poses[n, 1] - pose[1]
+        if x * x + y * y <= metres * metres:
+            turn = poses[n, 2] - pose[2] + np.pi
+            if turn < 0.0 or turn >= 2 * np.pi:  # a remainder takes ten times as long as all the rest
+                turn = turn % (2 * np.pi)
+            out[n] = abs(turn - np.pi) <= radians
+    return out
 
 
 @compiled(nogil=True)
@@ -121,9 +141,10 @@ def _heaviest_cell(poses: Array, weights: Array, cell: float) -> Array:
 
 @compiled(nogil=True)
 def _slot(slots: npt.NDArray[np.int32], cells: npt.NDArray[np.int64], number: int) -> int:
-    at = (number * 40503) % len(slots)
+    last = len(slots) - 1  # a power of two, less one
+    at = (number * 40503) & last
     while slots[at] >= 0 and cells[slots[at]] != number:
-        at = (at + 1) % len(slots)
+        at = (at + 1) & last
     return at
 
 
