@@ -54,7 +54,7 @@ def artifact_bytes(value: Value, facts: dict[str, Any] | None = None) -> bytes:
 
 
 def _write(file: BinaryIO, value: Value, facts: dict[str, Any] | None) -> None:
-    fields = {name: getattr(value, name) for name in field_names(value)}
+    fields = {name: getattr(value, name) for name in field_names(type(value))}
     arrays = {name: field for name, field in fields.items() if isinstance(field, np.ndarray | StoredRows)}
     rest = {name: field for name, field in fields.items() if name not in arrays}
     front = arrays if stored_fields(type(value)) else {}

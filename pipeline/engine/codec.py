@@ -6,6 +6,7 @@ import json
 import struct
 from collections import Counter
 from enum import Enum
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from omninav.pipeline.graph.value import VALUE_TYPES, Value, value_name
 
 _LENGTH = struct.Struct("<Q")
 _PLAIN = (str, bool, int, float, type(None))
+_to_json = json.JSONEncoder(separators=(",", ":")).encode
 
 
 class BadEncoding(ValueError):
@@ -26,7 +28,7 @@ class BadEncoding(ValueError):
 def encode(thing: Any) -> bytes:
     """A value (or plain data, lists, dicts, arrays) as bytes: a JSON header, then the arrays one after the other."""
     arrays: list[bytes] = []
-    header = json.dumps(_describe(thing, arrays), separators=(",", ":")).encode()
+    header = _to_json(_describe(thing, arrays)).encode()
     return b"".join([_LENGTH.pack(len(header)), header, *arrays])
 
 
@@ -46,6 +48,15 @@ def decode(content: bytes | memoryview) -> Any:
 
 def _describe(thing: Any, arrays: list[bytes]) -> Any:
     # plain JSON where JSON is exact; everything else is a list whose first item names its form
+    if type(thing) in _PLAIN:
+        return thing
+    if isinstance(thing, Value):
+        kind = type(thing)
+        described = ["value", _name_of(kind)]
+        for name in field_names(kind):
+            field = getattr(thing, name)
+            described.append(field if type(field) in _PLAIN else _describe(field, arrays))
+        return described
     if isinstance(thing, Enum):
         raise BadEncoding(f"{thing!r} is an Enum: use a Literal instead")
     if isinstance(thing, _PLAIN):
@@ -61,9 +72,6 @@ def _describe(thing: Any, arrays: list[bytes]) -> Any:
     if isinstance(thing, bytes):
         arrays.append(thing)
         return ["bytes", len(thing), sum(map(len, arrays[:-1]))]
-    if isinstance(thing, Value):
-        fields = [_describe(getattr(thing, name), arrays) for name in field_names(thing)]
-        return ["value", value_name(type(thing)), *fields]
     if isinstance(thing, tuple):
         return ["tuple", *[_describe(item, arrays) for item in thing]]
     if isinstance(thing, list):
@@ -112,19 +120,23 @@ def _restore(header: Any, data: memoryview) -> Any:
     raise BadEncoding(f"unknown form '{form}'")
 
 
-def field_names(thing: Any) -> list[str]:
-    """The fields of a value or a state (or of its class), which their base classes make dataclasses of."""
-    return [field.name for field in dataclasses.fields(thing)]
+_name_of = cache(value_name)
+
+
+@cache
+def field_names(cls: Any) -> tuple[str, ...]:
+    """The fields of a class of values or states, which their base classes make dataclasses of."""
+    return tuple(field.name for field in dataclasses.fields(cls))
 
 
 def encode_state(state: State) -> dict[str, Any]:
     """A state's fields as plain data for `encode`. Dataclasses inside a state must be Values."""
-    return {name: getattr(state, name) for name in field_names(state)}
+    return {name: getattr(state, name) for name in field_names(type(state))}
 
 
 def restore_state(state: State, fields: dict[str, Any]) -> None:
     """Put decoded fields back into a fresh state. Raises `BadEncoding` where the names have changed."""
-    names = set(field_names(state))
+    names = set(field_names(type(state)))
     if names != set(fields):
         raise BadEncoding(f"{type(state).__qualname__} has fields {sorted(names)}, the file has {sorted(fields)}")
     for name, value in fields.items():

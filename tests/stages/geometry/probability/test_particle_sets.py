@@ -5,7 +5,16 @@ from hypothesis import strategies as st
 
 from omninav.stages.geometry.plane.nearest_cells import NearestCells
 from omninav.stages.geometry.plane.se2 import between, compose, wrap
-from omninav.stages.geometry.probability.particles import effective_size, occupied_cells, systematic, uniform_around
+from omninav.stages.geometry.probability.particles import (
+    are_within,
+    effective_size,
+    heaviest_mode,
+    mode_and_mean,
+    occupied_cells,
+    systematic,
+    uniform_around,
+    weighted_mean,
+)
 
 POSES = st.tuples(*[st.floats(-50, 50)] * 3)
 
@@ -84,3 +93,22 @@ def test_a_cell_lists_the_points_nearest_to_its_centre(seed: int, radius: float)
 def test_points_far_apart_take_no_memory_between_them() -> None:
     cells = NearestCells(np.array([[0.0, 0.0], [500.0, 500.0]]), 1, 0.1, 1.0)
     assert cells.of(np.array([[0.0, 0.0], [250.0, 250.0], [500.0, 500.0]])).tolist() == [[0], [-1], [1]]
+
+
+def test_poses_within_a_tolerance_are_those_of_the_definition_whatever_turns_their_headings_hold():
+    rng = np.random.default_rng(2)
+    poses = rng.normal(0.0, [0.5, 0.5, 5.0], (4000, 3))
+    pose = np.array([0.1, -0.2, 3.0])
+    away = poses - pose
+    near = (np.square(away[:, :2]).sum(axis=1) <= 0.6**2) & (np.abs(wrap(away[:, 2])) <= 0.7)
+    assert 0 < near.sum() < len(near)
+    assert are_within(poses, pose, 0.6, 0.7).tolist() == near.tolist()
+
+
+def test_the_mean_of_all_stands_beside_the_heaviest_mode():
+    rng = np.random.default_rng(3)
+    poses, weights = rng.normal(0.0, [3.0, 3.0, 2.0], (500, 3)), rng.random(500)
+    *mode, mean = mode_and_mean(poses, weights)
+    assert mean.tolist() == weighted_mean(poses, weights).tolist()
+    for found, alone in zip(mode, heaviest_mode(poses, weights), strict=True):
+        np.testing.assert_array_equal(found, alone)
