@@ -5,6 +5,7 @@ import hashlib
 import json
 import struct
 from collections import Counter
+from collections.abc import Callable
 from enum import Enum
 from functools import cache
 from pathlib import Path
@@ -120,13 +121,13 @@ def _restore(header: Any, data: memoryview) -> Any:
     raise BadEncoding(f"unknown form '{form}'")
 
 
-_name_of = cache(value_name)
-
-
-@cache
-def field_names(cls: Any) -> tuple[str, ...]:
-    """The fields of a class of values or states, which their base classes make dataclasses of."""
+def _field_names(cls: Any) -> tuple[str, ...]:
     return tuple(field.name for field in dataclasses.fields(cls))
+
+
+field_names: Callable[[Any], tuple[str, ...]] = cache(_field_names)
+"""The fields of a class of values or states, which their base classes make dataclasses of."""
+_name_of: Callable[[Any], str] = cache(value_name)
 
 
 def encode_state(state: State) -> dict[str, Any]:
