@@ -146,9 +146,8 @@ def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]
         what = f"there is no variant '{spec.variant}' to make it with"
         raise ProblemsFound([Problem(f"artifacts.{name}.variant", what, hint)]) from None
     OmegaConf.set_struct(other, False)
-    for key in config:
-        if str(key) not in OF_THE_VARIANT:
-            other[key] = config._get_node(key)
+    given: Any = OmegaConf.to_container(config, resolve=False)
+    other.update({key: value for key, value in given.items() if key not in OF_THE_VARIANT})
     for key, value in spec.set.items():
         if key not in other or key in OF_THE_VARIANT:
             settings = [str(setting) for setting in other if setting not in OF_THE_VARIANT]
@@ -222,9 +221,9 @@ def settings_read(config: Any) -> set[str]:
     """The settings that the graph and its artifacts read, directly or by way of other settings."""
     read: set[str] = set()
     waiting = list(OF_THE_VARIANT)
+    raw: Any = OmegaConf.to_container(config, resolve=False)
     while waiting:
-        raw = config._get_node(waiting.pop())
-        text = str(OmegaConf.to_container(raw, resolve=False) if OmegaConf.is_config(raw) else raw)
+        text = str(raw[waiting.pop()])
         for unless, name in INTERPOLATION.findall(text):
             names = [unless] if unless and config.get(unless) is not None else [unless, name] if unless else [name]
             for each in names:

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import hydra
-from hydra._internal.config_loader_impl import ConfigLoaderImpl
-from hydra._internal.hydra import Hydra
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
+from hydra.errors import ConfigCompositionException
+from omegaconf import OmegaConf, open_dict
+from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBaseException
 
 from .hydra_session import hydra_errors
 
@@ -19,7 +20,7 @@ def compose(words: Sequence[str]) -> Any:
     """The configuration that words describe, where Hydra has been started. Raises Hydra's errors.
 
     Nearly all of Hydra's time goes into finding and merging the files of options (`variant=…`, `engine=…`). So what
-    options give is kept, and all else (`day=2`) is set in a copy of it, by Hydra's own function.
+    options give is kept, and all else (`day=2`) is set in a copy of it.
     """
     session = GlobalHydra.instance().hydra
     with hydra_errors():
@@ -27,12 +28,50 @@ def compose(words: Sequence[str]) -> Any:
         settings = [word for word in parsed if _is_setting(word)]
         options = tuple(str(word.input_line) for word in parsed if word not in settings)
         config = pickle.loads(_of_options(session, options))
-        ConfigLoaderImpl._apply_overrides_to_config(settings, config)
+        for word in settings:
+            try:
+                _set(config, word)
+            except OmegaConfBaseException as error:
+                raise ConfigCompositionException(f"Error merging override {word.input_line}") from error
     return config
 
 
+def _set(config: Any, word: Override) -> None:
+    """Set, add or take out what a word names, as Hydra does and with its words where that cannot be."""
+    key, value, line = word.key_or_group, word.value(), word.input_line
+    if word.package is not None:
+        raise ConfigCompositionException(
+            f"Override {line} looks like a config group override, but config group '{key}' does not exist."
+        )
+    if word.is_delete():
+        there = OmegaConf.select(config, key, throw_on_missing=False)
+        if there is None:
+            raise ConfigCompositionException(f"Could not delete from config. '{key}' does not exist.")
+        if value is not None and value != there:
+            raise ConfigCompositionException(
+                f"Could not delete from config. The value of '{key}' is {there} and not {value}."
+            )
+        above, _, name = key.rpartition(".")
+        with open_dict(config):
+            del (OmegaConf.select(config, above) if above else config)[name]
+        return
+    add = word.is_add() or word.is_force_add()
+    there = OmegaConf.select(config, key, throw_on_missing=False) if word.is_add() else None
+    if there is not None and not isinstance(value, dict | list):
+        raise ConfigCompositionException(
+            f"Could not append to config. An item is already at '{key}'.\n"
+            f"Either remove + prefix: '{str(line)[1:]}'\n"
+            f"Or add a second + to add or override '{key}': '+{line}'\n"
+        )
+    try:
+        OmegaConf.update(config, key, value, merge=True, force_add=add)
+    except (ConfigAttributeError, ConfigKeyError) as error:
+        what = f"Could not override '{key}'.\nTo append to your config use +{line}"
+        raise ConfigCompositionException(what) from error
+
+
 @functools.lru_cache(maxsize=256)
-def _of_options(session: Hydra, options: tuple[str, ...]) -> bytes:
+def _of_options(session: Any, options: tuple[str, ...]) -> bytes:
     # A configuration is read from its bytes five times as fast as it is copied.
     return pickle.dumps(hydra.compose("config", overrides=[*options]))
 
@@ -42,5 +81,5 @@ def _is_setting(word: Override) -> bool:
     key = word.key_or_group
     if word.is_sweep_override() or key.replace("/", ".").partition(".")[0] == "hydra":
         return False
-    loader: Any = GlobalHydra.instance().config_loader()
-    return isinstance(word.value(), dict) or not loader.repository.group_exists(key)
+    sources = GlobalHydra.instance().config_loader().get_sources()
+    return isinstance(word.value(), dict) or not any(source.is_group(key) for source in sources)

@@ -1,38 +1,34 @@
 """Hydra as omninav starts it: it composes configurations and launches jobs, and calls nothing else that they name."""
 
-import os
-import pickle
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
-import yaml
-from hydra import version
-from hydra._internal.config_loader_impl import ConfigLoaderImpl
-from hydra._internal.core_plugins.file_config_source import FileConfigSource
-from hydra._internal.core_plugins.importlib_resources_config_source import ImportlibResourcesConfigSource
-from hydra._internal.hydra import Hydra
-from hydra._internal.sources_registry import SourcesRegistry
-from hydra._internal.utils import create_config_search_path
-from hydra.core.config_search_path import SearchPathQuery
+from hydra import initialize, version
+from hydra.core.config_loader import ConfigLoader
+from hydra.core.config_search_path import ConfigSearchPath
 from hydra.core.config_store import ConfigStore
 from hydra.core.global_hydra import GlobalHydra
-from hydra.core.object_type import ObjectType
+from hydra.core.plugins import Plugins
 from hydra.errors import ConfigCompositionException, HydraException
-from hydra.plugins.config_source import ConfigLoadError, ConfigResult, ConfigSource
+from hydra.plugins.config_source import ConfigSource
+from hydra.plugins.search_path_plugin import SearchPathPlugin
+from hydra.types import RunMode
 from omegaconf import OmegaConf
-from omegaconf._utils import get_yaml_loader
 from omegaconf.errors import OmegaConfBaseException
 
+from hydra_plugins.omninav_launcher import OmninavLauncher
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, shown
 from omninav.pipeline.graph.registry import Entry, plugins
-from omninav.pipeline.graph.small_files import read_yaml
 
-from .config_groups import CONF, listed_groups, stage_option, stage_options
+from .config_groups import CONF
+from .config_sources import CheckedFolder, OwnFiles
 from .interpolations import interpolations_limited
 
+VERSION_BASE = "1.3"
+"""Version of Hydra whose defaults hold."""
 FOLDERS_OF_JOBS = ("run", "sweep")
 LAUNCHING = ("launcher", "sweeper")
 """Parts of `hydra.` whose classes are called, with parameters: those that installed packages registered."""
@@ -47,15 +43,14 @@ CALLED_BY_NAME = ("custom_search_space",)
 
 
 @contextmanager
-def hydra_started(folders: Sequence[str] = ()) -> Iterator[Hydra]:
+def hydra_started(folders: Sequence[str] = ()) -> Iterator[Any]:
     """Hydra, which finds configurations among omninav's own and in `folders` (of `--config-dir`)."""
-    from .launcher import offer_launcher
-
-    offer_launcher()
-    session, version_base = GlobalHydra.instance(), "1.3"
+    for plugin in (OwnFiles, CheckedFolder, _SearchPath, OmninavLauncher):
+        Plugins.instance().register(plugin)
+    session = GlobalHydra.instance()
     before, session.hydra = session.hydra, None
-    version.setbase(version_base)
-    session.hydra = _finding_in(folders) if folders else _finding_own(tuple(plugins()))
+    version.setbase(VERSION_BASE)
+    session.hydra = _finding_in(tuple(folders)) if folders else _finding_own(tuple(plugins()))
     try:
         with interpolations_limited():
             yield session.hydra
@@ -64,7 +59,7 @@ def hydra_started(folders: Sequence[str] = ()) -> Iterator[Hydra]:
 
 
 @lru_cache(maxsize=4)
-def _finding_own(offered: tuple[Entry, ...]) -> Hydra:
+def _finding_own(offered: tuple[Entry, ...]) -> Any:
     """Hydra without other folders: what it has read and composed serves all commands of a process.
 
     Only third parties' stages may be `offered` meanwhile; omninav's own files stay as they are.
@@ -72,97 +67,26 @@ def _finding_own(offered: tuple[Entry, ...]) -> Hydra:
     return _finding_in(())
 
 
-def _finding_in(folders: Sequence[str]) -> Hydra:
-    search_path = create_config_search_path(f"{OwnFiles.scheme()}://{CONF}")
-    SourcesRegistry.instance().register(CheckedFolder)
-    SourcesRegistry.instance().register(OwnFiles)
-    for folder in folders:
-        place = f"{CheckedFolder.scheme()}://{Path(folder).absolute()}"
-        search_path.prepend("command-line", place, SearchPathQuery(provider="schema"))
-    return Hydra(task_name="omninav", config_loader=CheckedLoader(search_path))
+def _finding_in(folders: Sequence[str]) -> Any:
+    for plugin in (OwnFiles, CheckedFolder, _SearchPath, OmninavLauncher):
+        Plugins.instance().register(plugin)
+    _SearchPath.folders = [str(Path(folder).absolute()) for folder in folders]
+    initialize(config_path=None, job_name="omninav", version_base=VERSION_BASE)
+    started: Any = GlobalHydra.instance().hydra
+    started.config_loader = CheckedLoader(started.config_loader)
+    return started
 
 
-class OwnFiles(ImportlibResourcesConfigSource):
-    """omninav's own configurations, each of which a process parses once, and the stages that are options by name."""
+class _SearchPath(SearchPathPlugin):
+    """Adds omninav's configurations and those of `--config-dir`, before the schemas that Hydra adds last."""
 
-    @staticmethod
-    def scheme() -> str:
-        """What stands before its path."""
-        return "own"
+    folders: Sequence[str] = ()
 
-    def load_config(self, config_path: str) -> ConfigResult:
-        """A file's content, or a node with the stage that an option is named after."""
-        if super().is_config(config_path):
-            return super().load_config(config_path)
-        target = _stage_of(config_path)
-        if target is None:
-            raise ConfigLoadError(f"Config not found : {config_path}")
-        header: dict[str, str | None] = {"package": f"nodes.{PurePosixPath(config_path).parent}"}
-        return ConfigResult(
-            self.provider, f"{self.scheme()}://{self.path}", OmegaConf.create({"_target_": target}), header
-        )
-
-    def is_config(self, config_path: str) -> bool:
-        """Tells whether an option is a file, or a stage's name."""
-        return super().is_config(config_path) or _stage_of(config_path) is not None
-
-    def is_group(self, config_path: str) -> bool:
-        """Tells whether a path is a folder, or the name of a group whose options are stages alone."""
-        return super().is_group(config_path) or config_path in listed_groups()
-
-    def list(self, config_path: str, results_filter: ObjectType | None) -> list[str]:
-        """The options of a group, those within folders of it apart."""
-        found = super().list(config_path, results_filter) if super().is_group(config_path) else []
-        if config_path == "":
-            named = [*listed_groups()] if results_filter in (None, ObjectType.GROUP) else []
-        else:
-            named = stage_options(config_path) if results_filter in (None, ObjectType.CONFIG) else []
-        return sorted({*found, *named})
-
-    def _read_config(self, res: Any) -> ConfigResult:
-        text = res.read_text(encoding="utf-8")
-        header = ConfigSource._get_header_dict(text[:512])
-        return ConfigResult(self.provider, f"{self.scheme()}://{self.path}", pickle.loads(_parsed(text)), header)
-
-
-def _stage_of(config_path: str) -> str | None:
-    group, _, name = config_path.removesuffix(".yaml").partition("/")
-    return stage_option(group, name)
-
-
-class _YamlLoader(yaml.CSafeLoader):
-    """Reads as OmegaConf does, ten times as fast."""
-
-    yaml_implicit_resolvers = get_yaml_loader().yaml_implicit_resolvers
-
-
-@lru_cache(maxsize=512)
-def _parsed(text: str) -> bytes:
-    # A configuration is read from its bytes five times as fast as it is made of plain values.
-    return pickle.dumps(OmegaConf.create(yaml.load(text, _YamlLoader) or {}))
-
-
-class CheckedFolder(FileConfigSource):
-    """A folder of configurations, whose files are read within limits."""
-
-    @staticmethod
-    def scheme() -> str:
-        """What stands before its path."""
-        return "checked"
-
-    def load_config(self, config_path: str) -> ConfigResult:
-        """A file's content. Raises `BadInput`."""
-        file = Path(self.path) / self._normalize_file_name(config_path)
-        if os.path.lexists(file):
-            content = read_yaml(file)
-            if content is not None and not isinstance(content, dict):
-                raise BadInput(f"{file}: {shown(content)}, expected names and their values (name: value)")
-        return super().load_config(config_path)
-
-    def list(self, config_path: str, results_filter: ObjectType | None) -> list[str]:
-        """Names of files and folders in a folder; a link to a folder is not listed: it may lead back here."""
-        folder, names = Path(self.path, config_path), super().list(config_path, results_filter)
-        return [name for name in names if not ((folder / name).is_symlink() and (folder / name).is_dir())]
+    def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
+        """Called by Hydra when it starts."""
+        search_path.append("main", f"{OwnFiles.scheme()}://{CONF}")
+        for folder in self.folders:
+            search_path.append("command-line", f"{CheckedFolder.scheme()}://{folder}")
 
 
 @contextmanager
@@ -184,24 +108,61 @@ def hydra_errors() -> Iterator[None]:
         raise ConfigCompositionException(f"{type(error).__name__}: {error}") from None
 
 
-class CheckedLoader(ConfigLoaderImpl):
-    """Refuses whatever stands under `hydra.` beyond the folders of jobs, launcher and sweeper, whoever composes it."""
+class CheckedLoader(ConfigLoader):
+    """Hydra's loader, which refuses whatever stands under `hydra.` beyond folders of jobs, launcher and sweeper."""
 
-    _own: Any = None
+    def __init__(self, hydras: ConfigLoader) -> None:
+        self._hydras = hydras
+        self._own: Any = None
 
     def load_configuration(self, config_name: str | None, overrides: list[str], *args: Any, **kwargs: Any) -> Any:
         """A composed configuration. Raises `ProblemsFound`, or Hydra's own errors."""
-        if any(word.lstrip("+~").startswith("hydra.searchpath") for word in overrides):
-            raise ProblemsFound([not_settable("hydra.searchpath")])  # Hydra imports a package that it names
+        _refuse_search_path(overrides)
         with hydra_errors():
-            config = super().load_configuration(config_name, overrides, *args, **kwargs)
+            config = self._hydras.load_configuration(config_name, overrides, *args, **kwargs)
         if overrides and config_name is not None:
-            if self._own is None:
-                self._own = super().load_configuration(None, [*OWN_WORDS], *args, **kwargs).hydra
-            problems = list(_foreign(config.hydra, self._own))
-            if problems:
-                raise ProblemsFound(dict.fromkeys(problems))
+            self._refuse_foreign(config)
         return config
+
+    def load_sweep_config(self, master_config: Any, sweep_overrides: list[str]) -> Any:
+        """The configuration of a sweep's job. Raises as `load_configuration`."""
+        _refuse_search_path(sweep_overrides)
+        with hydra_errors():
+            config = self._hydras.load_sweep_config(master_config, sweep_overrides)
+        self._refuse_foreign(config)
+        return config
+
+    def _refuse_foreign(self, config: Any) -> None:
+        if self._own is None:
+            self._own = self._hydras.load_configuration(None, [*OWN_WORDS], RunMode.RUN).hydra
+        problems = list(_foreign(config.hydra, self._own))
+        if problems:
+            raise ProblemsFound(dict.fromkeys(problems))
+
+    def get_search_path(self) -> ConfigSearchPath:
+        """As Hydra's."""
+        return self._hydras.get_search_path()
+
+    def get_sources(self) -> list[ConfigSource]:
+        """As Hydra's."""
+        return self._hydras.get_sources()
+
+    def list_groups(self, parent_name: str) -> list[str]:
+        """As Hydra's."""
+        return self._hydras.list_groups(parent_name)
+
+    def get_group_options(self, *args: Any, **kwargs: Any) -> list[str]:
+        """As Hydra's."""
+        return self._hydras.get_group_options(*args, **kwargs)
+
+    def compute_defaults_list(self, *args: Any, **kwargs: Any) -> Any:
+        """As Hydra's."""
+        return self._hydras.compute_defaults_list(*args, **kwargs)
+
+
+def _refuse_search_path(overrides: Sequence[str]) -> None:
+    if any(word.lstrip("+~").startswith("hydra.searchpath") for word in overrides):
+        raise ProblemsFound([not_settable("hydra.searchpath")])  # Hydra imports a package that it names
 
 
 def _foreign(given: Any, own: Any) -> Iterator[Problem]:
@@ -226,10 +187,7 @@ def _foreign(given: Any, own: Any) -> Iterator[Problem]:
 def _plain(config: Any, key: str, skip: Sequence[str]) -> Any:
     if key not in config or OmegaConf.is_missing(config, key):
         return None
-    value = config._get_node(key)
-    if not OmegaConf.is_dict(value):
-        return OmegaConf.to_container(value, resolve=False) if OmegaConf.is_config(value) else value._value()
-    plain: Any = OmegaConf.to_container(value, resolve=False)
+    plain: Any = OmegaConf.to_container(config, resolve=False)[key]
     return {name: part for name, part in plain.items() if name not in skip} if isinstance(plain, dict) else plain
 
 

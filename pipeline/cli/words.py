@@ -1,7 +1,7 @@
 """The words of a command line, before anything reads them as a configuration: flags, and what no word may hold."""
 
 import re
-from argparse import Namespace
+from argparse import SUPPRESS, ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence, Sized
 from functools import partial
 from pathlib import Path
@@ -18,15 +18,14 @@ MAX_NESTING = 20
 MAX_DIGITS = 100
 """Digits of a whole number."""
 _LONG_NUMBER = re.compile(rf"(?<![\w.])[-+]?\d{{{MAX_DIGITS},}}")
-NOT_TAKEN = ("experimental_rerun", "config_path", "config_name", "shell_completion")
+INFO = ("all", "config", "defaults", "defaults-tree", "plugins", "searchpath")
+NOT_TAKEN = {"experimental_rerun": (), "config_path": ("-cp",), "config_name": ("-cn",), "shell_completion": ("-sc",)}
 """Flags of Hydra that would read pickles, replace omninav's own configuration or write to a shell's start files."""
 
 
 def read_flags(arguments: Sequence[str]) -> Namespace:
     """Hydra's flags among arguments, and the `overrides`. Raises `BadInput` where one is not taken."""
-    from hydra._internal.utils import get_args_parser  # the words themselves are looked at without it
-
-    parser = get_args_parser()
+    parser = flags_parser()
     known = [flag for action in parser._actions for flag in action.option_strings]
     parser.error = partial(_refuse, known)  # type: ignore[method-assign]
     read = parser.parse_intermixed_args(list(arguments))  # flags may stand between words
@@ -38,6 +37,25 @@ def read_flags(arguments: Sequence[str]) -> Namespace:
             f"--config-dir: there is no folder {read.config_dir}; it holds groups, as FOLDER/match/mine.yaml"
         )
     return read
+
+
+def flags_parser() -> ArgumentParser:
+    """The flags that omninav shares with Hydra, and those of Hydra that it refuses by name."""
+    parser = ArgumentParser(add_help=False)
+    parser.add_argument("overrides", nargs="*", help="settings, as name=value")
+    parser.add_argument("--multirun", "-m", action="store_true", help="run a job for each value of a list")
+    parser.add_argument("--config-dir", "-cd", help="a folder with groups of configuration of one's own")
+    parser.add_argument("--cfg", "-c", choices=["job", "hydra", "all"], help="show the configuration, and run nothing")
+    parser.add_argument("--resolve", action="store_true", help="with --cfg: put values in place of interpolations")
+    parser.add_argument("--package", "-p", help="with --cfg: show this part of the configuration")
+    parser.add_argument("--info", "-i", nargs="?", const="all", choices=INFO, help="show how Hydra composes it")
+    parser.add_argument("--hydra-help", action="store_true", help="Hydra's help")
+    parser.add_argument("--help", "-h", action="store_true", help="omninav's help")
+    parser.add_argument("--run", "-r", action="store_true", help="run one job, as without flags")
+    for name, short in NOT_TAKEN.items():
+        takes = "store_true" if name == "shell_completion" else "store"
+        parser.add_argument(f"--{name.replace('_', '-')}", *short, action=takes, help=SUPPRESS)
+    return parser
 
 
 def refuse_twice(arguments: Sequence[str]) -> None:

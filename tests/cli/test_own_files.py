@@ -6,7 +6,7 @@ from hydra._internal.core_plugins.importlib_resources_config_source import Impor
 
 from omninav.pipeline.cli.composition import composed
 from omninav.pipeline.cli.config_groups import group_options, listed_groups
-from omninav.pipeline.cli.hydra_session import OwnFiles
+from omninav.pipeline.cli.config_sources import OwnFiles
 from omninav.pipeline.graph.registry import is_role, of_role
 
 CONF = Path(__file__).resolve().parents[2] / "conf"

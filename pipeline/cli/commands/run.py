@@ -9,8 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from hydra._internal.hydra import Hydra
-from hydra._internal.utils import get_args_parser
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
@@ -18,10 +16,10 @@ from omninav.pipeline.cli.composition import composed, offer_plugins
 from omninav.pipeline.cli.experiments import condition_words, run_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.jobs import OUTCOMES, run_job, show_sweep
-from omninav.pipeline.cli.launcher import is_of_engine
 from omninav.pipeline.cli.overrides import invalid_overrides, jobs_to_try, with_unlisted_parameters
+from omninav.pipeline.cli.sweep_jobs import is_of_engine
 from omninav.pipeline.cli.terminal import shown
-from omninav.pipeline.cli.words import read_flags
+from omninav.pipeline.cli.words import flags_parser, read_flags
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.run.plan import Plan, plan
@@ -56,10 +54,10 @@ def command(arguments: list[str], check: Callable[[Mapping[str, Any]], Plan] = p
             raise ProblemsFound(invalid_overrides(listed, folders, str(error))) from None
 
 
-def _handed_over(hydra: Hydra, flags: Namespace, words: list[str], job: Callable[[Any], float | None]) -> int:
+def _handed_over(hydra: Any, flags: Namespace, words: list[str], job: Callable[[Any], float | None]) -> int:
     """What the flags ask Hydra for: a job, a sweep, or something to print. The worst exit code of the jobs."""
     if flags.hydra_help:
-        hydra.hydra_help("config", get_args_parser(), flags)
+        hydra.hydra_help("config", flags_parser(), flags)
     elif flags.cfg:
         hydra.show_cfg("config", words, flags.cfg, flags.package, flags.resolve)
     elif flags.info:
@@ -84,7 +82,7 @@ def _handed_over(hydra: Hydra, flags: Namespace, words: list[str], job: Callable
     return 0
 
 
-def _sweep(hydra: Hydra, job: Callable[[Any], float | None], words: Sequence[str], outcomes: Path) -> None:
+def _sweep(hydra: Any, job: Callable[[Any], float | None], words: Sequence[str], outcomes: Path) -> None:
     """Run a sweep. An optimiser that gives up because every job has failed is no error of its own."""
     try:
         hydra.multirun("config", job, [*words, "hydra.mode=MULTIRUN"])
