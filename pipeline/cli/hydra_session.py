@@ -45,8 +45,6 @@ CALLED_BY_NAME = ("custom_search_space",)
 @contextmanager
 def hydra_started(folders: Sequence[str] = ()) -> Iterator[Any]:
     """Hydra, which finds configurations among omninav's own and in `folders` (of `--config-dir`)."""
-    for plugin in (OwnFiles, CheckedFolder, _SearchPath, OmninavLauncher):
-        Plugins.instance().register(plugin)
     session = GlobalHydra.instance()
     before, session.hydra = session.hydra, None
     version.setbase(VERSION_BASE)

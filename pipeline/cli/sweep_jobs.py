@@ -7,7 +7,7 @@ from typing import Any
 
 from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
-from omegaconf import OmegaConf, open_dict
+from omegaconf import OmegaConf, open_dict, read_write
 
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.jobs.executors import read_engine
@@ -89,9 +89,10 @@ def run_sweep_job(given: Mapping[str, Any], send: Send) -> dict[str, Any]:
         HydraConfig.instance().set_config(config)
         folder = Path(given["sweep"]) / str(HydraConfig.get().sweep.subdir)
         folder.mkdir(parents=True, exist_ok=True)
-        with open_dict(config):
+        with read_write(config.hydra.runtime):
             config.hydra.runtime.output_dir = str(folder)
-            HydraConfig.instance().set_config(config)
+        HydraConfig.instance().set_config(config)
+        with read_write(config), open_dict(config):
             del config["hydra"]
         (Path(given["sweep"]) / LOGS / f"{given['number']}.folder").write_text(str(folder), encoding="utf-8")
         return asdict(ended(config, [], _no_experiment))
