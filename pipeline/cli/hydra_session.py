@@ -185,7 +185,8 @@ def _foreign(given: Any, own: Any) -> Iterator[Problem]:
 def _plain(config: Any, key: str, skip: Sequence[str]) -> Any:
     if key not in config or OmegaConf.is_missing(config, key):
         return None
-    plain: Any = OmegaConf.to_container(config, resolve=False)[key]
+    whole: Any = OmegaConf.to_container(config, resolve=False)
+    plain = whole[key]
     return {name: part for name, part in plain.items() if name not in skip} if isinstance(plain, dict) else plain
 
 
