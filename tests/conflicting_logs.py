@@ -322,7 +322,10 @@ def print_table(tour: Path, drive: Path, folder: Path, other_tour: Path | None) 
     if other_tour is not None:
         rows["another building"] = as_is, learned_map(other_tour, folder)
     for name, (change, map) in rows.items():
-        found = of_whole_run(change, map, drive, folder)
+        try:
+            found = of_whole_run(change, map, drive, folder)
+        except omninav.BadInput as refused:
+            found = [Found(0, str(refused))]
         after = ", ".join(str(each.images) for each in found) or "never"
         print(f"| {name} | {after} | {'; '.join(each.sentence for each in found)} |", flush=True)
 

@@ -123,7 +123,7 @@ class InputConflicts(Stage):
         estimate: PoseEstimate | None = None,
         restart: Restart | None = None,
     ) -> Out:
-        """One image, or a tick without one."""
+        """One image, or a tick without one. `estimate`: where matches are not scattered by changed light."""
         of_map = () if map_conflicts is None else map_conflicts.sentences
         if ctx.tick.first_of_log or restart is not None:
             recent.rows, recent.pose, recent.judged = np.zeros((0, COLUMNS)), np.full(3, np.nan), 0
@@ -442,7 +442,7 @@ def foreign(watched: Watched, length_scale_m: float) -> str:
     return (
         f"the images fit no place of the map: of {len(believed)} best matches {100 * there:.0f} % lie at the estimate, "
         f"and {100 * fit.share:.0f} % of {fit.pairs} pairs lie to each other as odometry says: check that the map is of"
-        " this place, made with this camera, and that the light is like then"
+        " this place, and was made with this camera and in a light like this"
     )
 
 
