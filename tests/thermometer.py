@@ -181,14 +181,14 @@ EXPERIMENT = {
     },
     "page": {"rows": [], "columns": "gain"},
     "curves": [{"title": "Error (K)", "x_label": "reading", "path": "course.error_k", "x_path": "course.reading"}],
-    "claims": [
-        {
+    "claims": {
+        "smoothing": {
             "statement": "Some smoothing is better than none",
             "measure": "error",
             "of": {"gain": "0.4"},
             "below": {"gain": "1.0"},
         },
-        {"statement": "Less gain is always better", "measure": "error", "of": {"gain": "0.05"}, "lowest": True},
-    ],
+        "less": {"statement": "Less gain is always better", "measure": "error", "of": {"gain": "0.05"}, "lowest": True},
+    },
     "cores": 1,
 }

@@ -1,4 +1,4 @@
-"""The pages that are generated: of stages, variants and settings, from the classes and configurations themselves.
+"""The pages that are generated: stages, variants and settings from the classes, experiments from their results.
 
 mkdocs loads this file and calls its functions by their names. Pages that lie elsewhere in the repository (README,
 CONTRIBUTING, …) are taken as they are.
@@ -9,6 +9,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from experiment_pages import experiment_pages, with_results
 from mkdocs.structure.files import File, Files
 from setting_pages import settings_page
 from stage_pages import role_pages
@@ -28,7 +29,9 @@ LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s#]+)(#[^)\s]*)?\)")
 
 def on_files(files: Files, config: Any) -> Files:
     """Add what is generated, and what lies elsewhere."""
-    pages = {"reference/settings.md": settings_page()} | variants_page() | role_pages()
+    pages: dict[str, str | bytes] = (
+        {"reference/settings.md": settings_page()} | variants_page() | role_pages() | experiment_pages()
+    )
     pages |= {page: _at_home(ROOT / origin, page) for origin, page in TAKEN.items()}
     for page, content in pages.items():
         files.append(File.generated(config, page, content=content))
@@ -38,6 +41,7 @@ def on_files(files: Files, config: Any) -> Files:
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Let links of pages in docs/ that lead out of it lead to where it stands on the site."""
     origin = page.file.src_uri
+    markdown = with_results(markdown, origin)
     return markdown if origin in TAKEN.values() else _linked(markdown, f"docs/{origin}", origin)
 
 

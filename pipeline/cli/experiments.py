@@ -1,17 +1,23 @@
 """Experiments on the command line: which words are for their conditions, and how these are composed."""
 
-from collections.abc import Sequence
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
+from omninav.pipeline.experiment.pages import Judged
+from omninav.pipeline.experiment.result import ExperimentResult, read_result, result_files
 from omninav.pipeline.experiment.runner import ExperimentRun, plan_experiment
+from omninav.pipeline.experiment.specification import FULL, Experiment, read_experiment
 from omninav.pipeline.experiment.verdicts import MIN_SCENARIOS, Verdict, in_words
-from omninav.pipeline.graph.problems import ProblemsFound
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound
 
 from .composition import complete, read_words
 from .composition_cache import compose
+from .hydra_session import hydra_started
 from .overrides import invalid_overrides, with_unlisted_parameters
 from .terminal import show, shown
 
@@ -35,24 +41,27 @@ def run_experiment(config: Any, arguments: Sequence[str]) -> int:
     well = run.run()
     verdicts = run.verdicts()
     if verdicts:
-        show(verdict_table(verdicts))
-        if any(v.holds is None and any(case.scenarios < MIN_SCENARIOS for case in v.cases) for v in verdicts):
+        show(verdict_table(run.experiment, verdicts))
+        few = (case.scenarios < MIN_SCENARIOS for v in verdicts.values() if v.holds is None for case in v.cases)
+        if any(few):
             print(f"undecided: a verdict needs {MIN_SCENARIOS} scenarios")
     print(f"page: {shown(run.folder / (run.experiment.name + '.html'))}", flush=True)
     return 0 if well else 1
 
 
-def verdict_table(verdicts: Sequence[Verdict]) -> "TerminalTable":
+def verdict_table(experiment: Experiment, verdicts: Mapping[str, Verdict]) -> "TerminalTable":
     """A line for each claim: its verdict, the claim, and how many of its cases hold where not all do."""
     from rich.table import Table as TerminalTable
     from rich.text import Text
 
     table = TerminalTable.grid(padding=(0, 3, 0, 0))
-    for verdict in verdicts:
+    for key, verdict in verdicts.items():
         word = in_words(verdict.holds)
         holding = sum(case.holds is True for case in verdict.cases)
         cases = f" ({holding} of {len(verdict.cases)} cases hold)" if 0 < holding < len(verdict.cases) else ""
-        table.add_row(Text(word, "bold red" if verdict.holds is False else ""), Text(f"{verdict.claim}{cases}"))
+        table.add_row(
+            Text(word, "bold red" if verdict.holds is False else ""), Text(f"{experiment.claims[key].statement}{cases}")
+        )
     return table
 
 
@@ -64,6 +73,27 @@ def resolved_but_for_the_experiment(config: Any) -> dict[str, Any]:
     others = OmegaConf.masked_copy(config, [key for key in config if key != "experiment"])
     plain: Any = OmegaConf.to_container(others, resolve=True)
     return {**plain, "experiment": OmegaConf.to_container(config.experiment)}
+
+
+def judged_experiments(folder: Path, config_dirs: Sequence[str] = ()) -> Judged:
+    """The results in a folder, each with its experiment as the file that its command names has it now."""
+    results = [(path, read_result(path)) for path in result_files(folder)]
+    with hydra_started(config_dirs):
+        return [(_experiment_of(path, result, config_dirs), result) for path, result in results]
+
+
+def _experiment_of(path: Path, result: ExperimentResult, config_dirs: Sequence[str]) -> Experiment:
+    typed, _ = read_words(shlex.split(result.command)[1:])
+    keys = [word.lstrip("+~").partition("=")[0].partition(".")[0] for word in typed]
+    words = [word for word, key in zip(typed, keys, strict=True) if key in ("experiment", "profile")]
+    try:
+        config = compose(with_unlisted_parameters(words, list(config_dirs)))
+    except HydraException as error:
+        raise ProblemsFound(invalid_overrides(words, list(config_dirs), str(error))) from None
+    plain = resolved_but_for_the_experiment(config) if "experiment" in keys else {}
+    if plain.get("experiment", {}).get("name") != result.name:
+        raise BadInput(f"{path}: its command, `{result.command}`, is not of the experiment '{result.name}'")
+    return read_experiment(plain["experiment"], str(plain.get("profile") or FULL))
 
 
 def planned_experiment(config: Any, arguments: Sequence[str]) -> ExperimentRun:

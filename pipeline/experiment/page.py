@@ -1,7 +1,6 @@
 """An experiment as one page: verdicts, the paper's figures next to ours, failures, and how to reproduce it."""
 
 import base64
-import json
 import math
 import shlex
 from collections.abc import Mapping, Sequence
@@ -16,9 +15,10 @@ from omninav.pipeline.report.quantities import title, unit
 from omninav.pipeline.report.rendering import render
 
 from .conditions import ConditionRun
-from .plots import plots_of, row_labels
-from .specification import DEVELOPMENT, Experiment, Measure, figure_of
-from .verdicts import MIN_SCENARIOS, Case, Results, Verdict, in_words, judge, key_of, over_runs, pooled, samples
+from .plots import PagePlot, plots_of
+from .result import SUFFIX, Cell, ConditionRow, ExperimentResult, figures_of, result_text, rows_of
+from .specification import DEVELOPMENT, Claim, Experiment, Measure, figure_of
+from .verdicts import MIN_SCENARIOS, Case, Results, Verdict, in_words
 
 STYLES = {"holds": "held", "does not hold": "broken", "undecided": "quiet"}
 """The CSS class of a verdict."""
@@ -46,56 +46,84 @@ class PageContent:
 
 
 def write_page(content: PageContent, results: Results, development: Results, folder: Path) -> Path:
-    """Write `<name>.md`, `<name>.html`, its plots and `verdicts.json` into the experiment's folder.
+    """Write `<name>.md`, `<name>.html`, its plots and `<name>.result.json` into the experiment's folder.
 
     All of it follows from the results as they stand; conditions that failed or are still to run are named. Those of
     `development` stand beside the others in the tables, and nothing else is made of them.
     """
+    experiment = content.experiment
+    result = experiment_result(content, results, development)
+    write_whole(folder / f"{experiment.name}{SUFFIX}", result_text(result))
+    for file, written in markdown_page(experiment, result).items():
+        write_whole(folder / file, written)
+    path = folder / f"{experiment.name}.html"
+    plots = [
+        replace(plot, file=f"data:image/png;base64,{base64.b64encode(plot.content).decode()}")
+        for plot in plots_of(experiment, result)
+    ]
+    write_whole(path, render("experiment.html", **_values(experiment, result, plots)))
+    return path
+
+
+def experiment_result(content: PageContent, results: Results, development: Results) -> ExperimentResult:
+    """What is kept of an experiment as far as it has run."""
     experiment, conditions = content.experiment, content.conditions
-    verdicts = judge(experiment, results)
-    plain = [verdict.plain() for verdict in verdicts]
-    write_whole(folder / "verdicts.json", json.dumps(plain, indent=1, ensure_ascii=False) + "\n")
-    plots = plots_of(experiment, results)
-    for plot in plots:
-        write_whole(folder / plot.file, plot.content)
     common = [word for word in conditions[0].overrides if all(word in run.overrides for run in conditions)]
-    rows = [_condition(run, common) for run in conditions]
-    values: dict[str, Any] = {
+    verdicts, cells, curves = figures_of(experiment, results, development)
+    return ExperimentResult(
+        name=experiment.name,
+        command=shlex.join(content.argv),
+        profile=content.profile,
+        made_with=content.made_with,
+        repeated=_repeated(experiment),
+        verdicts=verdicts,
+        cells=cells,
+        curves=curves,
+        reference_runs=tuple(reference_text(content, number) for number in range(len(experiment.reference_runs))),
+        recordings={name: _facts(facts) for name, facts in content.recordings},
+        conditions=tuple(_condition(run, common) for run in conditions),
+        failures={run.name: run.error for run in content.all_runs if run.error},
+        missing=sum(len(run.missing) for run in content.all_runs if not run.error),
+        common_overrides=tuple(common),
+    )
+
+
+def markdown_page(experiment: Experiment, result: ExperimentResult) -> dict[str, str | bytes]:
+    """The page as Markdown, and its plots, by the names of their files."""
+    plots = plots_of(experiment, result)
+    page = render("experiment.md", **_values(experiment, result, plots))
+    return {f"{experiment.name}.md": page, **{plot.file: plot.content for plot in plots}}
+
+
+def _repeated(experiment: Experiment) -> str:
+    runs, seeds, scenarios = experiment.runs_of_a_condition, experiment.repetitions, experiment.scenarios
+    named = "seed 0" if runs == 1 else f"seeds 0 to {runs - 1}"
+    several = f", {seeds} in each of {len(scenarios)} scenarios ({', '.join(scenarios)})" if scenarios else ""
+    return f"{runs} repetitions of each condition with {named}{several}"
+
+
+def _values(experiment: Experiment, result: ExperimentResult, plots: Sequence[PagePlot]) -> dict[str, Any]:
+    """What the templates read."""
+    verdicts = result.judged(experiment)
+    return {
         "experiment": experiment,
-        "profile": content.profile,
-        "command": shlex.join(content.argv),
-        "verdicts": [_verdict(experiment, verdict) for verdict in verdicts],
-        "tables": [_table(experiment, results, development, name) for name in experiment.measures],
-        "reference_runs": [reference_text(content, number) for number in range(len(experiment.reference_runs))],
-        "recordings": [(name, _facts(facts)) for name, facts in content.recordings],
-        "conditions": rows,
-        "context_columns": list(dict.fromkeys(name for row in rows for name in row["context"])),
-        "common_overrides": common,
-        "made_with": content.made_with,
+        "result": result,
+        "verdicts": [_verdict(experiment, experiment.claims[key], verdict) for key, verdict in verdicts.items()],
+        "tables": [figure_table(experiment, result, name) for name in experiment.measures if name in result.cells],
+        "context_columns": list(dict.fromkeys(name for row in result.conditions for name in row.context)),
         "styles": STYLES,
-        "tiles": _tiles(content, verdicts),
-        "failures": [(run.name, run.error) for run in content.all_runs if run.error],
-        "missing": sum(len(run.missing) for run in content.all_runs if not run.error),
+        "tiles": _tiles(experiment, result, list(verdicts.values())),
         "repetitions": experiment.runs_of_a_condition,
-        "seeds": experiment.repetitions,
         "min_scenarios": MIN_SCENARIOS,
         "plots": plots,
     }
-    write_whole(folder / f"{experiment.name}.md", render("experiment.md", **values))
-    values["plots"] = [
-        replace(plot, file=f"data:image/png;base64,{base64.b64encode(plot.content).decode()}") for plot in plots
-    ]
-    path = folder / f"{experiment.name}.html"
-    write_whole(path, render("experiment.html", **values))
-    return path
 
 
 def number(value: float | None, digits: int) -> str:
     """A figure with a measure's digits, more where it would look like 0 and is not; a dash where there is none."""
     if value is None or not math.isfinite(value):
         return "–"
-    text = f"{value:.{digits}f}"
-    return f"{value:.1g}" if value and not float(text) else text
+    return f"{value:.1g}" if 0.0 < abs(value) <= 0.5 * 10.0**-digits else f"{value:.{digits}f}"
 
 
 def made_with(version: str, commit: str | None) -> str:
@@ -105,36 +133,34 @@ def made_with(version: str, commit: str | None) -> str:
     return f"Made with omninav {version}{at}"
 
 
-def summary(measure: Measure, values: Sequence[float]) -> str:
+def summary(measure: Measure, cell: Cell) -> str:
     """Mean ± standard deviation, or the figure that the measure judges; a dash where there is nothing."""
-    digits = measure.digits
-    if not values or len(values) == 1 or measure.over_runs != "mean":
-        return number(over_runs(measure, values) if values else None, digits)
-    mean, spread = float(np.mean(values)), float(np.std(values))
-    spread = spread if spread > 1e-9 * abs(mean) else 0.0  # equal figures, but for rounding
-    return f"{number(mean, digits)} ± {number(spread, digits)}"
+    mean = number(cell.figure, measure.digits)
+    return mean if cell.spread is None else f"{mean} ± {number(cell.spread, measure.digits)}"
 
 
-def beyond_the_mean(measure: Measure, values: Sequence[float], ran: int) -> list[str]:
+def beyond_the_mean(measure: Measure, cell: Cell) -> list[str]:
     """Note under a mean: the median where it differs, and how many of those that ran have a figure at all."""
-    shown, median = (
-        (number(of, measure.digits) for of in (over_runs(measure, values), float(np.median(values))))
-        if values
-        else ("", "")
-    )
-    parts = [f"median {median}"] if shown != median else []
-    return [*parts, f"{len(values)} of {ran}"] if len(values) < ran else parts
+    digits = measure.digits
+    parts = []
+    if cell.median is not None and number(cell.median, digits) != number(cell.figure, digits):
+        parts.append(f"median {number(cell.median, digits)}")
+    if cell.found < cell.ran and not measure.pooled:
+        parts.append(f"{cell.found} of {cell.ran}")
+    if cell.development is not None:
+        parts.append(f"development {number(cell.development, digits)}")
+    return parts
 
 
-def _verdict(experiment: Experiment, verdict: Verdict) -> dict[str, Any]:
-    measure = next(m for m in experiment.measures.values() if m.title == verdict.measure)
-    rows = [_case(case, measure) for case in verdict.cases]
+def _verdict(experiment: Experiment, claim: Claim, verdict: Verdict) -> dict[str, Any]:
+    measure = experiment.measures[claim.measure]
+    said = " ".join(part for part in (claim.paper, claim.where and f"({claim.where})") if part)
     return {
-        "claim": verdict.claim,
-        "paper": verdict.paper,
+        "claim": claim.statement,
+        "paper": f"{said}: “{claim.quote}”" if said and claim.quote else said or claim.quote,
         "measure": measure.title,
         "holds": in_words(verdict.holds),
-        "rows": rows,
+        "rows": [_case(case, measure) for case in verdict.cases],
     }
 
 
@@ -156,38 +182,25 @@ def _case(case: Case, measure: Measure) -> dict[str, str]:
     }
 
 
-def _table(experiment: Experiment, results: Results, development: Results, name: str) -> dict[str, Any]:
+def figure_table(experiment: Experiment, result: ExperimentResult, name: str) -> dict[str, Any]:
+    """A measure's table: the page's rows and columns, with the paper's figures beside ours."""
     measure, page = experiment.measures[name], experiment.page
     columns = experiment.labels(page.columns)
-    printed = bool(experiment.published.get(name))
     rows = []
-    for labels in row_labels(experiment):
+    for labels in rows_of(experiment):
         cells = []
         for column in columns:
-            here = labels | {page.columns: column}
-            ran = len(results.get(key_of(here), {}))
-            found = list(samples(experiment, results, name, here).values())
-            more = beyond_the_mean(measure, found, ran)
-            chosen_on = list(samples(experiment, development, name, here).values())
-            if chosen_on and not measure.pooled:
-                more.append(f"development {number(over_runs(measure, chosen_on), measure.digits)}")
-            if measure.pooled:
-                whole = pooled(experiment, results, name, here)
-                found, more = [] if whole is None else [whole], []
-            cells.append(
-                {
-                    "ours": summary(measure, found),
-                    "more": ", ".join(more),
-                    "paper": number(experiment.published_figure(name, here), measure.digits),
-                }
-            )
-        rows.append({"head": [labels[factor] for factor in page.rows] or ["all"], "cells": cells})
+            cell = result.cell(name, (*labels.values(), column))
+            paper = experiment.published_figure(name, labels | {page.columns: column})
+            ours, more = summary(measure, cell), ", ".join(beyond_the_mean(measure, cell))
+            cells.append({"ours": ours, "more": more, "paper": number(paper, measure.digits)})
+        rows.append({"head": list(labels.values()) or ["all"], "cells": cells})
     return {
         "title": measure.title,
         "heads": list(page.rows) or [""],
         "columns": columns,
         "rows": rows,
-        "printed": printed,
+        "printed": bool(experiment.published.get(name)),
     }
 
 
@@ -213,27 +226,22 @@ def _in_words(name: str, value: Any) -> str:
     return f"{title(name).lower()} {value} {unit(name)}".rstrip()
 
 
-def _tiles(content: PageContent, verdicts: Sequence[Verdict]) -> list[dict[str, str]]:
+def _tiles(experiment: Experiment, result: ExperimentResult, verdicts: Sequence[Verdict]) -> list[dict[str, str]]:
     """Tiles: how many claims hold, and how much has run."""
-    done = sum(len(run.results) for run in content.conditions)
-    total = sum(len(run.seeds) for run in content.conditions)
+    done, total = (sum(int(row.done.split("/")[part]) for row in result.conditions) for part in (0, 1))
     holding = sum(verdict.holds is True for verdict in verdicts)
     undecided = sum(verdict.holds is None for verdict in verdicts)
     name = "claims hold" + (f", {undecided} undecided" if undecided else "")
     claims = [{"value": str(holding), "of": f"of {len(verdicts)}", "name": name}]
     return [
         *(claims if verdicts else []),
-        {"value": str(len(content.experiment.conditions())), "of": "", "name": "conditions"},
+        {"value": str(len(experiment.conditions())), "of": "", "name": "conditions"},
         {"value": str(done), "of": f"of {total}", "name": "repetitions done"},
-        {"value": content.profile, "of": "", "name": "profile"},
+        {"value": result.profile, "of": "", "name": "profile"},
     ]
 
 
-def _condition(run: ConditionRun, common: Sequence[str]) -> dict[str, Any]:
+def _condition(run: ConditionRun, common: Sequence[str]) -> ConditionRow:
     first: Mapping[str, Any] = next(iter(run.results.values()), {})
-    return {
-        "name": run.name,
-        "overrides": shlex.join(word for word in run.overrides if word not in common),
-        "done": f"{len(run.results)}/{len(run.seeds)}",
-        "context": first.get("context", {}),
-    }
+    own = shlex.join(word for word in run.overrides if word not in common)
+    return ConditionRow(run.name, f"{len(run.results)}/{len(run.seeds)}", first.get("context", {}), own)

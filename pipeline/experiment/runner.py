@@ -82,8 +82,8 @@ class ExperimentRun:
         self.write_page()
         return well
 
-    def verdicts(self) -> list[Verdict]:
-        """Lists the verdict on each claim."""
+    def verdicts(self) -> dict[str, Verdict]:
+        """The verdict on each claim, by its key."""
         return judge(self.experiment, results_by_condition(self.conditions))
 
     def write_page(self) -> Path:

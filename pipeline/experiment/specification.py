@@ -83,7 +83,11 @@ class Claim:
     ratio_to: Mapping[str, Any] | None = None
     """Labels of a condition: the figure is then the ratio of the two means, and is compared with a number."""
     paper: str = ""
-    """The paper's own words or figure."""
+    """The paper's statement that it judges, in our words, with its figure."""
+    where: str = ""
+    """Place in the paper: section, figure, table, equation. With it the claim is listed among those of `source`."""
+    quote: str = ""
+    """The paper's own words, where they say more."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +168,10 @@ class Experiment:
     """Labels of conditions that are not run."""
     published: Mapping[str, Any] = field(default_factory=dict)
     """Measure -> labels in the order of the page's rows and column -> the paper's figure."""
-    claims: tuple[Claim, ...] = ()
+    source: str = ""
+    """The paper that its claims are from: `Porta & Kröse 2004`."""
+    claims: Mapping[str, Claim] = field(default_factory=dict)
+    """Key -> claim. Results name a claim by its key, so that its sentences may change."""
     curves: tuple[Curve, ...] = ()
     reference_runs: tuple[ReferenceRun, ...] = ()
     notes: tuple[str, ...] = ()
@@ -250,8 +257,11 @@ def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
     sweep = scaled.get("sweep") or {}
     if isinstance(sweep, Mapping):
         scaled["sweep"] = {factor: _without_null(labels) for factor, labels in sweep.items()}
-    for key in ("measures", "scenarios"):
+    for key in ("measures", "scenarios", "claims"):
         scaled[key] = _without_null(scaled.get(key) or {})
+    if isinstance(scaled["claims"], list):
+        hint = "claims: {closer: {statement: …, measure: …}}"
+        raise ProblemsFound([Problem("experiment.claims", "a list, expected a mapping: a key for each claim", hint)])
     scaled |= {key: _as_typed(scaled[key]) for key in TYPED if key in scaled}
     arguments, problems = convert_fields(scaled, Experiment, "experiment")
     if problems:
@@ -314,8 +324,13 @@ def _contradictions(experiment: Experiment) -> "list[Problem]":
     labelled = [(f"without[{n}]", labels) for n, labels in enumerate(experiment.without)]
     labelled += [(f"curves[{n}].only", curve.only) for n, curve in enumerate(experiment.curves)]
     measured = [(f"page.drawn[{n}]", name) for n, name in enumerate(page.drawn)]
-    for number, claim in enumerate(experiment.claims):
-        where = f"claims[{number}]"
+    for key, claim in experiment.claims.items():
+        where = f"claims.{key}"
+        if claim.where and not (experiment.source and claim.paper):
+            what = "a place in a paper, expected `paper` beside it, and `source` of the experiment"
+            problems.append(
+                Problem(f"experiment.{where}.where", what, "paper: what it says; source: Porta & Kröse 2004")
+            )
         measured.append((f"{where}.measure", claim.measure))
         problems += [Problem(f"experiment.{where}", fault) for fault in _faults(experiment, claim)]
         sides = [getattr(claim, side) for side in SIDES]

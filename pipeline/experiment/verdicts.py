@@ -1,7 +1,7 @@
 """Claims against results: means, bootstrap intervals of paired differences, and whether each claim holds."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -52,11 +52,8 @@ class Case:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A claim with its cases; it holds where all of them do."""
+    """The cases of a claim; it holds where all of them do."""
 
-    claim: str
-    measure: str
-    paper: str
     cases: tuple[Case, ...]
 
     @property
@@ -67,31 +64,13 @@ class Verdict:
             return False
         return None if None in found or not found else True
 
-    def plain(self) -> dict[str, Any]:
-        """Form of verdicts.json: the figures themselves where there is one case, else one entry for each."""
-        cases = [asdict(case) for case in self.cases]
-        head = {"claim": self.claim, "measure": self.measure, "paper": self.paper, "holds": self.holds}
-        if len(cases) == 1:
-            return head | {"ours": cases[0]["ours"], "interval": cases[0]["interval"], "cases": cases}
-        return head | {
-            "ours": {case["where"]: case["ours"] for case in cases},
-            "interval": {case["where"]: case["interval"] for case in cases},
-            "cases": cases,
-        }
-
-
-def verdict_of(plain: Mapping[str, Any]) -> Verdict:
-    """A verdict as verdicts.json holds it (`Verdict.plain`)."""
-    cases = [Case(**case | {"interval": case["interval"] and tuple(case["interval"])}) for case in plain["cases"]]
-    return Verdict(plain["claim"], plain["measure"], plain["paper"], tuple(cases))
-
 
 def in_words(holds: bool | None) -> str:
     """Verdict on a claim or a case in words."""
     return {True: "holds", False: "does not hold", None: "undecided"}[holds]
 
 
-def headline(verdicts: Sequence[Verdict]) -> str:
+def headline(verdicts: Iterable[Verdict]) -> str:
     """Verdict on the claims of a page together: it holds where every claim does."""
     found = [verdict.holds for verdict in verdicts]
     if len(set(found)) == 1 and (found[0] is not False or len(found) == 1):
@@ -145,17 +124,9 @@ def pooled(experiment: Experiment, results: Results, measure: str, labels: Label
     return None
 
 
-def judge(experiment: Experiment, results: Results) -> list[Verdict]:
-    """A verdict for each claim of the file, in its order."""
-    return [
-        Verdict(
-            claim.statement,
-            experiment.measures[claim.measure].title,
-            claim.paper,
-            tuple(_cases(experiment, claim, results)),
-        )
-        for claim in experiment.claims
-    ]
+def judge(experiment: Experiment, results: Results) -> dict[str, Verdict]:
+    """A verdict for each claim of the file, by its key."""
+    return {key: Verdict(tuple(_cases(experiment, claim, results))) for key, claim in experiment.claims.items()}
 
 
 def _cases(experiment: Experiment, claim: Claim, results: Results) -> list[Case]:

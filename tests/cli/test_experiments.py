@@ -7,12 +7,13 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 from background_runs import kill, start
 
+from omninav.pipeline.experiment.result import read_result
 from omninav.pipeline.jobs.progress import JobProgress
 
 STAGES = '''
@@ -123,9 +124,10 @@ page: {rows: [method], columns: tour}
 published:
   error: {fair: {TT1: 102, TT2: 30}}
 claims:
-  - {statement: fair is better than loaded, measure: error, of: {method: fair}, below: {method: loaded}, paper: better}
-  - {statement: fair is as good as the paper's, measure: error, of: {method: fair}, at_most: published}
-  - {statement: loaded is best, measure: error, of: {method: loaded}, lowest: true}
+  better:
+    {statement: fair is better than loaded, measure: error, of: {method: fair}, below: {method: loaded}, paper: better}
+  published: {statement: fair is as good as the paper's, measure: error, of: {method: fair}, at_most: published}
+  best: {statement: loaded is best, measure: error, of: {method: loaded}, lowest: true}
 profiles:
   quick: {repetitions: 2}
 """
@@ -166,9 +168,10 @@ curves:
     only: {method: loaded}
     reference: {odometry alone: steps.odometry_m}
 claims:
-  - {statement: errors fall, measure: rise, below: 0.0}
-  - {statement: half of the loaded one's, measure: error, of: {method: fair}, ratio_to: {method: loaded}, at_most: 0.6}
-  - {statement: the lucky are better, measure: lucky, of: {method: fair}, at_most: 2.0}
+  fall: {statement: errors fall, measure: rise, below: 0.0}
+  half:
+    {statement: half of the loaded one's, measure: error, of: {method: fair}, ratio_to: {method: loaded}, at_most: 0.6}
+  lucky: {statement: the lucky are better, measure: lucky, of: {method: fair}, at_most: 2.0}
 """
 ONCE = 2 * (20 + 30)
 """Lines in `computed`: in two conditions, each frame once."""
@@ -247,12 +250,12 @@ def test_a_page_with_verdicts_and_what_repetitions_share_computed_once(dice: Fin
     *verdicts, why, _ = dice.said.splitlines()[-5:]
     assert [line.split("  ")[0] for line in verdicts] == ["undecided"] * 3
     assert why == "undecided: a verdict needs 6 scenarios"
-    better, published, best = json.loads((folder / "verdicts.json").read_text())
-    assert better["holds"] is None  # six seeds of one drive say nothing of another
-    assert better["paper"] == "better"
-    assert [case["difference"] for case in better["cases"]] == pytest.approx([-100.0, -100.0], abs=10.0)
-    assert [case["ours"] < case["other"] for case in published["cases"]] == [True, False]
-    assert best["cases"][0]["difference"] > 0.0
+    verdicts = read_result(folder / "dice.result.json").verdicts
+    better, published, best = verdicts["better"], verdicts["published"], verdicts["best"]
+    assert [case.holds for case in better] == [None, None]  # six seeds of one drive say nothing of another
+    assert [case.difference for case in better] == pytest.approx([-100.0, -100.0], abs=10.0)
+    assert [case.ours < case.other for case in published] == [True, False]
+    assert best[0].difference > 0.0
     page = (folder / "dice.md").read_text()
     assert "(102.0)" in page
     assert not [line for line in page.split("\n") if line.endswith(" ")]
@@ -288,14 +291,15 @@ def test_series_within_runs_drives_as_repetitions_and_times_of_stages(omninav, p
     )
     omninav("--config-dir", "mine", "+experiment=laps", check=True)
     folder = place / "runs/laps_full"
-    fall, half, lucky = json.loads((folder / "verdicts.json").read_text())
-    assert fall["holds"] is True
-    assert [case["repetitions"] for case in fall["cases"]] == [12, 12, 12]
-    assert half["cases"][0]["ratio"] is True
-    assert half["ours"] == pytest.approx(0.5, abs=0.05)
-    assert half["holds"] is True
-    assert lucky["holds"] is None
-    judged = lucky["cases"][0]["judged"]
+    verdicts = read_result(folder / "laps.result.json").verdicts
+    fall, (half,), (lucky,) = verdicts["fall"], verdicts["half"], verdicts["lucky"]
+    assert [case.holds for case in fall] == [True, True, True]
+    assert [case.repetitions for case in fall] == [12, 12, 12]
+    assert half.ratio is True
+    assert half.ours == pytest.approx(0.5, abs=0.05)
+    assert half.holds is True
+    assert lucky.holds is None
+    judged = lucky.judged
     assert 0 < judged < 12
     page = (folder / "laps.md").read_text()
     assert f", {judged} of 12" in page
@@ -345,8 +349,9 @@ def test_a_failing_job_is_named_on_the_page_and_the_others_finish(omninav, place
     assert f"method loaded, tour TT2: {said}" in (folder / "dice.md").read_text()
     assert "the third is too many" in (folder / "dice.html").read_text()
     assert len(results(folder)) == 4
-    better, published, _ = json.loads((folder / "verdicts.json").read_text())
-    assert (better["holds"], published["holds"]) == (None, None)  # of fewer than six repetitions nothing is said
+    verdicts = read_result(folder / "dice.result.json").verdicts
+    held = {case.holds for key in ("better", "published") for case in verdicts[key]}
+    assert held == {None}  # of fewer than six repetitions nothing is said
     assert "Traceback" in (folder / "conditions/method_loaded_tour_TT1/run.log").read_text()
 
 
@@ -432,5 +437,6 @@ def test_results_are_the_same_bytes_wherever_they_were_computed(dice: Finished, 
     with engine as words:
         dice.go(*MINE, *words, f"runs={runs}", "cache=null")
     here, there = dice.place / "runs/dice_full", runs / "dice_full"
-    assert (there / "verdicts.json").read_bytes() == (here / "verdicts.json").read_bytes()
+    first, second = (read_result(folder / "dice.result.json") for folder in (here, there))
+    assert replace(second, command=first.command) == first
     assert results(there) == results(here)

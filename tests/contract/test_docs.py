@@ -7,7 +7,7 @@ from pathlib import Path
 from offenders import assert_each
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), ROOT / "runs/README.md", ROOT / "examples/README.md"])
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "runs/README.md", ROOT / "examples/README.md"])
 PAPERS = ROOT / "docs/papers.md"
 
 

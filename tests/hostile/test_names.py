@@ -32,7 +32,7 @@ def test_an_experiments_name_is_a_name(
     Path("my/experiment/mine.yaml").write_text(
         f'# @package experiment\ndefaults: [test_worlds, _self_]\nname: "{name}"\ntitle: T\nabout: A\n'
         "variant: omniview_mcl\nset: start=truth\nsweep: {match: {a: match=selective, b: match=l2}}\n"
-        "measures: {error: {title: E, path: [position_error_m.median], digits: 2}}\nclaims: []\n"
+        "measures: {error: {title: E, path: [position_error_m.median], digits: 2}}\nclaims: {}\n"
         "page: {rows: [], columns: match}\n"
     )
     for command in ([], ["check"]):

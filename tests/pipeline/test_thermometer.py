@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 import thermometer
 
+from omninav.pipeline.experiment.result import read_result
 from omninav.pipeline.experiment.runner import plan_experiment
 from omninav.pipeline.report.sweep_page import write_sweep_page
 from omninav.pipeline.report.terminal_tables import compare_table
@@ -83,10 +84,10 @@ def experiment(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_an_experiment_judges_its_claims(experiment: Path):
-    smoothing, less = json.loads((experiment / "verdicts.json").read_text())
-    assert smoothing["holds"] is True
-    assert smoothing["cases"][0]["repetitions"] == 6 * 2
-    assert less["holds"] is False
+    verdicts = read_result(experiment / "gains.result.json").verdicts
+    assert [case.holds for case in verdicts["smoothing"]] == [True]
+    assert verdicts["smoothing"][0].repetitions == 6 * 2
+    assert [case.holds for case in verdicts["less"]] == [False]
 
 
 def test_what_the_source_computes_is_recorded_once_for_each_scenario(experiment: Path):

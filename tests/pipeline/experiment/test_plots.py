@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from omninav.pipeline.experiment.plots import plots_of
+from omninav.pipeline.experiment.result import ExperimentResult, figures_of
 from omninav.pipeline.experiment.specification import read_experiment
 from omninav.pipeline.experiment.verdicts import key_of
 from omninav.pipeline.report.plot_style import PALETTE
@@ -33,7 +34,8 @@ def drawn(methods: int, along: tuple[float, ...] = (1.0,), **page: object) -> li
         level = along[int(condition.labels["method"][-1]) % len(along)]
         run = {"metrics": {"error": 2.0, "along": 3 * [level]}, "timing": {}, "facts": {}}
         results[key_of(condition.labels)] = {("world 1", 0): run, ("world 2", 0): run}
-    return [cv2.imdecode(np.frombuffer(p.content, np.uint8), cv2.IMREAD_COLOR) for p in plots_of(experiment, results)]
+    result = ExperimentResult("test", "", "full", "", "", *figures_of(experiment, results, {}))
+    return [cv2.imdecode(np.frombuffer(p.content, np.uint8), cv2.IMREAD_COLOR) for p in plots_of(experiment, result)]
 
 
 @pytest.mark.parametrize(

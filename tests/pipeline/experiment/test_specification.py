@@ -73,6 +73,7 @@ def faults(change: dict[str, object], profile: str = "full") -> list[str]:
 
 CURVE = {"title": "t", "x_label": "x", "path": "p"}
 RUN = {"text": "{}", "variant": "v", "measure": "m"}
+UNSOURCED = "a place in a paper, expected `paper` beside it, and `source` of the experiment"
 CLAIM = {"statement": "s", "measure": "error", "at_most": 1.0}
 
 
@@ -88,11 +89,20 @@ CLAIM = {"statement": "s", "measure": "error", "at_most": 1.0}
         ({"curves": [CURVE, CURVE | {"panels": "x"}]}, "experiment.curves[1].panels: there is no 'x'"),
         ({"reference_runs": [RUN | {"over": "x"}]}, "experiment.reference_runs[0].over: there is no 'x'"),
         ({"without": [{"data": "x"}]}, "experiment.without[0].data: there is no 'x'"),
-        ({"claims": [CLAIM | {"measure": "x"}]}, "experiment.claims[0].measure: there is no 'x'"),
-        ({"claims": [CLAIM, CLAIM | {"of": {"data": "x"}}]}, "experiment.claims[1].data: there is no 'x'"),
-        ({"claims": [CLAIM | {"of": {"x": "a"}}]}, "experiment.claims[0]: there is no 'x'"),
-        ({"claims": [CLAIM | {"ratio_to": {"x": "a"}}]}, "experiment.claims[0]: there is no 'x'"),
-        ({"claims": [CLAIM | {"at_most": {"data": "x"}}]}, "experiment.claims[0].data: there is no 'x'"),
+        ({"claims": {"a": CLAIM | {"measure": "x"}}}, "experiment.claims.a.measure: there is no 'x'"),
+        ({"claims": {"a": CLAIM, "b": CLAIM | {"of": {"data": "x"}}}}, "experiment.claims.b.data: there is no 'x'"),
+        ({"claims": {"a": CLAIM | {"of": {"x": "a"}}}}, "experiment.claims.a: there is no 'x'"),
+        ({"claims": {"a": CLAIM | {"ratio_to": {"x": "a"}}}}, "experiment.claims.a: there is no 'x'"),
+        ({"claims": {"a": CLAIM | {"at_most": {"data": "x"}}}}, "experiment.claims.a.data: there is no 'x'"),
+        (
+            {"claims": {"a": CLAIM | {"where": "Table 1", "paper": "so it is"}}},
+            "experiment.claims.a.where: " + UNSOURCED,
+        ),
+        (
+            {"source": "A paper 2004", "claims": {"a": CLAIM | {"where": "Table 1"}}},
+            "experiment.claims.a.where: " + UNSOURCED,
+        ),
+        ({"claims": [CLAIM]}, "experiment.claims: a list, expected a mapping: a key for each claim"),
         ({"repetitions": 100_001}, "experiment.repetitions: expected at least 1, and at most 100,000"),
         (
             {"sweep": {"method": dict.fromkeys(range(401), ""), "data": dict.fromkeys(range(250), "")}},
@@ -115,8 +125,8 @@ def test_each_fault_is_named_with_its_place(change: dict[str, object], problem: 
         {"repetitions": 1},
         {"repetitions": 100_000},
         {"sweep": {"method": dict.fromkeys(range(400), ""), "data": dict.fromkeys(range(250), "")}},
-        {"claims": [CLAIM | {"of": {"data": "first"}, "ratio_to": {"method": "b"}}]},
-        {"claims": [CLAIM | {"at_most": "published", "of": {"method": "a"}}]},
+        {"claims": {"a": CLAIM | {"of": {"data": "first"}, "ratio_to": {"method": "b"}}}},
+        {"claims": {"a": CLAIM | {"at_most": "published", "of": {"method": "a"}}}},
         {"page": FILE["page"] | {"along": "data", "panels": "method", "drawn": ["error"]}},
         {"curves": [CURVE | {"panels": "data", "only": {"method": "b"}}], "reference_runs": [RUN | {"over": "data"}]},
     ],
@@ -127,7 +137,7 @@ def test_a_file_at_its_limits_is_read(change: dict[str, object]):
 
 def claim_faults(change: dict[str, object], **measure: object) -> list[str]:
     error = {"title": "Error", "path": ["error"], **measure}
-    return faults({"measures": {"error": error}, "claims": [{"statement": "s", "measure": "error", **change}]})
+    return faults({"measures": {"error": error}, "claims": {"a": {"statement": "s", "measure": "error", **change}}})
 
 
 @pytest.mark.parametrize(
@@ -143,7 +153,7 @@ def claim_faults(change: dict[str, object], **measure: object) -> list[str]:
 )
 def test_a_claim_makes_one_comparison_that_can_be_made(change: dict[str, object], fault: str):
     (found,) = claim_faults(change)
-    assert found.startswith(f"experiment.claims[0]: {fault}")
+    assert found.startswith(f"experiment.claims.a: {fault}")
 
 
 def test_what_is_not_a_mean_is_not_compared_with_conditions():
@@ -221,9 +231,14 @@ def test_a_measure_is_read_from_metrics_timing_or_facts(measure: dict[str, objec
 
 
 def test_what_a_file_leaves_out():
-    file = FILE | {"curves": [CURVE], "reference_runs": [RUN | {"over": "data"}], "claims": [CLAIM]}
+    file = FILE | {"curves": [CURVE], "reference_runs": [RUN | {"over": "data"}], "claims": {"a": CLAIM}}
     found = read_experiment(file, "full")
-    error, (curve,), (run,), (claim,) = found.measures["error"], found.curves, found.reference_runs, found.claims
+    error, (curve,), (run,), (claim,) = (
+        found.measures["error"],
+        found.curves,
+        found.reference_runs,
+        found.claims.values(),
+    )
     assert (found.repetitions, found.shared, found.cores) == (50, True, None)
     assert (error.scale, error.digits, error.aggregate, error.window, error.pooled) == (
         1.0,

@@ -1,0 +1,112 @@
+"""Pages of many experiments from their result files: one each, an index, and the list of the papers' claims."""
+
+from collections.abc import Iterator, Sequence
+
+from .page import markdown_page, number
+from .result import ExperimentResult
+from .specification import Claim, Experiment
+from .verdicts import Verdict, headline, in_words
+
+INDEX, CLAIMS = "results.md", "claims.md"
+"""Files with the index and with the papers' claims."""
+Judged = Sequence[tuple[Experiment, ExperimentResult]]
+"""Experiments, each with its result."""
+
+
+def pages(judged: Judged) -> dict[str, str | bytes]:
+    """Every page and plot, by the name of its file."""
+    found: dict[str, str | bytes] = {INDEX: index_page(judged), CLAIMS: claims_page(judged)}
+    for experiment, result in judged:
+        found |= markdown_page(experiment, result)
+    return found
+
+
+def index_page(judged: Judged) -> str:
+    """A row for each experiment: its page, its command, and the verdict on its claims."""
+    rows = []
+    for experiment, result in judged:
+        verdicts = result.judged(experiment)
+        titles = [
+            "; ".join(
+                experiment.claims[key].statement.rstrip(".") for key, each in verdicts.items() if each.holds is held
+            )
+            for held in (False, None)
+        ]
+        link = f"[{experiment.title}]({experiment.name}.md)"
+        scenarios = str(max((case.scenarios for each in verdicts.values() for case in each.cases), default=0))
+        rows.append((link, f"`{result.command}`", scenarios, f"**{headline(verdicts.values())}**", *titles))
+    head = ("page", "command", "scenarios", "verdict", "does not hold", "undecided")
+    return f"# All experiments\n\n{_table(head, rows)}"
+
+
+def claims_page(judged: Judged) -> str:
+    """The papers' claims, paper by paper: each with its place, the experiment that judges it, verdict and figure."""
+    blocks = ["# What the papers claim, and what we find"]
+    for source in sources(judged):
+        rows = [
+            (
+                claim.paper,
+                claim.where,
+                f"[{experiment.title}]({experiment.name}.md): {claim.statement}",
+                in_words(verdict.holds),
+                _ours(experiment, claim, verdict),
+            )
+            for experiment, claim, verdict in claims_of(judged, source)
+        ]
+        table = _table(("claim", "where", "experiment", "verdict", "ours"), rows)
+        blocks += [f"## {source}", counts(judged, source), table]
+    return "\n\n".join(blocks)
+
+
+def sources(judged: Judged) -> list[str]:
+    """The papers whose claims are judged."""
+    return list(dict.fromkeys(experiment.source for experiment, _ in judged if experiment.source))
+
+
+def claims_of(judged: Judged, source: str) -> Iterator[tuple[Experiment, Claim, Verdict]]:
+    """A paper's claims with the verdicts on them; those that only we expect are left out."""
+    for experiment, result in judged:
+        for key, verdict in result.judged(experiment).items():
+            claim = experiment.claims[key]
+            if experiment.source == source and claim.where:
+                yield experiment, claim, verdict
+
+
+def counts(judged: Judged, source: str) -> str:
+    """A sentence: how many of a paper's claims are judged, and how."""
+    held = [verdict.holds for *_, verdict in claims_of(judged, source)]
+    kinds = ", ".join(f"{held.count(each)} {in_words(each)}" for each in (True, False, None))
+    return f"Of {len(held)} claims: {kinds}."
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
+    for row in rows:
+        cells = (" ".join(cell.split()).replace("|", r"\|") for cell in row)
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _ours(experiment: Experiment, claim: Claim, verdict: Verdict) -> str:
+    """The measure, our figure, what it is compared with and the difference's interval; of several cases the range."""
+    title = experiment.measures[claim.measure].title
+    known = [(case, case.ours) for case in verdict.cases if case.ours is not None]
+    if not known:
+        return f"{title}: –"
+    case, ours = known[0]
+    measure = f"{title}{', ratio' if case.ratio else ''}"
+    if len(verdict.cases) == 1:
+        beside = "" if case.other is None else f", beside {_figure(case.other)} ({case.against})"
+        between = "" if case.interval is None else f", difference {' to '.join(map(_figure, case.interval))}"
+        return f"{measure}: {_figure(ours)}{beside}{between}"
+    figures = sorted(figure for _, figure in known)
+    held = [case.holds for case in verdict.cases]
+    undecided = f", {held.count(None)} undecided" if None in held else ""
+    cases = f"{held.count(True)} of {len(held)} cases hold{undecided}"
+    return f"{measure}: {_figure(figures[0])} to {_figure(figures[-1])}; {cases}"
+
+
+def _figure(value: float) -> str:
+    """Three digits or four; whole numbers as such."""
+    whole = float(value).is_integer() or abs(value) >= 100.0
+    return number(value, 0 if whole else 1 if abs(value) >= 10.0 else 2)

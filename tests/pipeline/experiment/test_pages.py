@@ -1,0 +1,152 @@
+"""Pages of experiments say what their result files say, and no more."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from omninav.pipeline.cli.experiments import judged_experiments
+from omninav.pipeline.cli.main import main
+from omninav.pipeline.experiment.page import markdown_page
+from omninav.pipeline.experiment.pages import Judged, claims_of, claims_page, counts, index_page, sources
+from omninav.pipeline.experiment.result import ExperimentResult, result_text
+from omninav.pipeline.experiment.specification import read_experiment
+from omninav.pipeline.experiment.verdicts import Case, in_words
+from omninav.pipeline.graph.problems import BadInput
+
+RESULTS = Path(__file__).resolve().parents[3] / "docs" / "experiments"
+MADE = re.compile(r"Made with omninav [\w.]+, commit [0-9a-f]{12}( with changes that are not committed)?")
+CLAIM = {"statement": "it holds", "measure": "error", "at_most": 9.0}
+FILE = {
+    "name": "one",
+    "title": "One",
+    "source": "A paper 2004",
+    "about": "About it.",
+    "variant": "none",
+    "sweep": {"day": {"first": "", "second": ""}},
+    "measures": {"error": {"title": "Error (cm)", "path": ["error"]}},
+    "page": {"rows": [], "columns": "day"},
+    "claims": {
+        "whole": CLAIM | {"paper": "they say so", "where": "Table 1"},
+        "part": CLAIM | {"statement": "… too", "paper": "and this", "where": "section 2", "quote": "so it is"},
+        "ours": CLAIM | {"statement": "so we think", "quote": "not said"},
+        "unrun": CLAIM | {"paper": "it will", "where": "section 3"},
+    },
+}
+
+
+def case(where: str, holds: bool | None, ours: float, scenarios: int = 7) -> Case:
+    return Case(where, ours, 9.0, "the limit", ours - 9.0, (-1.0, 1.5), holds, 7, 7, scenarios=scenarios)
+
+
+def judged(**verdicts: tuple[Case, ...]) -> Judged:
+    result = ExperimentResult("one", "omninav +experiment=one", "full", "", "", verdicts, {})
+    return [(read_experiment(FILE, "full"), result)]
+
+
+def test_each_claim_of_a_paper_stands_with_its_place_verdict_and_figure() -> None:
+    found = judged(
+        whole=(case("first", True, 3.0), case("second", False, 1234.5)),
+        part=(case("second", None, 5.25),),
+        ours=(case("first", True, 1.0),),
+    )
+    link = "[One](one.md)"
+    text = claims_page(found)
+    assert f"| they say so | Table 1 | {link}: it holds | does not hold | Error (cm): 3 to 1234; 1 of 2 cases" in text
+    shown = "Error (cm): 5.25, beside 9 (the limit), difference -1 to 1.50"
+    assert f"| and this | section 2 | {link}: … too | undecided | {shown} |" in text
+    assert counts(found, "A paper 2004") == "Of 2 claims: 0 holds, 1 does not hold, 1 undecided."
+    assert "so we think" not in text  # no paper says it
+    assert "it will" not in text  # no result judges it
+    page = str(markdown_page(*found[0])["one.md"])
+    assert "| … too (Error (cm)): **undecided** | and this (section 2): “so it is” | second | 5.2 |" in page
+    assert "| so we think (Error (cm)): **holds** | not said | first | 1.0 |" in page
+
+
+@pytest.mark.parametrize(
+    ("ours", "shown"),
+    [(0.125, "0.12"), (9.96, "9.96"), (10.06, "10.1"), (99.46, "99.5"), (100.4, "100"), (-12.5, "-12.5")],
+)
+def test_figures_have_three_digits_or_four(ours: float, shown: str) -> None:
+    assert f"| holds | Error (cm): {shown}, beside 9 (the limit)" in claims_page(judged(whole=(case("", True, ours),)))
+
+
+def test_the_index_says_over_how_many_scenarios_claims_were_judged() -> None:
+    found = judged(whole=(case("", None, 1.0, 3), case("", True, 1.0, 6)), ours=(case("", True, 1.0),))
+    assert (
+        "| [One](one.md) | `omninav +experiment=one` | 7 | **1 of 2 hold, 1 undecided** |  | it holds |"
+        in index_page(found)
+    )
+
+
+@pytest.fixture(scope="module")
+def committed() -> Judged:
+    return judged_experiments(RESULTS)
+
+
+def test_every_committed_result_judges_the_claims_of_its_file_and_shows_its_conditions(committed: Judged) -> None:
+    for experiment, result in committed:
+        assert set(result.verdicts) == set(experiment.claims), experiment.name
+        assert set(result.cells) == set(experiment.measures), experiment.name
+        shown = {
+            (*(condition.labels[row] for row in experiment.page.rows), condition.labels[experiment.page.columns])
+            for condition in experiment.conditions()
+        }
+        for measure, cells in result.cells.items():
+            assert {cell.at for cell in cells if cell.figure is not None} <= shown, (experiment.name, measure)
+            assert shown <= {cell.at for cell in cells}, (experiment.name, measure)
+        assert MADE.fullmatch(result.made_with), experiment.name
+
+
+def test_a_page_says_what_its_result_file_does(committed: Judged, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("omninav.pipeline.experiment.page.plots_of", lambda *_: [])
+    for experiment, result in committed:
+        page = str(markdown_page(experiment, result)[f"{experiment.name}.md"])
+        said = re.findall(r"\| (holds|does not hold|undecided) \|\n", page)
+        assert said == [in_words(each.holds) for key in experiment.claims for each in result.verdicts[key]]
+        for key, verdict in result.judged(experiment).items():
+            assert f"\n| {experiment.claims[key].statement} (" in page
+            assert f"): **{in_words(verdict.holds)}** |" in page
+
+
+def test_the_five_papers_have_claims_and_a_page_each(committed: Judged) -> None:
+    pages = {page: page.read_text() for page in RESULTS.glob("*.md")}
+    assert len(sources(committed)) == 5
+    for source in sources(committed):
+        assert len(list(claims_of(committed, source))) > 40
+        (page,) = (text for text in pages.values() if f"{{{{ claims {source} }}}}" in text)
+        assert len(re.findall(r"^\{\{ (?:table|plot) ", page, re.MULTILINE)) == 2
+
+
+def test_the_command_writes_pages_plots_index_and_claims(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    results, built = tmp_path / "results", tmp_path / "deep/pages"
+    results.mkdir()
+    name = "omniview_mcl_timing"
+    (results / f"{name}.result.json").write_bytes((RESULTS / f"{name}.result.json").read_bytes())
+    assert main(["experiments", str(results), str(built)]) == 0
+    assert f"index: {built / 'results.md'}\nclaims: {built / 'claims.md'}\n" in capsys.readouterr().out
+    assert {path.name for path in built.iterdir()} == {"results.md", "claims.md", f"{name}.md", f"{name}.png"}
+    assert f"({name}.md)" in (built / "results.md").read_text()
+    assert f"]({name}.png)" in (built / f"{name}.md").read_text()
+
+
+def test_what_is_no_result_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "one.result.json"
+    ((_, result),) = judged(whole=(case("", True, 1.0),))
+    plain = json.loads(result_text(result))
+    for content, message in (
+        (None, "no result is in it"),
+        ("nothing", "is no result of an experiment"),
+        ('{"name": "one"}', "needs 'verdicts'"),
+        (json.dumps(plain), "there is no 'one'"),
+        (json.dumps(plain | {"command": "omninav match=l2"}), "is not of the experiment 'one'"),
+        (json.dumps(plain | {"command": "omninav +experiment=light/lamps"}), "is not of the experiment 'one'"),
+    ):
+        if content is not None:
+            file.write_text(content)
+        assert main(["experiments", str(tmp_path), str(tmp_path / "pages")]) == 2
+        assert message in capsys.readouterr().err
+    assert not (tmp_path / "pages").exists()
+    with pytest.raises(BadInput, match="name the folder with results, and one for the pages"):
+        __import__("omninav.pipeline.cli.commands.experiments", fromlist=["command"]).command([str(tmp_path)])
