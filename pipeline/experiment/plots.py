@@ -85,8 +85,8 @@ def _curve(title: str, x_label: str, panels: Sequence[str], lines: Sequence[Line
                     marker="o" if len(line.x) <= 30 else None,
                     markersize=3,
                 )
-                if line.least:
-                    axes.fill_between(line.x, line.least, line.largest, color=colour, alpha=0.15, linewidth=0)
+                if line.low:
+                    axes.fill_between(line.x, line.low, line.high, color=colour, alpha=0.15, linewidth=0)
             for index, line in enumerate(line for line in here if line.reference):
                 dashes = ("--", ":", "-.")[index % 3]
                 axes.plot(line.x, line.mean, color="#555555", linestyle=dashes, linewidth=1.3, label=line.name)

@@ -51,9 +51,9 @@ class Line:
     name: str
     x: tuple[float, ...]
     mean: tuple[float, ...]
-    least: tuple[float, ...] = ()
+    low: tuple[float, ...] = ()
     """Empty where there is one repetition."""
-    largest: tuple[float, ...] = ()
+    high: tuple[float, ...] = ()
     panel: str = ""
     reference: bool = False
     """Whether it is equal in all conditions of a panel and drawn dashed."""

@@ -241,7 +241,7 @@ FULL = "full"
 def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
     """The experiment that a file describes, at the scale of a profile. Raises `ProblemsFound` with all problems.
 
-    A profile changes entries of the file: mappings key by key, the labels of a factor and everything else as a whole.
+    A profile changes entries of the file: mappings key by key; claims, the labels of a factor and all else as a whole.
     A file that stands on another (its `defaults`) takes a label or a measure of that one out by setting it to null.
     """
     profiles, problems = convert(plain.get("profiles") or {}, dict[str, dict | None], "profiles")  # type: ignore[type-arg]
@@ -252,7 +252,7 @@ def read_experiment(plain: Mapping[str, Any], profile: str) -> Experiment:
         raise ProblemsFound([Problem("profile", f"this experiment has no profile '{profile}'", hint)])
     scaled = dict(plain)
     for key, value in (profiles.get(profile) or {}).items():
-        both = isinstance(value, Mapping) and isinstance(scaled.get(key), Mapping)
+        both = key != "claims" and isinstance(value, Mapping) and isinstance(scaled.get(key), Mapping)
         scaled[key] = {**scaled[key], **value} if both else value
     sweep = scaled.get("sweep") or {}
     if isinstance(sweep, Mapping):

@@ -48,6 +48,14 @@ def test_a_profile_changes_mappings_key_by_key_and_null_takes_a_label_out():
     assert quick.repetitions == 2
 
 
+def test_a_profile_has_claims_of_its_own_since_they_name_its_labels():
+    quick = {"claims": {"small": {"statement": "s", "measure": "error", "below": 1.0}}}
+    claims = {"a": {"statement": "s", "measure": "error", "at_most": 1.0}}
+    file = FILE | {"claims": claims, "profiles": {"quick": quick}}
+    assert list(read_experiment(file, "quick").claims) == ["small"]
+    assert list(read_experiment(file, "full").claims) == ["a"]
+
+
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
