@@ -169,9 +169,8 @@ def _lines(experiment: Experiment, results: Results, curve: Curve) -> Iterator[L
             if len(x):
                 y = curve.scale * y
                 band = (np.nanmin(y, axis=0), np.nanmax(y, axis=0)) if len(y) > 1 else ((), ())
-                yield Line(
-                    _named(condition, shown), _floats(x), _floats(np.nanmean(y, axis=0)), *map(_floats, band), panel
-                )
+                low, high = (_floats(edge) for edge in band)
+                yield Line(_named(condition, shown), _floats(x), _floats(np.nanmean(y, axis=0)), low, high, panel)
         yield from common.values()
 
 
