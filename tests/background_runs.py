@@ -1,11 +1,36 @@
-"""Runs of the command line in the background: left to end, or killed on their way."""
+"""Runs of the command line: in this process, or in the background and killed on their way."""
 
+import io
 import os
 import signal
 import subprocess
 import sys
 import time
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
+from unittest.mock import patch
+
+from omninav.pipeline.cli.main import main
+from omninav.pipeline.engine.codec import decode, unseal
+
+
+def run_here(place: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """Runs `omninav …` in a folder and in this process, which has imported everything already."""
+    out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8") for _ in range(2))
+    environment = patch.dict(os.environ, COLUMNS="120"), patch("sys.argv", ["omninav", *words])
+    with chdir(place), environment[0], environment[1], redirect_stdout(out), redirect_stderr(err):
+        code = main(words)
+    for stream in (out, err):
+        stream.seek(0)
+    return subprocess.CompletedProcess(words, code, out.read(), err.read())
+
+
+def finished(place: Path, *words: str) -> Path:
+    """The folder of a run that was left to end."""
+    place.mkdir(exist_ok=True)
+    ended = run_here(place, *words)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    return place / "runs" / "latest"
 
 
 def start(place: Path, *words: str) -> subprocess.Popen[bytes]:
@@ -23,23 +48,25 @@ def kill(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def wait_for_checkpoint(process: subprocess.Popen[bytes], place: Path) -> None:
-    """Returns once a run in that folder could be resumed, or is over."""
-    while process.poll() is None and not any(place.glob("runs/*/checkpoints/**/checkpoint")):
+def wait_for_checkpoint(process: subprocess.Popen[bytes], place: Path, ticks: int = 0) -> None:
+    """Returns once a run in that folder could be resumed after that many ticks of a graph, or is over."""
+    while process.poll() is None and not any(
+        _ticks(found) >= ticks for found in place.glob("runs/*/checkpoints/**/checkpoint")
+    ):
         time.sleep(0.02)
 
 
-def finished(place: Path, *words: str) -> Path:
-    """The folder of a run that was left to end."""
-    assert start(place, *words).wait(timeout=900) == 0
-    return place / "runs" / "latest"
+def _ticks(checkpoint: Path) -> int:
+    try:
+        return int(decode(unseal(checkpoint.read_bytes(), ""))["ticks"])
+    except FileNotFoundError:
+        return -1
 
 
-def killed_and_resumed(place: Path, *words: str, after_s: float) -> Path:
-    """The folder of a run that was killed `after_s` after its first checkpoint, and resumed."""
+def killed_and_resumed(place: Path, *words: str, ticks: int) -> Path:
+    """The folder of a run that was killed when its checkpoint had that many ticks, and resumed."""
     process = start(place, *words)
-    wait_for_checkpoint(process, place)
-    time.sleep(after_s)
+    wait_for_checkpoint(process, place, ticks)
     assert process.poll() is None, "it was over before it could be killed"
     kill(process)
     return finished(place, "resume", "runs/latest")

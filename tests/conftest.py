@@ -1,19 +1,15 @@
 """What several tests need: the command line, here or in its own process, and the built-in world's features once."""
 
 import fcntl
-import io
 import os
 import subprocess
 import sys
 from collections.abc import Callable
-from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
-from unittest.mock import patch
 
 import pytest
+from background_runs import run_here
 from hypothesis import settings
-
-from omninav.pipeline.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[1]
 RECORDINGS = ROOT / "tests" / "data"
@@ -46,21 +42,12 @@ def omninav(tmp_path: Path) -> Command:
     """Runs `omninav …` in an empty folder and in this process, which has imported everything already."""
 
     def run(*words: str, check: bool = False) -> subprocess.CompletedProcess[str]:
-        out, err = (io.TextIOWrapper(io.BytesIO(), "utf-8") for _ in range(2))
-        process = chdir(tmp_path), patch.dict(os.environ, COLUMNS="120"), patch("sys.argv", ["omninav", *words])
-        with process[0], process[1], process[2], redirect_stdout(out), redirect_stderr(err):
-            code = main(words)
-        ended = subprocess.CompletedProcess(words, code, *(_text(stream) for stream in (out, err)))
+        ended = run_here(tmp_path, *words)
         if check:
-            assert code == 0, ended.stdout + ended.stderr
+            assert ended.returncode == 0, ended.stdout + ended.stderr
         return ended
 
     return run
-
-
-def _text(stream: io.TextIOWrapper) -> str:
-    stream.seek(0)
-    return stream.read()
 
 
 @pytest.fixture

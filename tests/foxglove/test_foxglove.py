@@ -108,7 +108,7 @@ def test_foxgloves_client_watches_a_run_and_gets_what_was_sent_before_it_came():
     assert json.loads(client.stdout.readline())["server"] == "omninav"
     for shown in others:
         server.step(ctx, before, shown)
-    found = json.loads(client.communicate(timeout=20)[0].splitlines()[-1])
+    found = json.loads(client.communicate(timeout=60)[0].splitlines()[-1])
     assert found["/grid"]["stamp"] == str(run.ticks[0].stamp)
     assert found["/grid"]["first"]["data"]["length"] == 120 * 80
     assert [entry["differences"] for entry in found.values()] == [[]] * 5

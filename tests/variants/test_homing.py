@@ -48,7 +48,7 @@ def test_the_report_shows_what_it_followed_and_the_drive_as_a_video(whole: Path)
 
 
 def test_killed_on_its_way_it_goes_on_to_the_same_bytes(whole: Path, tmp_path: Path):
-    run = killed_and_resumed(tmp_path, *WORDS, after_s=4.0)  # the local map has been made
+    run = killed_and_resumed(tmp_path, *WORDS, ticks=30)  # the local map has been made
     assert_same_bytes(run, whole, "metrics.json", "result.mcap", "drive.mp4")
 
 
@@ -66,7 +66,7 @@ WARPED = (
 
 
 def test_warping_finds_the_target_without_features_and_goes_on_to_the_same_bytes(tmp_path: Path):
-    run = killed_and_resumed(tmp_path / "killed", *WARPED, after_s=0.3)
+    run = killed_and_resumed(tmp_path / "killed", *WARPED, ticks=4)
     field = json.loads((run / "metrics.json").read_text())["homing_field"]
     assert field["found_rate"] == 1.0
     assert field["median_deg"] < 10.0

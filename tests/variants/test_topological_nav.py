@@ -44,7 +44,7 @@ def test_a_robot_that_does_not_know_where_it_is_drives_to_a_place_and_docks_ther
 
 
 def test_killed_on_its_way_it_goes_on_to_the_same_bytes(whole: Path, tmp_path: Path, shared_cache: Path):
-    run = killed_and_resumed(tmp_path, *WORDS, "goal=3", *KILLED, f"cache={shared_cache}", after_s=4.0)
+    run = killed_and_resumed(tmp_path, *WORDS, "goal=3", *KILLED, f"cache={shared_cache}", ticks=40)
     assert_same_bytes(run, whole, "metrics.json", "result.mcap", "trajectory.tum")
 
 

@@ -32,5 +32,5 @@ def test_a_robot_wanders_without_a_contact_and_every_command_is_in_the_result(wh
 
 
 def test_a_killed_closed_loop_resumes_to_the_same_bytes(whole: Path, tmp_path: Path):
-    run = killed_and_resumed(tmp_path, *WORDS, after_s=0.5)
+    run = killed_and_resumed(tmp_path, *WORDS, ticks=10)
     assert_same_bytes(run, whole, "metrics.json", "result.mcap")

@@ -30,7 +30,7 @@ def made(tmp_path_factory: pytest.TempPathFactory, shared_cache: Path) -> Path:
 
 
 def test_killed_while_learning_it_goes_on_to_the_same_bytes(made: Path, tmp_path: Path) -> None:
-    run = killed_and_resumed(tmp_path, *MADE, "checkpoint_s=0.1", "cache=null", after_s=0.3)
+    run = killed_and_resumed(tmp_path, *MADE, "checkpoint_s=0.1", "cache=null", ticks=10)
     assert_same_bytes(run, made, "map.omap", "words.omap")
 
 

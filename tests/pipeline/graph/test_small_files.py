@@ -64,13 +64,13 @@ def test_aliases_and_merges_are_followed_and_dates_stay_texts() -> None:
     ],
 )
 def test_what_breaks_a_limit_is_one_short_line_with_its_place(text: str | bytes, said: str) -> None:
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(BadInput) as caught:
         parse_yaml(text, "file")
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 300
-    assert time.perf_counter() - began < 1
+    assert time.process_time() - began < 1
 
 
 def test_what_is_no_file_is_named_without_waiting_for_it(tmp_path: Path) -> None:

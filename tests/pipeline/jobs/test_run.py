@@ -93,8 +93,8 @@ def test_a_job_ends_whose_client_gives_no_sign_of_life(tmp_path: Path, monkeypat
 
 
 def test_a_job_goes_on_as_long_as_its_client_gives_signs_of_life(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(perform, "LEASE_S", 1.0)
-    monkeypatch.setattr(run, "RENEW_S", 0.2)
+    monkeypatch.setattr(perform, "LEASE_S", 2.0)
+    monkeypatch.setattr(run, "RENEW_S", 0.05)
     slow = job("take", tmp_path, megabytes=1, seconds=3, mark=str(tmp_path / "mark"))
     with Workers(EngineSettings(workers=1), tmp_path) as workers:
         assert workers.run([slow])["take"].error is None

@@ -40,7 +40,7 @@ def node(other_end: OtherEnd) -> Iterator["queue.Queue[str]"]:
     threading.Thread(target=lambda: [said.put(line.strip()) for line in output], daemon=True).start()
     yield said
     process.kill()
-    process.wait(timeout=10)
+    process.wait(timeout=WAIT_S)
 
 
 def test_amcls_topics_and_services_are_answered(other_end: OtherEnd, node: "queue.Queue[str]"):

@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -102,16 +103,19 @@ def test_the_camera_is_described_in_a_file(wire, tmp_path):
     assert read_camera(tmp_path / "robot.camera.yaml").height == CAMERA.height
 
 
-def test_in_real_time_a_tick_takes_its_time(wire):
-    import time
+def test_in_real_time_a_tick_takes_its_time(wire, monkeypatch):
+    now = [100.0]
 
-    drive = Drive(real_time=True)
-    drive.tick()
-    drive.tick()
-    before = time.monotonic()
-    for _ in range(3):
+    def take(timeout_s):
+        now[0] += timeout_s
+
+    monkeypatch.setattr(wire, "take", take)
+    monkeypatch.setattr(robot_driver, "time", SimpleNamespace(monotonic=lambda: now[0], time_ns=lambda: 10**18))
+    drive, moments = Drive(real_time=True), []
+    for _ in range(5):
         drive.tick()
-    assert time.monotonic() - before > 0.4  # three ticks of 0.2 s, less what may have been waited before
+        moments.append(now[0])
+    assert np.diff(moments[1:]) == pytest.approx([0.2] * 3)
 
 
 def test_a_topic_whose_type_is_not_installed_is_left_out(wire, monkeypatch):
