@@ -1,5 +1,6 @@
 """What every configuration file promises: it opens with what it is and a command that composes."""
 
+import functools
 import itertools
 import re
 import shlex
@@ -146,6 +147,7 @@ def test_every_variant_builds_without_what_it_is_measured_by():
         assert ("estimate" in left) == ("fusion" in left), variant
 
 
+@functools.cache
 def nodes_of(variant: str, *words: str) -> set[str]:
     return set(plan(complete(compose([f"variant={variant}", *words]))).graph.nodes)
 
