@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
@@ -11,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
-from background_runs import kill, start
+from background_runs import kill, run_here, start
 
 from omninav.pipeline.experiment.result import read_result
 from omninav.pipeline.jobs.progress import JobProgress
@@ -220,8 +218,7 @@ class Finished:
     said: str
 
     def go(self, *words: str) -> str:
-        command = [sys.executable, "-m", "omninav", *words]
-        ended = subprocess.run(command, cwd=self.place, capture_output=True, text=True, timeout=120)
+        ended = run_here(self.place, *words)
         assert ended.returncode == 0, ended.stdout + ended.stderr
         return ended.stdout
 

@@ -18,12 +18,14 @@ def planned(*words: str):
         return plan(complete(config))
 
 
-@pytest.mark.parametrize("variant", ["retrieval_mcl", "omniview_mcl"])
-@pytest.mark.parametrize("features", ["haar_integral", "hsv_histogram"])
-@pytest.mark.parametrize("match", ["retrieval", "selective"])
-@pytest.mark.parametrize("sensor", ["visibility", "near_references"])
-@pytest.mark.parametrize("fusion", ["uniform_recovery", "importance_resampling"])
-def test_each_stage_of_one_variant_serves_the_other(variant: str, features: str, match: str, sensor: str, fusion: str):
+@pytest.mark.parametrize("v", [0, 1])
+@pytest.mark.parametrize("f", [0, 1])
+@pytest.mark.parametrize("m", [0, 1])
+def test_each_stage_of_one_variant_serves_the_other(v: int, f: int, m: int):
+    """Eight of the 32 combinations, among which any two of the stages occur together."""
+    variant, features = ("retrieval_mcl", "omniview_mcl")[v], ("haar_integral", "hsv_histogram")[f]
+    match, sensor = ("retrieval", "selective")[m], ("visibility", "near_references")[v ^ f]
+    fusion = ("uniform_recovery", "importance_resampling")[v ^ m]
     words = (f"features={features}", f"match={match}", f"sensor={sensor}", f"fusion={fusion}", "plots=all")
     nodes = planned(f"variant={variant}", *words).graph.nodes
     assert ("visibility_areas" in nodes) == (sensor == "visibility")
