@@ -8,7 +8,7 @@ from .tick_messages import PathSoFar, by_tick, tick_messages
 
 
 class ResultMessages(Stage):
-    """Makes the messages of each tick on some topics of `result.mcap`, for who publishes them. The topics are:
+    """Makes the messages of each tick on some topics of `result.mcap`, for who publishes them.
 
     | topic | message | holds |
     |---|---|---|
