@@ -5,11 +5,15 @@ These names are all that a user needs; whatever else is inside may move. Each is
 
 import importlib
 import os
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from .working_directory import ignore_working_directory
 
 ignore_working_directory()
+with suppress(ValueError):  # it says what is no number itself
+    if int(os.environ.get("NUMBA_NUM_THREADS", "1")) < 1:  # with which numba cannot be imported
+        del os.environ["NUMBA_NUM_THREADS"]
 os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", "100000000")  # read as OpenCV is loaded: none larger is decoded
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ delayed values wait in `channels`; what "after" stages collect goes to sequences
 
 import time
 import zlib
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -177,16 +177,6 @@ class Engine:
         source = self.graph.source
         if source is not None and isinstance(source.stage, Source) and source.stage.repeatable:
             source.stage.setup(self.calls[source.name].ctx)
-
-    def try_once(self, names: Collection[str]) -> None:
-        """Run these nodes once, as far as they lead: what they refuse at the first tick, they refuse now.
-
-        Raises `BadInput` and `StageFailed`.
-        """
-        for name in (name for name in self.graph.nodes if name in names):
-            call = self.calls[name]
-            call.node.stage.setup(call.ctx)
-            call.run(self.values)
 
     def tick(self) -> bool:
         """One turn of the loop. False where there is none: the source has ended."""

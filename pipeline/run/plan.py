@@ -166,7 +166,10 @@ def _plan_artifact(name: str, spec: ArtifactSpecification, graph: Graph | None) 
         try:
             type_of(file)
         except BadInput as error:
-            raise ProblemsFound([Problem(name, str(error), _how_to_get(name, spec))]) from None
+            hint = _how_to_get(name, spec)
+            if file.is_file() and file.suffix != ".omap" and spec.made_from:
+                hint = f"if it is what a {name} is made from, type {spec.made_from[0]}={spec.file}; else {hint}"
+            raise ProblemsFound([Problem(name, str(error), hint)]) from None
         return ArtifactPlan(name, file=file)
     if spec.graph is None:
         what = f"this variant needs a {name}, and none is given"

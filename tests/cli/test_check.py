@@ -44,3 +44,16 @@ def test_an_engine_that_a_sweep_refuses_is_refused(tmp_path: Path, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     assert main(["check", "variant=omniview_cml", f"log={DRIVE}", "engine.workers=-1"]) == 2
     assert "engine.workers: -1, expected a whole number >= 1" in capsys.readouterr().err
+
+
+def test_a_folder_that_the_run_cannot_take_is_refused(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ["check", "variant=wander", "cache=null"]
+    assert main([*words, "hydra.run.dir=/proc/x"]) == 2
+    assert "hydra.run.dir=/proc/x: /proc: nothing can be written there" in capsys.readouterr().err
+    (tmp_path / "done").mkdir()
+    (tmp_path / "done" / "manifest.json").write_text("{}")
+    assert main([*words, "hydra.run.dir=done"]) == 2
+    assert "done: there is a run in it" in capsys.readouterr().err
+    assert main([*words, "hydra.run.dir=new"]) == 0
+    assert not (tmp_path / "new").exists()

@@ -170,3 +170,10 @@ def test_the_version_is_of_omninavs_own_checkout_and_no_others(tmp_path: Path, m
     monkeypatch.setattr(provenance, "__file__", str(site / "provenance.py"))
     assert provenance.git_commit() is None
     assert not (tmp_path / "EXECUTED").exists()
+
+
+def test_a_number_of_threads_with_which_numba_cannot_be_imported_is_left_out() -> None:
+    words = [sys.executable, "-c", "import omninav.pipeline.engine.compiled"]
+    for number in ("0", "-1"):
+        ended = subprocess.run(words, env={**os.environ, "NUMBA_NUM_THREADS": number}, capture_output=True, text=True)
+        assert ended.returncode == 0, ended.stderr

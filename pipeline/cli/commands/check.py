@@ -2,7 +2,7 @@
 
 import math
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +10,10 @@ from omegaconf import OmegaConf
 
 from omninav.pipeline.cli.composition import complete, composed, read_words
 from omninav.pipeline.cli.experiments import condition_words, planned_experiment
+from omninav.pipeline.cli.jobs import no_run_in
 from omninav.pipeline.engine.artifact import check_artifact, read_artifact
 from omninav.pipeline.engine.engine import Engine, EngineOptions
-from omninav.pipeline.engine.prefix import lineage, prefix_nodes
+from omninav.pipeline.engine.prefix import prefix_nodes
 from omninav.pipeline.experiment.conditions import open_inputs
 from omninav.pipeline.experiment.runner import ExperimentRun
 from omninav.pipeline.experiment.specification import DEVELOPMENT
@@ -27,6 +28,9 @@ from omninav.pipeline.run.plan import Plan, input_digests, plan
 
 MAX_TRIED = 1 << 26
 """Bytes of an artifact's file with which a first tick is tried: reading and preparing a larger one takes long."""
+
+HYDRA_FOLDERS = ("hydra.run.dir", "hydra.sweep.dir")
+"""Settings of Hydra that name where runs lie."""
 
 
 def command(arguments: list[str]) -> int:
@@ -43,15 +47,13 @@ def command(arguments: list[str]) -> int:
     for artifact in planned.artifacts:
         if artifact.file is not None:
             check_artifact(artifact.file)
-    _refuse_unwritable(planned.config)
+    _refuse_unwritable(planned.config, words)
     for graph in (*(artifact.graph for artifact in planned.artifacts if artifact.graph is not None), planned.graph):
         engine = Engine(graph, {}, EngineOptions(planned.seed))
         engine.check_source()
         engine.set_up_source()
         if not _is_simulated(graph):
-            engine.try_once(lineage(graph, prefix_nodes(graph)))
-    if not _is_simulated(planned.graph):
-        _try_first_tick(planned)
+            _try_first_tick(graph, _small_files(planned) if graph is planned.graph else None, planned.seed)
     graph = planned.graph
     before, tick, after = (len(graph.of_lifetime(kind)) for kind in LIFETIMES)
     sizes = f"{counted(len(graph.nodes), 'node')}, {counted(len(graph.wires), 'wire')}"
@@ -61,22 +63,27 @@ def command(arguments: list[str]) -> int:
     return 0
 
 
-def _try_first_tick(planned: Plan) -> None:
-    """Run the first tick where all artifacts are files small enough to be tried in passing, as its run would.
+def _small_files(planned: Plan) -> dict[str, Path] | None:
+    """The files of all artifacts, where all are files small enough to be tried in passing."""
+    files = {each.name: each.file for each in planned.artifacts if each.file is not None}
+    small = all(file.stat().st_size <= MAX_TRIED for file in files.values())
+    return files if small and len(files) == len(planned.artifacts) else None
+
+
+def _try_first_tick(graph: Graph, files: Mapping[str, Path] | None, seed: int) -> None:
+    """Run the first tick as the run will: with artifacts of `files`, or without them what follows from the log alone.
 
     Stages that give nothing, since they leave files or show something, are left out.
     """
-    source, files = planned.graph.source, {each.name: each.file for each in planned.artifacts}
+    source = graph.source
     if source is None or not isinstance(source.stage, Source) or not source.stage.repeatable:
         return
-    if all(file is not None and file.stat().st_size <= MAX_TRIED for file in files.values()):
-        artifacts = {name: read_artifact(file) for name, file in files.items() if file is not None}
-        ticking = planned.graph.of_lifetime("tick")
-        outputs = [f"{node.name}.{port}" for node in ticking for port in node.signature.outputs]
-        options = EngineOptions(planned.seed, checkpoint_s=math.inf)
-        engine = Engine(planned.graph.leading_to(outputs), artifacts, options)
-        engine.begin()
-        engine.tick()
+    ticking = prefix_nodes(graph) if files is None else [node.name for node in graph.of_lifetime("tick")]
+    outputs = [f"{name}.{port}" for name in ticking for port in graph.nodes[name].signature.outputs]
+    artifacts = {name: read_artifact(file) for name, file in (files or {}).items()}
+    engine = Engine(graph.leading_to(outputs), artifacts, EngineOptions(seed, checkpoint_s=math.inf))
+    engine.begin()
+    engine.tick()
 
 
 def _is_simulated(graph: Graph) -> bool:
@@ -85,10 +92,14 @@ def _is_simulated(graph: Graph) -> bool:
     return source is not None and isinstance(source.stage, Recordable) and source.stage.recording_key() is not None
 
 
-def _refuse_unwritable(config: Mapping[str, Any]) -> None:
-    """Raise `BadInput` where runs or what is cached cannot be written."""
-    for setting in ("runs", "cache"):
-        folder = config.get(setting)
+def _refuse_unwritable(config: Mapping[str, Any], words: Sequence[str] = ()) -> None:
+    """Raise `BadInput` where runs or what is cached cannot be written, or a run is where this one is to be."""
+    folders = {setting: config.get(setting) for setting in ("runs", "cache")}
+    typed = (word.partition("=") for word in words)
+    folders |= {name: value.strip("'\"") for name, _, value in typed if name in HYDRA_FOLDERS and "$" not in value}
+    if "hydra.run.dir" in folders:
+        no_run_in(Path(folders["hydra.run.dir"]))
+    for setting, folder in folders.items():
         if folder is None:
             continue
         place = Path(str(folder)).absolute()

@@ -10,6 +10,8 @@ from omninav.pipeline.engine.compiled import compiled
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int64]
+MIN_SPREAD = 1e-6
+"""Standard deviation of log S up to which similarities are alike: the rounding of 32-bit numbers."""
 
 
 @compiled(nogil=True)
@@ -30,12 +32,12 @@ def contrast_power(best: Floats, contrast: float, sampling_weight: Array | None 
     """The power p at which S^p differs by `contrast` nats for each standard deviation of log S.
 
     `best` (R,): each reference's similarity at its best heading. `sampling_weight` (R,): how many references of the map
-    each represents; None: one each.
+    each represents; None: one each. Where all are alike, as in a map of one, S is taken as it is.
     """
     logarithms = np.log(np.maximum(best, 1e-12)).astype(np.float64)
     centre = np.average(logarithms, weights=sampling_weight)
     spread = math.sqrt(float(np.average(np.square(logarithms - centre), weights=sampling_weight)))
-    return contrast / max(spread, 1e-6)
+    return contrast / spread if spread > MIN_SPREAD else 1.0
 
 
 def evidence_novelty(driven_m: float | None, independence_m: float, min_novelty: float) -> float:

@@ -172,6 +172,16 @@ def test_an_artifact_that_is_neither_given_nor_made_says_what_to_give() -> None:
     assert "type tour=… to make one with 'toy', or map=FILE.omap to load one" in str(found.value)
 
 
+def test_what_an_artifact_is_made_from_given_in_its_place_says_what_to_type(tmp_path: Path) -> None:
+    (tmp_path / "drive.mcap").write_bytes(b"\x89MCAP0\r\n")
+    config = configuration("other", None)
+    file = str(tmp_path / "drive.mcap")
+    config["artifacts"] = {"map": {"variant": "toy", "made_from": ["tour"], "file": file}}
+    with pytest.raises(ProblemsFound) as found:
+        plan(config)
+    assert f"if it is what a map is made from, type tour={file}" in str(found.value)
+
+
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(ProblemsFound, match=r"nowhere\.omap: there is no such file"):
         plan(configuration("other", tmp_path / "nowhere.omap"))

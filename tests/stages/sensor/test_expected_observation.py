@@ -7,10 +7,12 @@ from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.geometry.appearance.segments import selective_similarity, turned_view
 from omninav.stages.geometry.plane.nearest_cells import NearestCells
+from omninav.stages.geometry.probability.evidence import contrast_power
 from omninav.stages.match.cosine import CosineMatch
 from omninav.stages.match.l2 import L2Match
 from omninav.stages.match.selective import SelectiveMatch
 from omninav.stages.sensor.expected_observation import ExpectedObservation, similarity_of_expected
+from omninav.stages.sensor.near_references import NearReferences
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentColours, SegmentHistograms
 from omninav.stages.values.maps import ReferenceGraph
@@ -101,3 +103,24 @@ def test_whatever_compares_otherwise_is_refused() -> None:
     alike = CosineMatch().step(Context("match"), seen, map).similarities
     with pytest.raises(BadInput, match="use match=selective"):
         stage.step(ctx, alike, seen, belief, map)
+
+
+@pytest.mark.parametrize("sensor", [ExpectedObservation(), NearReferences()])
+def test_a_map_of_one_reference_weighs_particles_by_its_similarity(sensor: NearReferences) -> None:
+    """Nothing is known of how similarities differ between references, and a view may be nearer than any compared."""
+    map = ReferenceGraph(REFERENCES[:1], FEATURES[:1], "histograms", np.zeros((0, 2), np.int64), "truth")
+    assert contrast_power(np.array([0.9], np.float32), 3.0) == 1.0
+    assert contrast_power(np.array([0.9, 0.9], np.float32), 3.0) == 1.0
+    assert contrast_power(np.array([0.9, 0.8], np.float32), 3.0) == pytest.approx(3.0 / (0.5 * np.log(0.9 / 0.8)))
+    ctx = Context("sensor", np.random.default_rng(0))
+    sensor.setup(ctx)
+    poses = REFERENCES[0] + np.array([[0.0, 0.0, turn] for turn in np.linspace(-3, 3, 50)])
+    field = np.full((1, 12), 0.4, np.float32)
+    out = sensor.step(
+        ctx,
+        Similarities(field, exponent=0.5),
+        **({"features": SegmentHistograms(FEATURES[0])} if isinstance(sensor, ExpectedObservation) else {}),
+        particles=Particles(poses, np.full(50, 0.02)),
+        map=map,
+    )
+    assert 0.5 < out.likelihood.values.max() < 5.0
