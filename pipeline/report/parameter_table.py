@@ -23,12 +23,23 @@ def parameter_rows(graph: DrawnGraph) -> list[ParameterRow]:
     rows = []
     for node in graph.nodes.values():
         for name, parameter in node.signature.parameters.items():
-            default = "" if parameter.default is dataclasses.MISSING else _text(parameter.default)
-            value = _text(node.parameters[name]) if name in node.parameters else default
-            rows.append(ParameterRow(node.name, name, value, default, parameter.meaning, value != default))
+            stated = parameter.default
+            default = _plain({} if stated is dataclasses.MISSING else stated)
+            value = _plain(node.parameters.get(name, default))
+            if isinstance(default, dict) and isinstance(value, dict):
+                value = default | value  # of settings that belong together, some may be left out
+            shown = "" if stated is dataclasses.MISSING else _text(default)
+            rows.append(ParameterRow(node.name, name, _text(value), shown, parameter.meaning, value != default))
     return rows
 
 
+def _plain(value: object) -> object:
+    """A value as a configuration has it."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    return [_plain(each) for each in value] if isinstance(value, tuple | list) else value
+
+
 def _text(value: object) -> str:
-    text = str(list(value) if isinstance(value, tuple) else value)
+    text = str(value)
     return text if len(text) <= 120 else f"{text[:119]}…"

@@ -2,6 +2,7 @@ import base64
 import html
 import json
 import re
+from dataclasses import dataclass
 from html.parser import HTMLParser
 from types import SimpleNamespace
 from typing import Annotated
@@ -220,6 +221,34 @@ def test_parameters_stand_beside_their_defaults_with_what_they_mean(tmp_path):
     assert "nodes.smooth.window 9 5 Readings" in changed
     assert "robust" not in changed
     assert "nodes.smooth.robust False False" in every
+
+
+def test_settings_that_belong_together_are_compared_one_by_one_and_long_values_to_their_ends():
+    @dataclass(frozen=True)
+    class Window:
+        size: int = 5
+        shape: str = "flat"
+
+    class Smoothed(Stage):
+        """Smooths."""
+
+        window: Window = Window()
+        """How readings are averaged."""
+        names: tuple[str, ...] = ("x" * 200, "a")
+        """Readings."""
+
+        class Out(Outputs):
+            value: Metrics
+
+        def step(self, ctx: Context) -> Out: ...
+
+    def changed(**parameters: object) -> list[bool]:
+        node = SimpleNamespace(name="smooth", signature=signature(Smoothed), parameters=parameters)
+        return [row.changed for row in parameter_rows(SimpleNamespace(nodes={"smooth": node}))]
+
+    assert changed(window={"size": 5, "shape": "flat"}, names=["x" * 200, "a"]) == [False, False]
+    assert changed(window={"shape": "flat"}) == [False, False]
+    assert changed(window={"size": 6}, names=["x" * 200, "b"]) == [True, True]
 
 
 def test_a_figure_that_is_not_as_it_should_be_is_a_tile_in_another_colour(tmp_path):
