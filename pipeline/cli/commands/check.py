@@ -98,7 +98,7 @@ def _refuse_unwritable(config: Mapping[str, Any], words: Sequence[str] = ()) -> 
     typed = (word.partition("=") for word in words)
     folders |= {name: value.strip("'\"") for name, _, value in typed if name in HYDRA_FOLDERS and "$" not in value}
     if "hydra.run.dir" in folders:
-        no_run_in(Path(folders["hydra.run.dir"]))
+        no_run_in(Path(str(folders["hydra.run.dir"])))
     for setting, folder in folders.items():
         if folder is None:
             continue
