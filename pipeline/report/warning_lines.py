@@ -6,8 +6,8 @@ from typing import Any
 
 from .quantities import words
 
-PARTICULARS = re.compile(r"^\w+: |\S*[\d/]\S*|\S+\.\w+\S*")
-"""Parts of a sentence that say where something was found: the name in front, numbers, files."""
+PARTICULARS = re.compile(r"^(?:\w+: )+|\S*[\d/]\S*|\S+\.\w+\S*")
+"""Parts of a sentence that say where something was found: the names in front, numbers, files."""
 
 
 def skipped(manifest: Mapping[str, Any]) -> list[dict[str, Any]]:
