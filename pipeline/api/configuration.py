@@ -6,10 +6,9 @@ from functools import cached_property
 from html import escape
 from typing import Any
 
-import yaml
-
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.run.config_text import config_text
 from omninav.pipeline.run.plan import Plan, plan
 
 from .plain_errors import plain_errors
@@ -47,7 +46,7 @@ class Configuration:
 
     def __str__(self) -> str:
         """All of it as YAML."""
-        return yaml.safe_dump(dict(self.settings), sort_keys=False, allow_unicode=True, width=120)
+        return config_text(self.settings)
 
     def _repr_html_(self) -> str:
         return f"<p><b>{escape(self.variant)}</b> <code>{escape(' '.join(self.words))}</code></p>{self._repr_svg_()}"

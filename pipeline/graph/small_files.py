@@ -1,5 +1,6 @@
 """Small text and YAML files, read within limits: whatever their bytes are, plain data or one line on what is wrong."""
 
+import copy
 import math
 import stat
 from collections.abc import Iterator
@@ -12,7 +13,7 @@ import yaml
 from .problems import BadInput, shown
 
 MAX_BYTES = 1_000_000
-"""Largest accepted YAML file, bytes. The longest of ours has 9 kB, a run's configuration some 70."""
+"""Largest accepted YAML file, bytes. The longest of ours has 9 kB, a run's configuration some 20."""
 MAX_DEPTH = 40
 """Mappings and lists within each other."""
 MAX_VALUES = 50_000
@@ -115,7 +116,7 @@ class _Reader:
             self._refuse(event, f"*{shown(event.anchor)} repeats what is not there yet")
         value, size = self.anchors[event.anchor]
         self._count(event, size)
-        return value
+        return copy.deepcopy(value)  # who changes one of them changes no other
 
     def _count(self, event: Any, number: int) -> None:
         self.values += number

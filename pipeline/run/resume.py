@@ -86,7 +86,7 @@ def _reopened(run: RunFolder, folder: Path) -> Plan | None:
     changed = [name for name, digest in inputs.items() if began.inputs.get(name) != digest]
     if changed:
         raise BadInput(f"{folder}: {', '.join(changed)} changed since the run was started; start a new run")
-    run.describe(planned)
+    run.describe(planned, config)
     run.manifest["status"] = "running"
     for name in ("error", "ended", "files", "saved", "artifacts"):
         run.manifest.pop(name, None)

@@ -11,13 +11,12 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from omninav.pipeline.engine.code_version import LIBRARIES, version
 from omninav.pipeline.engine.codec import encode, seal
 from omninav.pipeline.files import Damaged, Taken, digest_text, locked, read_json, write_json, write_whole
 from omninav.pipeline.graph.problems import BadInput
 
+from .config_text import config_text
 from .inputs import refuse_missing
 from .metrics_files import MANIFEST
 from .plan import Plan, input_digests
@@ -82,12 +81,12 @@ class RunFolder:
         """Keep the manifest as it stands, and the text of the configuration, where damage to their files is found."""
         write_whole(self.beginning, seal(encode({"manifest": self.manifest, "config": config})))
 
-    def describe(self, planned: Plan) -> None:
-        """Write what follows from the plan: config and graph."""
+    def describe(self, planned: Plan, config: str) -> None:
+        """Write the text of the configuration, and the graph that follows from it."""
         from omninav.pipeline.report.graph_svg import svg  # drawing is not needed to start the command line
         from omninav.pipeline.report.mermaid import mermaid
 
-        write_whole(self.folder / CONFIG, config_text(planned))
+        write_whole(self.folder / CONFIG, config)
         write_whole(self.folder / "graph.svg", svg(planned.graph))
         write_whole(self.folder / "graph.mmd", mermaid(planned.graph))
 
@@ -95,11 +94,6 @@ class RunFolder:
 def recorded_name(origin: str) -> str:
     """The file that holds every value of a recorded output."""
     return f"{origin}.values"
-
-
-def config_text(planned: Plan) -> str:
-    """A plan's configuration as its file holds it."""
-    return yaml.safe_dump(dict(planned.config), sort_keys=False, allow_unicode=True, width=120)
 
 
 def start(
@@ -120,7 +114,7 @@ def start(
     beginning = root / f".{named}.{os.getpid()}.part" if folder is None else folder.absolute()
     beginning.mkdir(parents=True, exist_ok=True)
     run = RunFolder(beginning)
-    config_file = config_text(planned)
+    config_file = config_text(planned.config)
     run.manifest = {
         "omninav": version("omninav"),
         "status": "running",
@@ -138,7 +132,7 @@ def start(
     }
     try:
         with run.owned():
-            run.describe(planned)
+            run.describe(planned, config_file)
             for name, content in (files or {}).items():
                 write_whole(beginning / name, content)
             run.seal_beginning(config_file)
@@ -161,7 +155,7 @@ def was_started(folder: Path, planned: Plan) -> bool:
         return False
     now = {
         "graph": planned.digest,
-        "config": digest_text(config_text(planned)),
+        "config": digest_text(config_text(planned.config)),
         "inputs": input_digests(planned),
         "git_commit": git_commit(),
     }

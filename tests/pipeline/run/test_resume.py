@@ -10,8 +10,9 @@ from omninav.pipeline.engine.artifact import write_artifact
 from omninav.pipeline.engine.codec import encode, seal
 from omninav.pipeline.files import digest_text, read_json
 from omninav.pipeline.graph.problems import BadInput, ProblemsFound
+from omninav.pipeline.run.config_text import config_text
 from omninav.pipeline.run.plan import plan
-from omninav.pipeline.run.resume import resume
+from omninav.pipeline.run.resume import complete_run, resume
 from omninav.pipeline.run.run_folder import RunFolder, start
 from toys import Number
 
@@ -43,6 +44,19 @@ def test_a_run_that_was_stopped_ends_in_its_own_folder(tmp_path: Path, monkeypat
     resumed, _ = resume(run.folder)
     assert resumed.folder == run.folder.resolve()
     assert read_json(run.folder / "manifest.json")["status"] == "complete"
+
+
+def test_a_run_goes_on_with_the_text_of_its_configuration_as_it_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    run = begun(tmp_path)
+    rewrite(run)  # as older versions wrote it: each part in full, one value a line
+    text = (run.folder / "config.yaml").read_text()
+    assert text != config_text(yaml.safe_load(text))
+    resume(run.folder)
+    assert (run.folder / "config.yaml").read_text() == text
+    assert complete_run(run.folder)[1] == text
 
 
 def test_a_run_of_an_older_version_says_how_to_start_it_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
