@@ -161,6 +161,26 @@ def test_images_taken_close_by_do_not_tell_how_often_a_wrong_place_looks_right()
     assert LearnWrongPoseAgreement().step(Context("chance"), pairs, LengthScale(0.3)).when_wrong.share == 0.5
 
 
+@pytest.mark.parametrize(
+    ("heading", "other", "expected"),
+    [
+        (-0.5, 0.5, (3 * 1 / 3) / 4),
+        (3.1, -3.1, (2 * 1 / 2 + 1.974 / 3) / 4),
+        (1.0, 1.05, (2 * 1 / 2 + 1.997 / 3) / 4),
+    ],
+)
+def test_a_pose_at_the_same_place_is_wrong_where_it_is_turned_away(heading: float, other: float, expected: float):
+    # Two images of one place, another place 10 m away that looks the same, and one 20 m away that looks like nothing
+    # else, which tells nothing. Of the others the best match is one wrong pose of three, their place's image that is
+    # turned among them; 0.083 rad (across pi) or 0.05 apart that one is right, and one of two is wrong; the third image
+    # agrees with both: exp(-(0.083 / 0.175)^4 / 2) = 0.974.
+    look, unlike = np.random.default_rng(3).dirichlet(np.ones(20), (2, 8)).astype(np.float32)
+    poses = np.array([[0.0, 0.0, heading], [0.0, 0.0, other], [10.0, 0.0, 0.0], [20.0, 0.0, 0.0]])
+    places = ReferenceGraph(poses, np.stack([look, look, look, unlike]), "histograms", LINE.edges, "truth")
+    share = LearnWrongPoseAgreement().step(Context("chance"), places, LengthScale(0.3)).when_wrong.share
+    assert share == pytest.approx(expected, abs=0.01)
+
+
 def test_inputs_that_mislead_lower_the_confidence():
     def sure(conflicts: Conflicts | None) -> float:
         monitor, recent = ConfidenceMonitor(right_in_conflict=0.3), ConfidenceMonitorState()
