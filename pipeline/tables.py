@@ -11,6 +11,11 @@ from .graph.problems import BadInput
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+UNPACKED_BYTES, UNPACKED_RATIO = 1 << 26, 64
+"""Largest table in memory: bytes, and bytes more for each of its file."""
+_BATCH = 1000
+"""Rows that are unpacked at once."""
+
 
 def write_table(path: Path, columns: Mapping[str, "npt.NDArray[Any]"]) -> None:
     """Write columns of one length as `<path>.csv` and `<path>.parquet`. What is NaN or masked is an empty cell.
@@ -31,11 +36,20 @@ def write_table(path: Path, columns: Mapping[str, "npt.NDArray[Any]"]) -> None:
 
 def read_table(path: Path, wanted: Callable[[str], bool] = lambda name: True) -> Any:
     """The wanted columns of a Parquet file: a pandas DataFrame where pandas is installed, else a pyarrow Table."""
+    import pyarrow as pa
     import pyarrow.parquet as parquet
 
     try:
-        names = [name for name in parquet.read_schema(path).names if wanted(name)]
-        table = parquet.read_table(path, columns=names)
+        with parquet.ParquetFile(path) as file:
+            schema, left = file.schema_arrow, UNPACKED_BYTES + UNPACKED_RATIO * path.stat().st_size
+            names = [name for name in schema.names if wanted(name)]
+            batches = []
+            for batch in file.iter_batches(_BATCH, columns=names):
+                batches.append(batch)
+                left -= batch.nbytes
+                if left < 0:
+                    raise BadInput(f"{path}: it unpacks to more than a table of its size holds; is it damaged?")
+        table = pa.Table.from_batches(batches, pa.schema([schema.field(name) for name in names], schema.metadata))
     except (OSError, ValueError) as error:
         raise BadInput(f"{path}: not a table that can be read ({str(error).splitlines()[0]:.120})") from None
     return table.to_pandas() if find_spec("pandas") is not None else table

@@ -20,6 +20,10 @@ MAX_DEFINITION = 100_000
 """Bytes of a message's definition with all that it is made of; those of ROS have some 5000."""
 
 
+MAX_PARTS = 100_000
+"""Largest number of messages and texts in a message's arrays of fixed length, each within each other."""
+
+
 @cache
 def standard_types() -> "Typestore":
     """The message types that come with ROS 2."""
@@ -39,10 +43,32 @@ def types_of(msgtype: str, encoding: str, definition: bytes) -> "Typestore":
     try:
         text = definition.decode()
         store.register(get_types_from_msg(text, msgtype) if encoding == "ros2msg" else get_types_from_idl(text))
+        refuse_long_arrays(store, msgtype)
         store.get_msgdef(msgtype)  # fails where a part of the definition is missing
     except Exception:
         return standard_types()
     return store
+
+
+def refuse_long_arrays(store: "Typestore", msgtype: str) -> None:
+    """Raise ValueError for a type of too many parts, however few bytes they take: its code alone might take minutes."""
+    from rosbags.interfaces import Nodetype
+
+    @cache
+    def parts(name: str) -> int:
+        return 1 + sum(of_field(*definition) for _, definition in store.fielddefs[name][1])
+
+    def of_field(kind: Any, detail: Any) -> int:
+        if kind == Nodetype.NAME:
+            return parts(detail)
+        if kind == Nodetype.BASE:
+            return 1
+        inner, length = detail
+        numbers = inner[0] == Nodetype.BASE and inner[1][0] not in ("string", "wstring")
+        return 1 if numbers else of_field(*inner) * (length if kind == Nodetype.ARRAY else 1)
+
+    if parts(msgtype) > MAX_PARTS:
+        raise ValueError(f"{msgtype} has more than {MAX_PARTS:,} parts")
 
 
 def encode_message(msgtype: str, content: Any, stamp: int | None = None) -> bytes:

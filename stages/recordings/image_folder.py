@@ -4,7 +4,7 @@ import hashlib
 import os
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -129,7 +129,7 @@ class ImageFolder:
         if not parts or Path(pattern).is_absolute() or ".." in parts:
             raise UnreadableRecording(f"{self._where}: {shown(pattern)} names no file within the recording's folder")
         try:
-            return [path for path in self._folder.glob(pattern) if path.is_file()]
+            return [path for path in _glob(self._folder, parts) if path.is_file()]
         except (OSError, ValueError) as error:
             raise UnreadableRecording(f"{self._folder}: {shown(pattern)} cannot be looked for ({error})") from None
 
@@ -228,6 +228,17 @@ class ImageFolder:
             with suppress(Undecodable, BadInput):
                 return _image_at(path)
         raise UnreadableRecording(f"{self._folder}: not one of its {len(self._paths_kept)} images can be decoded")
+
+
+def _glob(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
+    """Paths in a folder that a pattern fits, part by part: whatever links lead to a folder, it is looked into once."""
+    folders = [folder]
+    for part in parts[:-1]:
+        below: dict[tuple[int, ...], Path] = {}
+        for path in (path for one in folders for path in sorted(one.glob(part)) if path.is_dir()):
+            below.setdefault(os.stat(path)[1:3], path)  # its inode and device
+        folders = list(below.values())
+    return (path for one in folders for path in one.glob(parts[-1]))
 
 
 def _image_at(path: Path) -> Pixels:

@@ -20,7 +20,7 @@ from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.small_files import read_yaml
 from omninav.pipeline.mcap.chunks import MAX_BYTES, MAX_RATIO, Allowance, unpack_lz4, unpack_zstd
 from omninav.pipeline.mcap.message import BadMessage, Record
-from omninav.pipeline.mcap.message_types import standard_types
+from omninav.pipeline.mcap.message_types import refuse_long_arrays, standard_types
 
 from .recording import Format, OpenOptions, UnreadableRecording
 from .topic_recording import TopicRecording
@@ -176,6 +176,7 @@ class BagFeed:
             if part.exists() and not part.is_file():
                 raise UnreadableRecording(f"{part}: this is a folder, a pipe or a device, expected a file")
         self._stated: dict[str, int] = {}
+        self._sound_types: set[str] = set()
         files = [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]
         self._limits = _Limits(files)
         try:
@@ -269,6 +270,9 @@ class BagFeed:
         """A message object. Raises `BadMessage`."""
         msgtype = self.topics[topic]
         try:
+            if msgtype not in self._sound_types:
+                refuse_long_arrays(self._reader.typestore, msgtype)
+                self._sound_types.add(msgtype)
             return self._reader.deserialize(bytes(data), msgtype)
         except Exception as error:
             raise BadMessage(f"{self.path}: a message on {topic} is not a sound {msgtype} ({error!s:.160})") from None

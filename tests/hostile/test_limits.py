@@ -2,12 +2,14 @@
 
 import bz2
 import sqlite3
+import struct
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import made_logs
 import numpy as np
 import pytest
 from conftest import DATA, needs_data
@@ -16,6 +18,7 @@ from hostile.harness import within
 from omninav.pipeline import BadInput
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.mcap.reader import LogReader
+from omninav.pipeline.tables import read_table
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.plausibility import MotionLimits, believed
 from omninav.stages.recordings.positions import track_directions
@@ -262,3 +265,66 @@ def test_a_command_without_memory_ends_in_one_line(monkeypatch: pytest.MonkeyPat
     assert capsys.readouterr().err == (
         "there is no memory left; close other programs, or raise the limit (`ulimit -v`)\n"
     )
+
+
+@pytest.mark.parametrize("pattern", ["*/*/*/*/*/*/*/*.jpg", "**/*/*/*/*/*/*.jpg"])
+def test_links_between_folders_of_images_are_not_followed_again_and_again(tmp_path: Path, pattern: str):
+    for one in "abcdef":
+        (tmp_path / one).mkdir()
+        for other in "abcdef":
+            (tmp_path / one / f"to_{other}").symlink_to(tmp_path / other)
+    (tmp_path / "recording.yaml").write_text(f"frames: {{images: '{pattern}', period: 1}}\n")
+    with within(), pytest.raises(BadInput, match="no image fits"):
+        open_recording(str(tmp_path))
+
+
+def test_a_table_of_parquet_unpacks_in_proportion_to_its_size(tmp_path: Path):
+    import pyarrow as pa
+    import pyarrow.parquet as parquet
+
+    zeros = pa.table({"tick": np.zeros(1_000_000, np.int64)})
+    with parquet.ParquetWriter(tmp_path / "frames.parquet", zeros.schema) as writer:
+        for _ in range(20):
+            writer.write_table(zeros)
+    with within(2.0, 150_000_000), pytest.raises(BadInput, match="unpacks to more than a table of its size holds"):
+        read_table(tmp_path / "frames.parquet")
+
+
+HEADER = "std_msgs/Header header\nstring format\nuint8[] data\n"
+OTHERS = {
+    "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id\n",
+    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
+}
+TYPES: dict[str, dict[str, str]] = {
+    "a long array": {"": "std_msgs/Empty[4000000000] more\n", "std_msgs/Empty": ""},
+    "arrays in arrays": {
+        "": "a/A[1000] more\n",
+        "a/A": "a/B[1000] more\n",
+        "a/B": "a/C[1000] more\n",
+        "a/C": "uint8[0] x",
+    },
+    "a long array of texts": {"": "string[4000000000] more\n"},
+    "pairs of pairs": {"": "a/P0 more\n", "a/P40": "uint8[0] x"}
+    | {f"a/P{n}": f"a/P{n + 1} x\na/P{n + 1} y\n" for n in range(40)},
+}
+
+
+@pytest.mark.parametrize("kind", TYPES)
+def test_of_a_message_type_with_arrays_that_multiply_nothing_is_read(tmp_path: Path, kind: str):
+    from mcap.writer import Writer
+
+    parts = OTHERS | TYPES[kind]
+    definition = HEADER + parts.pop("")
+    for name, fields in parts.items():
+        definition += f"{'=' * 80}\nMSG: {name}\n{fields}"
+    message = b"\0\1\0\0" + struct.pack("<iII4sI4sII", 1, 0, 1, b"", 1, b"", 0, 4_000_000_000) + bytes(1000)
+    with (tmp_path / "log.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("sensor_msgs/msg/CompressedImage", "ros2msg", definition.encode())
+        channel = writer.register_channel("/camera/image/compressed", "cdr", schema)
+        writer.add_message(channel, 10**9, message, 10**9)
+        writer.finish()
+    (tmp_path / "camera.yaml").write_bytes(made_logs.CAMERA)
+    with within(), pytest.raises(BadInput, match="not one of its 1 images can be decoded"):
+        open_recording(str(tmp_path / "log.mcap"))
