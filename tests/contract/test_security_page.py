@@ -50,6 +50,7 @@ TESTS = {
         "tests/hostile/test_examples.py",
         "test_a_map_whose_sum_is_right_over_wrong_content_is_refused_by_name",
     ),
+    "Tables of runs": ("tests/hostile/test_limits.py", "test_a_table_of_parquet_unpacks_in_proportion_to_its_size"),
     "Images": (
         "tests/stages/values/test_encoded_image.py",
         "test_an_image_that_says_it_is_too_large_is_not_decoded",
