@@ -14,6 +14,10 @@ Shorts = npt.NDArray[np.int32]
 
 MAX_CELLS = 1 << 26
 """Cells over an area; a huge one has larger cells."""
+FEW_POINTS = 1000
+"""Points up to which all of them are looked at for each cell, which takes less time than a search in a tree."""
+TIE = 1e-9
+"""Relative difference of squared distances below which the tree decides which comes first."""
 
 
 class NearestCells:
@@ -45,7 +49,7 @@ class NearestCells:
         new = _new_cells(poses, *cells, self._known)
         if len(new):
             centres = self.origin + self.cell * (np.column_stack(np.divmod(new, self._rows)) + 0.5)
-            found = self._tree.query(centres, k=[*range(1, self.k + 1)], distance_upper_bound=self.radius)[1]
+            found = self._nearest(centres)
             known = self._known + len(new)
             if known > len(self._lists):
                 self._lists = np.concatenate([self._lists, np.full((known, self.k), -1, np.int32)])
@@ -53,6 +57,20 @@ class NearestCells:
             self._known = known
         lists: Shorts = self._lists[_numbers_of(poses, *cells)]
         return lists
+
+    def _nearest(self, centres: Array) -> Ints:
+        """The points nearest to centres (M, 2): (M, k), nearest first, then the number of points."""
+        number = self._tree.n
+        if not number or number > FEW_POINTS:
+            return self._in_tree(centres)
+        found, ties = _nearest_of_few(centres, self._tree.data, self.k, self.radius)
+        if ties.any():
+            found[ties] = self._in_tree(centres[ties])
+        return found
+
+    def _in_tree(self, centres: Array) -> Ints:
+        found: Ints = self._tree.query(centres, k=[*range(1, self.k + 1)], distance_upper_bound=self.radius)[1]
+        return found
 
 
 @compiled(nogil=True)
@@ -79,3 +97,32 @@ def _numbers_of(poses: Array, origin: Array, cell: float, columns: int, rows: in
         if 0 <= i < columns and 0 <= j < rows:
             found[n] = numbers[i * rows + j]
     return found
+
+
+@compiled(nogil=True)
+def _nearest_of_few(centres: Array, points: Array, k: int, radius: float) -> tuple[Ints, npt.NDArray[np.bool_]]:
+    # As the tree's search gives them, and for which centres distances are too equal to say which comes first.
+    found, ties = np.full((len(centres), k), len(points), np.int64), np.zeros(len(centres), np.bool_)
+    nearest, squares = np.empty(k + 1, np.int64), np.empty(k + 1)
+    limit = radius * radius
+    for m in range(len(centres)):
+        number = 0
+        for n in range(len(points)):
+            x, y = points[n, 0] - centres[m, 0], points[n, 1] - centres[m, 1]
+            square = x * x + y * y
+            if abs(square - limit) <= TIE * limit:
+                ties[m] = True
+            if square >= limit or (number > k and square >= squares[k]):
+                continue
+            at = number if number <= k else k
+            while at > 0 and squares[at - 1] > square:
+                nearest[at], squares[at] = nearest[at - 1], squares[at - 1]
+                at -= 1
+            nearest[at], squares[at] = n, square
+            number = min(number + 1, k + 1)
+        for at in range(1, number):
+            if squares[at] - squares[at - 1] <= TIE * squares[at]:
+                ties[m] = True
+        for at in range(min(number, k)):
+            found[m, at] = nearest[at]
+    return found, ties
