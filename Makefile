@@ -29,6 +29,7 @@ format: $(VENV)/.installed  ## format the code and mend what can be mended autom
 
 docs: export NO_MKDOCS_2_WARNING = 1
 docs: $(VENV)/.installed  ## build the documentation site: build/site/index.html
+	@echo "running the tutorials and building the pages: some minutes (OMNINAV_EXECUTE=false: without running the tutorials)"
 	$(BIN)/mkdocs build --quiet
 
 bench: $(VENV)/.benchmarks  ## measure speed, beside other libraries
@@ -62,6 +63,7 @@ clean:  ## remove the virtual environment and all build and check caches
 
 $(VENV)/.demo: pyproject.toml
 	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "omninav needs Python 3.11: make PYTHON=python3.11 …"'
+	@echo "installing into $(VENV): a minute or two"
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
 	touch $@

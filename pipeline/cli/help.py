@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from importlib.resources import files
 
-from .config_groups import CONF, group_files, group_options
+from .config_groups import CONF, group_options, tools
 
 FLAGS = ("-h", "--help")
 BLOCKS = ("defaults", "variant", "inputs", "nodes", "wires", "artifacts", "saves")
@@ -23,9 +23,11 @@ def help_text(words: Sequence[str]) -> str:
     if named and f"{named[0]}.txt" in {file.name for file in texts.iterdir()}:
         text = texts.joinpath(f"{named[0]}.txt").read_text(encoding="utf-8")
         return re.sub(r"\{group:(\w+)\}", lambda found: _options(found[1]), text)
-    for file in group_files("variant"):
-        if len(named) > 1 and file.name == f"{'_'.join(named[:2])}.yaml":
-            return _of_tool(named[:2], file.read_text(encoding="utf-8"))
+    typed = " ".join(named[:2])
+    group = named[0] if named else ""
+    meant = [tool for tool in tools() if tool == typed] or [tool for tool in tools() if tool.split()[0] == group]
+    if meant:
+        return "\n".join(map(_of_tool, meant))
     return files(CONF).joinpath("help.txt").read_text(encoding="utf-8")
 
 
@@ -33,12 +35,12 @@ def _options(group: str) -> str:
     return ", ".join(group_options(group))
 
 
-def _of_tool(named: Sequence[str], text: str) -> str:
+def _of_tool(named: str) -> str:
     """The comment at the head of a tool's file, its example, its inputs, and its settings with their comments."""
     import yaml
 
-    content = yaml.safe_load(text)
-    tool = f"omninav {' '.join(named)}"
+    text = files(CONF).joinpath(f"variant/{named.replace(' ', '_')}.yaml").read_text(encoding="utf-8")
+    content, tool = yaml.safe_load(text), f"omninav {named}"
     comment = next(line for line in text.splitlines() if line.startswith("# ") and "@package" not in line)
     what, _, example = comment[2:].partition("  omninav ")
     rows = []

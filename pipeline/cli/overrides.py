@@ -18,7 +18,7 @@ from hydra.core.override_parser.types import ChoiceSweep, Override, RangeSweep, 
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 
-from omninav.pipeline.graph.problems import BadInput, Problem, nearest, shown
+from omninav.pipeline.graph.problems import BadInput, Problem, shown, suggest
 from omninav.pipeline.graph.registry import UnknownStage, resolve
 from omninav.pipeline.graph.signature import BadStage, signature
 
@@ -58,7 +58,11 @@ def _several_values(word: Override) -> Problem:
     text = str(word.input_line)
     name, _, values = text.partition("=")
     listed = f"'{name}=[{values}]' for a list, or " if isinstance(word.value(), ChoiceSweep) else ""
-    return Problem(name, f"{shown(values)} are several values", f"type {listed}omninav -m {text} … for a run with each")
+    decimals = re.fullmatch(r"-?\d+,\d+", values)
+    fraction = f"; decimal fractions have a point: {values.replace(',', '.')}" if decimals else ""
+    return Problem(
+        name, f"{shown(values)} are several values", f"type {listed}omninav -m {text} … for a run with each{fraction}"
+    )
 
 
 def with_unlisted_parameters(words: Sequence[str], folders: Sequence[str]) -> list[str]:
@@ -257,6 +261,4 @@ def _parameters_of(node: Mapping[str, Any]) -> tuple[list[str], str]:
 
 
 def _like(name: str, options: Sequence[str], before: str, after: str) -> str:
-    near = nearest(name, options)
-    listing = f"there are: {', '.join(sorted(options))}"
-    return f"did you mean '{before}{near}{after}'? {listing}" if near else listing
+    return suggest(name, options, "there are", before, after)

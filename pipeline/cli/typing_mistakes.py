@@ -46,7 +46,7 @@ def mistyped_word(arguments: Sequence[str]) -> str:
         if any(mark in QUOTES for mark in head[:1] + value[:1]) and not Path(value or head).exists():
             return f"{word:.60}: these are typographic quotes; type ' or \" in their place"
         if any(space in head for space in SPACES) and not Path(head).exists():
-            return f"{word:.60}: a space in it is a no-break space; type it anew"
+            return f"{word:.60}: a space in it is a no-break space; type it again"
         if word == "=":
             return f"no spaces around =: type {before}={after}"
         if word.startswith("="):

@@ -80,6 +80,8 @@ def _refuse(known: Sequence[str], message: str) -> NoReturn:
         near = nearest(f"--{name}", known, 0.75)
         hint = f"did you mean {near}?" if near else f"settings have no dashes: type {name}={value or '…'}"
         raise BadInput(f"{flag.split()[0]:.60}: there is no such flag; {hint}")
+    if "ignored explicit argument" in message:  # -help is -h with something behind it
+        raise BadInput("a short flag stands alone; did you mean --help? `omninav --help` shows what to type")
     raise BadInput(f"{message}; `omninav --help` shows what to type")
 
 

@@ -237,7 +237,10 @@ def _opened(path: Path) -> Iterator[tuple[zipfile.ZipFile, int]]:
     What is wrong inside becomes `BadInput` too.
     """
     if not path.is_file():
-        raise BadInput(f"{path}: {'this is a folder, expected a file' if path.is_dir() else 'there is no such file'}")
+        inside = sorted(file.name for file in path.glob("*.omap")) if path.is_dir() else []
+        named = f" in it: {', '.join(inside)}" if inside else ""
+        what = f"this is a folder, expected a file{named}" if path.is_dir() else "there is no such file"
+        raise BadInput(f"{path}: {what}")
     with path.open("rb") as file:
         end, size = _checked_sum(path, file)
         try:

@@ -8,6 +8,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+MAX_LISTED = 15
+"""Names that are listed behind the one that was probably meant."""
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -129,9 +132,12 @@ def nearest(name: str, options: Iterable[str], least: float = 0.5) -> str | None
     return found[0] if found else None
 
 
-def suggest(name: str, options: Iterable[str], kind: str, prefix: str = "") -> str:
-    """A hint for a mistyped name: the nearest one where there is one, then all that exist."""
+def suggest(name: str, options: Iterable[str], kind: str, prefix: str = "", suffix: str = "") -> str:
+    """A hint for a mistyped name: the nearest one where there is one, then all that exist, unless they are many."""
     options = sorted(options)
     listing = f"{kind}: {', '.join(options)}" if options else f"there are no {kind}"
     near = nearest(name, options)
-    return f"did you mean '{prefix}{near}'? {listing}" if near else listing
+    if near is None:
+        return listing
+    found = f"did you mean '{prefix}{near}{suffix}'?"
+    return f"{found} {listing}" if len(options) <= MAX_LISTED else f"{found} (one of {len(options)})"

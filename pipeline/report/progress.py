@@ -13,6 +13,8 @@ from .terminal_text import Uncleaned, plain
 
 SAID_S = 2.5
 """How long words of a stage stand beside the frames, seconds."""
+RATED_S = 0.05
+"""Shortest time over which frames per second are stated, seconds."""
 
 
 class Progress:
@@ -111,7 +113,7 @@ class Progress:
     def _show(self, now: float) -> None:
         self._shown = self._done
         seconds = now - self._started
-        rate = (self._done - self._first) / seconds if seconds > 0 and self._done > self._first else None
+        rate = (self._done - self._first) / seconds if seconds >= RATED_S and self._done > self._first else None
         left = (self._total - self._done) / rate if self._total is not None and rate else None
         note = ", ".join(filter(None, (self._note, self._doing if now - self._doing_since < SAID_S else "")))
         if self._live:

@@ -9,6 +9,7 @@ from omninav.pipeline.graph.results import Metrics, Quantity
 
 STATISTICS = ("mean", "std", "median", "p90", "p95", "max", "rmse")
 """An entry with no other keys than these is a distribution."""
+SPELLED = {"p90": "90th percentile", "p95": "95th percentile"}
 PER_LOG = "logs"
 """The list of each log's own metrics, where there are several logs."""
 UNITS = {
@@ -170,7 +171,7 @@ def numbers(metrics: Metrics) -> dict[str, Number]:
     flat = {}
     for entry in entries(metrics):
         for statistic, value in (entry.statistics or {"": entry.value}).items():
-            name = ", ".join(part for part in (entry.title, statistic, entry.where) if part)
+            name = ", ".join(part for part in (entry.title, SPELLED.get(statistic, statistic), entry.where) if part)
             path = f"{entry.path}.{statistic}" if statistic else entry.path
             flat[path] = Number(path, name, entry, value)
     return flat

@@ -4,6 +4,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from omninav.pipeline.graph.problems import counted
+
 from .quantities import words
 
 PARTICULARS = re.compile(r"^(?:\w+: )+|\S*[\d/]\S*|\S+\.\w+\S*")
@@ -27,7 +29,8 @@ def warning_lines(manifest: Mapping[str, Any]) -> list[str]:
     for row in skipped(manifest):
         if row["first"]:
             kind, which = row["kind"].rpartition(".")[2], "" if row["count"] == 1 else "first: "
-            lines.append(f"{kind}: {row['count']} ({which}{row['first']})")
+            times = f", {counted(row['count'], 'time')}"
+            lines.append(f"{kind}{times} ({which}{row['first']})")
     return lines
 
 
@@ -36,4 +39,4 @@ def grouped(lines: Sequence[str]) -> list[str]:
     found: dict[str, list[str]] = {}
     for line in lines:
         found.setdefault(" ".join(PARTICULARS.sub("", line).split()), []).append(line)
-    return [one if not more else f"{one} (and {len(more)} like it)" for one, *more in found.values()]
+    return [one if not more else f"{one} (and {len(more)} more like this)" for one, *more in found.values()]

@@ -16,7 +16,7 @@ from .transport import TransportName, connect
 class PublishTruth(Stage):
     """Publishes the true pose on `/ground_truth/pose` and the number of collisions so far on `/collisions` (UInt32)."""
 
-    transport: Literal["ros2", "rclpy", "dds"] = "ros2"
+    transport: Literal["ros2"] | TransportName = "ros2"
     """As of the driver."""
     domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
     """The ROS domain; null: `ROS_DOMAIN_ID`, else 0."""
@@ -26,8 +26,7 @@ class PublishTruth(Stage):
 
     def setup(self, ctx: Context) -> None:
         """Join the domain."""
-        names: dict[str, TransportName] = {"ros2": "rclpy", "rclpy": "rclpy", "dds": "dds"}
-        self._transport = connect(names[self.transport], self.domain)
+        self._transport = connect("rclpy" if self.transport == "ros2" else self.transport, self.domain)
 
     def step(self, ctx: Context, tick: Tick, truth: Pose, tally: DriveTally) -> Out:
         """One tick; it has the stamp that the driver gave it."""

@@ -17,9 +17,10 @@ def open_transport(domain: int) -> Transport:
     """A node in a domain. Raises `TransportError` where rclpy is missing."""
     try:
         import rclpy  # noqa: F401
-    except ImportError:
+    except ImportError as error:
         raise TransportError(
-            "transport=rclpy needs ROS 2: source its setup.bash, or pip install 'omninav[ros2]' with Python 3.11"
+            f"transport=rclpy needs ROS 2 ({error!s:.100}): source its setup.bash with the Python that it was built "
+            "for, or pip install 'omninav[ros2]' with Python 3.11"
         ) from None
     try:
         return RclpyTransport(domain)

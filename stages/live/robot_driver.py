@@ -73,8 +73,9 @@ class RobotDriver(Stage):
     for the next tick is what has come when the tick is over; it holds until another comes, for `command_s` at most.
     """
 
-    transport: Literal["ros2", "rclpy", "dds"] = "ros2"
-    """`ros2` (or `rclpy`): a sourced ROS 2, or omninav[ros2]. `dds`: without ROS, omninav[live]."""
+    transport: Literal["ros2"] | TransportName = "ros2"
+    """`ros2` (or `rclpy`): a sourced ROS 2, or omninav[ros2]. Without ROS: `dds`, omninav[live], or `zenoh`,
+    omninav[zenoh]."""
     domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
     """The ROS domain; null: `ROS_DOMAIN_ID`, else 0."""
     real_time: bool = True
@@ -100,8 +101,7 @@ class RobotDriver(Stage):
 
     def setup(self, ctx: Context) -> None:
         """Join the domain."""
-        names: dict[str, TransportName] = {"ros2": "rclpy", "rclpy": "rclpy", "dds": "dds"}
-        self._transport: Transport = connect(names[self.transport], self.domain)
+        self._transport: Transport = connect("rclpy" if self.transport == "ros2" else self.transport, self.domain)
         self._started = self._worked = self._free = 0.0
         self._offset, self._noted = 0, (0.0, 0.0)
         self._subscribed = ""

@@ -19,8 +19,8 @@ QUANTITIES = {
     "confidence.weight": Quantity(title="Belief in the estimate, median", unit="%", better="higher"),
     "confidence.path_m": Quantity(title="Length of the estimated path", context=True),
     "confidence.odometry_path_m": Quantity(title="Length of odometry's path", context=True),
-    "confidence.step_off_odometry_m": Quantity(title="Step against odometry's, median", better="lower"),
-    "confidence.turn_off_odometry_deg": Quantity(title="Turn against odometry's, median", better="lower"),
+    "confidence.step_off_odometry_m": Quantity(title="Difference of step from odometry, median", better="lower"),
+    "confidence.turn_off_odometry_deg": Quantity(title="Difference of turn from odometry, median", better="lower"),
     "confidence.similarity": Quantity(title="Similarity of the best match, median"),
     "confidence.similarity_p10": Quantity(title="Similarity of the best match, 10th percentile"),
 }

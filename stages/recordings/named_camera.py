@@ -47,7 +47,8 @@ def assumed_camera(name: str, pixels: Pixels) -> tuple[Camera, str]:
         raise UnreadableRecording(
             f"{name}: nothing says how its images of {width} x {height} are to be read; type "
             "camera=PATH/camera.yaml, or camera=perspective (an ordinary camera), donut (a mirror), fisheye, "
-            "dual_fisheye or equirectangular (from straight up to straight down)"
+            "dual_fisheye or equirectangular (from straight up to straight down); a panorama strip needs a camera.yaml "
+            "(projection: cylindrical, or equirectangular with its elevations)"
         )
     if _two_circles(pixels):
         raise UnreadableRecording(

@@ -43,6 +43,8 @@ def open_recording(
     if path.is_dir():
         hints = "; ".join(filter(None, (one.hint(log, options) for one in formats)))
         raise UnreadableRecording(f"{log}: no recording is in this folder ({kinds}); {hints}")
+    if not path.exists() and any(path.suffix in one.suffixes for one in formats):
+        raise UnreadableRecording(f"{log}: no such file{_candidates(path)}")
     what = "not a recording" if path.exists() else f"no such file{_candidates(path)}"
     raise UnreadableRecording(f"{log}: {what}; name {kinds}")
 

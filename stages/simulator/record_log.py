@@ -54,10 +54,11 @@ class RecordLog(Stage):
         drives = [SimulatedRecording(self.world, self.route, day, self.kidnappings) for day in days]
         ctx.doing("rendering the first image (a minute if the renderer has to be compiled)")
         record(drives, path, progress=ctx.progress)
-        path.with_suffix(".camera.yaml").write_text(write_camera(drives[0].camera), encoding="utf-8")
+        camera, floor = path.with_suffix(".camera.yaml"), path.with_suffix(".plan.png")
+        camera.write_text(write_camera(drives[0].camera), encoding="utf-8")
         world = World(self.world, days[0])
         driven = {f"{self.route}, day {drive.day}": drive.truth for drive in drives}
-        draw_plan(world, path.with_suffix(".plan.png"), driven)
+        draw_plan(world, floor, driven)
         grid = write_grid(world, path.parent / f"{path.stem}.grid")
         images = sum(len(drive.stamps) for drive in drives)
         collisions = sum(drive.collisions for drive in drives)
@@ -73,5 +74,5 @@ class RecordLog(Stage):
             ctx.fact(name, value)
         if collisions:
             print(f"{path}: the robot touched obstacles {counted(collisions, 'time')}")
-        print(f"{path}: {counted(images, 'image')}; floor plan, camera.yaml and {grid} beside it")
+        print(f"{path}: {counted(images, 'image')}; beside it {camera.name}, {floor.name} and {grid}")
         return self.Out()

@@ -29,6 +29,15 @@ def test_every_command_explains_itself(words, capsys):
     assert not missing
 
 
+def test_the_first_word_of_two_explains_all_that_it_begins(capsys):
+    main(["map", "--help"])
+    told = capsys.readouterr().out
+    tools = [tool for tool in TOOLS if tool.startswith("map ")]
+    assert len(tools) > 3
+    assert all(f"omninav {tool} " in told for tool in tools)
+    assert "omninav camera" not in told
+
+
 def test_help_and_version_answer_without_configuration(omninav):
     assert "omninav resume runs/latest" in omninav("--help", check=True).stdout
     assert re.match(r"omninav \d", omninav("--version", check=True).stdout)

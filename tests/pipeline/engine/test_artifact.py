@@ -52,6 +52,11 @@ def file(tmp_path: Path) -> Path:
     return tmp_path / "known.omap"
 
 
+def test_of_a_folder_the_files_in_it_are_named(file: Path):
+    with pytest.raises(BadInput, match=r"this is a folder, expected a file in it: known\.omap"):
+        read_artifact(file.parent)
+
+
 def test_a_value_and_how_it_was_made_come_back(file: Path):
     assert read_artifact(file).value == 2.5
     assert type_of(file) is Number

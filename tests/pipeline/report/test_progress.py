@@ -26,6 +26,11 @@ def drive(stream, frames, step_s, total=None, name="localise"):
     return stream.getvalue()
 
 
+def test_no_rate_is_stated_of_a_frame_that_took_no_time():
+    last = json.loads(drive(io.StringIO(), 1, 1e-6, total=1).splitlines()[-1])
+    assert (last["frames"], last["frames_per_second"]) == (1, None)
+
+
 def test_elsewhere_than_in_a_terminal_there_is_a_json_line_every_two_seconds_and_one_at_the_end():
     lines = [json.loads(line) for line in drive(io.StringIO(), 67, 0.125, total=67).splitlines()]
     assert [line["frames"] for line in lines] == [17, 33, 49, 65, 67]

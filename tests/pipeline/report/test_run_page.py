@@ -185,7 +185,7 @@ def test_slides_hold_each_photograph_once_and_cannot_end_their_script(tmp_path):
 
 def test_what_was_skipped_stands_above_the_results(tmp_path):
     said = text_of(report(tmp_path))
-    assert said.index("duplicate frame: 7 (first: frame 12 <twice>)") < said.index("Position error")
+    assert said.index("duplicate frame, 7 times (first: frame 12 <twice>)") < said.index("Position error")
 
 
 def test_ticks_in_which_a_stage_had_nothing_to_do_are_no_warning(tmp_path):

@@ -3,10 +3,10 @@ from omninav.pipeline.report.warning_lines import grouped, warning_lines
 
 def test_what_is_said_of_several_files_is_one_line_with_a_count():
     said = ["map: No odometry in tour.mcap: made", "No odometry in logs/drive 2.mcap: made", "The disk is full"]
-    assert grouped(said) == ["map: No odometry in tour.mcap: made (and 1 like it)", "The disk is full"]
+    assert grouped(said) == ["map: No odometry in tour.mcap: made (and 1 more like this)", "The disk is full"]
     guessed = [f"{of}assumed: walk.mp4: 30 images per second" for of in ("map: ", "")]
-    assert grouped(guessed) == [f"{guessed[0]} (and 1 like it)"]
-    assert grouped([f"frame {n}: too dark" for n in range(3)]) == ["frame 0: too dark (and 2 like it)"]
+    assert grouped(guessed) == [f"{guessed[0]} (and 1 more like this)"]
+    assert grouped([f"frame {n}: too dark" for n in range(3)]) == ["frame 0: too dark (and 2 more like this)"]
 
 
 def test_different_causes_stay_apart():
@@ -16,4 +16,7 @@ def test_different_causes_stay_apart():
 
 def test_skipped_data_is_a_warning_where_a_first_case_is_known():
     dropped = {"source.undecodable_image": {"count": 3, "first": "frame 7"}, "source.seen": 5}
-    assert warning_lines({"warnings": ["a"], "dropped": dropped}) == ["a", "undecodable image: 3 (first: frame 7)"]
+    assert warning_lines({"warnings": ["a"], "dropped": dropped}) == [
+        "a",
+        "undecodable image, 3 times (first: frame 7)",
+    ]
