@@ -162,7 +162,7 @@ def test_the_first_figures_say_how_far_off_whether_lost_and_when_it_converged():
 
     assert first(*[0.5] * 12) == [
         ("Position error, median", "0.500 m", False),
-        ("Position error, p90", "0.500 m", False),
+        ("Position error, 90th percentile", "0.500 m", False),
         ("Heading error, median", "0°", False),
         ("Lost, by more than 2 m", "0 %", False),
         ("Converged", "at once", False),

@@ -29,9 +29,7 @@ def test_a_format_that_a_user_wrote_opens_its_names(tmp_path: Path) -> None:
         assert (
             open_recording(str(tmp_path / "one.drive")).digest() == open_recording(str(tmp_path / "one.mcap")).digest()
         )
-        with pytest.raises(
-            UnreadableRecording, match=r"no such file \(in that folder: one\.drive\); name .*\.drive file"
-        ):
+        with pytest.raises(UnreadableRecording, match=r"no such file \(in that folder: one\.drive\)$"):
             open_recording(str(tmp_path / "two.drive"))
     finally:
         FORMATS.remove(Renamed)
