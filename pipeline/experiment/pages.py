@@ -75,8 +75,8 @@ def claims_of(judged: Judged, source: str) -> Iterator[tuple[Experiment, Claim, 
 def counts(judged: Judged, source: str) -> str:
     """A sentence: how many of a paper's claims are judged, and how."""
     held = [verdict.holds for *_, verdict in claims_of(judged, source)]
-    kinds = ", ".join(f"{held.count(each)} {in_words(each)}" for each in (True, False, None))
-    return f"Of {len(held)} claims: {kinds}."
+    holding, failing, undecided = (held.count(each) for each in (True, False, None))
+    return f"Of {len(held)} claims of this paper {holding} hold, {failing} do not, and {undecided} are undecided."
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

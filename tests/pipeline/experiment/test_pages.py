@@ -56,7 +56,7 @@ def test_each_claim_of_a_paper_stands_with_its_place_verdict_and_figure() -> Non
     assert f"| they say so | Table 1 | {link}: it holds | does not hold | Error (cm): 3 to 1234; 1 of 2 cases" in text
     shown = "Error (cm): 5.25, beside 9 (the limit), difference -1 to 1.50"
     assert f"| and this | section 2 | {link}: … too | undecided | {shown} |" in text
-    assert counts(found, "A paper 2004") == "Of 2 claims: 0 holds, 1 does not hold, 1 undecided."
+    assert counts(found, "A paper 2004") == "Of 2 claims of this paper 0 hold, 1 do not, and 1 are undecided."
     assert "so we think" not in text  # no paper says it
     assert "it will" not in text  # no result judges it
     page = str(markdown_page(*found[0])["one.md"])
