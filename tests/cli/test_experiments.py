@@ -5,7 +5,7 @@ import re
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -435,5 +435,5 @@ def test_results_are_the_same_bytes_wherever_they_were_computed(dice: Finished, 
         dice.go(*MINE, *words, f"runs={runs}", "cache=null")
     here, there = dice.place / "runs/dice_full", runs / "dice_full"
     first, second = (read_result(folder / "dice.result.json") for folder in (here, there))
-    assert replace(second, command=first.command) == first
+    assert (second.verdicts, second.cells, second.curves) == (first.verdicts, first.cells, first.curves)
     assert results(there) == results(here)
