@@ -46,7 +46,7 @@ def views(folder: Path, name: str, *words: str) -> ReferenceGraph:
     """Features and poses of every image of a drive, as a map; made once."""
     file = folder / f"{name}.omap"
     if not file.exists():
-        settings = ("variant=omniview_mcl_map", "nodes.mapping.distance_m=0.001", "plots=none", "cache=null")
+        settings = ("map", "variant=omniview_mcl", "nodes.mapping.distance_m=0.001", "plots=none", "cache=null")
         runs = folder / "runs"
         subprocess.run([sys.executable, "-m", "omninav", *settings, *words, f"runs={runs}"], check=True)
         file.write_bytes((runs / "latest" / "map.omap").read_bytes())

@@ -149,7 +149,7 @@ def main() -> int:
         else:
             log = write_log(folder / "tour.mcap", number, far=2.5 * RADIUS_M)
             print(f"a tour of {number} images, {log.stat().st_size / 1e6:.0f} MB, each a reference")
-            table(["variant=omniview_mcl_map", f"log={log}", *common])
+            table(["map", "variant=omniview_mcl", f"log={log}", *common])
             learned = (folder / "runs" / "latest" / "map.omap").resolve()
             print(f"map.omap: {learned.stat().st_size / 1e6:.1f} MB")
             table([f"map={learned}", f"log={write_log(folder / 'drive.mcap', 50)}", *common], 1)

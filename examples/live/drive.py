@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     camera.unlink(missing_ok=True)
     if given.map is None:
         tour = folder / "map"
-        words = ("variant=topological_nav_map", "world=office", "route=tour", "day=0", f"hydra.run.dir={tour}")
+        words = ("map", "variant=topological_nav", "world=office", "route=tour", "day=0", f"hydra.run.dir={tour}")
         if not (tour / "map.omap").exists():
             subprocess.run(omninav(*words), check=True)
         given.map = str(tour / "map.omap")

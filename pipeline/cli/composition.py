@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from hydra.core.config_store import ConfigStore
-from hydra.errors import HydraException, MissingConfigException
+from hydra.errors import HydraException
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
@@ -22,8 +22,9 @@ from omninav.pipeline.graph.stage import Bounds
 from omninav.pipeline.run.artifact_specification import ArtifactSpecification, read_specifications, without_absent
 from omninav.pipeline.run.inputs import not_taken, read_inputs
 
+from .artifact_graph import words_of_graph
 from .composition_cache import compose
-from .config_groups import group_files, settings_left_open, suggest_option
+from .config_groups import listed_groups, replaced, settings_left_open
 from .hydra_session import hydra_started
 from .overrides import invalid_overrides, with_unlisted_parameters
 from .words import read_flags
@@ -32,6 +33,8 @@ OF_THE_VARIANT = ("variant", "inputs", "nodes", "wires", "artifacts", "saves")
 """Keys that a variant's file sets; everything else in a configuration is a setting."""
 OF_THE_RUN = ("seed", "runs", "cache", "checkpoint_s", "validate", "record", "objective", "plots")
 """Settings that every run reads, whatever its graph is."""
+MAKING = ("choices", "nodes", "wires")
+"""What an artifact's specification says of the graph that makes it."""
 UNSET = "(unset)"
 INTERPOLATION = re.compile(r"\$\{(?:oc\.select:|unless:(\w+),)?\s*(\w+)")
 
@@ -87,6 +90,9 @@ def complete(config: Any) -> dict[str, Any]:
         problems = [*not_taken(plain, settings_left_open()), *_nothing_named(plain), *_unfit_settings(plain)]
         for name, spec in specs.items():
             problems += [*_given_twice(config, name, spec), *_given_alone(name, spec, specs)]
+            if spec.variant is not None:
+                where = f"artifacts.{name}.variant"
+                problems.append(Problem(where, "this setting is gone", replaced().get(where, "")))
         if problems:
             raise ProblemsFound(problems)
         graph_of = functools.cache(lambda maker: _graph_of(config, maker, specs))
@@ -94,11 +100,15 @@ def complete(config: Any) -> dict[str, Any]:
             own = plain["artifacts"][name]
             maker = spec.together_with or name
             making = specs[maker]
-            if making.variant is not None:
-                own["variant"], own["made_from"] = making.variant, sorted(set(_linked(config, maker).values()))
+            made = making.choices is not None and making.required
+            if made:
+                own["variant"] = f"{making.choices.get('variant', config.variant)}_{maker}"
+                own["made_from"] = sorted(set(_linked(config, maker).values()))
+            elif making is spec:  # how it would be made is nothing that this run does
+                plain["artifacts"][name] = own = {key: own[key] for key in own if key not in MAKING}
             if spec.file is not None:
                 own["file"] = _past_links(spec.file)
-            elif making.variant is not None and making.file is None and not _lacks(config, maker):
+            elif made and making.file is None and not _lacks(config, maker):
                 own["graph"] = copy.deepcopy(graph_of(maker))
     except OmegaConfBaseException as error:
         where = getattr(error, "full_key", None) or "config"
@@ -138,13 +148,12 @@ def _is_repeatable(node: Any) -> bool:
 
 def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]) -> dict[str, Any]:
     spec = specs[name]
+    words = words_of_graph(str(config.variant), spec.choices or {})
     try:
-        other = compose([f"variant={spec.variant}"])
-    except MissingConfigException:
-        variants = [file.name.removesuffix(".yaml") for file in group_files("variant")]
-        hint = suggest_option("variant", str(spec.variant), variants, "variants")
-        what = f"there is no variant '{spec.variant}' to make it with"
-        raise ProblemsFound([Problem(f"artifacts.{name}.variant", what, hint)]) from None
+        other = compose(words)
+    except HydraException as error:
+        problems = invalid_overrides(words, (), str(error))
+        raise ProblemsFound([Problem(f"artifacts.{name}.choices", p.what, p.hint) for p in problems]) from None
     OmegaConf.set_struct(other, False)
     given: Any = OmegaConf.to_container(config, resolve=False)
     other.update({key: value for key, value in given.items() if key not in OF_THE_VARIANT})
@@ -154,6 +163,7 @@ def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]
             hint = suggest(key, settings, "settings")
             raise ProblemsFound([Problem(f"artifacts.{name}.set.{key}", "there is no such setting", hint)])
         other[key] = value
+    absent = {*spec.inherit} - {*other.nodes}
     for each in (spec, *(other for other in specs.values() if other.together_with == name)):
         for node in filter(lambda node: _is_repeatable(config.nodes[node]), each.inherit):
             other.nodes[node] = OmegaConf.to_container(config.nodes[node], resolve=False)
@@ -162,7 +172,15 @@ def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]
                 block[node] = OmegaConf.merge(block.get(node) or {}, change)
     made = _without_taken_out(OmegaConf.to_container(other, resolve=True))  # type: ignore[arg-type]
     made = dict(without_absent(_without_unset(made)))  # what makes an artifact begins without those it can do without
+    if absent:
+        made["nodes"] = dict(sorted(made["nodes"].items(), key=lambda item: _place_in_groups(item[0])))
     return {key: made.get(key) for key in ("nodes", "wires", "saves")}
+
+
+def _place_in_groups(node: str) -> int:
+    """Place of a node that an option gives: in the order of the groups, before the nodes of none."""
+    groups = listed_groups()
+    return groups.index(node) if node in groups else len(groups)
 
 
 # inputs of artifacts

@@ -14,6 +14,8 @@ from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import Entry, built_in_stage, is_role, of_role
 
 CONF = "omninav.conf"
+LEARN = "learn"
+"""The group whose options are artifacts that can be made by themselves."""
 
 
 def group_files(group: str) -> list[Traversable]:
@@ -25,11 +27,12 @@ def group_files(group: str) -> list[Traversable]:
 
 def suggest_option(group: str, option: str, options: Iterable[str], kind: str, prefix: str = "") -> str:
     """A hint for an option that a group does not have: what took its place, or what is like it."""
-    return _replaced().get(f"{group}={option}") or suggest(option, options, kind, prefix)
+    return replaced().get(f"{group}={option}") or suggest(option, options, kind, prefix)
 
 
 @functools.cache
-def _replaced() -> dict[str, str]:
+def replaced() -> dict[str, str]:
+    """What to type in place of options (`group=option`) and settings that are gone."""
     import yaml
 
     found: dict[str, str] = yaml.load(
@@ -46,6 +49,11 @@ def tools() -> list[str]:
         for file in named
         if "\n  source: null\n" in file.read_text(encoding="utf-8")
     ]
+
+
+def learnable() -> list[str]:
+    """The artifacts that can be made by themselves (`learn=NAME`, `omninav NAME`)."""
+    return [file.name.removesuffix(".yaml") for file in group_files(LEARN)]
 
 
 def is_group(name: str) -> bool:

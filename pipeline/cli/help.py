@@ -20,14 +20,15 @@ def help_text(words: Sequence[str]) -> str:
     """The text of the command or tool that a command line names, of `omninav` where it names none."""
     named = [word for word in words if word not in (*FLAGS, "help")]
     texts = files(CONF).joinpath("help")
-    if named and f"{named[0]}.txt" in {file.name for file in texts.iterdir()}:
+    found: list[str] = []
+    tool = " ".join(named[:2])
+    of_group = [one for one in tools() if named and one.split()[0] == named[0]]
+    if tool not in of_group and named and f"{named[0]}.txt" in {file.name for file in texts.iterdir()}:
         text = texts.joinpath(f"{named[0]}.txt").read_text(encoding="utf-8")
-        return re.sub(r"\{group:(\w+)\}", lambda found: _options(found[1]), text)
-    typed = " ".join(named[:2])
-    group = named[0] if named else ""
-    meant = [tool for tool in tools() if tool == typed] or [tool for tool in tools() if tool.split()[0] == group]
-    if meant:
-        return "\n".join(map(_of_tool, meant))
+        found.append(re.sub(r"\{group:(\w+)\}", lambda match: _options(match[1]), text))
+    found += map(_of_tool, [tool] if tool in of_group else of_group)
+    if found:
+        return "\n".join(found)
     return files(CONF).joinpath("help.txt").read_text(encoding="utf-8")
 
 

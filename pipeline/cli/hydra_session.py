@@ -16,13 +16,14 @@ from hydra.errors import ConfigCompositionException, HydraException
 from hydra.plugins.config_source import ConfigSource
 from hydra.plugins.search_path_plugin import SearchPathPlugin
 from hydra.types import RunMode
-from omegaconf import OmegaConf
+from omegaconf import OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 
 from hydra_plugins.omninav_launcher import OmninavLauncher
 from omninav.pipeline.graph.problems import BadInput, Problem, ProblemsFound, shown
 from omninav.pipeline.graph.registry import Entry, plugins
 
+from .artifact_graph import learned, words_of_artifact, words_of_variant
 from .config_groups import CONF
 from .config_sources import CheckedFolder, OwnFiles
 from .interpolations import interpolations_limited
@@ -117,7 +118,9 @@ class CheckedLoader(ConfigLoader):
         """A composed configuration. Raises `ProblemsFound`, or Hydra's own errors."""
         _refuse_search_path(overrides)
         with hydra_errors():
-            config = self._hydras.load_configuration(config_name, overrides, *args, **kwargs)
+            words, variant = self._of_artifact(overrides)
+            config = self._hydras.load_configuration(config_name, words, *args, **kwargs)
+            _name(config, variant, overrides)
         if overrides and config_name is not None:
             self._refuse_foreign(config)
         return config
@@ -126,9 +129,20 @@ class CheckedLoader(ConfigLoader):
         """The configuration of a sweep's job. Raises as `load_configuration`."""
         _refuse_search_path(sweep_overrides)
         with hydra_errors():
-            config = self._hydras.load_sweep_config(master_config, sweep_overrides)
+            words, variant = self._of_artifact(sweep_overrides)
+            config = self._hydras.load_sweep_config(master_config, words)
+            _name(config, variant, sweep_overrides)
         self._refuse_foreign(config)
         return config
+
+    def _of_artifact(self, words: list[str]) -> tuple[list[str], str]:
+        """The words that describe the graph of the artifact that is asked for, and its name; else the words, and ''."""
+        name = learned(words)
+        if name is None:
+            return words, ""
+        of_variant = words_of_variant(words, self.list_groups(""))
+        variant = self._hydras.load_configuration("config", of_variant, RunMode.RUN)
+        return words_of_artifact(name, variant, words), f"{variant.variant}_{name}"
 
     def _refuse_foreign(self, config: Any) -> None:
         if self._own is None:
@@ -156,6 +170,14 @@ class CheckedLoader(ConfigLoader):
     def compute_defaults_list(self, *args: Any, **kwargs: Any) -> Any:
         """As Hydra's."""
         return self._hydras.compute_defaults_list(*args, **kwargs)
+
+
+def _name(config: Any, variant: str, words: Sequence[str]) -> None:
+    """Name the graph of an artifact by its variant, and keep the words that were typed."""
+    if variant:
+        config.variant = variant
+        with open_dict(config.hydra):
+            config.hydra.overrides.task = [word for word in words if not word.lstrip("+~").startswith("hydra")]
 
 
 def _refuse_search_path(overrides: Sequence[str]) -> None:

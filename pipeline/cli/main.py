@@ -8,7 +8,7 @@ from importlib.resources import files
 
 from omninav.pipeline.report.terminal_text import cleaned
 
-from .config_groups import tools
+from .config_groups import LEARN, learnable, tools
 from .help import asks_for_help, help_text
 from .output import lost_output, mend_streams
 from .typing_mistakes import command_first, mistyped_word, with_homes
@@ -69,6 +69,8 @@ def _run(arguments: list[str]) -> int:
         name, arguments = arguments[0], arguments[1:]
     elif _is_tool(arguments):
         name = "tool"
+    elif arguments[:1] and arguments[0] in learnable() and not any(word.isidentifier() for word in arguments[1:2]):
+        name, arguments = "run", [f"{LEARN}={arguments[0]}", *arguments[1:]]
     elif arguments and arguments[0].isidentifier():
         return _unknown_command(*arguments[:2])
     else:

@@ -23,13 +23,15 @@ from omninav.pipeline.graph.registry import UnknownStage, resolve
 from omninav.pipeline.graph.signature import BadStage, signature
 
 from .composition_cache import compose
-from .config_groups import suggest_option
+from .config_groups import replaced, suggest_option
 from .hydra_session import SETTABLE, not_settable
 
 MAX_JOBS = 100_000
 """Jobs of a sweep, and values of each setting that varies."""
 MAX_LISTED = 10_000
 """Files of a folder of `--config-dir` that are looked at for a name that is like a mistyped one."""
+OF_ARTIFACTS_GRAPH = re.compile(r"^\+?(?=artifacts\.\w+\.(nodes|wires)\.)")
+"""The beginning of a word that changes the graph which makes an artifact."""
 WITHIN_GRAPH = ("nodes.", "wires.", "artifacts.", "saves.")
 
 
@@ -68,8 +70,10 @@ def _several_values(word: Override) -> Problem:
 def with_unlisted_parameters(words: Sequence[str], folders: Sequence[str]) -> list[str]:
     """The words, in which a parameter that a stage has and its configuration does not list is added (`++nodes.…`).
 
-    A configuration lists only what differs from the stage's defaults, and Hydra sets only what is listed.
+    A configuration lists only what differs from the stage's defaults, and Hydra sets only what is listed. Changes to
+    the graph that makes an artifact are added too, whether or not the variant has some of its own.
     """
+    words = [OF_ARTIFACTS_GRAPH.sub("++", word) for word in words]
     if not any(word.startswith("nodes.") for word in words):
         return list(words)
     _, parsed = _parsed(words)
@@ -213,6 +217,9 @@ def _unknown_setting(word: Override, config: Mapping[str, Any], groups: list[str
         return
     value = str(word.input_line).partition("=")[2]
     parents, name, inside = _deepest(config, path)
+    if path in replaced():
+        yield Problem(path, "this setting is gone", replaced()[path])
+        return
     if word.is_add():
         if name is None and not word.is_force_add() and not isinstance(inside, Mapping):
             yield Problem(path, "it is there already", f"type {path}={value}")

@@ -11,14 +11,15 @@ from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 
 @dataclass(frozen=True)
 class ArtifactSpecification:
-    """Origin of an artifact: a file, or an output of another variant's graph."""
+    """Origin of an artifact: a file, or an output of a graph that makes it."""
 
     file: str | None = None
     """The file it is loaded from; none: it is made, where it can be."""
-    variant: str | None = None
-    """The variant whose graph makes it."""
+    choices: dict[str, str] | None = None
+    """Options that choose the graph which makes it: `graph` of conf/graph, none: this variant's own; and options of
+    other groups in it. None: it is not made, only loaded. Where it is not `required` it is made if it is asked for."""
     output: str = ""
-    """The output (`node.port`) of that graph that is taken; none: what that variant saves under the artifact's name."""
+    """The output (`node.port`) of that graph that is taken; none: what that graph saves under the artifact's name."""
     set: dict[str, Any] = field(default_factory=dict)
     """Settings of that graph that differ from this run's; all others are this run's."""
     inherit: tuple[str, ...] = ()
@@ -36,6 +37,8 @@ class ArtifactSpecification:
     """Whether nothing can run without it; else the wires from it are left out where it is neither given nor made."""
     for_plots: bool = False
     """Whether only plots read it: experiments do without."""
+    variant: str | None = None
+    """The name of that graph: this variant's and the artifact's. Found by composing, not written."""
     made_from: tuple[str, ...] = ()
     """Settings that have to be given for it to be made. Found by composing, not written."""
     graph: dict[str, Any] | None = None
@@ -52,7 +55,8 @@ def read_specifications(config: Mapping[str, Any]) -> dict[str, ArtifactSpecific
     for name, given in block.items():
         where = f"artifacts.{name}"
         if not isinstance(given, Mapping):
-            problems.append(Problem(where, "expected a mapping", f"write {where}: {{variant: …}} or {{file: …}}"))
+            hint = f"write {where}: {{choices: {{graph: …}}}} or {{file: …}}"
+            problems.append(Problem(where, "expected a mapping", hint))
             continue
         arguments, wrong = convert_fields(given, ArtifactSpecification, where)
         problems += wrong

@@ -37,13 +37,13 @@ def not_taken(config: Mapping[str, Any], settings: Iterable[str]) -> Iterator[Pr
         if config.get(name) is not None and name not in inputs:
             takes = ", ".join(inputs) or "no input at all"
             hint = f"leave {name}=… away; its `inputs` are: {takes}"
-            yield Problem(name, f"variant={config.get('variant')} does not take it", hint)
+            yield Problem(name, f"{config.get('variant')} does not take it", hint)
 
 
 def refuse_missing(config: Mapping[str, Any]) -> None:
     """Raise `ProblemsFound` where an input is required and not given."""
     problems = [
-        Problem(name, f"variant={config.get('variant')} needs it: {wanted.meaning}", f"type {name}=…")
+        Problem(name, f"{config.get('variant')} needs it: {wanted.meaning}", f"type {name}=…")
         for name, wanted in read_inputs(config).items()
         if wanted.required and config.get(name) is None
     ]

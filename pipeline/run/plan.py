@@ -187,7 +187,7 @@ def _how_to_get(name: str, spec: ArtifactSpecification) -> str:
     if spec.together_with is not None:
         both = f"; or {give} in place of {spec.together_with}=FILE, which makes both" if give else ""
         return f"type {name}=FILE.omap too, which was saved beside {spec.together_with}=FILE{both}"
-    make = f"type {give} to make one with '{spec.variant}', or " if give else "type "
+    make = f"type {give} to make one, or " if give else "type "
     return f"{make}{name}=FILE.omap to load one"
 
 

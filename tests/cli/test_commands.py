@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
+from omninav.pipeline.cli.config_groups import learnable
 from omninav.pipeline.cli.main import COMMANDS, main
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -17,7 +18,7 @@ HELP = (ROOT / "conf" / "help.txt").read_text(encoding="utf-8")
 TOOLS = [f"{one} {other}" for one, other in re.findall(r"^  (camera|map) (\w+)", HELP, re.MULTILINE)]
 
 
-@pytest.mark.parametrize("words", [*COMMANDS, *TOOLS])
+@pytest.mark.parametrize("words", [*COMMANDS, *learnable(), *TOOLS])
 def test_every_command_explains_itself(words, capsys):
     main([*words.split(), "--help"])
     told = capsys.readouterr().out
@@ -74,13 +75,13 @@ def test_a_run_with_a_wrong_configuration_says_the_same_and_makes_nothing(omnina
 
 
 @pytest.mark.parametrize("command", ["check", "graph"])
-def test_a_map_may_be_made_by_a_variant_of_ones_own(omninav, tmp_path: Path, command):
-    (tmp_path / "mine" / "variant").mkdir(parents=True)
-    own = (ROOT / "conf" / "variant" / "omniview_mcl_map.yaml").read_text().replace("omniview_mcl_map", "own_map")
-    (tmp_path / "mine" / "variant" / "own_map.yaml").write_text(own)
-    words = (command, "--config-dir=mine", "variant=omniview_mcl", "artifacts.map.variant=own_map")
+def test_a_map_may_be_made_by_a_graph_of_ones_own(omninav, tmp_path: Path, command):
+    (tmp_path / "mine" / "graph").mkdir(parents=True)
+    own = (ROOT / "conf" / "graph" / "reference_map.yaml").read_text()
+    (tmp_path / "mine" / "graph" / "own_map.yaml").write_text(own)
+    words = (command, "--config-dir=mine", "variant=omniview_mcl", "artifacts.map.choices.graph=own_map")
     assert omninav(*words).returncode == 0
-    assert "own_mop" in omninav(*words[:-1], "artifacts.map.variant=own_mop").stderr
+    assert "there is no 'own_mop'" in omninav(*words[:-1], "artifacts.map.choices.graph=own_mop").stderr
 
 
 def test_check_says_who_reads_the_truth(omninav):
@@ -104,7 +105,7 @@ def test_a_log_of_ones_own_without_a_map_says_what_to_type(omninav, tmp_path: Pa
     ended = omninav("variant=omniview_mcl", "log=drive.mcap")
     assert ended.returncode == 2
     assert "this variant needs a map" in ended.stderr
-    assert "type tour=… to make one with 'omniview_mcl_map', or map=FILE.omap to load one" in ended.stderr
+    assert "type tour=… to make one, or map=FILE.omap to load one" in ended.stderr
     assert list(tmp_path.iterdir()) == []
 
 
@@ -138,9 +139,9 @@ def test_a_log_of_ones_own_without_a_map_says_what_to_type(omninav, tmp_path: Pa
         (("--config-dir=nowhere",), "there is no folder nowhere"),
         (
             ("variant=wander", "log=d.mcap"),
-            "variant=wander does not take it\n      leave log=… away; its `inputs` are: camera",
+            "wander does not take it\n      leave log=… away; its `inputs` are: camera",
         ),
-        (("variant=topological_nav",), "goal: variant=topological_nav needs it: where to go"),
+        (("variant=topological_nav",), "goal: topological_nav needs it: where to go"),
         (("+artifacts.map.set={rout: tour}",), "did you mean 'route'?"),
         (("+artifacts.map.inheritd=[unwarp]",), "ArtifactSpecification has no parameter 'inheritd'"),
     ],
@@ -168,7 +169,7 @@ def test_the_map_of_the_latest_run_can_be_named(omninav, demo: Path, shared_cach
 
 
 def test_a_missing_log_is_one_line_that_names_it(omninav, tmp_path: Path):
-    ended = omninav("variant=omniview_mcl_map", "log=nowhere.mcap")
+    ended = omninav("map", "variant=omniview_mcl", "log=nowhere.mcap")
     assert ended.returncode == 2
     assert "nowhere.mcap" in ended.stderr
     assert len(ended.stderr.strip().split("\n")) == 1

@@ -26,11 +26,11 @@ def test_a_camera_is_looked_through(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 def test_a_variant_that_runs_over_a_log_is_no_such_command(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["omniview", "mcl_map", "log=L"]) == 2
+    assert main(["homing", "field", "log=L"]) == 2
     assert main(["camera", "lok"]) == 2
     assert main(["homing"]) == 2
     said = capsys.readouterr().err
-    assert "type omninav variant=omniview_mcl_map" in said
+    assert "type omninav variant=homing_field" in said
     assert "'camera lok' is no command. did you mean 'omninav camera look'? there are: omninav camera calibrate" in said
     assert "'homing' is no command. type omninav variant=homing" in said
 

@@ -10,6 +10,7 @@ from offenders import assert_each
 from omninav.pipeline.cli.commands.simulate import is_live
 from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.cli.composition_cache import compose
+from omninav.pipeline.cli.config_groups import learnable
 from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.main import COMMANDS
@@ -56,6 +57,8 @@ def command_composes(line: str) -> None:
     command = words.pop(0) if words and words[0] in COMMANDS else ""
     if command in NO_GRAPH:
         return
+    if words[0] in learnable() and not words[1].isidentifier():
+        words[0] = f"learn={words[0]}"
     tool = "_".join(words[:2])
     if (ROOT / f"conf/variant/{tool}.yaml").is_file():
         words = [f"variant={tool}", *words[2:]]

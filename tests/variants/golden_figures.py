@@ -66,18 +66,20 @@ RUNS: dict[str, tuple[str, ...]] = {
         "nodes.source.seconds=3",
     ),
     "topological_nav_map": (MAPPED, EVERY_SECOND),
-    "topological_nav_map_as_printed": (MAPPED, EVERY_SECOND),
+    "topological_nav_as_printed_map": (MAPPED, EVERY_SECOND),
     "two_views": (),
     "wander": (*SMALL_CAMERA, "nodes.source.seconds=4"),
 }
-"""What is typed after variant=NAME."""
+"""Variant -> what is typed after variant=NAME; NAME_map -> … after `map variant=NAME`."""
 
 
 def measured(variant: str, place: Path, cache: Path) -> dict[str, Any]:
     """The figures of a variant that was run in this folder."""
     place.mkdir(parents=True, exist_ok=True)
     kept = ("runs=runs", f"cache={cache}", "seed=0")
-    words = ("simulate", *RUNS[variant]) if variant == "simulate" else (f"variant={variant}", *RUNS[variant], *kept)
+    of = variant.removesuffix("_map")
+    named = ("map", f"variant={of}") if of != variant else (f"variant={variant}",)
+    words = ("simulate", *RUNS[variant]) if variant == "simulate" else (*named, *RUNS[variant], *kept)
     with chdir(place):
         code = main(words)
     assert code == 0, f"omninav {' '.join(words)} ended with {code}"

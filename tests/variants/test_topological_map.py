@@ -1,4 +1,4 @@
-"""topological_nav_map as a user runs it: a map of a furnished house, which grows from a second drive."""
+"""The map of topological_nav as a user learns it: a map of a furnished house, which grows from a second drive."""
 
 import json
 from pathlib import Path
@@ -10,7 +10,7 @@ HOUSE = DATA / "photoreal-house"
 
 
 def test_a_drive_on_another_day_is_recognised_in_the_map_of_a_tour(omninav, tmp_path: Path):
-    words = ("variant=topological_nav_map", "nodes.source.stride=2")
+    words = ("map", "variant=topological_nav", "nodes.source.stride=2")
     omninav(*words, f"log={TOUR}", check=True)
     first = (tmp_path / "runs" / "latest").resolve()
     metrics = json.loads((first / "metrics.json").read_text())
@@ -25,7 +25,7 @@ def test_a_drive_on_another_day_is_recognised_in_the_map_of_a_tour(omninav, tmp_
 
 @needs_data
 def test_a_house_becomes_places_and_a_second_drive_adds_to_them(omninav, tmp_path: Path):
-    words = ("variant=topological_nav_map", f"log={HOUSE}/tour.mcap", "nodes.source.stride=4")
+    words = ("map", "variant=topological_nav", f"log={HOUSE}/tour.mcap", "nodes.source.stride=4")
     omninav(*words, check=True)
     first = (tmp_path / "runs" / "latest").resolve()
     metrics = json.loads((first / "metrics.json").read_text())
@@ -36,8 +36,7 @@ def test_a_house_becomes_places_and_a_second_drive_adds_to_them(omninav, tmp_pat
     assert metrics["map"]["step_m"]["max"] < 5.0
     assert "Loop hypotheses and the topological map" in (first / "report.html").read_text()
 
-    again = ("variant=topological_nav_map", f"log={HOUSE}/drive.mcap", f"map={first}/map.omap", "nodes.source.stride=4")
-    omninav(*again, check=True)
+    omninav(*words[:2], f"log={HOUSE}/drive.mcap", f"map={first}/map.omap", words[-1], check=True)
     second = (tmp_path / "runs" / "latest").resolve()
     grown = json.loads((second / "metrics.json").read_text())
     assert grown["loops"]["wrong"] == 0

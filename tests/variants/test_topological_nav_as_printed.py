@@ -54,7 +54,7 @@ def is_printed_homing(graph: Graph) -> None:
 
 
 def test_a_printed_map_has_prototypes_alone_and_neither_words_nor_merging_nor_straightening():
-    is_printed_map(planned("variant=topological_nav_map_as_printed").graph)
+    is_printed_map(planned("learn=map", "variant=topological_nav_as_printed").graph)
 
 
 def test_a_printed_place_filter_has_a_gaussian_and_no_words_over_a_printed_map():
@@ -72,7 +72,7 @@ def test_printed_navigation_is_all_of_these_and_one_route():
     assert whole.graph.nodes["planning"].stage.max_routes == 1
 
 
-@pytest.mark.parametrize("variant", ["homing", "topological_nav_map", "topological_localisation"])
+@pytest.mark.parametrize("variant", ["homing", "topological_nav learn=map", "topological_localisation"])
 def test_ours_is_not_as_printed(variant: str):
-    features = planned(f"variant={variant}").graph.nodes["features"].stage
+    features = planned(*f"variant={variant}".split()).graph.nodes["features"].stage
     assert type(features) is not SiftAndColumns

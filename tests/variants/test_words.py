@@ -45,7 +45,10 @@ def test_a_saved_map_is_used_with_its_words(made: Path, tmp_path: Path) -> None:
 def test_words_are_of_the_map_that_is_used(variant: str, tmp_path: Path, shared_cache: Path) -> None:
     overrides = {
         "its own parameter": (f"+artifacts.map.{LOCALISERS[variant]}",),
-        "another variant's": ("artifacts.map.variant=retrieval_mcl_map", "+artifacts.map.nodes.mapping.min_turn_deg=5"),
+        "another variant's": (
+            "artifacts.map.choices.mapping=image_database",
+            "+artifacts.map.nodes.mapping.min_turn_deg=5",
+        ),
         "of part of the tour": ("tour_settings.cuts=[[10,20]]",),
     }
     settings = {"tour": TOUR, "grid": GRID} if variant == "retrieval_mcl" else {"tour": TOUR}

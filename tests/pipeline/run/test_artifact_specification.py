@@ -141,7 +141,7 @@ def test_repetitions_do_without_what_comes_with_a_map(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("spec", "where", "words"),
     [
-        ({"varient": "toy"}, "artifacts.map.varient", "did you mean 'artifacts.map.variant'?"),
+        ({"choises": {}}, "artifacts.map.choises", "did you mean 'artifacts.map.choices'?"),
         ({"required": "no"}, "artifacts.map.required", "'no' (str), expected bool"),
         ({"inherit": ["sauce"]}, "artifacts.map.inherit", "did you mean 'source'?"),
         ({"must_match": ["raeder"]}, "artifacts.map.must_match", "did you mean 'reader'?"),

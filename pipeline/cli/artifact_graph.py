@@ -1,0 +1,84 @@
+"""The graph that makes an artifact of a variant: chosen by the variant, composed by Hydra as every configuration is.
+
+A variant's block `artifacts` says how each is made. With `learn=NAME` that graph is a configuration of its own, run
+over a log of its own; where the artifact is made on the way, `composition` composes it in the same words.
+"""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any
+
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from omegaconf import OmegaConf
+
+from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
+from omninav.pipeline.graph.registry import UnknownStage, resolve
+from omninav.pipeline.graph.stage import Source
+
+from .config_groups import LEARN
+from .words import word_of
+
+
+def words_of_graph(variant: str, choices: Mapping[str, str]) -> list[str]:
+    """The words that choose the graph: one of `conf/graph`, or else the variant's own, and options of other groups."""
+    graph = choices.get("graph")
+    first = ["~variant", f"+graph={graph}"] if graph else [f"variant={choices.get('variant', variant)}"]
+    rest = ((group, option) for group, option in choices.items() if group not in ("graph", "variant"))
+    return [*first, *(f"{group}={option}" for group, option in rest)]
+
+
+def learned(words: Sequence[str]) -> str | None:
+    """The artifact that words ask for (`learn=NAME`), None where they ask for none."""
+    names = [word.partition("=")[2] for word in words if word.startswith(f"{LEARN}=")]
+    return names[-1] if names and "," not in names[-1] else None
+
+
+def words_of_variant(words: Sequence[str], groups: Collection[str]) -> list[str]:
+    """Those of the words that choose options, but for `learn`: what they give says how the artifact is made."""
+    return [text for key, text in _keyed(words) if key in groups and key != LEARN]
+
+
+def words_of_artifact(name: str, variant: Any, words: Sequence[str]) -> list[str]:
+    """The words that describe the graph of an artifact, as a run of its own, followed by those that were typed.
+
+    `variant` is the configuration that the options among `words` describe. Raises `ProblemsFound` where it says
+    nowhere how the artifact is made.
+    """
+    artifacts: Any = OmegaConf.to_container(variant.artifacts, resolve=False)
+    makers = [key for key, spec in artifacts.items() if spec is not None and spec.get("choices") is not None]
+    if name not in makers:
+        what = f"variant={variant.variant} has no '{name}' to learn"
+        raise ProblemsFound([Problem(LEARN, what, suggest(name, makers, "artifacts", f"{LEARN}=") if makers else "")])
+    spec = artifacts[name]
+    typed = dict(_keyed(words))
+    chosen = variant.hydra.runtime.choices
+    shared = {node: variant.nodes[node] for node in spec.get("inherit") or () if not _is_source(variant.nodes[node])}
+    options = {node: str(chosen[node]) for node in shared if chosen.get(node)}
+    groups = words_of_graph(str(variant.variant), {**options, **spec["choices"]})
+    return [
+        *(word for word in groups if word.lstrip("+~").partition("=")[0] not in typed.keys() - {"variant"}),
+        *(f"++nodes.{name}={_value(node)}" for name, node in shared.items()),
+        *_changes(spec),
+        *(text for key, text in _keyed(words) if key not in (LEARN, "variant")),
+    ]
+
+
+def _changes(spec: Mapping[str, Any]) -> Iterator[str]:
+    for block in ("nodes", "wires"):
+        for name, change in (spec.get(block) or {}).items():
+            yield f"++{block}.{name}={word_of(change)}"
+
+
+def _keyed(words: Sequence[str]) -> list[tuple[str, str]]:
+    parsed = OverridesParser.create().parse_overrides([*words])
+    return [(word.key_or_group, str(word.input_line)) for word in parsed]
+
+
+def _value(node: Any) -> str:
+    return word_of(OmegaConf.to_container(node, resolve=False))
+
+
+def _is_source(node: Any) -> bool:
+    try:
+        return issubclass(resolve(str(node.get("_target_"))), Source)
+    except UnknownStage:  # reported by `build`
+        return False
