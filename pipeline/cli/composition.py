@@ -100,15 +100,15 @@ def complete(config: Any) -> dict[str, Any]:
             own = plain["artifacts"][name]
             maker = spec.together_with or name
             making = specs[maker]
-            made = making.choices is not None and making.required
-            if made:
-                own["variant"] = f"{making.choices.get('variant', config.variant)}_{maker}"
+            choices = making.choices if making.required else None
+            if choices is not None:
+                own["variant"] = f"{choices.get('variant', config.variant)}_{maker}"
                 own["made_from"] = sorted(set(_linked(config, maker).values()))
             elif making is spec:  # how it would be made is nothing that this run does
                 plain["artifacts"][name] = own = {key: own[key] for key in own if key not in MAKING}
             if spec.file is not None:
                 own["file"] = _past_links(spec.file)
-            elif made and making.file is None and not _lacks(config, maker):
+            elif choices is not None and making.file is None and not _lacks(config, maker):
                 own["graph"] = copy.deepcopy(graph_of(maker))
     except OmegaConfBaseException as error:
         where = getattr(error, "full_key", None) or "config"

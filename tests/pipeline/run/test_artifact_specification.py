@@ -169,7 +169,7 @@ def test_an_artifact_that_is_neither_given_nor_made_says_what_to_give() -> None:
     with pytest.raises(ProblemsFound) as found:
         plan(config)
     assert "this variant needs a map, and none is given" in str(found.value)
-    assert "type tour=… to make one with 'toy', or map=FILE.omap to load one" in str(found.value)
+    assert "type tour=… to make one, or map=FILE.omap to load one" in str(found.value)
 
 
 def test_what_an_artifact_is_made_from_given_in_its_place_says_what_to_type(tmp_path: Path) -> None:
