@@ -57,7 +57,7 @@ def command_composes(line: str) -> None:
     command = words.pop(0) if words and words[0] in COMMANDS else ""
     if command in NO_GRAPH:
         return
-    if words[0] in learnable() and not words[1].isidentifier():
+    if words[:1] and words[0] in learnable() and not any(word.isidentifier() for word in words[1:2]):
         words[0] = f"learn={words[0]}"
     tool = "_".join(words[:2])
     if (ROOT / f"conf/variant/{tool}.yaml").is_file():

@@ -41,6 +41,7 @@ RUNS: dict[str, tuple[str, ...]] = {
     "omniview_mcl_map": (MAPPED,),
     "particle_cml": (BOTH, "nodes.novelty_threshold.views=30", "nodes.source.stop=40"),
     "particle_cml_as_printed": (BOTH, "nodes.novelty_threshold.views=30", "nodes.source.stop=40"),
+    "particle_cml_as_printed_map": (MAPPED, "nodes.novelty_threshold.views=30"),
     "particle_cml_baseline": (TOUR, DRIVE, EVERY_SECOND),
     "particle_cml_baseline_map": (MAPPED, EVERY_SECOND),
     "particle_cml_map": (MAPPED, "nodes.novelty_threshold.views=30"),
