@@ -33,8 +33,10 @@ def learned(words: Sequence[str]) -> str | None:
 
 
 def words_of_variant(words: Sequence[str], groups: Collection[str]) -> list[str]:
-    """Those of the words that choose options, but for `learn`: what they give says how the artifact is made."""
-    return [text for key, text in _keyed(words) if key in groups and key != LEARN]
+    """Those of the words that choose one option, but for `learn`: what they give says how the artifact is made."""
+    parsed = OverridesParser.create().parse_overrides([*words])
+    one = [word for word in parsed if word.key_or_group in groups and not word.is_sweep_override()]
+    return [str(word.input_line) for word in one if word.key_or_group != LEARN]
 
 
 def words_of_artifact(name: str, variant: Any, words: Sequence[str]) -> list[str]:
