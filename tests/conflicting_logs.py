@@ -298,7 +298,8 @@ def of_whole_run(change: Change, map: Path, drive: Path, folder: Path) -> list[F
 
 def learned_map(tour: Path, folder: Path) -> Path:
     """The file of the map that `omninav` learns from a tour."""
-    return omninav.run("omninav_map", log=str(tour), runs=str(folder), plots="none", progress=False).folder / "map.omap"
+    run = omninav.run("omninav", learn="map", log=str(tour), runs=str(folder), plots="none", progress=False)
+    return run.folder / "map.omap"
 
 
 def changed_map(sound: Path, path: Path, poses: Callable[[Array], Any]) -> Path:
