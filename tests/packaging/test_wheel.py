@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-NAMES = ("omninav", "pipeline", "stages", "conf", "pyproject.toml", "README.md", "LICENSE")
+NAMES = ("omninav", "hydra_plugins", "pipeline", "stages", "conf", "pyproject.toml", "README.md", "LICENSE")
 BACKEND = tuple(map(int, importlib.metadata.version("setuptools").split(".")[:2]))
 pytestmark = pytest.mark.skipif(BACKEND < (77, 0), reason="setuptools is older than 77: pip install -e '.[dev]'")
 UNUSED = shutil.ignore_patterns("__pycache__", "*.egg-info")
@@ -81,7 +81,7 @@ def test_the_wheel_holds_every_module_every_option_and_the_templates_and_no_test
     assert "omninav/conf/config.yaml" in expected
     assert set(content(wheel)) == expected | {
         f"omninav/{name}" for name in ("__init__.py", "__main__.py", "testing.py", "working_directory.py", "py.typed")
-    }
+    } | {"hydra_plugins/omninav_launcher.py"}
 
 
 def test_the_sdist_builds_the_same_wheel(wheel: Path, sdist: Path, tmp_path: Path):

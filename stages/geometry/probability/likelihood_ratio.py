@@ -37,13 +37,16 @@ def logistic_fit(scores: Array, weights: Array, right: npt.NDArray[np.bool_]) ->
     below 0.
     """
     design = np.column_stack([np.ones_like(scores), scores])
-    found = np.zeros(2)
+    found, reached = np.zeros(2), set[bytes]()
     for _ in range(50):  # Newton's method, with steps that cannot leap over the optimum of separable examples
         odds = 1.0 / (1.0 + np.exp(-np.clip(design @ found, -MAX_LOG_ODDS, MAX_LOG_ODDS)))
         gradient = design.T @ (weights * (right - odds)) - RIDGE * found
         curvature = (design * (weights * odds * (1.0 - odds))[:, None]).T @ design + RIDGE * np.eye(2)
         step = np.linalg.solve(curvature, gradient)
-        found += step * min(1.0, 3.0 / max(float(np.abs(step).max()), 1e-12))
+        found = found + step * min(1.0, 3.0 / max(float(np.abs(step).max()), 1e-12))
+        if found.tobytes() in reached:  # only rounding is left
+            break
+        reached.add(found.tobytes())
     if found[1] <= 1e-6:
         return 0.0, 0.0
     return float(found[1]), float(-found[0] / found[1])

@@ -122,7 +122,7 @@ def test_tracking_by_some_references_is_as_good_as_comparing_the_whole_map() -> 
 
 
 def test_how_well_a_picture_fits_anywhere_is_that_of_the_whole_map_however_wrong_the_belief() -> None:
-    rng, ratio = np.random.default_rng(3), []
+    rng, ratio, match = np.random.default_rng(3), [], SelectiveMatch()
     belief = Particles(rng.normal(DRIVE[0], (0.1, 0.1, 0.05), (200, 3)), np.full(200, 1 / 200))
     for pose in ELSEWHERE[::4]:
         view, said = SegmentHistograms(LAND.seen_from(pose, rng.normal(0, 0.5, (SEGMENTS, BINS)))), []
@@ -130,7 +130,7 @@ def test_how_well_a_picture_fits_anywhere_is_that_of_the_whole_map_however_wrong
             ctx = Context("candidates")
             candidates.setup(ctx)
             chosen = candidates.step(ctx, view, MAP, INDEX, belief, LENGTH_SCALE).candidates
-            alike = SelectiveMatch().step(Context("match"), view, MAP, chosen).similarities
+            alike = match.step(Context("match"), view, MAP, chosen).similarities
             sensor = NearReferences()
             sensor.setup(ctx)
             said.append(sensor.step(ctx, alike, belief, MAP, None, LENGTH_SCALE).likelihood.mean_likelihood)
