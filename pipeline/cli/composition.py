@@ -34,7 +34,7 @@ OF_THE_VARIANT = ("variant", "inputs", "nodes", "wires", "artifacts", "saves")
 OF_THE_RUN = ("seed", "runs", "cache", "checkpoint_s", "validate", "record", "objective", "plots")
 """Settings that every run reads, whatever its graph is."""
 MAKING = ("choices", "nodes", "wires")
-"""What an artifact's specification says of the graph that makes it."""
+"""Keys of an artifact's specification that change the graph which makes it."""
 UNSET = "(unset)"
 INTERPOLATION = re.compile(r"\$\{(?:oc\.select:|unless:(\w+),)?\s*(\w+)")
 

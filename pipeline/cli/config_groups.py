@@ -32,7 +32,7 @@ def suggest_option(group: str, option: str, options: Iterable[str], kind: str, p
 
 @functools.cache
 def replaced() -> dict[str, str]:
-    """What to type in place of options (`group=option`) and settings that are gone."""
+    """Reads hints for options (`group=option`) and settings that are gone: name -> what to type."""
     import yaml
 
     found: dict[str, str] = yaml.load(

@@ -1,4 +1,4 @@
-"""Where Hydra finds configurations: omninav's own files and stages, and the folders of `--config-dir`."""
+"""Hydra's sources of configurations: omninav's own files and stages, and the folders of `--config-dir`."""
 
 import os
 import pickle
@@ -70,7 +70,7 @@ class OwnFiles(_Files):
 
     @staticmethod
     def scheme() -> str:
-        """What stands before its path."""
+        """Returns the prefix of its paths."""
         return "own"
 
     @property
@@ -109,7 +109,7 @@ class CheckedFolder(_Files):
 
     @staticmethod
     def scheme() -> str:
-        """What stands before its path."""
+        """Returns the prefix of its paths."""
         return "checked"
 
     @property

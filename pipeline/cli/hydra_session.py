@@ -70,7 +70,10 @@ def _finding_in(folders: Sequence[str]) -> Any:
     for plugin in (OwnFiles, CheckedFolder, _SearchPath, OmninavLauncher):
         Plugins.instance().register(plugin)
     _SearchPath.folders = [str(Path(folder).absolute()) for folder in folders]
-    initialize(config_path=None, job_name="omninav", version_base=VERSION_BASE)
+    try:
+        initialize(config_path=None, job_name="omninav", version_base=VERSION_BASE)
+    finally:
+        _SearchPath.folders = None
     started: Any = GlobalHydra.instance().hydra
     started.config_loader = CheckedLoader(started.config_loader)
     return started
@@ -79,10 +82,13 @@ def _finding_in(folders: Sequence[str]) -> Any:
 class _SearchPath(SearchPathPlugin):
     """Adds omninav's configurations and those of `--config-dir`, before the schemas that Hydra adds last."""
 
-    folders: Sequence[str] = ()
+    folders: Sequence[str] | None = None
+    """Folders of `--config-dir` while omninav starts Hydra; None: another program starts it, with its own files."""
 
     def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
         """Called by Hydra when it starts."""
+        if self.folders is None:
+            return
         search_path.append("main", f"{OwnFiles.scheme()}://{CONF}")
         for folder in self.folders:
             search_path.append("command-line", f"{CheckedFolder.scheme()}://{folder}")

@@ -60,7 +60,7 @@ def run_sweep(
 
 
 def is_of_engine(word: str) -> bool:
-    """Whether a word says where jobs run, and nothing of what they do."""
+    """Tells whether a word says where jobs run, and nothing of what they do."""
     return word.lstrip("+").startswith(("engine=", "engine."))
 
 

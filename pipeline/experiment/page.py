@@ -66,7 +66,7 @@ def write_page(content: PageContent, results: Results, development: Results, fol
 
 
 def experiment_result(content: PageContent, results: Results, development: Results) -> ExperimentResult:
-    """What is kept of an experiment as far as it has run."""
+    """Collects the results of an experiment as far as it has run."""
     experiment, conditions = content.experiment, content.conditions
     common = [word for word in conditions[0].overrides if all(word in run.overrides for run in conditions)]
     verdicts, cells, curves = figures_of(experiment, results, development)
@@ -103,7 +103,7 @@ def _repeated(experiment: Experiment) -> str:
 
 
 def _values(experiment: Experiment, result: ExperimentResult, plots: Sequence[PagePlot]) -> dict[str, Any]:
-    """What the templates read."""
+    """Returns the values that the templates read."""
     verdicts = result.judged(experiment)
     return {
         "experiment": experiment,

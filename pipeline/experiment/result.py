@@ -56,12 +56,12 @@ class Line:
     high: tuple[float, ...] = ()
     panel: str = ""
     reference: bool = False
-    """Whether it is equal in all conditions of a panel and drawn dashed."""
+    """True for a value that is equal in all conditions of a panel and drawn dashed."""
 
 
 @dataclass(frozen=True)
 class ConditionRow:
-    """How much of a condition has run, how large it was, and what was typed for it."""
+    """States of a condition: repetitions that have run, their size, and what was typed for it."""
 
     name: str
     done: str
@@ -81,7 +81,7 @@ class ExperimentResult:
     made_with: str
     """Version and commit."""
     repeated: str
-    """How often each condition was run, with which seeds and scenarios."""
+    """Number of runs of each condition, with their seeds and scenarios."""
     verdicts: Mapping[str, tuple[Case, ...]]
     """Key of a claim -> its cases."""
     cells: Mapping[str, tuple[Cell, ...]]

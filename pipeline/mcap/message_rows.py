@@ -50,7 +50,7 @@ def row_bytes(rows: npt.NDArray[np.void]) -> list[bytes]:
 
 
 def _struct(store: "Typestore", msgtype: str, message: Any, at: int) -> tuple[np.dtype[Any], int, int]:
-    """How a message lies that is written after `at` bytes, where it begins and where it ends."""
+    """Computes the layout of a message that is written after `at` bytes, with its first and its last byte."""
     names, formats, starts, begin = [], [], [], -1
     for name, definition in store.fielddefs[msgtype][1]:
         dtype, start, at = _field(store, definition, getattr(message, name), at)

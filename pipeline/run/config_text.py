@@ -58,7 +58,7 @@ class _Dumper(yaml.SafeDumper):
         return node
 
     def ignore_aliases(self, data: Any) -> bool:
-        """Whether a value is written again where it stands again."""
+        """Tells whether a value is written in full each time it occurs."""
         return id(data) not in self.parts
 
     def generate_anchor(self, node: yaml.Node) -> str:

@@ -56,8 +56,8 @@ class Publish(Stage):
     pose: str | None = "/estimate/pose"
     """The estimate (PoseWithCovarianceStamped, latched); `/amcl_pose` takes AMCL's place."""
     tf: str | None = "/tf"
-    """Where `map_frame -> odom_frame` is published: the estimate over the odometry as the robot reports it, which
-    begins anew where it is reset."""
+    """Topic of the transform `map_frame -> odom_frame`: the estimate over the odometry as the robot reports it, which
+    starts over where it is reset."""
     tf_tolerance_s: Annotated[float, Bounds(ge=0)] = 1.0
     """How far ahead of the image the transform is dated, so that it holds until the next one: as AMCL's."""
     map_frame: str = MAP

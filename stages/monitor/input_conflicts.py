@@ -202,7 +202,7 @@ def pose_now(before: Array, odometry: Pose | None, motion: Motion | None) -> Arr
 
 
 def lies_at(match: Array, estimate: PoseEstimate | None, length_scale_m: float) -> float:
-    """Whether a match (3,) lies where the robot is believed to be: 1 or 0, NaN without an estimate."""
+    """Tests whether a match (3,) lies where the robot is believed to be: 1 or 0, NaN without an estimate."""
     if estimate is None:
         return math.nan
     away = match - np.array(pose_row(estimate.pose))
@@ -257,8 +257,8 @@ MISSCALED_OCTAVES, MISTURNED = 0.4, math.radians(20.0)
 NEAR_SCALES, NEAR_RAD = 2.0, math.radians(30.0)
 """A match lies at the estimate within so many length scales, turned by less than this (rad)."""
 SCATTERED, ELSEWHERE = 0.05, 0.1
-"""Of a whole window less than this share of pairs of matches lies to each other as odometry says, and less than this
-share of matches at the estimate, where images fit no place of the map."""
+"""Largest shares, over a whole window, of pairs of matches that agree with odometry and of matches at the estimate,
+with which images are said to fit no place of the map."""
 
 
 def judge(watched: Watched, length_scale_m: float) -> tuple[str, str]:

@@ -78,7 +78,7 @@ def weighted_points(stamp: int, namespace: str, colour: Colour, size: float, pla
 
 
 def homing_arrow(stamp: int, direction: float, length: float) -> Fields:
-    """Where a homing vector points (rad), from the robot, so long (m)."""
+    """Draws a homing vector as an arrow from the robot: its direction (rad) and length (m)."""
     arrow = marker(stamp, "homing", ARROW, 0.08, GREEN, [], BASE)
     arrow["pose"] = {"orientation": quaternion(direction)}
     arrow["scale"]["x"] = length

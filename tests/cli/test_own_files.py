@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+from hydra import initialize
 from hydra._internal.core_plugins.importlib_resources_config_source import ImportlibResourcesConfigSource
+from hydra.core.global_hydra import GlobalHydra
 
 from omninav.pipeline.cli.composition import composed
 from omninav.pipeline.cli.config_groups import group_options, listed_groups
@@ -45,3 +47,12 @@ def test_a_file_that_holds_no_stage_or_several_is_no_option():
     assert not own.is_config("fusion/growing_prior")
     assert not own.is_config("geometry/plane")
     assert not own.is_group("geometry")
+
+
+def test_another_program_of_hydras_in_the_same_process_does_not_find_them():
+    with composed(["variant=omniview_mcl"]):
+        pass
+    with initialize(config_path=None, version_base="1.3"):
+        providers = {each.provider for each in GlobalHydra.instance().config_loader().get_search_path().get_path()}
+        assert "hydra" in providers
+        assert "main" not in providers

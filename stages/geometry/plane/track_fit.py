@@ -72,7 +72,7 @@ class Agreement(NamedTuple):
 
 
 def agreement(track: Array, other: Array, length_scale_m: float) -> Agreement:
-    """How many pairs of poses of `other` (N, 3) lie to each other as those of `track` (N, 3) do, as they are.
+    """Counts the pairs of poses of `other` (N, 3) that lie to each other as those of `track` (N, 3) do, as they are.
 
     Pairs count where `track` moved by two length scales; they agree within one and a half, turned by less than 30
     degrees. Matches that are drawn by chance agree in some hundredths.

@@ -75,7 +75,7 @@ def heaviest_mode(poses: Array, weights: Array, radius: float = 1.0) -> tuple[Ar
 
 
 def mode_and_mean(poses: Array, weights: Array, radius: float = 1.0) -> tuple[Array, Array, float, Array]:
-    """What `heaviest_mode` gives, and the mean (3,) of all."""
+    """Computes what `heaviest_mode` does, and the mean (3,) of all particles."""
     poses, weights = np.ascontiguousarray(poses, np.float64), np.ascontiguousarray(weights, np.float64)
     sines, cosines = np.sin(poses[:, 2]), np.cos(poses[:, 2])  # numpy takes a tenth of the time that numba does
     start = _heaviest_cell(poses, weights, radius / 2)
@@ -87,7 +87,7 @@ def mode_and_mean(poses: Array, weights: Array, radius: float = 1.0) -> tuple[Ar
 
 @compiled(nogil=True)
 def are_within(poses: Array, pose: Array, metres: float, radians: float) -> Members:
-    """Whether each of poses (N, 3) is within a tolerance of a pose (3,): (N,)."""
+    """Tests whether each of poses (N, 3) is within a tolerance of a pose (3,): (N,)."""
     out = np.zeros(len(poses), np.bool_)
     for n in range(len(poses)):
         x, y = poses[n, 0] - pose[0], poses[n, 1] - pose[1]
