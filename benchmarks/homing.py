@@ -20,7 +20,6 @@ from omninav.stages.homing.local_mapping import LocalMapping, LocalMappingState
 from omninav.stages.match.correspondences import MatchFeatures
 from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.config import mirror
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.world import World
 from omninav.stages.values.correspondences import Correspondences
@@ -28,13 +27,15 @@ from omninav.stages.values.homing import HomingTarget
 from omninav.stages.values.image import Image
 from omninav.stages.values.local_features import LocalFeatures
 
+from .renderer import world_config
 from .table import Row, medians
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from two_views import angle_deg, two_views, unit
 
 SCENES = 200
-CAMERA = camera_of(replace(DEMO, camera=mirror(columns=320)))
+STORE = world_config("home_store_demo")
+CAMERA = camera_of(replace(STORE, camera=mirror(columns=320)))
 
 
 def rows() -> list[Row]:
@@ -133,7 +134,7 @@ def _absolute() -> list[Row]:
 
 
 def _homing() -> list[Row]:
-    camera, rays, scene = CAMERA, camera_rays(CAMERA), World(DEMO).scene
+    camera, rays, scene = CAMERA, camera_rays(CAMERA), World(STORE).scene
     way = np.linspace((4.0, 4.2, -0.5), (4.8, 4.84, 0.3), 12)
     images = [Image(render(scene, rays, tuple(pose), 0.9)) for pose in way]
     sift, match, ctx = RotationReducedSift(), MatchFeatures(), Context("homing")

@@ -54,8 +54,8 @@ def rows() -> list[Row]:
     return found
 
 
-def _world(name: str) -> World:
-    """A world of `conf/world` on its busiest day."""
+def world_config(name: str) -> WorldConfig:
+    """A world of `conf/world`."""
     from hydra import compose, initialize_config_module
     from omegaconf import OmegaConf
 
@@ -63,6 +63,12 @@ def _world(name: str) -> World:
         described = OmegaConf.to_container(compose("config", overrides=[f"world={name}"]).world, resolve=True)
     config, problems = convert(described, WorldConfig, "world")
     assert not problems, problems
+    return config  # type: ignore[no-any-return]
+
+
+def _world(name: str) -> World:
+    """A world on its busiest day."""
+    config = world_config(name)
     busiest = max(range(len(config.days)), key=lambda day: config.days[day].people)
     return World(config, busiest)
 

@@ -18,7 +18,6 @@ from omninav.stages.mapping.topological import TopologicalMapping
 from omninav.stages.mapping.view_comparison import ViewComparison
 from omninav.stages.match.visual_distance import MatchPlaces
 from omninav.stages.simulator.cameras import camera_of, camera_rays
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.world import World
 from omninav.stages.values.image import Image, Pixels
@@ -26,6 +25,7 @@ from omninav.stages.values.local_features import GlobalDescriptor, LocalFeatures
 from omninav.stages.values.pose import Pose
 from omninav.stages.values.topological_map import TopologicalMap
 
+from .renderer import world_config
 from .table import Row, medians
 
 IMAGES, PLACES = 545, 60
@@ -45,9 +45,10 @@ def rows() -> list[Row]:
 
 def two_views() -> tuple[list[Pixels], HyperbolicMirror]:
     """Two views of the built-in world, 320 x 240, half a metre apart and turned, and their camera."""
-    camera = camera_of(DEMO)
+    store = world_config("home_store_demo")
+    camera = camera_of(store)
     assert isinstance(camera, HyperbolicMirror)
-    scene, rays = World(DEMO).scene, camera_rays(camera)
+    scene, rays = World(store).scene, camera_rays(camera)
     seen = [render(scene, rays, pose, 0.9) for pose in ((5.0, 5.0, 0.0), (5.5, 5.2, 0.6))]
     half = HyperbolicMirror(
         320, 240, camera.focal_x / 2, camera.focal_y / 2, 159.5, 119.5, camera.a, camera.b,

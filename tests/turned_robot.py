@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from world_files import DEMO
 
 from omninav.pipeline import Context
 from omninav.stages.simulator.cameras import camera_of, camera_rays
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.world import World
 from omninav.stages.unwarp.panorama import UnwarpPanorama

@@ -1,4 +1,4 @@
-"""Typed configuration of a simulated world. `WorldConfig()` is an empty hall, `demo.DEMO` a small home store.
+"""Typed configuration of a simulated world. `WorldConfig()` is an empty hall; `conf/world` has others.
 
 Bodies are listed one by one (shelves, blocks, wall panels, lamps) or in groups (aisle blocks, rooms, a lamp grid),
 which `layout.expand` turns into single bodies. Metres and radians in the map frame (z up, the floor at 0) unless a

@@ -11,7 +11,6 @@ from omninav.stages.values.local_features import LocalFeatures, VerticalSegments
 from omninav.stages.values.pose import Pose
 
 from .config import WorldConfig
-from .demo import DEMO
 from .first_hits import first_hits
 from .world import World
 
@@ -21,7 +20,7 @@ class FeatureDepths(Stage):
 
     log: str | tuple[str, ...] | None = None
     """A recorded log: then nothing is known of the place and the output is absent."""
-    world: WorldConfig = DEMO
+    world: WorldConfig = WorldConfig()
     """The simulated world."""
     day: Annotated[int, Bounds(ge=0)] = 0
     """Day of the simulated world."""

@@ -9,14 +9,13 @@ from omninav.stages.recordings.occupancy_grid import grid_beside, grid_digest, r
 from omninav.stages.values.floor_plan import FloorPlan
 
 from .config import WorldConfig
-from .demo import DEMO
 from .world import World, outline
 
 
 class WorldPlan(Stage):
     """Gives the floor plan of a simulated world on a day, for plots."""
 
-    world: WorldConfig | None = DEMO
+    world: WorldConfig | None = None
     """The simulated world; null: a real one, of which there is no plan."""
     day: Annotated[int, Bounds(ge=0)] = 1
     """Day of the simulated world."""
@@ -41,7 +40,7 @@ class DrivenPlan(Stage):
 
     log: str | tuple[str, ...] | None = None
     """The recorded logs."""
-    world: WorldConfig = DEMO
+    world: WorldConfig = WorldConfig()
     """The simulated world, for runs without a log."""
     day: int | tuple[int, ...] = 1
     """Its days."""

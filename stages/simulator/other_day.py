@@ -9,7 +9,6 @@ from omninav.stages.values.image import Image
 from omninav.stages.values.pose import Pose
 
 from .config import WorldConfig
-from .demo import DEMO
 from .robot_camera import RobotCamera
 from .world import World
 
@@ -21,7 +20,7 @@ class OtherDay(Stage):
     Noise is drawn anew for each image.
     """
 
-    world: WorldConfig = DEMO
+    world: WorldConfig = WorldConfig()
     """The simulated world."""
     day: Annotated[int, Bounds(ge=0)] = 1
     """The other day."""

@@ -9,7 +9,6 @@ from omninav.pipeline.graph.problems import BadInput, counted
 from omninav.stages.recordings.camera_yaml import write_camera
 
 from .config import Kidnapping, WorldConfig
-from .demo import DEMO
 from .occupancy import write_grid
 from .plan_image import draw_plan
 from .simulated_log import record
@@ -30,7 +29,7 @@ class RecordLog(Stage):
     `UnreadableRecording` for an unknown route.
     """
 
-    world: WorldConfig = DEMO
+    world: WorldConfig = WorldConfig()
     """The simulated world."""
     route: str = "drive"
     """Name of a route of the world."""

@@ -7,7 +7,6 @@ from omninav.stages.recordings.rooms_yaml import rooms_of_log
 from omninav.stages.values.rooms import Rooms
 
 from .config import WorldConfig
-from .demo import DEMO
 
 
 def rooms_of(world: WorldConfig) -> Rooms | None:
@@ -22,7 +21,7 @@ class WorldRooms(Stage):
     log: str | tuple[str, ...] | None = None
     """A recorded log: its rooms are those that are attached to the first log that has any, as those of simulated drives
     have."""
-    world: WorldConfig = DEMO
+    world: WorldConfig = WorldConfig()
     """The simulated world, where no log is named."""
 
     class Out(Outputs):

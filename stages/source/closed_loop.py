@@ -13,7 +13,6 @@ from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator import route_planning
 from omninav.stages.simulator.cameras import shutter_times
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.drawn_starts import drawn_way_back
 from omninav.stages.simulator.obstacles import gather
 from omninav.stages.simulator.odometry import draw_bias, measured
@@ -70,7 +69,7 @@ class ClosedLoop(Source):
     for a place to start where the robot has no room.
     """
 
-    world: WorldConfig = DEMO
+    world: WorldConfig = WorldConfig()
     """The world, with the robot that drives in it."""
     day: Annotated[int, Bounds(ge=0)] = 1
     """As the world is on this day."""

@@ -10,7 +10,6 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.simulator.cameras import camera_of
 from omninav.stages.simulator.config import WorldConfig
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.values.encoded_image import MAX_FILE_BYTES, Undecodable, decode_image
 from omninav.stages.values.image import Image, Pixels
 
@@ -27,7 +26,7 @@ class GoalImage(Stage):
 
     goal: str | int | None = None
     """An image file, by its suffix; any other names a place, and there is no image."""
-    world: WorldConfig | None = DEMO
+    world: WorldConfig | None = None
     """The simulated world whose robot took it; null: a real one's robot."""
     camera: str | None = None
     """The camera.yaml of a real robot or of another one in that world, or a projection (`equirectangular`, …)."""
@@ -61,7 +60,7 @@ class GoalImage(Stage):
 
     def _camera(self, pixels: Pixels) -> Camera:
         if self.camera is None:
-            return camera_of(self.world or DEMO)
+            return camera_of(self.world or WorldConfig())
         camera = named_camera(self.camera, lambda: pixels.shape[1::-1])[0].found_in(pixels)
         if camera is None:
             raise BadInput("goal: no ring of a mirror stands out in the image; give centre and mask in a camera.yaml")

@@ -14,7 +14,6 @@ from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.occupancy_grid import MAX_CELLS, coarser, grid_beside, grid_digest, read_occupancy
 from omninav.stages.simulator.config import WorldConfig
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.occupancy import occupancy
 from omninav.stages.simulator.world import World
 from omninav.stages.values.grid import FREE, OCCUPIED, UNKNOWN, FreeSpace, OccupancyGrid
@@ -49,7 +48,7 @@ class PlaceGrid(Stage):
     """The log that is driven: its grid is not known, unless `grid` names it."""
     tour: str | tuple[str, ...] | None = None
     """The log that the map was made from; grids beside it are suggested."""
-    world: WorldConfig = DEMO
+    world: WorldConfig = WorldConfig()
     """The simulated world."""
 
     class Out(Outputs):

@@ -13,7 +13,6 @@ from omninav.stages.camera.model import Camera
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Recording, UnreadableRecording
 from omninav.stages.simulator.config import WorldConfig
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.drawn_starts import drawn_pose
 from omninav.stages.simulator.first_hits import first_hits
 from omninav.stages.simulator.robot_camera import RobotCamera
@@ -54,7 +53,7 @@ class HomingGrid(Source):
     """The log that the views are of; null: they are rendered."""
     camera: str | None = None
     """A camera.yaml in place of the log's own."""
-    world: WorldConfig = DEMO
+    world: WorldConfig = WorldConfig()
     """The world that they are rendered of."""
     day: Annotated[int, Bounds(ge=0)] = 0
     """As the world is on this day."""

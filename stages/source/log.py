@@ -22,7 +22,6 @@ from omninav.stages.recordings.plausibility import MotionLimits
 from omninav.stages.recordings.recording import Recording, Topics, UnreadableRecording
 from omninav.stages.recordings.truth_file import truth_from
 from omninav.stages.simulator.config import Kidnapping, WorldConfig
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.values.image import Image
 from omninav.stages.values.pose import GuessedPose, Motion, Pose
 
@@ -70,7 +69,7 @@ class LogSource(Source):
 
     log: str | tuple[str, ...] | None = None
     """One recording or several (see `open_recording`). Null: a drive through the simulated `world`."""
-    world: WorldConfig = DEMO
+    world: WorldConfig = WorldConfig()
     """What is driven through where no log is named."""
     route: str | None = None
     """Which of the world's routes is driven."""

@@ -4,12 +4,12 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from world_files import DEMO
 
 from omninav.pipeline import Context
 from omninav.stages.control.follow_homing import FollowHoming, FollowHomingState
 from omninav.stages.control.stall_monitor import StallMonitor, StallMonitorState
 from omninav.stages.simulator.config import Day, Door, Room, mirror
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.source.closed_loop import ClosedLoop, ClosedLoopState
 from omninav.stages.values.homing import HomingVector, PathProgress
 from omninav.stages.values.pose import Pose

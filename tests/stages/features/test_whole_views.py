@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy import fft
+from world_files import DEMO
 
 from omninav.pipeline import Context, Stage
 from omninav.stages.features.averaged_strip import Contrast, averaged_strip, local_contrast
 from omninav.stages.features.dct import CosineTransform, cosine_basis, lowest_frequencies
 from omninav.stages.features.fourier import SegmentSpectrum, spectrum_around
 from omninav.stages.simulator.cameras import camera_of, camera_rays
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.world import World
 from omninav.stages.unwarp.panorama import UnwarpPanorama

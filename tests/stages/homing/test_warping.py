@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from world_files import DEMO
 
 from omninav.pipeline import BadInput, Context, Tick
 from omninav.stages.camera.perspective import Perspective
@@ -14,7 +15,6 @@ from omninav.stages.homing.first_image import FirstImage
 from omninav.stages.homing.warping import WarpingVector, WarpingVectorState
 from omninav.stages.simulator.cameras import camera_of, camera_rays
 from omninav.stages.simulator.config import mirror
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.world import World
 from omninav.stages.values.homing import HomingVector

@@ -1,20 +1,14 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
-from omegaconf import OmegaConf
 from small_run import collected
+from world_files import world_of
 
 from omninav.pipeline import Context, Tick
-from omninav.pipeline.graph.ports import convert
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.metrics.error_curves import ErrorCurves, lap_ends
-from omninav.stages.simulator.config import WorldConfig
 from omninav.stages.simulator.simulated_recording import SimulatedRecording
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.pose import Motion, Pose
-
-WORLDS = Path(__file__).resolve().parents[3] / "conf" / "world"
 
 
 def circle(laps: float, per_lap: int = 40, radius: float = 5.0) -> np.ndarray:
@@ -50,12 +44,7 @@ def test_who_comes_back_past_the_start_to_leave_by_the_other_side_has_not_ended_
 
 
 def test_the_seven_laps_around_the_shelves_are_seven_though_the_first_is_driven_by_either_side():
-    described = [OmegaConf.load(WORLDS / f"{name}.yaml") for name in ("empty", "home_store_small")]
-    entries = OmegaConf.to_container(OmegaConf.merge(*described), resolve=True)
-    entries.pop("defaults")
-    world, problems = convert(entries, WorldConfig, "world")
-    assert not problems
-    truth = SimulatedRecording(world, "laps", 0).truth
+    truth = SimulatedRecording(world_of("home_store_small"), "laps", 0).truth
     ends = lap_ends(truth, truth[0], 2.0)
     assert np.diff([0, *ends, len(truth)]) / len(truth) == pytest.approx([0.255, *[0.124] * 6], abs=0.002)
 

@@ -5,6 +5,7 @@ import cv2
 import numpy as np
 import pytest
 from small_run import reference_graph, small_run
+from world_files import DEMO
 
 from omninav.pipeline import Context
 from omninav.stages.mapping.thumbnails import joined
@@ -17,7 +18,6 @@ from omninav.stages.plots.similarity_heat_map import SimilarityHeatMap
 from omninav.stages.plots.similarity_peaks import SimilarityPeaks
 from omninav.stages.plots.snapshot_times import even_frames, geometric_steps, is_snapshot_frame, spread_out
 from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.floor_plan import plan_of
 from omninav.stages.values.image import Panorama
 from omninav.stages.values.similarity import Similarities

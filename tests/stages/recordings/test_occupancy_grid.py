@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import DATA, needs_data
+from world_files import DEMO
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.occupancy_grid import coarser, read_occupancy
 from omninav.stages.simulator.config import WorldConfig
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.occupancy import write_grid
 from omninav.stages.simulator.world import World
 from omninav.stages.source.grid import PlaceGrid, along_path, free_space
@@ -162,7 +162,7 @@ def test_poses_are_drawn_evenly_over_the_free_cells_with_all_headings():
 
 
 def test_without_a_log_it_is_the_worlds_own_grid_as_it_would_be_written(tmp_path):
-    out = PlaceGrid(resolution_m=0.1).step(CTX)
+    out = PlaceGrid(world=DEMO, resolution_m=0.1).step(CTX)
     read = read_occupancy(write_grid(World(DEMO, 0), tmp_path, 0.1))
     assert out.grid.made_from == "world"
     np.testing.assert_array_equal(out.grid.cells, read.cells)

@@ -2,11 +2,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from world_files import DEMO
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.recordings.occupancy_grid import boxes, read_grid
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.floor_plan import DrivenPlan, WorldPlan
 from omninav.stages.simulator.occupancy import write_grid
 from omninav.stages.simulator.world import World
@@ -51,8 +51,8 @@ def test_the_grid_beside_a_log_is_its_plan(tmp_path):
 
 
 def test_without_a_log_the_plan_is_the_worlds():
-    plan = DrivenPlan(day=(1, 2)).step(CTX).plan
-    np.testing.assert_array_equal(plan.outlines, WorldPlan().step(CTX).plan.outlines)
+    plan = DrivenPlan(world=DEMO, day=(1, 2)).step(CTX).plan
+    np.testing.assert_array_equal(plan.outlines, WorldPlan(world=DEMO).step(CTX).plan.outlines)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from world_files import DEMO
 
 from omninav.pipeline import Context
 from omninav.pipeline.mcap.reader import LogReader
@@ -15,7 +16,6 @@ from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
 from omninav.stages.simulator.cameras import camera_rays
 from omninav.stages.simulator.config import Day, Delivery, Kidnapping, OdometryNoise, Route, Sensor, mirror
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.record_log import RecordLog
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.simulated_log import record

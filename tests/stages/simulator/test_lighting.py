@@ -6,11 +6,11 @@ import time
 
 import numpy as np
 import pytest
+from world_files import DEMO
 
 from omninav.pipeline.graph.ports import convert
 from omninav.stages.simulator.bodies import Box, box_array
 from omninav.stages.simulator.config import Day, Lamp, Room, WallPanel, WorldConfig
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.lighting import Light, contact_map, lamps_and_windows, lamps_on, light_map
 from omninav.stages.simulator.world import World
 

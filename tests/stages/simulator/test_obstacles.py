@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from world_files import DEMO
 
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.simulator.config import Kidnapping, Ranges, Robot
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.obstacles import Obstacles, beam, gather, nearest
 from omninav.stages.simulator.ranges import measure
 from omninav.stages.simulator.robot import (

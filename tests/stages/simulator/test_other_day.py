@@ -3,10 +3,10 @@
 import dataclasses
 
 import numpy as np
+from world_files import DEMO
 
 from omninav.pipeline import Context
 from omninav.stages.simulator.config import Day
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.other_day import OtherDay
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.pose import Pose

@@ -6,11 +6,11 @@ import math
 import numpy as np
 import numpy.typing as npt
 import pytest
+from world_files import DEMO
 
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.simulator.cameras import camera_rays
 from omninav.stages.simulator.config import Day
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.people import PARTS, Person, Track, figures
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.simulated_recording import SimulatedRecording

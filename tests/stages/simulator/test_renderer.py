@@ -8,6 +8,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 import pytest
+from world_files import DEMO
 
 from omninav.pipeline import BadInput
 from omninav.stages.camera.cylindrical import Cylindrical
@@ -20,7 +21,6 @@ from omninav.stages.camera.perspective import Perspective
 from omninav.stages.camera.rays import turned
 from omninav.stages.simulator.cameras import camera_of, camera_rays, shutter_times
 from omninav.stages.simulator.config import Block, Lamp, Sensor, WorldConfig, mirror
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.people import Person
 from omninav.stages.simulator.renderer import Scene, render
 from omninav.stages.simulator.world import World

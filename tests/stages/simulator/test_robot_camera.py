@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from world_files import DEMO
 
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator.cameras import camera_rays, leaning
 from omninav.stages.simulator.config import CameraErrors, Ramps, Sensor, WorldConfig, mirror
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.robot_camera import RobotCamera, lean
 from omninav.stages.simulator.scene import Scene

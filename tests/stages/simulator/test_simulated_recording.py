@@ -6,11 +6,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from world_files import DEMO
 
 from omninav.stages.recordings.recording import Recording, UnreadableRecording
 from omninav.stages.simulator import simulated_recording as simulated
 from omninav.stages.simulator.config import Day, Route
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.simulated_log import record
 from omninav.stages.simulator.simulated_recording import SimulatedRecording
 from omninav.stages.simulator.world import World

@@ -6,16 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from world_files import DEMO, world_of
 
-from omninav.pipeline.graph.ports import convert
 from omninav.stages.simulator import textures
 from omninav.stages.simulator.config import Block, Day, WorldConfig
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.occupancy import occupancy, write_grid
 from omninav.stages.simulator.plan_image import draw_plan
 from omninav.stages.simulator.world import World
-
-CONF = Path(__file__).parents[3] / "conf" / "world"
 
 
 @pytest.fixture(scope="module")
@@ -23,13 +20,8 @@ def demo() -> World:
     return World(DEMO)
 
 
-@pytest.mark.parametrize(("file", "said_in_code"), [("empty", WorldConfig()), ("home_store_demo", DEMO)])
-def test_files_of_worlds_say_what_the_code_defaults_to(file: str, said_in_code: WorldConfig) -> None:
-    described = yaml.safe_load((CONF / f"{file}.yaml").read_text())
-    described.pop("defaults", None)
-    world, problems = convert(described, WorldConfig, "world")
-    assert not problems
-    assert world == said_in_code
+def test_the_empty_world_is_what_the_code_defaults_to() -> None:
+    assert world_of("empty") == WorldConfig()
 
 
 def test_clearance_is_the_distance_to_the_nearest_face(demo: World) -> None:

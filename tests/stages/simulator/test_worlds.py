@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from omegaconf import OmegaConf
+from world_files import WORLDS, world_of
 
 from omninav.pipeline.graph.ports import convert
 from omninav.stages.geometry.plane.se2 import compose, wrap
@@ -22,8 +23,7 @@ from omninav.stages.simulator.simulated_log import record
 from omninav.stages.simulator.simulated_recording import SimulatedRecording
 from omninav.stages.simulator.world import World
 
-CONF = Path(__file__).parents[3] / "conf" / "world"
-NAMES = sorted(path.stem for path in CONF.glob("*.yaml") if path.stem != "empty")
+NAMES = sorted(path.stem for path in WORLDS.glob("*.yaml") if path.stem != "empty")
 SIZES = {
     "home_store_small": (25, 10), "home_store_mid": (50, 80), "home_store": (100, 60), "office": (37, 14),
     "hall": (20, 20), "institute": (10, 15),
@@ -31,17 +31,8 @@ SIZES = {
 
 
 @lru_cache
-def load(name: str) -> WorldConfig:
-    described = OmegaConf.to_container(OmegaConf.merge(*(OmegaConf.load(CONF / f"{n}.yaml") for n in ("empty", name))))
-    described.pop("defaults")  # type: ignore[union-attr,call-arg]
-    world, problems = convert(described, WorldConfig, "world")
-    assert not problems
-    return world  # type: ignore[no-any-return]
-
-
-@lru_cache
 def built(name: str, day: int = 0) -> World:
-    return World(load(name), day)
+    return World(world_of(name), day)
 
 
 def length(line: np.ndarray) -> float:
@@ -50,7 +41,7 @@ def length(line: np.ndarray) -> float:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_world_is_named_as_its_file_and_has_a_tour_and_a_drive(name: str) -> None:
-    world = load(name)
+    world = world_of(name)
     assert world.name == name
     assert {"tour", "drive"} <= set(world.routes)
     assert world.size == SIZES.get(name, world.size)
@@ -71,7 +62,7 @@ def test_grid_and_plan_show_the_same_bodies(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_tours_keep_clear_of_everything_on_the_first_and_on_the_last_day(name: str) -> None:
-    config = load(name)
+    config = world_of(name)
     for day in (0, len(config.days) - 1):
         world = built(name, day)
         for route in _of_each_kind(config.routes.values()):
@@ -92,7 +83,7 @@ def _of_each_kind(routes: Iterable[Route]) -> list[Route]:
 
 def test_a_robot_that_would_touch_something_keeps_closer_to_its_path(monkeypatch: pytest.MonkeyPatch) -> None:
     """Behind a door of this office stands furniture, and the robot turns round in the doorway."""
-    office = dataclasses.replace(load("office"), draw=1)
+    office = dataclasses.replace(world_of("office"), draw=1)
     assert SimulatedRecording(office, "tour", 3).collisions == 0
     monkeypatch.setattr(simulated_recording, "JITTER_SHARES", (1.0,))
     assert SimulatedRecording(office, "tour", 3).collisions == 1
@@ -120,7 +111,7 @@ def test_a_days_line_is_beside_the_route_by_the_stated_share_of_its_spread() -> 
     ],
 )
 def test_routes_have_the_lengths_of_the_papers(name: str, route: str, least: float, most: float) -> None:
-    assert least <= length(route_planning.plan(built(name), load(name).routes[route])) <= most
+    assert least <= length(route_planning.plan(built(name), world_of(name).routes[route])) <= most
 
 
 def test_laps_begin_where_what_comes_first_has_led() -> None:
@@ -135,7 +126,7 @@ def test_laps_begin_where_what_comes_first_has_led() -> None:
 @pytest.mark.parametrize(("name", "route", "farthest"), [("hall", "area", 30.0), ("home_store_mid", "part", 30.0)])
 def test_who_builds_a_map_soon_comes_back_to_where_he_has_been(name: str, route: str, farthest: float) -> None:
     """No stretch of new floor, farther than 0.6 m from any place left 6 m of way before, is longer than 30 m."""
-    truth = SimulatedRecording(load(name), route, 0).truth[:, :2]
+    truth = SimulatedRecording(world_of(name), route, 0).truth[:, :2]
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(truth, axis=0).T))])
     known = np.array([(np.hypot(*(truth[way < way[k] - 6.0] - at).T) < 0.6).any() for k, at in enumerate(truth)])
     returns = way[np.concatenate([np.flatnonzero(known), [len(way) - 1]])]
@@ -143,17 +134,17 @@ def test_who_builds_a_map_soon_comes_back_to_where_he_has_been(name: str, route:
 
 
 def test_the_campus_tour_has_about_545_images() -> None:
-    assert len(SimulatedRecording(load("campus"), "tour", 0).stamps) == pytest.approx(545, abs=10)
+    assert len(SimulatedRecording(world_of("campus"), "tour", 0).stamps) == pytest.approx(545, abs=10)
 
 
 def test_a_lap_of_the_office_loop_has_about_100_images() -> None:
-    assert len(SimulatedRecording(load("office_loop"), "lap", 0).stamps) == pytest.approx(100, abs=8)
+    assert len(SimulatedRecording(world_of("office_loop"), "lap", 0).stamps) == pytest.approx(100, abs=8)
 
 
 def test_three_laps_of_four_are_slipped_on_and_one_of_ten_begins_elsewhere() -> None:
     """Porta & Kroese: four laps with three liftings; a lap cut short by a kidnapping, then nine more."""
-    slip, kidnap = (SimulatedRecording(load("office_loop"), route, 0) for route in ("slip", "kidnap"))
-    lap = len(SimulatedRecording(load("office_loop"), "lap", 0).stamps)
+    slip, kidnap = (SimulatedRecording(world_of("office_loop"), route, 0) for route in ("slip", "kidnap"))
+    lap = len(SimulatedRecording(world_of("office_loop"), "lap", 0).stamps)
     assert len(slip.stamps) == pytest.approx(4 * lap, abs=15)
     starts = [(moment - int(slip.times[0])) / 1e9 / (slip.times[-1] - slip.times[0]) * 4e9 for moment, _ in slip.lifted]
     assert [int(start) for start in starts] == [1, 2, 3]
@@ -167,7 +158,7 @@ def test_three_laps_of_four_are_slipped_on_and_one_of_ten_begins_elsewhere() -> 
 
 
 def test_the_changing_institute_has_8000_pictures_in_one_drive() -> None:
-    assert 8000 <= len(SimulatedRecording(load("institute"), "changing", 0).stamps) <= 8400
+    assert 8000 <= len(SimulatedRecording(world_of("institute"), "changing", 0).stamps) <= 8400
 
 
 def test_the_home_store_has_more_than_40_aisles_and_training_goes_through_each() -> None:
@@ -183,7 +174,7 @@ def test_the_home_store_has_more_than_40_aisles_and_training_goes_through_each()
 
 
 def test_the_second_test_tour_meets_the_most_people() -> None:
-    days = load("home_store").days
+    days = world_of("home_store").days
     assert max(days, key=lambda day: day.people) is days[2]
     assert days[0].rearranged == 0.0
 
@@ -329,7 +320,7 @@ def test_clearance_is_exact_far_from_everything() -> None:
 
 @pytest.mark.parametrize("name", ["home_store_small", "office", "campus"])
 def test_a_piece_of_a_log_is_the_same_bytes_twice(name: str, tmp_path: Path) -> None:
-    config = load(name)
+    config = world_of(name)
     short = dataclasses.replace(config, routes={"piece": dataclasses.replace(config.routes["drive"], length=0.3)})
     for log in ("one.mcap", "two.mcap"):
         record(SimulatedRecording(short, "piece", 1), tmp_path / log)
@@ -337,8 +328,8 @@ def test_a_piece_of_a_log_is_the_same_bytes_twice(name: str, tmp_path: Path) -> 
 
 
 def test_the_store_in_the_documentation_is_one() -> None:
-    text = (CONF.parents[1] / "docs" / "worlds.md").read_text().split("```yaml\n")[1].split("```")[0]
-    described = OmegaConf.merge(OmegaConf.load(CONF / "empty.yaml"), OmegaConf.create(text))
+    text = (WORLDS.parents[1] / "docs" / "worlds.md").read_text().split("```yaml\n")[1].split("```")[0]
+    described = OmegaConf.merge(OmegaConf.load(WORLDS / "empty.yaml"), OmegaConf.create(text))
     plain = {key: value for key, value in OmegaConf.to_container(described).items() if key != "defaults"}  # type: ignore[union-attr]
     config, problems = convert(plain, WorldConfig, "world")
     assert not problems

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from world_files import DEMO
 
 from omninav.pipeline import Context
 from omninav.pipeline.engine.codec import decode, encode, encode_state, restore_state
@@ -14,7 +15,6 @@ from omninav.stages.control.wall_avoider import WallAvoider, WallAvoiderState
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator.cameras import camera_of, camera_rays, shutter_times
 from omninav.stages.simulator.config import Delivery, Kidnapping, OdometryNoise, Ranges, Sensor, WorldConfig, mirror
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.obstacles import gather
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.robot import around, limits, reach, steer

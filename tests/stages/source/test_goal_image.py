@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 import pytest
 from made_rings import ring_picture
+from world_files import DEMO
 
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.plots.image_file import ImageFile
 from omninav.stages.simulator.config import mirror
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.source.goal_image import GoalImage
 from omninav.stages.values.image import Image
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import DATA, needs_data
+from world_files import DEMO
 
 from omninav.pipeline import Context
 from omninav.stages.recordings.recording import UnreadableRecording
 from omninav.stages.simulator.config import mirror
-from omninav.stages.simulator.demo import DEMO
 from omninav.stages.simulator.world import World
 from omninav.stages.source.homing_grid import HomingGrid, HomingGridState, grid_around, in_sight
 
