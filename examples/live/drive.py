@@ -58,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     robot = subprocess.Popen(omninav(*words, python=given.robot_python), stderr=(folder / "robot.log").open("w"))
     try:
         wait_for(camera, robot)
-        common = ("variant=topological_nav", "goal=kitchen", f"map={given.map}", "video=none")
+        common = ("variant=topological_nav", "goal=kitchen", f"map={given.map}")
         ends = ("nodes.source.rest_s=2", f"nodes.source.seconds={given.seconds}")
         node = subprocess.Popen(omninav("live", *common, *ends, f"camera={camera}", f"hydra.run.dir={run}"))
         wait_for(run / "live.mcap.unfinished", node)

@@ -102,9 +102,8 @@ class Slide(Value):
 class Figure(Value):
     """A plot for the report. `content`: PNG, JPEG or SVG bytes; `caption`: what it shows and what to look for.
 
-    `name` is its file name without suffix; plots are shown in the order of `order`, then of their names. A video is
-    one too (`media_type` video/mp4): `per_second`, its frames in a second, lets the reader step through it. `slides`
-    are what changes from frame to frame over an SVG, which the reader steps through as well.
+    `name` is its file name without suffix; plots are shown in the order of `order`, then of their names. `slides` are
+    what changes from frame to frame over an SVG, which the reader steps through.
     """
 
     reported = True
@@ -114,7 +113,6 @@ class Figure(Value):
     content: bytes
     media_type: str = "image/png"
     order: int = 50
-    per_second: float | None = None
     slides: tuple[Slide, ...] = ()
 
 

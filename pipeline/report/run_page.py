@@ -84,9 +84,7 @@ def _figure(figure: Figure) -> dict[str, Any]:
         if figure.slides:
             shown |= {"kind": "slides", "slides": figure.slides, "data": Markup(_slides(figure.slides))}
         return shown
-    video = figure.media_type.startswith("video/") and figure.per_second
-    shown |= {"media_type": figure.media_type, "base64": base64.b64encode(figure.content).decode()}
-    return shown | ({"kind": "video", "per_second": figure.per_second} if video else {})
+    return shown | {"media_type": figure.media_type, "base64": base64.b64encode(figure.content).decode()}
 
 
 def _stand_side_by_side(figures: Sequence[dict[str, Any]]) -> None:

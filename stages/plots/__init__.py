@@ -1,1 +1,1 @@
-"""Figures for the report, videos, trajectories and logs for other tools."""
+"""Figures for the report, trajectories and logs for other tools."""

@@ -11,8 +11,7 @@ from .homing_snapshot import EncodedHomingView, Points
 
 Colour = tuple[int, int, int]
 LOST, TRACKED, AGAIN, MATCHED = range(4)
-NAMES = {TRACKED: "tracked", AGAIN: "found again", MATCHED: "matched again", LOST: "lost"}
-"""Kinds of features, in the order of legends."""
+"""Kinds of features: lost, tracked, found again, matched again."""
 BRIGHT: dict[int, Colour] = {
     LOST: (0, 94, 255),
     TRACKED: (255, 200, 60),
@@ -25,12 +24,6 @@ VECTOR: Colour = (0, 159, 255)
 DARK: Colour = (25, 25, 25)
 FINE = 4
 """Bits of a pixel's fraction that OpenCV draws with."""
-
-
-def hexadecimal(colour: Colour) -> str:
-    """A colour as matplotlib takes it."""
-    blue, green, red = colour
-    return f"#{red:02x}{green:02x}{blue:02x}"
 
 
 def is_known(vector: HomingVector) -> bool:

@@ -1,4 +1,4 @@
-"""Draws maps, grids, plans, poses and Gaussians on the axes of a plan view."""
+"""Draws maps, grids, plans and poses on the axes of a plan view."""
 
 from typing import TYPE_CHECKING
 
@@ -66,35 +66,6 @@ def draw_links(axes: "Axes", map: TopologicalMap) -> None:
     axes.add_collection(LineCollection(paths, colors=REFERENCE, linewidths=0.7, zorder=1))
 
 
-def draw_gaussians(
-    axes: "Axes", means: Array, covariances: Array, colours: Array, sigmas: float = 2.0, zorder: float = 3
-) -> None:
-    """Gaussians over the pose, (K, 3) and (K, 3, 3), as ellipses of `sigmas` standard deviations in the plane.
-
-    `colours` (K, 4) are those of the lines; the inside is a third as opaque, and less where there are many.
-    """
-    if not len(means):
-        return
-    from matplotlib.collections import EllipseCollection
-
-    spread, axes_of = np.linalg.eigh(covariances[:, :2, :2])  # ascending: the long axis is the last
-    diameters = 2 * sigmas * np.sqrt(np.maximum(spread, 0.0))
-    axes.add_collection(
-        EllipseCollection(
-            widths=diameters[:, 1],
-            heights=diameters[:, 0],
-            angles=np.degrees(np.arctan2(axes_of[:, 1, 1], axes_of[:, 0, 1])),
-            units="xy",
-            offsets=means[:, :2],
-            offset_transform=axes.transData,
-            facecolors=colours * (1, 1, 1, min(0.33, 15 / len(means))),
-            edgecolors=colours,
-            linewidths=0.7,
-            zorder=zorder,
-        )
-    )
-
-
 def draw_plan(axes: "Axes", plan: FloorPlan | None) -> None:
     """What stands on the floor, in grey."""
     if plan is None:
@@ -150,12 +121,6 @@ def extent_of(*points: Array, margin: float = 0.06) -> tuple[float, float, float
     low, high = together.min(axis=0), together.max(axis=0)
     pad = margin * float((high - low).max()) + 0.25
     return float(low[0] - pad), float(high[0] + pad), float(low[1] - pad), float(high[1] + pad)
-
-
-def broken_at_jumps(path: Array, metres: float = 1.0) -> Array:
-    """A path (N, 2 or more) as x and y, with a row of NaN wherever it jumps farther: nobody drove there."""
-    jumps = np.flatnonzero(np.hypot(*np.diff(path[:, :2], axis=0).T) > metres) + 1
-    return np.insert(path[:, :2], jumps, np.nan, axis=0)
 
 
 def fitting_height(extent: tuple[float, float, float, float] | None, width: float, low: float, high: float) -> float:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,17 +18,22 @@ from omninav.stages.values.belief import GaussianMixture, Particles, PlaceBelief
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OccupancyGrid
+from omninav.stages.values.homing import DrivingStatus, PathProgress
 from omninav.stages.values.map_places import AnyMap, map_poses
+from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.thumbnails import Thumbnails
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
 
+from . import homing_frames
 from .belief_spread import spread_m
 from .best_match_picture import first_seen, picture_of_reference, picture_of_view
 from .drawing import extent_of
+from .homing_snapshot import EncodedHomingView
 from .panorama_snapshot import EncodedPanorama
 from .plan_chart import draw_surroundings, jumps, plan_chart
 from .snapshot_times import even_frames
+from .target_images import target_of
 
 Flags = npt.NDArray[np.bool_]
 Shown = Particles | GaussianMixture | PlaceBelief
@@ -41,6 +47,9 @@ class FrameByFrame(Stage):
     The reference (or place) of the map that looked most like the image is ringed; with `thumbnails` its image stands
     below the robot's, turned as the robot is turned against it. Of a map that is learned on the way the image is one of
     the drive's own `panoramas`, by the map's `events`, and the ring is where the robot was when it saw it.
+
+    With `homing` the image is the robot's own, with the features that it follows; the target view, the homing vector,
+    the planned route and the robot's state are shown too.
     """
 
     class Out(Outputs):
@@ -60,6 +69,10 @@ class FrameByFrame(Stage):
         plan: FloorPlan | None = None,
         events: Sequence[ViewEvent | None] | None = None,
         panoramas: Sequence[EncodedPanorama | None] | None = None,
+        homing: Sequence[EncodedHomingView | None] | None = None,
+        progress: Sequence[PathProgress | None] | None = None,
+        statuses: Sequence[DrivingStatus | None] | None = None,
+        routes: Sequence[PlannedRoute | None] | None = None,
     ) -> Out:
         """The whole run at once."""
         ticks = first_seen(events or ())
@@ -80,7 +93,16 @@ class FrameByFrame(Stage):
             if seen is not None:
                 spot = _pose_at(drive, seen)
             _draw_now(layer, belief, last, path, n, spot)
-            photographs = [] if snapshot is None else [("image", snapshot.jpeg)]
+            photographs, facts = [] if snapshot is None else [("image", snapshot.jpeg)], _facts(last, n, belief, spot)
+            followed, route = _of(homing, tick), _of(routes, tick)
+            if followed is not None:
+                places = map if isinstance(map, TopologicalMap) else None
+                goal, target = target_of(_of(progress, tick), route, places, drive.truth[0], thumbnails)
+                photographs = homing_frames.pictures(followed, target)
+                facts += homing_frames.facts(followed, _of(progress, tick), _of(statuses, tick))
+                homing_frames.draw_vector(layer, last.truth[n], followed.vector, goal)
+                if places is not None:
+                    homing_frames.draw_route(layer, route, places)
             picture = None
             if photographs and seen is not None and panoramas is not None:
                 picture = picture_of_view(panoramas[seen], last.reference_turn[n])
@@ -89,14 +111,21 @@ class FrameByFrame(Stage):
             if picture is not None:
                 photographs.append(("best match in the map", picture))
             label = f"frame {int(last.frames[n])} · {last.seconds[n]:.1f} s"
-            slides.append(Slide(label, layer.svg, tuple(photographs), tuple(_facts(last, n, belief, spot))))
+            slides.append(Slide(label, layer.svg, tuple(photographs), tuple(facts)))
         words = [shown_frames(last.frames[rows].tolist(), len(last)), *_ellipses_held(last)]
         if beliefs is not None:
             chart.name("belief", "pink", "dot")
             chart.name("estimate, 95 % ellipse" if _doubted(last).any() else "estimate", "blue", "line")
         if (ticks or not isinstance(map, ViewMixtures)) and (last.reference >= 0).any():
             chart.name("best reference", "green", "ring")
-        words += _what_images_show(snapshots[int(last.row[rows[0]])])
+        if homing is None:
+            words += _what_images_show(snapshots[int(last.row[rows[0]])])
+        else:
+            chart.name("homing vector", "orange")
+            chart.name("target view, truly", "orange", "ring")
+            words.append(homing_frames.COLOURS)
+        if routes is not None:
+            chart.name("planned route", "green")
         if isinstance(map, TopologicalMap) and thumbnails is not None:
             words.append("The map's images are as the camera took them.")
         return self.Out(
@@ -110,6 +139,10 @@ class FrameByFrame(Stage):
                 slides=tuple(slides),
             )
         )
+
+
+def _of(values: Sequence[Any] | None, tick: int) -> Any:
+    return None if values is None else values[tick]
 
 
 def shown_frames(shown: Sequence[int], frames: int) -> str:

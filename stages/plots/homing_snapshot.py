@@ -1,21 +1,24 @@
 """Keeps small images of a drive by homing, because images themselves are too large to be kept."""
 
 import math
-from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, State, Tick, Value
+from omninav.pipeline import Context, Outputs, Stage, Tick, Value
 from omninav.stages.camera.model import Camera, seen_at
 from omninav.stages.camera.panorama import camera_behind
 from omninav.stages.camera.thumbnail import thumbnail
 from omninav.stages.values.homing import HomingTarget, HomingVector, TrackedFeatures
 from omninav.stages.values.image import Image, Panorama
 
+from .snapshot_times import is_snapshot_frame
+
 Array = npt.NDArray[np.float64]
 Points = npt.NDArray[np.float32]
 
+COLUMNS = 480
+"""Largest width of a kept image, pixels."""
 NEAREST_M, MIN_LENGTH_M, MAX_LENGTH_M, UNKNOWN_LENGTH_M = 0.35, 0.7, 6.0, 1.5
 """Start of a homing vector on the floor, its least and greatest length, and its length where that is unknown (m)."""
 
@@ -40,22 +43,11 @@ class EncodedHomingView(Value):
     vector: HomingVector | None = None
 
 
-class HomingSnapshotState(State):
-    """When it state last (ns)."""
-
-    stamp: int = 0
-
-
 class HomingSnapshot(Stage):
-    """Keeps, every few tenths of a second, a small JPEG of the robot's image (quality 80) with the state of homing.
+    """Keeps at even steps a small JPEG of the robot's image (quality 80) with the state of homing.
 
-    Of a mirror's or a fisheye's image the disc. Without a target the image alone.
+    A mirror's or a fisheye's image is cut to its disc. Without a target the image alone is kept.
     """
-
-    every_s: Annotated[float, Bounds(ge=0)] = 0.4
-    """Seconds between snapshots."""
-    columns: Annotated[int, Bounds(ge=32)] = 480
-    """Largest width of the image (px)."""
 
     class Out(Outputs):
         """`snapshot`: absent in between."""
@@ -65,7 +57,6 @@ class HomingSnapshot(Stage):
     def step(
         self,
         ctx: Context,
-        state: HomingSnapshotState,
         tick: Tick,
         image: Image | Panorama,
         camera: Camera | None = None,
@@ -74,10 +65,9 @@ class HomingSnapshot(Stage):
         tracks: TrackedFeatures | None = None,
     ) -> Out:
         """One tick."""
-        if not tick.first_of_log and tick.stamp - state.stamp < 0.99e9 * self.every_s:
+        if not is_snapshot_frame(tick.frame):
             return self.Out()
-        state.stamp = tick.stamp
-        small = thumbnail(image.pixels, camera, self.columns)
+        small = thumbnail(image.pixels, camera, COLUMNS)
         points, floor_line, there = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2))
         kinds, of_target = np.zeros(0, np.int64), np.zeros(0, np.int8)
         if tracks is not None:

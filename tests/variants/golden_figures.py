@@ -22,11 +22,10 @@ SMALL_CAMERA = (
     "world.camera.K=[[217.4375,0,139.5],[0,217.4375,104.5],[0,0,1]]",
     "world.camera.mask={inner_radius_px: 15, outer_radius_px: 104}",
 )
-NO_VIDEO = ("~nodes.video", "~wires.video")
 
 RUNS: dict[str, tuple[str, ...]] = {
-    "homing": (*SMALL_CAMERA, *NO_VIDEO, "nodes.source.seconds=4"),
-    "homing_as_printed": (*SMALL_CAMERA, *NO_VIDEO, "nodes.source.seconds=4"),
+    "homing": (*SMALL_CAMERA, "nodes.source.seconds=4"),
+    "homing_as_printed": (*SMALL_CAMERA, "nodes.source.seconds=4"),
     "homing_field": ("world=home_store_demo", *SMALL_CAMERA, "nodes.field.rings=2"),
     "matched_pairs": (MAPPED, "nodes.matches.pairs=4"),
     "omninav": (TOUR, DRIVE),
@@ -58,11 +57,10 @@ RUNS: dict[str, tuple[str, ...]] = {
     ),
     "topological_localisation": (TOUR, DRIVE, EVERY_SECOND),
     "topological_localisation_as_printed": (TOUR, DRIVE, EVERY_SECOND),
-    "topological_nav": ("world=home_store_demo", *SMALL_CAMERA, *NO_VIDEO, "goal=3", "nodes.source.seconds=3"),
+    "topological_nav": ("world=home_store_demo", *SMALL_CAMERA, "goal=3", "nodes.source.seconds=3"),
     "topological_nav_as_printed": (
         "world=home_store_demo",
         *SMALL_CAMERA,
-        *NO_VIDEO,
         "goal=3",
         "nodes.source.seconds=3",
     ),

@@ -36,26 +36,6 @@ for (const box of document.querySelectorAll(".slideshow")) {  // step through th
   });
   show(0);
 }
-for (const box of document.querySelectorAll(".video")) {  // step through a video, frame by frame
-  const video = box.querySelector("video"), rate = Number(box.dataset.perSecond);
-  const slider = box.querySelector("input"), label = box.querySelector("output");
-  const [play, back, on] = box.querySelectorAll("button");
-  const last = () => Math.max(0, Math.round(video.duration * rate) - 1);
-  const now = () => Math.min(last(), Math.floor(video.currentTime * rate + 0.01));
-  const name = (frame) => { slider.value = frame; label.textContent = `frame ${frame + 1} of ${last() + 1}`; };
-  const update = () => { if (!video.seeking) name(now()); play.textContent = video.paused ? "play" : "pause"; };
-  const go = (frame) => {
-    const to = Math.min(Math.max(frame, 0), last());
-    video.pause(); video.currentTime = (to + 0.5) / rate; name(to);
-  };
-  const begin = () => { video.controls = false; slider.max = last(); box.querySelector("div").hidden = false; update(); };
-  if (video.readyState > 0) begin(); else video.addEventListener("loadedmetadata", begin);
-  for (const event of ["timeupdate", "seeked", "play", "pause", "ended"]) video.addEventListener(event, update);
-  slider.addEventListener("input", () => go(Number(slider.value)));
-  play.addEventListener("click", () => video.paused ? video.play() : video.pause());
-  back.addEventListener("click", () => go(Number(slider.value) - 1));
-  on.addEventListener("click", () => go(Number(slider.value) + 1));
-}
 const large = document.getElementById("large");  // a click on a picture enlarges it, another one closes it
 document.addEventListener("click", (event) => {
   if (large.open) { large.close(); return; }

@@ -119,16 +119,6 @@ def test_plots_are_inside_the_page_in_their_order(tmp_path):
     assert SVG in page
 
 
-def test_a_video_is_inside_the_page_and_can_be_stepped_through(tmp_path):
-    video = Figure("video", "The drive", "Frame by frame.", b"not really a video", "video/mp4", per_second=8.0)
-    page = report(tmp_path, figures=(PICTURE, video))
-    assert 'src="data:video/mp4;base64,' in page
-    assert 'data-per-second="8.0"' in page
-    assert page.count("<video") == 1
-    picture = Figure("film", "The drive", "Moving.", b"GIF89a not really", "image/gif", per_second=8.0)
-    assert "<video" not in report(tmp_path, figures=(picture,))  # a browser plays it by itself
-
-
 def test_tables_of_stages_are_shown(tmp_path):
     table = Table("places", "Places", "Where it has been.", ("place", "seen (s)"), (("hall", 1.234), ("<b>", None)))
     page = report(tmp_path, tables=(table,))

@@ -9,14 +9,13 @@ from world_files import DEMO
 
 from omninav.pipeline import Context
 from omninav.stages.mapping.thumbnails import joined
-from omninav.stages.plots.belief_snapshots import BeliefSnapshots
 from omninav.stages.plots.error_over_time import ErrorOverTime
 from omninav.stages.plots.frame_by_frame import FrameByFrame
 from omninav.stages.plots.map_plan import MapPlot
 from omninav.stages.plots.panorama_snapshot import PanoramaSnapshot
 from omninav.stages.plots.similarity_heat_map import SimilarityHeatMap
 from omninav.stages.plots.similarity_peaks import SimilarityPeaks
-from omninav.stages.plots.snapshot_times import even_frames, geometric_steps, is_snapshot_frame, spread_out
+from omninav.stages.plots.snapshot_times import even_frames, is_snapshot_frame, spread_out
 from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap
 from omninav.stages.simulator.floor_plan import plan_of
 from omninav.stages.values.image import Panorama
@@ -45,7 +44,6 @@ def all_figures(run):
     yield TrajectoryOverMap().step(CTX, run.drive, run.map).figure
     yield ErrorOverTime().step(CTX, run.drive).figure
     yield MapPlot().step(CTX, run.drive, run.map).figure
-    yield BeliefSnapshots().step(CTX, run.drive, run.beliefs, run.map).figure
     yield FrameByFrame().step(CTX, run.drive, list(panoramas(run)), run.beliefs, run.map).figure
     yield SimilarityHeatMap().step(CTX, run.drive, list(similarities(run)), run.map).figure
 
@@ -83,9 +81,9 @@ def test_a_users_own_matplotlib_settings_change_nothing(figures):
 
     with matplotlib.rc_context({"font.size": 20, "lines.linewidth": 9, "figure.facecolor": "red"}):
         run = small_run()
-        again = BeliefSnapshots().step(CTX, run.drive, run.beliefs, run.map).figure
+        again = SimilarityHeatMap().step(CTX, run.drive, list(similarities(run)), run.map).figure
         assert matplotlib.rcParams["font.size"] == 20
-    assert again.content == figures[3].content
+    assert again.content == figures[-1].content
 
 
 def test_a_trajectory_stands_over_what_stands_on_the_floor():
@@ -168,7 +166,7 @@ def test_without_truth_there_is_a_trajectory_but_no_error():
 def test_an_empty_run_gives_no_pictures():
     run = small_run(frames=0)
     run.map = reference_graph(0)
-    assert list(all_figures(run)) == [None] * 6
+    assert list(all_figures(run)) == [None] * 5
 
 
 def test_a_run_whose_estimates_are_all_absent_still_gives_a_picture():
@@ -187,12 +185,6 @@ def test_peaks_are_kept_with_their_best_headings():
     peaks = SimilarityPeaks().step(CTX, run.ticks[0], Similarities(values, np.array([4, 9]))).peaks
     assert peaks.reference == 9
     assert peaks.profile.tolist() == pytest.approx([0, 0, 0, 0.9])
-
-
-def test_geometric_steps_hold_the_first_and_the_last_frame():
-    assert geometric_steps(244, 6) == [0, 2, 8, 26, 80, 243]  # 3^0 .. 3^5, less one
-    assert geometric_steps(1, 6) == [0]
-    assert geometric_steps(0, 6) == []
 
 
 def test_things_spread_out_hold_both_ends():

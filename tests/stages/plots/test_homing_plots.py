@@ -1,4 +1,8 @@
-"""What homing follows, as images and as a video."""
+"""What homing follows, frame by frame."""
+
+import dataclasses
+import math
+import re
 
 import cv2
 import numpy as np
@@ -11,12 +15,11 @@ from omninav.pipeline.engine.codec import decode, encode
 from omninav.stages.camera.equirectangular import Equirectangular
 from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.mapping.thumbnails import TourSnapshot, ViewThumbnails, joined
-from omninav.stages.plots.drive_video import DriveVideo
-from omninav.stages.plots.homing_snapshot import HomingSnapshot, HomingSnapshotState
-from omninav.stages.plots.homing_snapshots import HomingSnapshots
+from omninav.stages.plots.frame_by_frame import FrameByFrame
+from omninav.stages.plots.homing_frames import draw_vector
+from omninav.stages.plots.homing_snapshot import HomingSnapshot
+from omninav.stages.plots.plan_chart import plan_chart
 from omninav.stages.plots.target_images import FirstThumbnail, image_of, target_view
-from omninav.stages.plots.video import gif, mp4
-from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing import DrivingStatus, HomingTarget, HomingVector, PathProgress, TrackedFeatures
 from omninav.stages.values.image import Image
@@ -51,11 +54,11 @@ def vector(tick: int, lost: bool) -> HomingVector:
     return HomingVector(0, 0.4, 0.1, 0.5, 0.5, 0.2, metres, 0 if lost else 5, "lost" if lost else "tracking")
 
 
-def snapshots(camera: HyperbolicMirror | Equirectangular, every_s: float = 0.0) -> list:
+def snapshots(camera: HyperbolicMirror | Equirectangular) -> list:
     """A drive of two seconds; at tick 0 there is no target yet, at tick 7 it is lost."""
     rng = np.random.default_rng(0)
     looks = [rng.integers(0, 255, (camera.height_px // 30, camera.width // 30, 3)).astype(np.uint8) for _ in range(2)]
-    stage, looked, found = HomingSnapshot(every_s=every_s, columns=240), HomingSnapshotState(), []
+    stage, found = HomingSnapshot(), []
     for k in range(TICKS):
         pixels = np.roll(looks[0].repeat(30, axis=0).repeat(30, axis=1), 3 * k, axis=1)
         kinds = np.array([1, 1, 2, 3, 0, 1])
@@ -65,7 +68,6 @@ def snapshots(camera: HyperbolicMirror | Equirectangular, every_s: float = 0.0) 
         found.append(
             stage.step(
                 CTX,
-                looked,
                 Tick(k, k * 200_000_000, 0, k, k == 0),
                 Image(pixels),
                 camera,
@@ -85,7 +87,8 @@ def drive(camera: HyperbolicMirror | Equirectangular = MIRROR) -> dict:
             [Tick(k, k * 200_000_000, 0, k, k == 0) for k in range(TICKS)],
             [Pose(1.0 + 0.2 * k, 1.1, 0.1 * k) for k in range(TICKS)],
         ),
-        "snapshots": snapshots(camera),
+        "homing": snapshots(camera),
+        "statuses": [DrivingStatus("driving")] * TICKS,
         "progress": [None if k == 0 else PathProgress(0, 1, 4, 1, False, False, False) for k in range(TICKS)],
         "routes": [way] * 10 + [over] * 2,
         "map": MAP,
@@ -93,79 +96,61 @@ def drive(camera: HyperbolicMirror | Equirectangular = MIRROR) -> dict:
     }
 
 
-def video_of(ctx: Context = CTX) -> DriveVideo.Out:
-    beliefs = [PlaceBelief(np.array([0.7, 0.2, 0.1]), np.zeros((3, 3)))] * TICKS
-    return DriveVideo(after_s=0.1).step(ctx, statuses=[DrivingStatus("driving")] * TICKS, beliefs=beliefs, **drive())
-
-
-def frames_in(content: bytes, path) -> list:
-    path.write_bytes(content)
-    video, found = cv2.VideoCapture(str(path)), []
-    while (read := video.read())[0]:
-        found.append(read[1])
-    return found
+def jpeg_pixels(jpeg: bytes) -> np.ndarray:
+    return cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR).astype(int)
 
 
 @pytest.mark.parametrize("camera", [MIRROR, STRIP], ids=["mirror", "strip"])
-def test_rows_are_drawn_the_same_every_time_for_every_camera(camera):
-    one, other = (HomingSnapshots().step(CTX, **drive(camera)).figure for _ in range(2))
-    assert one.content == other.content
-    pixels = cv2.imdecode(np.frombuffer(one.content, np.uint8), cv2.IMREAD_COLOR)
-    assert pixels.std() > 20
-    assert len(one.content) < 600_000
+def test_a_frame_shows_what_is_followed_the_target_and_the_vector(camera):
+    given = drive(camera)
+    one, other = (FrameByFrame().step(CTX, snapshots=[None] * TICKS, **given).figure for _ in range(2))
+    assert encode(one) == encode(other)
+    first, followed, lost, *_ = (one.slides[n] for n in (0, 3, 7))
+    assert [caption for caption, _ in first.photographs] == ["image"]
+    assert [caption for caption, _ in followed.photographs] == ["image", "target: place 1"]
+    seen, target_view = (jpeg_pixels(jpeg) for _, jpeg in followed.photographs)
+    plain = decoded(given["homing"][3].jpeg).astype(int)
+    assert np.abs(seen - plain).max() > 60  # features and the vector are drawn into the image
+    assert target_view.shape == seen.shape
+    facts = dict(followed.facts)
+    assert facts["homing vector"] == "1.90 m, turn 6°"
+    assert facts["features"] == "5 agree, 1 of 6 lost"
+    assert facts["path"] == "view 2 of 4"
+    assert facts["robot"] == "driving"
+    assert dict(lost.facts)["homing vector"] == "the target is lost"
+    assert "--orange" in followed.overlay
+    assert "--green" in followed.overlay  # the route
+
+
+def test_the_vector_is_drawn_from_the_robot_as_long_as_it_is_known_and_dashed_where_it_is_not():
+    def drawn(vector_: HomingVector) -> list[float]:
+        chart = plan_chart((0.0, 10.0, 0.0, 10.0))
+        layer = chart.layer()
+        draw_vector(layer, np.array([2.0, 3.0, math.pi / 2]), vector_, np.full(3, np.nan))
+        (mark,) = layer.marks
+        marks.append(mark)
+        x0, y0, x1, y1 = map(float, re.findall(r"-?\d+\.\d", mark)[:4])
+        unit = chart.x.per_unit
+        return [(x1 - x0) / unit, (y0 - y1) / unit]
+
+    marks: list[str] = []
+    known = HomingVector(0, 0.0, 0.1, 0.5, 0.5, 0.2, 4.0, 5, "tracking")
+    assert drawn(known) == pytest.approx([0.0, 4.0], abs=0.01)  # the robot looks up the page
+    assert drawn(dataclasses.replace(known, metres=None, direction=-math.pi / 2)) == pytest.approx([1.0, 0.0], abs=0.01)
+    assert ["dasharray" in mark for mark in marks] == [False, True]
 
 
 def test_a_snapshot_is_of_the_mirrors_disc_and_its_points_move_with_it():
     snapshot = snapshots(MIRROR)[1]
-    assert snapshot.size == (240, 240)  # of 640 x 480
-    assert decoded(snapshot.jpeg).shape == (240, 240, 3)
-    middle = (np.array([319.5, 239.5]) - (81, 1) + 0.5) * 240 / 478 - 0.5  # the disc begins at column 81, row 1
-    assert middle == pytest.approx((119.5, 119.5), abs=0.5)
+    assert snapshot.size == (478, 478)  # of 640 x 480
+    assert decoded(snapshot.jpeg).shape == (478, 478, 3)
+    middle = np.array([319.5, 239.5]) - (81, 1) + 0.0  # the disc begins at column 81, row 1
+    assert middle == pytest.approx((238.5, 238.5), abs=0.5)
     way = snapshot.floor_line[np.isfinite(snapshot.floor_line).all(axis=1)]
     towards = np.arctan2(*(way[-1] - middle)[::-1])  # in the picture an azimuth turns by the camera's yaw
     assert towards == pytest.approx(0.4 - 0.3, abs=0.02)
     assert snapshot.target_kinds.tolist() == [1, 1, 2, 3, 0, 1, -1, -1, -1]
     assert encode(decode(encode(snapshot))) == encode(snapshot)
-
-
-def test_between_snapshots_nothing_is_kept():
-    given = [snapshot is not None for snapshot in snapshots(STRIP, every_s=0.5)]
-    assert given == [k % 3 == 0 for k in range(TICKS)]  # ticks are 0.2 s apart: 0.6 s is the next
-
-
-def test_a_video_is_written_whole_the_same_every_time_and_ends_with_the_drive(tmp_path):
-    ctx = Context("video", folder=tmp_path)
-    one, other = video_of(ctx=ctx).figure, video_of().figure
-    assert one.content == other.content == (tmp_path / "drive.mp4").read_bytes()
-    assert [path.name for path in tmp_path.iterdir()] == ["drive.mp4"]
-    assert one.media_type == "video/mp4"
-    frames = frames_in(one.content, tmp_path / "again.mp4")
-    assert len(frames) == 11  # it arrives at tick 10, and 0.1 s later is before the next
-    assert np.abs(frames[3].astype(int) - frames[8]).mean() > 2
-    assert len(one.content) < 400_000
-    assert "11 frames" in one.caption
-
-
-def test_a_video_has_no_more_frames_than_it_may(tmp_path):
-    given = drive() | {"statuses": [None] * TICKS}
-    video = DriveVideo(frames=4).step(CTX, **given).figure
-    assert len(frames_in(video.content, tmp_path / "few.mp4")) == 4
-
-
-def test_without_an_encoder_a_video_is_an_animated_image(tmp_path, monkeypatch):
-    monkeypatch.setattr("omninav.stages.plots.video.mp4", lambda frames, per_second: None)
-    ctx = Context("video", folder=tmp_path)
-    figure = video_of(ctx=ctx).figure
-    assert figure.media_type == "image/gif"
-    assert (tmp_path / "drive.gif").read_bytes() == figure.content == video_of().figure.content
-    assert figure.content.startswith(b"GIF89a")
-
-
-def test_both_kinds_of_video_hold_the_frames_in_their_order(tmp_path):
-    frames = [np.full((64, 96, 3), shade, np.uint8) for shade in (20, 120, 220)]
-    for made, name in ((mp4(frames, 5.0), "a.mp4"), (gif(frames, 5.0), "a.gif")):
-        shades = [frame.mean() for frame in frames_in(made.content, tmp_path / name)]
-        assert shades == pytest.approx([20, 120, 220], abs=6)
 
 
 def test_the_target_is_the_view_that_the_way_has_come_to():

@@ -8,7 +8,6 @@ from rosbags.highlevel import AnyReader
 from small_run import mixture_run, small_run
 
 from omninav.pipeline import Context
-from omninav.stages.plots.belief_snapshots import BeliefSnapshots
 from omninav.stages.plots.changed_mixtures import ChangedMixtures
 from omninav.stages.plots.map_ellipses import MapEllipses
 from omninav.stages.plots.map_growth import MapGrowth
@@ -34,11 +33,10 @@ def learned(run):
 
 
 def all_figures(run, learned):
-    map, beliefs, events, after = learned
+    map, _, events, after = learned
     kept = [ChangedMixtures().step(CTX, now, event).mixtures for now, event in zip(after, events, strict=True)]
     drive = run.drive
     yield TrajectoryOverMap().step(CTX, drive, map).figure
-    yield BeliefSnapshots().step(CTX, drive, beliefs, map).figure
     yield MapEllipses().step(CTX, drive, map, PLAN).figure
     yield MapGrowth().step(CTX, drive, events).figure
     yield ReferenceLife().step(CTX, drive, events, kept, PLAN).figure

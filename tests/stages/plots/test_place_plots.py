@@ -8,7 +8,6 @@ from made_places import made_map
 from small_run import collected
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.plots.drawing import broken_at_jumps
 from omninav.stages.plots.drive_over_plan import DriveOverPlan, planned_routes
 from omninav.stages.plots.place_belief_over_time import PlaceBeliefOverTime, binned, with_neighbours
 from omninav.stages.plots.true_and_estimated_place import BESIDE, RIGHT, WRONG, TrueAndEstimatedPlace, judged
@@ -52,12 +51,6 @@ def test_the_way_planned_is_drawn_over_the_plan_with_its_goal():
     first, last = planned_routes(ways, MAP)
     assert first.tolist() == [[1.0, 1.0], [1.0, 1.0], [4.0, 1.0], [4.0, 4.0]]  # path images lie at their owner's
     assert len(last) == 5
-
-
-def test_a_path_is_broken_where_the_robot_was_carried():
-    path = np.array([(0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (3.0, 0.0, 0.0), (3.4, 0.0, 0.0)])
-    assert np.isnan(broken_at_jumps(path)).any(axis=1).tolist() == [False, False, True, False, False]
-    assert broken_at_jumps(path[:1]).tolist() == [[0.0, 0.0]]
 
 
 def believed() -> list[PlaceBelief | None]:

@@ -3,7 +3,6 @@ import numpy as np
 from small_run import collected, small_run
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.plots.belief_snapshots import BeliefSnapshots
 from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap
 from omninav.stages.plots.visibility_areas import ShowVisibilityAreas, views_by_cell
 from omninav.stages.sensor.line_of_sight import axes_of, visibility_areas
@@ -54,11 +53,7 @@ def test_a_stand_in_is_called_one():
     assert "stand-in" in ShowVisibilityAreas(examples=1).step(CTX, MAP, areas, grid).figure.caption
 
 
-def test_a_grid_lies_under_paths_and_beliefs_where_it_is_wired():
+def test_a_grid_lies_under_paths_where_it_is_wired():
     run = small_run()
     paths = [TrajectoryOverMap().step(CTX, run.drive, run.map, grid).figure for grid in (None, ROOM)]
     assert paths[0].content != paths[1].content
-    beliefs = [
-        BeliefSnapshots(frames=2).step(CTX, run.drive, run.beliefs, run.map, grid).figure for grid in (None, ROOM)
-    ]
-    assert beliefs[0].content != beliefs[1].content
