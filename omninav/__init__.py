@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from .pipeline.api.run import load_artifact as load_map
     from .pipeline.api.session import Session, Step, open, resume
     from .pipeline.api.sweep import Sweep, open_sweep, sweep
+    from .pipeline.api.tool import tool
     from .pipeline.engine.call import StageFailed
 
 __all__ = [
@@ -76,6 +77,7 @@ __all__ = [
     "run",
     "sweep",
     "testing",
+    "tool",
 ]
 
 _PLACES = {
@@ -85,6 +87,7 @@ _PLACES = {
     "Session Step open resume": "pipeline.api.session",
     "Sweep open_sweep sweep": "pipeline.api.sweep",
     "StageFailed": "pipeline.engine.call",
+    "tool": "pipeline.api.tool",
 }
 """Where names are defined; the others are the framework's own, for authors of stages."""
 _PLACE_OF = {name: place for names, place in _PLACES.items() for name in names.split()}

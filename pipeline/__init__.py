@@ -4,6 +4,7 @@ from .graph.problems import BadInput, Problem, ProblemsFound
 from .graph.results import Figure, Metrics, Quantity, Table
 from .graph.stage import Bounds, Context, Outputs, Source, Stage, State, Truth
 from .graph.stored_rows import StoredRows
+from .graph.tool import Tool
 from .graph.value import Tick, Value
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "StoredRows",
     "Table",
     "Tick",
+    "Tool",
     "Truth",
     "Value",
 ]

@@ -13,7 +13,7 @@ from omninav.pipeline.report.graph_svg import svg
 from omninav.pipeline.run.inputs import read_inputs
 from omninav.pipeline.run.plan import plan
 
-NEEDED = {"topological_nav": ["goal=kitchen"], "simulate": ["log=out.mcap"]}
+NEEDED = {"topological_nav": ["goal=kitchen"]}
 """What is typed to draw a variant that does not run without."""
 
 

@@ -15,10 +15,11 @@ def words_of(words: tuple[str, ...], settings: Mapping[str, Any]) -> list[str]:
     typed = [_checked(word) for word in words]
     if typed and typed[0].isidentifier():
         typed[0] = f"variant={typed[0]}"
-    return [*typed, *(_setting(name, value) for name, value in settings.items())]
+    return [*typed, *(setting_word(name, value) for name, value in settings.items())]
 
 
-def _setting(name: str, value: Any) -> str:
+def setting_word(name: str, value: Any) -> str:
+    """A setting as it would be typed. Raises `BadInput` for a value that no word can hold."""
     try:
         return f"{name}={word_of(value)}"
     except BadInput as refused:

@@ -135,7 +135,7 @@ class RunSettings:
 
 def _unfit_settings(plain: Mapping[str, Any]) -> list[Problem]:
     settings = {name: plain[name] for name in RunSettings.__dataclass_fields__ if name in plain}
-    return [Problem(p.where.lstrip("."), p.what, p.hint) for p in convert_fields(settings, RunSettings, "")[1]]
+    return convert_fields(settings, RunSettings, "")[1]
 
 
 def _is_repeatable(node: Any) -> bool:

@@ -13,6 +13,8 @@ from typing import Any
 from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import Entry, built_in_stage, is_role, of_role
 
+from .tools import tools
+
 CONF = "omninav.conf"
 LEARN = "learn"
 """The group whose options are artifacts that can be made by themselves."""
@@ -27,6 +29,9 @@ def group_files(group: str) -> list[Traversable]:
 
 def suggest_option(group: str, option: str, options: Iterable[str], kind: str, prefix: str = "") -> str:
     """A hint for an option that a group does not have: what took its place, or what is like it."""
+    command = option.removesuffix("_live").replace("_", " ")
+    if group == "variant" and command in tools():
+        return f"it is a command; type omninav {command} …; `omninav {command} --help` shows what it takes"
     return replaced().get(f"{group}={option}") or suggest(option, options, kind, prefix)
 
 
@@ -39,16 +44,6 @@ def replaced() -> dict[str, str]:
         files(CONF).joinpath("help/replaced.txt").read_text(encoding="utf-8"), yaml.CSafeLoader
     )
     return found
-
-
-def tools() -> list[str]:
-    """Commands of two words, which variants without a source are."""
-    named = [file for file in group_files("variant") if "_" in file.name]
-    return [
-        file.name.removesuffix(".yaml").replace("_", " ", 1)
-        for file in named
-        if "\n  source: null\n" in file.read_text(encoding="utf-8")
-    ]
 
 
 def learnable() -> list[str]:

@@ -4,13 +4,13 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
-from importlib.resources import files
 
 from omninav.pipeline.report.terminal_text import cleaned
 
-from .config_groups import LEARN, learnable, tools
+from .config_groups import LEARN, group_files, learnable
 from .help import asks_for_help, help_text
 from .output import lost_output, mend_streams
+from .tools import tools
 from .typing_mistakes import command_first, mistyped_word, with_homes
 
 COMMANDS = (
@@ -67,7 +67,7 @@ def _run(arguments: list[str]) -> int:
     os.environ["PYTHONSAFEPATH"] = "1"  # processes of ours do not import what lies in the working directory
     if arguments and arguments[0] in COMMANDS:
         name, arguments = arguments[0], arguments[1:]
-    elif _is_tool(arguments):
+    elif " ".join(arguments[:2]) in tools():
         name = "tool"
     elif arguments[:1] and arguments[0] in learnable() and not any(word.isidentifier() for word in arguments[1:2]):
         name, arguments = "run", [f"{LEARN}={arguments[0]}", *arguments[1:]]
@@ -120,20 +120,14 @@ def _refuse_lost_folder() -> None:
         raise BadInput("the folder that you are in is gone; change to another: cd FOLDER") from None
 
 
-def _is_tool(arguments: Sequence[str]) -> bool:
-    """Whether the first two words together name a variant."""
-    words = arguments[:2]
-    named = len(words) == 2 and all(word.isidentifier() for word in words)
-    return named and files("omninav.conf").joinpath(f"variant/{'_'.join(words)}.yaml").is_file()
-
-
 def _unknown_command(name: str, second: str = "") -> int:
     from omninav.pipeline.graph.problems import nearest, suggest
 
-    variants = {file.name.removesuffix(".yaml") for file in files("omninav.conf").joinpath("variant").iterdir()}
-    longer = sorted(one.removeprefix(f"{name}_") for one in variants if one.startswith(f"{name}_"))
-    if name in variants:
-        hint = f"type omninav variant={name}"
+    variants = {file.name.removesuffix(".yaml") for file in group_files("variant")}
+    longer = [one.removeprefix(f"{name} ") for one in tools() if one.startswith(f"{name} ")]
+    both = f"{name}_{second}"
+    if {name, both} & variants:
+        hint = f"type omninav variant={both if both in variants else name}"
     elif longer:
         listing = ", ".join(f"omninav {name} {one}" for one in longer)
         name, near = f"{name} {second}".strip(), nearest(second, longer)

@@ -40,7 +40,7 @@ def invalid_overrides(words: Sequence[str], folders: Sequence[str], message: str
 
     `folders` are those of `--config-dir`.
     """
-    problems, parsed = _parsed(words)
+    problems, parsed = parsed_words(words)
     groups = {name: _options(name, folders) for name in _groups(folders)}
     swaps = [word for word in parsed if word.key_or_group in groups]
     options = [problem for word in swaps for problem in _unknown_option(word, groups[word.key_or_group])]
@@ -76,7 +76,7 @@ def with_unlisted_parameters(words: Sequence[str], folders: Sequence[str]) -> li
     words = [OF_ARTIFACTS_GRAPH.sub("++", word) for word in words]
     if not any(word.startswith("nodes.") for word in words):
         return list(words)
-    _, parsed = _parsed(words)
+    _, parsed = parsed_words(words)
     groups = _groups(folders)
     plain = _plain([word for word in parsed if word.key_or_group in groups], folders)
     return [f"++{word}" if word.startswith("nodes.") and _unlisted(word, plain) else word for word in words]
@@ -87,7 +87,8 @@ def _unlisted(word: str, config: Mapping[str, Any]) -> bool:
     return name is not None and isinstance(inside, Mapping) and name in _parameters_of(inside)[0]
 
 
-def _parsed(words: Sequence[str]) -> tuple[list[Problem], list[Override]]:
+def parsed_words(words: Sequence[str]) -> tuple[list[Problem], list[Override]]:
+    """Words as Hydra reads them, and a problem for each that it cannot read."""
     problems: list[Problem] = []
     parsed: list[Override] = []
     for text in words:

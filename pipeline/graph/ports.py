@@ -213,12 +213,13 @@ def convert_fields(
     known = read_parameters(expected)
     arguments: dict[str, Any] = {}
     problems: list[Problem] = []
+    above = f"{where}." if where else ""
     for name, value in given.items():
         if name in skip:
             continue
-        path = f"{where}.{name}"
+        path = f"{above}{name}"
         if name not in known:
-            hint = suggest(str(name), known, "parameters", prefix=f"{where}.")
+            hint = suggest(str(name), known, "parameters", prefix=above)
             problems.append(Problem(path, f"{expected.__name__} has no parameter '{name}'", hint))
             continue
         arguments[name], found = convert(value, known[name].type, path)
@@ -226,5 +227,5 @@ def convert_fields(
     for name, parameter in known.items():
         if parameter.default is dataclasses.MISSING and name not in given:
             what = f"{expected.__name__} needs '{name}' ({type_name(parameter.type)})"
-            problems.append(Problem(f"{where}.{name}", what, f"type {where}.{name}=…"))
+            problems.append(Problem(f"{above}{name}", what, f"type {above}{name}=…"))
     return arguments, problems

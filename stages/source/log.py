@@ -182,11 +182,10 @@ class LogSource(Source):
 
     def record(self, ctx: Context, folder: Path) -> None:
         """Write a simulated drive as an MCAP log, with camera.yaml, floor plan and grid beside it."""
-        from omninav.stages.simulator.record_log import RecordLog
+        from omninav.stages.simulator.record_log import record_log
 
         assert self.route is not None
-        log = str(folder / DRIVE)
-        RecordLog(log=log, world=self.world, route=self.route, day=self.day, kidnappings=self.kidnappings).step(ctx)
+        record_log(folder / DRIVE, self.world, self.route, self.day, self.kidnappings, ctx)
 
     def replay(self, folder: Path) -> dict[str, Any]:
         """Read the log in place of the world that it is of."""

@@ -136,11 +136,11 @@ def test_a_donut_is_refused_where_no_ring_stands_out(tmp_path: Path, capsys: pyt
     )
 
 
-def test_a_stage_that_a_tool_has_no_use_for_is_one_problem(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_setting_that_a_tool_does_not_take_is_one_problem(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["camera", "look", f"log={DRIVE}", "unwarp=panorama"]) == 2
     said = capsys.readouterr().err
-    assert "1 problem:\n  nodes.unwarp: UnwarpPanorama has no place in this graph" in said
-    assert "leave unwarp=… out" in said
+    assert "1 problem:\n  unwarp: LookThroughCamera has no parameter 'unwarp'" in said
+    assert "parameters: camera, frame, log, out, topics" in said
 
 
 def _text(word: str) -> str:

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from omninav.pipeline.cli.config_groups import learnable
 from omninav.pipeline.cli.main import COMMANDS, main
+from omninav.pipeline.cli.tools import tool_class, tool_from, tools
+from omninav.pipeline.graph.signature import read_parameters
 
 ROOT = Path(__file__).resolve().parents[2]
 HELP = (ROOT / "conf" / "help.txt").read_text(encoding="utf-8")
@@ -24,10 +25,14 @@ def test_every_command_explains_itself(words, capsys):
     told = capsys.readouterr().out
     assert told.startswith(f"omninav {words}")
     assert "{group" not in told
-    file = ROOT / "conf" / "variant" / f"{words.replace(' ', '_')}.yaml"
-    settings = yaml.safe_load(file.read_text(encoding="utf-8")) if file.is_file() else {}
-    missing = [name for name in settings.get("inputs", {}) if f"  {name}=" not in told]
-    assert not missing
+    arguments = read_parameters(tool_class(words)) if words in TOOLS else {}
+    assert not [name for name in arguments if f"  {name}=" not in told]
+
+
+def test_the_example_of_every_tool_fits_its_arguments():
+    assert {*TOOLS, "simulate"} == {*tools()}
+    for name in tools():
+        tool_from(tool_class(name), tool_class(name).example.split())
 
 
 def test_the_first_word_of_two_explains_all_that_it_begins(capsys):

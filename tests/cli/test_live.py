@@ -28,7 +28,7 @@ def test_what_is_typed_takes_the_place_of_what_live_adds(typed: list[list[str]])
     ]
 
 
-@pytest.mark.parametrize("variant", ["homing_field", "matched_pairs", "camera_look"])
+@pytest.mark.parametrize("variant", ["homing_field", "matched_pairs"])
 def test_a_variant_that_is_no_robots_is_refused_by_name(variant: str):
     with composed([*live.SETTINGS, f"variant={variant}"]) as config:
         settings = complete(config)

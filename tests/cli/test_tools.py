@@ -1,4 +1,4 @@
-"""Commands that variants without a source are: two words, one file."""
+"""Commands with arguments of their own, which write files and leave no run."""
 
 import json
 from pathlib import Path
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from small_run import reference_graph
 
+import omninav
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.engine.artifact import read_artifact, write_artifact
 from omninav.stages.values.projection import Projection
@@ -92,7 +93,6 @@ def test_maps_that_do_not_join_are_refused_in_one_line(
         ("thin", "a.omap", "out=./a.omap"): "this map is read; type another name",
         ("thin", "a.omap", "out=b.txt"): "type out=NAME.omap",
         ("thin", "a.omap", "b.omap"): "maps: 2 files are given, expected 1 map",
-        ("cut", "a.omap"): "type area=[x0,y0,x1,y1]",
         ("cut", "a.omap", "area=[90,90,91,91]"): "nothing of a.omap lies there; it goes from [",
         ("show", "projection.omap"): "it holds a Projection, no map",
         ("show", "none.omap"): "none.omap: there is no such file",
@@ -104,6 +104,35 @@ def test_maps_that_do_not_join_are_refused_in_one_line(
         assert len(lines) == 1
     assert main(["map", "join", "a.omap", "drift.omap", "same_frame=true"]) == 0
     assert read_artifact(tmp_path / "joined.omap").pose_source == "odometry"  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("map cut a.omap", "area: it is needed"),
+        ("map cut a.omap area=[0,0,1,1] uot=b.omap", "did you mean 'out'? parameters: area, maps, out"),
+        ("map cut a.omap area=0,0,1,1", "several as 'name=[A,B]'"),
+        ("map cut a.omap area=[0,0,1,1] ~out", "there is nothing to take out"),
+        ("map thin a.omap spacing=-1", "spacing: -1.0 is out of bounds, expected float > 0"),
+        ("camera look", "type log=…: A log of any kind."),
+        ("camera look a.mcap topics.imag=/x", "topics.imag: Topics has no parameter 'imag'"),
+        ("simulate rouet=tour log=a.mcap", "did you mean 'route'?"),
+        ("simulate log=a.mcap world=ofice", "did you mean 'world=office'?"),
+        ("variant=map_cut", "it is a command; type omninav map cut"),
+        ("variant=simulate_live live=dds", "it is a command; type omninav simulate"),
+    ],
+)
+def test_arguments_that_do_not_fit_are_said(words: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(words.split()) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_tool_is_called_from_python(tmp_path: Path) -> None:
+    whole = map_of(tmp_path / "a.omap", 20)
+    omninav.tool("map cut", str(whole), area=[0, -4, 8, 4], out=tmp_path / "b.omap")
+    assert 0 < len(read_artifact(tmp_path / "b.omap")) < 20  # type: ignore[arg-type]
+    with pytest.raises(omninav.BadInput, match=r"'map cot': there is no such tool; did you mean 'map cut'\?"):
+        omninav.tool("map cot", str(whole))
 
 
 def test_a_drive_is_localised_in_a_joined_and_in_a_thinned_map(

@@ -56,7 +56,7 @@ def mine(hydra: dict[str, object]) -> None:
 @pytest.mark.parametrize(
     ("command", "where"),
     [(("check",), where) for where in HYDRA]
-    + [(command, "hydra.callbacks") for command in (("graph",), ("simulate",), (), ("-m",))],
+    + [(command, "hydra.callbacks") for command in (("graph",), ("simulate", "live=dds"), (), ("-m",))],
 )
 def test_what_a_configuration_says_of_hydra_is_refused_before_anything_is_called(
     command: tuple[str, ...], where: str, capsys: pytest.CaptureFixture[str]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from offenders import assert_each
 
-from omninav.pipeline.cli.commands.simulate import is_live
+from omninav.pipeline.cli.commands.simulate import LIVE, is_live
 from omninav.pipeline.cli.composition import complete
 from omninav.pipeline.cli.composition_cache import compose
 from omninav.pipeline.cli.config_groups import learnable
@@ -15,6 +15,7 @@ from omninav.pipeline.cli.experiments import resolved_but_for_the_experiment
 from omninav.pipeline.cli.hydra_session import hydra_started
 from omninav.pipeline.cli.main import COMMANDS
 from omninav.pipeline.cli.overrides import jobs_to_try, with_unlisted_parameters
+from omninav.pipeline.cli.tools import tool_class, tool_from, tools
 from omninav.pipeline.run.plan import plan
 
 ROOT = Path(__file__).parents[2]
@@ -59,13 +60,14 @@ def command_composes(line: str) -> None:
         return
     if words[:1] and words[0] in learnable() and not any(word.isidentifier() for word in words[1:2]):
         words[0] = f"learn={words[0]}"
-    tool = "_".join(words[:2])
-    if (ROOT / f"conf/variant/{tool}.yaml").is_file():
-        words = [f"variant={tool}", *words[2:]]
+    tool = command if command == "simulate" and not is_live(words) else " ".join(words[:2])
+    if tool in tools():
+        arguments = words if tool == command else words[2:]
+        if arguments:  # else a page speaks of it
+            tool_from(tool_class(tool), arguments)
+        return
     words = [word for word in words if "=" in word and "…" not in word and not word.startswith("hydra")]
-    for job in jobs_to_try(
-        [f"variant=simulate{'_live' if is_live(words) else ''}", *words] if command == "simulate" else words, []
-    ):
+    for job in jobs_to_try([*LIVE, *words] if command == "simulate" else words, []):
         composed(job)
 
 

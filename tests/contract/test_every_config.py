@@ -13,6 +13,7 @@ import yaml
 from offenders import assert_each
 from omegaconf import OmegaConf
 
+from omninav.pipeline.cli.commands.simulate import LIVE
 from omninav.pipeline.cli.composition import complete, settings_read
 from omninav.pipeline.cli.composition_cache import compose
 from omninav.pipeline.cli.config_groups import settings_left_open
@@ -90,6 +91,7 @@ def command_composes(path: Path) -> None:
     if group(path) != "graph":  # its files are included by variants
         assert f"{'+' if group(path) == 'experiment' else ''}{group(path)}={option}" in command, command
     words = [word for word in command if not word.startswith("-")]
+    words = [*LIVE, *words[1:]] if words[:1] == ["simulate"] else words
     compose(with_unlisted_parameters(words, []))
 
 
@@ -111,6 +113,9 @@ def test_a_shared_graph_is_included_by_the_variant_in_its_head():
 
 def graph_is_included(path: Path) -> None:
     words = shlex.split(head(path)[1].partition("  omninav ")[2])
+    if words[0] == "simulate":
+        assert LIVE[1] == f"+graph={path.stem}"
+        return
     variant = next(word.removeprefix("variant=") for word in words if word.startswith("variant="))
     assert path.stem in graphs_of(CONF / "variant" / f"{variant}.yaml")
 

@@ -1,10 +1,17 @@
-"""`omninav simulate`: what the variant `simulate` computes, written as a log, or sent while it is computed."""
+"""`omninav simulate`: a simulated drive, written as a log, or sent while it is computed."""
+
+import contextlib
 
 from omninav.pipeline.cli.composition import complete, composed
 from omninav.pipeline.engine.compile_notice import compile_notice
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.report.progress import Progress
 from omninav.pipeline.run.plan import plan
+
+from . import tool
+
+LIVE = ("~variant", "+graph=simulate_live")
+"""Words that choose the graph that sends what it simulates."""
 
 
 def is_live(arguments: list[str]) -> bool:
@@ -13,18 +20,17 @@ def is_live(arguments: list[str]) -> bool:
 
 
 def command(arguments: list[str]) -> int:
-    """Run the variant `simulate`, or with `live=…` the variant `simulate_live`; neither leaves a run folder."""
-    live = is_live(arguments)
+    """Run the tool `simulate`, or with `live=…` that graph until it is stopped; neither leaves a run folder."""
+    if not is_live(arguments):
+        return tool.command(["simulate", *arguments])
     with Progress() as progress, compile_notice(progress.say):
         progress.say("reading the configuration")
-        with composed([f"variant=simulate{'_live' if live else ''}", *arguments]) as config:
+        with composed([*LIVE, *arguments]) as config:
             planned = plan(complete(config))  # of no artifacts
 
         def on_tick(done: int, total: int | None) -> None:
             progress.update("simulate", done, total)
 
-        try:
+        with contextlib.suppress(KeyboardInterrupt):  # that is how it ends
             Engine(planned.graph, {}, EngineOptions(planned.seed, on_tick=on_tick, on_doing=progress.say)).run()
-        except KeyboardInterrupt:
-            return 0 if live else 130  # live it runs until it is stopped, and nothing of it is left
     return 0

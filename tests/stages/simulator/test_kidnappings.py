@@ -16,7 +16,7 @@ from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Topics, UnreadableRecording
 from omninav.stages.simulator.cameras import camera_rays
 from omninav.stages.simulator.config import Day, Delivery, Kidnapping, OdometryNoise, Route, Sensor, mirror
-from omninav.stages.simulator.record_log import RecordLog
+from omninav.stages.simulator.record_log import record_log
 from omninav.stages.simulator.renderer import render
 from omninav.stages.simulator.simulated_log import record
 from omninav.stages.simulator.simulated_recording import SimulatedRecording
@@ -213,7 +213,7 @@ def test_days_that_cannot_be_are_refused():
 def test_what_a_written_log_states_does_not_count_the_metres_it_was_carried(tmp_path: Path) -> None:
     """Wheels without errors know how far they rolled, and nothing of being lifted."""
     said = Context("record")
-    RecordLog(world=EXACT, route="there", day=(0, 1), log=str(tmp_path / "out.mcap"), kidnappings=KIDNAPPED).step(said)
+    record_log(tmp_path / "out.mcap", EXACT, "there", (0, 1), KIDNAPPED, said)
     drives = [SimulatedRecording(EXACT, "there", day, KIDNAPPED) for day in (0, 1)]
     rolled = sum(np.hypot(*np.diff(drive.rolled[:, :2], axis=0).T).sum() for drive in drives)
     jumped = sum(np.hypot(*np.diff(drive.true_poses[:, :2], axis=0).T).sum() for drive in drives)

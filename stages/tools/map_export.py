@@ -10,21 +10,20 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
+from omninav.pipeline import BadInput, Bounds, Context, Tool
 from omninav.pipeline.engine.artifact import read_artifact
 from omninav.pipeline.files import user_path
+from omninav.stages.map_files.saved import MapOfPlaces, SavedMap, read_saved
 from omninav.stages.values.encoded_image import Undecodable
 from omninav.stages.values.image import Pixels
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.thumbnails import Thumbnails
 
-from .saved import MapOfPlaces, SavedMap, read_saved
-
 BESIDE = "thumbnails.omap"
 """File in which the run that learned a map leaves its images."""
 
 
-class ExportMap(Stage):
+class ExportMap(Tool):
     """Writes the images of a map's references or views as `0.png`, `1.png`, … into a new folder, and nothing else.
 
     In the order of the tour: the topological map of ViNT, NoMaD and GNM (`deployment/topomaps/images/NAME`) and of
@@ -32,7 +31,9 @@ class ExportMap(Stage):
     images are missing or another map's, or the folder holds something.
     """
 
-    maps: str | tuple[str, ...] | None = None
+    example = "runs/latest/map.omap spacing=1 out=topomap"
+
+    maps: str | tuple[str, ...]
     """The map (.omap)."""
     images: str | None = None
     """The images of its references (.omap); null: `thumbnails.omap` beside the map."""
@@ -43,10 +44,7 @@ class ExportMap(Stage):
     out: str = "topomap"
     """The folder to write."""
 
-    class Out(Outputs):
-        """Nothing: it writes files."""
-
-    def step(self, ctx: Context) -> Out:
+    def run(self, ctx: Context) -> None:
         """Export the map."""
         (source,) = read_saved(self.maps, at_most=1)
         folder = self._folder()
@@ -73,7 +71,6 @@ class ExportMap(Stage):
             shutil.rmtree(part, ignore_errors=True)
         missing = f"; {len(order) - len(there)} have none" if len(there) < len(order) else ""
         print(f"{folder}: images of {len(kept)} of {len(order)} views, 0.png to {len(kept) - 1}.png{missing}")
-        return self.Out()
 
     def _folder(self) -> Path:
         folder = user_path(self.out)

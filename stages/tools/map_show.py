@@ -7,40 +7,38 @@ from typing import Any, get_args
 import numpy as np
 from scipy.spatial import KDTree
 
-from omninav.pipeline import BadInput, Context, Outputs, Stage
+from omninav.pipeline import BadInput, Context, Tool
 from omninav.pipeline.engine.artifact import read_artifact, read_header
 from omninav.pipeline.files import user_path, write_whole
 from omninav.pipeline.report.plot_style import plot
+from omninav.stages.plots.drawing import draw_grid, draw_map, plan_axes
 from omninav.stages.recordings.occupancy_grid import read_occupancy
 from omninav.stages.values.map_places import AnyMap, map_poses
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.topological_map import TopologicalMap
 
-from .drawing import draw_grid, draw_map, plan_axes
-
 SAMPLE = 10_000
 """Poses of which the distance to the nearest other one is measured, and references that are drawn."""
 
 
-class ShowMap(Stage):
+class ShowMap(Tool):
     """Prints what saved maps hold, and draws where their references or places are, over a grid where one is given.
 
     Raises BadInput where a file is no map.
     """
 
-    maps: str | tuple[str, ...] | None = None
+    example = "a.omap grid=office.yaml out=office.png"
+
+    maps: str | tuple[str, ...]
     """The maps (.omap)."""
     grid: str | None = None
     """An occupancy grid (map.yaml) to draw under them."""
     out: str = "map.png"
     """The file to write; of several maps one beneath the other."""
 
-    class Out(Outputs):
-        """Nothing: it prints, and writes a file."""
-
-    def step(self, ctx: Context) -> Out:
+    def run(self, ctx: Context) -> None:
         """Show the maps."""
-        names = (self.maps,) if isinstance(self.maps, str) else self.maps or ()
+        names = (self.maps,) if isinstance(self.maps, str) else self.maps
         path = user_path(self.out)
         if not names or path.suffix != ".png":
             raise BadInput("maps: name a map, and a .png to write: FILE.omap out=map.png")
@@ -59,7 +57,6 @@ class ShowMap(Stage):
                     axes.legend()
         write_whole(path, drawn.content)
         print(f"{'picture':<12} {path}")
-        return self.Out()
 
 
 def _read(file: Path) -> AnyMap:

@@ -13,9 +13,9 @@ from omninav.stages.camera.hyperbolic import HyperbolicMirror
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.rays import unit_vectors
 from omninav.stages.recordings.camera_yaml import read_camera
-from omninav.stages.unwarp.calibrate_camera import CalibrateCamera
+from omninav.stages.tools.camera_calibrate import CalibrateCamera
+from omninav.stages.tools.camera_look import LookThroughCamera
 from omninav.stages.unwarp.calibration import board_points, calibrated
-from omninav.stages.unwarp.look_through_camera import LookThroughCamera
 
 MIRROR = HyperbolicMirror(640, 480, 497.0, 497.0, 322.0, 236.0, 28.095, 23.4125, 34.0, 238.0)
 LENS = Fisheye(640, 480, 150.0, 316.0, 243.0, 236.0)
@@ -92,29 +92,28 @@ def test_images_of_a_board_make_a_camera_file_and_a_picture(tmp_path: Path, caps
     )
     out = tmp_path / "camera.yaml"
     stage = CalibrateCamera(images=str(tmp_path / "images"), board=f"{COLUMNS}x{ROWS}", out=str(out))
-    stage.step(Context("calibrate"))
+    stage.run(Context("calibrate"))
     assert worst_deg(read_camera(out), MIRROR) < 0.5
     printed = capsys.readouterr().out
     assert "image 0: 0." in printed
     assert "over 6 images; no board in images 6" in printed
     written = out.read_bytes(), out.with_suffix(".png").read_bytes()
     assert written[1].startswith(b"\x89PNG")
-    stage.step(Context("calibrate"))
+    stage.run(Context("calibrate"))
     assert (out.read_bytes(), out.with_suffix(".png").read_bytes()) == written
     look = tmp_path / "look.png"
-    LookThroughCamera(log=str(tmp_path / "images"), camera=str(out), out=str(look)).step(Context("look"))
+    LookThroughCamera(log=str(tmp_path / "images"), camera=str(out), out=str(look)).run(Context("look"))
     assert cv2.imread(str(look)) is not None
 
 
 def test_what_cannot_be_calibrated_is_said(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "0.png"), np.random.default_rng(0).integers(0, 256, (48, 64, 3), dtype=np.uint8))
     for stage, what in (
-        (CalibrateCamera(), "images=FOLDER"),
         (CalibrateCamera(images=str(tmp_path), board="9"), "type board=9x6"),
         (CalibrateCamera(images=str(tmp_path), out="camera.txt"), "type out=camera.yaml"),
         (CalibrateCamera(images=str(tmp_path)), "no board of 9 x 6 inner corners"),
     ):
         with pytest.raises(BadInput, match=what):
-            stage.step(Context("calibrate"))
+            stage.run(Context("calibrate"))
     with pytest.raises(BadInput, match="at least 3 are needed"):
         calibrated("hyperbolic", (640, 480), MIRROR.ring, seen(MIRROR, -0.1)[:2], board_points(COLUMNS, ROWS))

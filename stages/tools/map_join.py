@@ -5,18 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from omninav.pipeline import BadInput, Context, Outputs, Stage
+from omninav.pipeline import BadInput, Context, Tool
+from omninav.stages.map_files.aligned import aligned
+from omninav.stages.map_files.places import joined_places
+from omninav.stages.map_files.references import joined_references
+from omninav.stages.map_files.saved import MapOfPlaces, SavedMap, read_saved, refuse_other_views, target, write_saved
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import PoseSource
 from omninav.stages.values.topological_map import TopologicalMap
 
-from .aligned import aligned
-from .places import joined_places
-from .references import joined_references
-from .saved import MapOfPlaces, SavedMap, read_saved, refuse_other_views, target, write_saved
 
-
-class JoinMaps(Stage):
+class JoinMaps(Tool):
     """Writes one map of the references, or places, of several.
 
     All must be of one kind, with views made in the same way. Maps of references whose poses are in frames of their own
@@ -25,7 +24,9 @@ class JoinMaps(Stage):
     others.
     """
 
-    maps: str | tuple[str, ...] | None = None
+    example = "a.omap b.omap out=joined.omap"
+
+    maps: str | tuple[str, ...]
     """The maps (.omap), at least two."""
     same_frame: bool = False
     """States that the poses of all maps are in one frame, so that they stay. It need not be said of poses from ground
@@ -33,10 +34,7 @@ class JoinMaps(Stage):
     out: str = "joined.omap"
     """The file to write."""
 
-    class Out(Outputs):
-        """Nothing: it writes a file."""
-
-    def step(self, ctx: Context) -> Out:
+    def run(self, ctx: Context) -> None:
         """Join the maps."""
         sources = read_saved(self.maps, at_least=2)
         path = target(self.out, sources)
@@ -49,7 +47,6 @@ class JoinMaps(Stage):
         write_saved(path, map, sources, "join")
         what = "references" if isinstance(map, ReferenceGraph) else "places"
         print(f"{path}: {len(map)} {what} of {len(sources)} maps ({' + '.join(str(len(one.map)) for one in sources)})")
-        return self.Out()
 
 
 def _in_one_frame(sources: Sequence[SavedMap], map: MapOfPlaces) -> MapOfPlaces:

@@ -4,7 +4,7 @@ import time
 from pathlib import Path
 from typing import Annotated
 
-from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
+from omninav.pipeline import BadInput, Bounds, Context, Tool
 from omninav.pipeline.files import user_path
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.mcap.writer import LogWriter
@@ -13,30 +13,29 @@ from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.values.image import Pixels
 
 
-class RecordCamera(Stage):
+class RecordCamera(Tool):
     """Writes the images of a webcam, or of another camera that OpenCV reads, as an MCAP log, until Ctrl-C.
 
     Each image has the time at which it was read, and is kept as JPEG; camera.yaml is attached. Images that come faster
     than `rate_hz` are left out. Raises BadInput where there is no such camera, or nothing says how it is to be read.
     """
 
+    example = "device=0 camera=perspective out=drive.mcap"
+
+    camera: str | None = None
+    """Its camera.yaml, or a projection (equirectangular, dual_fisheye, fisheye, donut, perspective)."""
     device: int | str = 0
     """Number of the camera, or its file as /dev/video0; a video stands for a camera too."""
     out: str = "camera.mcap"
     """The log to write."""
-    camera: str | None = None
-    """Its camera.yaml, or a projection (equirectangular, dual_fisheye, fisheye, donut, perspective)."""
     seconds: Annotated[float, Bounds(gt=0)] | None = None
     """How long to record; null: until Ctrl-C, or until the camera ends."""
     rate_hz: Annotated[float, Bounds(gt=0, le=1e6)] = 10.0
     """Images per second at most."""
     quality: Annotated[int, Bounds(ge=1, le=100)] = 92
-    """Of the JPEGs."""
+    """Quality of the JPEGs, 1 to 100."""
 
-    class Out(Outputs):
-        """Nothing: it writes a file."""
-
-    def step(self, ctx: Context) -> Out:
+    def run(self, ctx: Context) -> None:
         """Record, and say what was recorded."""
         path = user_path(self.out)
         if path.suffix != ".mcap":
@@ -48,7 +47,6 @@ class RecordCamera(Stage):
         finally:
             device.close()
         print(f"{path}: {counted(written, 'image')}; log={path} reads it")
-        return self.Out()
 
     def _record(self, ctx: Context, device: CameraDevice, path: Path) -> int:
         first = device.first()

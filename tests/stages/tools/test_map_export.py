@@ -10,8 +10,8 @@ from small_run import reference_graph
 from omninav.pipeline import BadInput, Context
 from omninav.pipeline.cli.main import main
 from omninav.pipeline.engine.artifact import write_artifact
-from omninav.stages.map_files.export import ExportMap, spaced
 from omninav.stages.mapping.thumbnails import joined
+from omninav.stages.tools.map_export import ExportMap, spaced
 
 CTX = Context("export")
 WIDE = 36
@@ -52,14 +52,14 @@ def test_images_are_numbered_in_the_order_of_the_tour(tmp_path: Path, capsys: py
 
 
 def test_images_are_spaced_and_missing_ones_are_passed_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    ExportMap(maps=saved(tmp_path, missing=2), spacing=2.0, out=str(tmp_path / "out")).step(CTX)
+    ExportMap(maps=saved(tmp_path, missing=2), spacing=2.0, out=str(tmp_path / "out")).run(CTX)
     assert written(tmp_path / "out") == [0, 3, 5]
     assert "1 have none" in capsys.readouterr().out
     assert spaced(np.array([(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (0.9, 0.9)]), 1.0).tolist() == [0, 2]
 
 
 def test_what_a_forward_camera_sees_is_cut_out_of_the_middle(tmp_path: Path):
-    ExportMap(maps=saved(tmp_path), field_deg=80, out=str(tmp_path / "out")).step(CTX)
+    ExportMap(maps=saved(tmp_path), field_deg=80, out=str(tmp_path / "out")).run(CTX)
     image = cv2.imread(str(tmp_path / "out" / "3.png"))
     assert image.shape == (8, 8, 3)
     assert (image == 255).all()
@@ -69,25 +69,25 @@ def test_maps_without_their_images_are_refused(tmp_path: Path):
     out = str(tmp_path / "out")
     lone = saved(tmp_path, images=None)
     with pytest.raises(BadInput, match=r"holds no images, and there is no thumbnails\.omap beside it; export the map"):
-        ExportMap(maps=lone, out=out).step(CTX)
+        ExportMap(maps=lone, out=out).run(CTX)
     with pytest.raises(BadInput, match=r"has 4 images, .*map\.omap has 6 views: another map's"):
-        ExportMap(maps=saved(tmp_path, images=4), out=out).step(CTX)
+        ExportMap(maps=saved(tmp_path, images=4), out=out).run(CTX)
     with pytest.raises(BadInput, match=r"it holds a ReferenceGraph, expected images"):
-        ExportMap(maps=lone, images=lone, out=out).step(CTX)
+        ExportMap(maps=lone, images=lone, out=out).run(CTX)
     with pytest.raises(BadInput, match=r"it has no image to write"):
-        ExportMap(maps=saved(tmp_path, references=1, images=1, missing=0), out=out).step(CTX)
+        ExportMap(maps=saved(tmp_path, references=1, images=1, missing=0), out=out).run(CTX)
     assert not (tmp_path / "out").exists()
 
 
 def test_a_folder_that_holds_something_is_left_alone(tmp_path: Path):
     name = saved(tmp_path)
     with pytest.raises(BadInput, match="it is there, and not an empty folder"):
-        ExportMap(maps=name, out=str(tmp_path)).step(CTX)
+        ExportMap(maps=name, out=str(tmp_path)).run(CTX)
 
 
 def test_an_image_that_is_none_is_named_and_nothing_is_left(tmp_path: Path):
     name = saved(tmp_path)
     write_artifact(tmp_path / "thumbnails.omap", joined([grey(0), b"no image", *[grey(n) for n in range(2, 6)]]))
     with pytest.raises(BadInput, match=r"thumbnails\.omap: image 1 cannot be decoded"):
-        ExportMap(maps=name, out=str(tmp_path / "out")).step(CTX)
+        ExportMap(maps=name, out=str(tmp_path / "out")).run(CTX)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["map.omap", "thumbnails.omap"]

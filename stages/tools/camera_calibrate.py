@@ -6,23 +6,23 @@ from typing import Annotated
 import cv2
 import numpy as np
 
-from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
+from omninav.pipeline import BadInput, Bounds, Context, Tool
 from omninav.pipeline.files import user_path, write_whole
 from omninav.pipeline.report.plot_style import PALETTE, plot
 from omninav.stages.camera.mirror_ring import RingNotFound, find_ring
 from omninav.stages.camera.model import Ring
 from omninav.stages.recordings.camera_yaml import write_camera
 from omninav.stages.recordings.opening import open_recording
+from omninav.stages.unwarp.calibration import Array, Calibration, Model, board_points, calibrated
 from omninav.stages.values.image import Image, Pixels
 
-from .calibration import Array, Calibration, Model, board_points, calibrated
-from .look_through_camera import draw_panorama
+from .camera_look import draw_panorama
 
 MAX_SQUARES = 40
 """Inner corners of a board along one side."""
 
 
-class CalibrateCamera(Stage):
+class CalibrateCamera(Tool):
     """Calibrates a mirror or a fisheye lens by images of a flat checkerboard, held all around the camera.
 
     Writes camera.yaml, and beside it a picture: the panorama that it gives, every corner's residual, and each image's.
@@ -30,7 +30,9 @@ class CalibrateCamera(Stage):
     board is seen in fewer than three images, or no camera of that model explains them.
     """
 
-    images: str | None = None
+    example = "images=FOLDER board=9x6"
+
+    images: str
     """A folder of images, or a video (anything that `log` may be)."""
     board: str = "9x6"
     """Inner corners of the board, COLUMNSxROWS: one less than its squares along each side."""
@@ -41,13 +43,8 @@ class CalibrateCamera(Stage):
     out: str = "camera.yaml"
     """The file to write."""
 
-    class Out(Outputs):
-        """Nothing: it writes files."""
-
-    def step(self, ctx: Context) -> Out:
+    def run(self, ctx: Context) -> None:
         """Find the board in every image, fit, and write."""
-        if not self.images:
-            raise BadInput("calibrate: name the images of the board: images=FOLDER")
         path = user_path(self.out)
         if path.suffix not in (".yaml", ".yml"):
             raise BadInput(f"calibrate: out={self.out:.100} is no .yaml; type out=camera.yaml")
@@ -83,7 +80,6 @@ class CalibrateCamera(Stage):
             f"{path}: {self.projection}, {np.sqrt(np.mean(found.rms_px**2)):.2f} px over {len(seen)} images"
             f"{missed if len(seen) < len(chosen) else ''}; look at {picture}"
         )
-        return self.Out()
 
 
 def board_size(board: str) -> tuple[int, int]:

@@ -8,7 +8,7 @@ import pytest
 
 from omninav.pipeline import BadInput, Context
 from omninav.stages.recordings.opening import open_recording
-from omninav.stages.source.record_camera import RecordCamera
+from omninav.stages.tools.camera_record import RecordCamera
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def device(tmp_path: Path) -> str:
 
 def test_what_a_camera_gives_is_a_log_with_its_camera(tmp_path: Path, device: str) -> None:
     out = str(tmp_path / "drive.mcap")
-    RecordCamera(device=device, out=out, camera="perspective", rate_hz=1e6).step(Context("record"))
+    RecordCamera(device=device, out=out, camera="perspective", rate_hz=1e6).run(Context("record"))
     recording = open_recording(out)
     assert recording.camera.projection == "perspective"
     assert len(recording.stamps) == 5
@@ -31,7 +31,7 @@ def test_what_a_camera_gives_is_a_log_with_its_camera(tmp_path: Path, device: st
 
 def test_images_that_come_too_fast_are_left_out(tmp_path: Path, device: str) -> None:
     out = str(tmp_path / "drive.mcap")
-    RecordCamera(device=device, out=out, camera="perspective", rate_hz=0.01).step(Context("record"))
+    RecordCamera(device=device, out=out, camera="perspective", rate_hz=0.01).run(Context("record"))
     assert len(open_recording(out).stamps) == 1
 
 
@@ -43,6 +43,6 @@ def test_what_cannot_be_recorded_is_said(tmp_path: Path, device: str) -> None:
         (RecordCamera(device=device, out=str(tmp_path / "x.mcap")), "nothing says how its images of 80 x 64"),
     ):
         with pytest.raises(BadInput, match=what):
-            stage.step(Context("record"))
+            stage.run(Context("record"))
     with pytest.raises(BadInput, match=r"log=camera:0: .*omninav live log=camera:0; .*omninav camera record device=0"):
         open_recording("camera:0")

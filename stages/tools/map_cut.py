@@ -3,39 +3,35 @@
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import BadInput, Context, Outputs, Stage
+from omninav.pipeline import BadInput, Context, Tool
+from omninav.stages.map_files.places import cut_places
+from omninav.stages.map_files.references import cut_references
+from omninav.stages.map_files.saved import MapOfPlaces, read_saved, target, write_saved
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Coordinate
-
-from .places import cut_places
-from .references import cut_references
-from .saved import MapOfPlaces, read_saved, target, write_saved
 
 Area = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
 
 
-class CutMap(Stage):
+class CutMap(Tool):
     """Writes the part of a map that lies in an area: its references or places, and the edges or links between them.
 
     Raises BadInput where the file is no such map, or nothing of it lies there.
     """
 
-    maps: str | tuple[str, ...] | None = None
+    example = "a.omap area=[0,0,10,5] out=cut.omap"
+
+    maps: str | tuple[str, ...]
     """The map (.omap)."""
-    area: Area | None = None
+    area: Area
     """x0, y0, x1, y1 (m): two opposite corners, in the map's frame."""
     out: str = "cut.omap"
     """The file to write."""
 
-    class Out(Outputs):
-        """Nothing: it writes a file."""
-
-    def step(self, ctx: Context) -> Out:
+    def run(self, ctx: Context) -> None:
         """Cut the map."""
         (source,) = read_saved(self.maps, at_most=1)
         path, whole = target(self.out, [source]), source.map
-        if self.area is None:
-            raise BadInput("area: none is given; type area=[x0,y0,x1,y1], two opposite corners in metres")
         poses = poses_of(whole)
         inside = within_area(poses, self.area)
         if not inside.any():
@@ -46,7 +42,6 @@ class CutMap(Stage):
         write_saved(path, left, [source], f"cut area={list(self.area)}")
         what = "references" if isinstance(whole, ReferenceGraph) else "places"
         print(f"{path}: {len(left)} of {len(whole)} {what}")
-        return self.Out()
 
 
 def poses_of(map: MapOfPlaces) -> npt.NDArray[np.float64]:

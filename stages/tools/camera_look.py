@@ -6,17 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 import cv2
 import numpy as np
 
-from omninav.pipeline import BadInput, Bounds, Context, Figure, Outputs, Stage
+from omninav.pipeline import BadInput, Bounds, Context, Tool
 from omninav.pipeline.files import user_path, write_whole
 from omninav.pipeline.report.plot_style import PALETTE, plot
 from omninav.stages.camera.model import Camera
 from omninav.stages.camera.rays import angles, turned, unit_vectors
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import Topics
-from omninav.stages.values.encoded_image import decode_image
+from omninav.stages.unwarp.table import remap_table
 from omninav.stages.values.image import Image
-
-from .table import remap_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,15 +23,17 @@ COLUMNS = 1440
 """Of the full circle; of an ordinary camera's image as many as its part of it has."""
 
 
-class LookThroughCamera(Stage):
+class LookThroughCamera(Tool):
     """Writes one image of a log, unwarped, as a PNG with azimuths and, where they are known, elevations.
 
     Upright things stand upright in it, the horizon is level, and what is ahead of the robot is at 0 degrees, or the
     camera is not what it is said to be. Raises BadInput where the log cannot be read.
     """
 
-    log: str | None = None
-    """The log (see `open_recording`)."""
+    example = "log=drive.mp4 camera=camera.yaml out=look.png"
+
+    log: str
+    """A log of any kind."""
     camera: str | None = None
     """A camera.yaml, or a projection, in place of the log's own."""
     topics: Topics = Topics()
@@ -43,16 +43,11 @@ class LookThroughCamera(Stage):
     out: str = "look.png"
     """The file to write."""
 
-    class Out(Outputs):
-        """`figure`: what it writes as a file."""
-
-        figure: Figure
-
-    def step(self, ctx: Context) -> Out:
+    def run(self, ctx: Context) -> None:
         """Unwarp one image and draw it."""
         path = user_path(self.out)
-        if self.log is None or path.suffix != ".png":
-            raise BadInput("look: name a log, and a .png to write: log=PATH out=look.png")
+        if path.suffix != ".png":
+            raise BadInput(f"look: out={self.out:.100} is no .png; type out=look.png")
         recording = open_recording(self.log, self.topics, self.camera)
         frames = range(self.frame, len(recording.stamps))
         frame, pixels = next(((n, found) for n in frames if (found := recording.image(n)) is not None), (0, None))
@@ -67,16 +62,6 @@ class LookThroughCamera(Stage):
         for sentence in recording.assumed:
             print(f"assumed: {sentence}")
         print(f"{path}: image {frame}, {camera.projection} camera; forward is at 0 degrees")
-        return self.Out(
-            figure=Figure(
-                name="look",
-                title="What the camera sees",
-                caption=f"Image {frame} of {self.log} by a {camera.projection} camera, unwarped; forward is at 0. "
-                "Where upright things lean or the horizon is bent, the camera is not what it is said to be.",
-                content=cv2.imencode(".jpg", decode_image(drawn.content))[1].tobytes(),
-                media_type="image/jpeg",
-            )
-        )
 
 
 def field_of_view(camera: Camera) -> tuple[float, float, float, float]:

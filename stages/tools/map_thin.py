@@ -2,32 +2,30 @@
 
 from typing import Annotated
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Tool
+from omninav.stages.map_files.places import thinned_places
+from omninav.stages.map_files.references import thinned_references
+from omninav.stages.map_files.saved import read_saved, target, write_saved
 from omninav.stages.values.maps import ReferenceGraph
 
-from .places import thinned_places
-from .references import thinned_references
-from .saved import read_saved, target, write_saved
 
-
-class ThinMap(Stage):
+class ThinMap(Tool):
     """Writes a map with fewer references, at least `spacing` apart.
 
     In their order each reference takes the place of those around it, and their edges. Of a topological map, path images
     are left out, and no places. Raises BadInput where the file is no such map.
     """
 
-    maps: str | tuple[str, ...] | None = None
+    example = "a.omap spacing=0.5 out=thinned.omap"
+
+    maps: str | tuple[str, ...]
     """The map (.omap)."""
     spacing: Annotated[float, Bounds(gt=0, le=1e6)] = 0.5
     """Smallest distance (m) between two references, or two path images of a way."""
     out: str = "thinned.omap"
     """The file to write."""
 
-    class Out(Outputs):
-        """Nothing: it writes a file."""
-
-    def step(self, ctx: Context) -> Out:
+    def run(self, ctx: Context) -> None:
         """Thin the map."""
         (source,) = read_saved(self.maps, at_most=1)
         path, map = target(self.out, [source]), source.map
@@ -39,4 +37,3 @@ class ThinMap(Stage):
             few = thinned_places(map, self.spacing)
             write_saved(path, few, [source], f"thin spacing={self.spacing:g}")
             print(f"{path}: {len(few.ways)} of {len(map.ways)} path images, at least {self.spacing:g} m apart")
-        return self.Out()
