@@ -16,14 +16,14 @@ from omegaconf import OmegaConf
 from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.engine.compile_notice import compile_notice
 from omninav.pipeline.files import locked, write_json
-from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input, suggest
-from omninav.pipeline.graph.results import Metrics
+from omninav.pipeline.graph.problems import BadInput, ProblemsFound, as_bad_input
 from omninav.pipeline.run.execution import execute
 from omninav.pipeline.run.plan import Plan, plan
 from omninav.pipeline.run.resume import resume
 from omninav.pipeline.run.run_folder import Interrupted, start, was_started
 
 from .composition import complete
+from .objective import check_objective, objective_of
 from .terminal import show, show_report, show_results, shown, terminal_width
 
 OUTCOMES = "OMNINAV_OUTCOMES"
@@ -145,6 +145,8 @@ def _run(
     if sweep is not None and settings.get("plots") == "auto":
         settings["plots"] = "none"
     planned = check(settings)
+    if settings.get("objective"):
+        check_objective(settings["objective"], planned.graph)
     if sweep is None and folder is not None:
         no_run_in(folder)
     argv = ["omninav", *(sweep.overrides.split() if sweep else sys.argv[1:])]
@@ -159,17 +161,6 @@ def _run(
     else:
         show_report(run.folder)
     return objective_of(metrics, settings["objective"]) if settings.get("objective") else None
-
-
-def objective_of(metrics: Metrics, path: str) -> float | None:
-    """The figure that an optimiser works on; None where it is no number. Raises `BadInput` where there is no figure."""
-    from omninav.pipeline.report.quantities import numbers
-
-    found = numbers(metrics)
-    if path not in found:
-        raise BadInput(f"objective={path}: this run has no such figure; {suggest(path, found, 'figures')}")
-    value = found[path].value
-    return float(value) if isinstance(value, int | float) else None
 
 
 def no_run_in(folder: Path) -> Path:

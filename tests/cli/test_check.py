@@ -46,6 +46,20 @@ def test_an_engine_that_a_sweep_refuses_is_refused(tmp_path: Path, monkeypatch, 
     assert "engine.workers: -1, expected a whole number >= 1" in capsys.readouterr().err
 
 
+def test_an_objective_that_no_stage_measures_is_refused_before_the_run(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ["variant=omniview_cml", f"log={DRIVE}"]
+    for first in (["check"], []):
+        assert main([*first, *words, "objective=position_eror_m.median"]) == 2
+        assert (
+            "no stage of this graph measures 'position_eror_m'; did you mean 'position_error_m'?"
+            in capsys.readouterr().err
+        )
+    assert not list(tmp_path.iterdir())
+    for named in ("position_error_m.median", "after_convergence.loss_rate"):
+        assert main(["check", *words, f"objective={named}"]) == 0
+
+
 def test_a_folder_that_the_run_cannot_take_is_refused(tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     words = ["check", "variant=wander", "cache=null"]

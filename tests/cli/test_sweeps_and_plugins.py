@@ -161,6 +161,6 @@ def test_an_optimiser_whose_jobs_all_fail_says_so_in_a_line(omninav, shared_cach
 
 
 def test_an_objective_that_no_run_has_is_named_with_what_there_is(omninav, shared_cache: Path):
-    ended = omninav("variant=plain_matching", SHORT, f"cache={shared_cache}", "objective=position_eror_m.median")
+    ended = omninav("variant=plain_matching", SHORT, f"cache={shared_cache}", "objective=position_error_m.medan")
     assert ended.returncode == 2
     assert "did you mean 'position_error_m.median'?" in ended.stderr

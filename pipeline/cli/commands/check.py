@@ -11,6 +11,7 @@ from omegaconf import OmegaConf
 from omninav.pipeline.cli.composition import complete, composed, read_words
 from omninav.pipeline.cli.experiments import condition_words, planned_experiment
 from omninav.pipeline.cli.jobs import no_run_in
+from omninav.pipeline.cli.objective import check_objective
 from omninav.pipeline.engine.artifact import check_artifact, read_artifact
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.engine.prefix import prefix_nodes
@@ -42,6 +43,8 @@ def command(arguments: list[str]) -> int:
             return _check_experiment(planned_experiment(config, arguments))
         read_engine(OmegaConf.to_container(config.engine, resolve=True))
         planned = plan(complete(config))
+    if planned.config.get("objective"):
+        check_objective(planned.config["objective"], planned.graph)
     refuse_missing(planned.config)
     input_digests(planned)  # opens every file that the run reads
     for artifact in planned.artifacts:
