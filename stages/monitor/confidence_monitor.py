@@ -35,11 +35,35 @@ STEEPNESS = 4
 class ConfidenceMonitorState(State):
     """Where the robot would be now if each of the last images had been taken where its best match was: `places` (M, 3),
     the oldest first; how new each was: `novelties` (M,), and how much it still counts: `weights` (M,), 0 of a stretch
-    that was driven without an image."""
+    that was driven without an image. `estimates` (M, 3) are the poses stated with these images, carried to now, and
+    `doubts` (M,) how much each image still counts against its own; `contradicted` is the last image's share of it."""
 
     places: Array = field(default_factory=lambda: np.zeros((0, 3)))
     novelties: Array = field(default_factory=lambda: np.zeros(0))
     weights: Array = field(default_factory=lambda: np.zeros(0))
+    estimates: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    doubts: Array = field(default_factory=lambda: np.zeros(0))
+    contradicted: float = 0.0
+
+    def forget(self) -> None:
+        """Begin anew: the robot may be anywhere."""
+        self.places, self.estimates = np.zeros((0, 3)), np.zeros((0, 3))
+        self.novelties, self.weights, self.doubts = np.zeros(0), np.zeros(0), np.zeros(0)
+        self.contradicted = 0.0
+
+    def move(self, motion: Motion) -> None:
+        """Carry all poses along with the robot."""
+        moved = np.array((motion.x, motion.y, motion.turn))
+        self.places, self.estimates = compose(self.places, moved), compose(self.estimates, moved)
+
+    def add(self, place: Array, estimate: Array, novelty: float, weight: float, doubt: float, memory: float) -> None:
+        """Remember an image; the older ones count less by what this one counts, 1 / e after `memory` full ones."""
+        fading = math.exp(-max(weight, doubt) / memory)
+        self.places = np.concatenate([self.places, place[None]])[-MAX_IMAGES:]
+        self.estimates = np.concatenate([self.estimates, estimate[None]])[-MAX_IMAGES:]
+        self.novelties = np.concatenate([self.novelties, [novelty]])[-MAX_IMAGES:]
+        self.weights = np.concatenate([self.weights * fading, [weight]])[-MAX_IMAGES:]
+        self.doubts = np.concatenate([self.doubts * fading, [doubt]])[-MAX_IMAGES:]
 
 
 class ConfidenceMonitor(Stage):
@@ -52,8 +76,10 @@ class ConfidenceMonitor(Stage):
     times the belief's share within the tolerance is the confidence.
 
     An image counts as much as it does in the filter (the likelihood's novelty), and the more, the farther its best
-    match leads all matches elsewhere: one that resembles many places says nothing of any. A way without images raises
-    the probability that the robot was carried elsewhere, as images do.
+    match leads all matches elsewhere: one that resembles many places says nothing of any. It may still say where the
+    robot is not: it counts against its estimate, the more, the farther its best match leads all those around the
+    estimate, and fully if it is the first to do so, since it then repeats none before it. A way without images
+    raises the probability that the robot was carried elsewhere, as images do.
 
     How well it does, and where the defaults are from: docs/experiments/confidence.md.
     """
@@ -69,7 +95,7 @@ class ConfidenceMonitor(Stage):
     at which an image counts half."""
     strength: Annotated[float, Bounds(gt=0)] = 20.0
     """From how many images the share of agreements by chance is taken to be known."""
-    kidnapping_probability: Annotated[float, Bounds(ge=0, lt=1)] = 0.01
+    kidnapping_probability: Annotated[float, Bounds(ge=0, lt=1)] = 0.02
     """Probability per independent image, or per length scale driven without one, that the robot was carried elsewhere,
     or found itself again."""
 
@@ -98,20 +124,27 @@ class ConfidenceMonitor(Stage):
     ) -> Out:
         """One image, or a tick without one. `likelihood`: of the same image, for its novelty."""
         if ctx.tick.first_of_log or restart is not None:
-            recent.places, recent.novelties, recent.weights = np.zeros((0, 3)), np.zeros(0), np.zeros(0)
+            recent.forget()
         elif motion is not None:
-            recent.places = compose(recent.places, np.array((motion.x, motion.y, motion.turn)))
+            recent.move(motion)
         pose = np.array(pose_row(estimate.pose))
         gate, radians = max(self.within_m, length_scale.metres), math.radians(self.within_deg)
         if similarities is not None and similarities.values.size:
-            lead = lead_of_best(similarities, map, ELSEWHERE * gate)
-            distinct = 1.0 / (1.0 + (self.distinct_lead / max(lead, 1e-9)) ** STEEPNESS)
             novelty = 1.0 if likelihood is None else likelihood.novelty
-            self._remember(recent, best_place(similarities, map), novelty, distinct)
+            distinct = self._counted(lead_of_best(similarities, map, ELSEWHERE * gate))
+            against = self._counted(lead_over_pose(similarities, map, pose, ELSEWHERE * gate))
+            repeated = recent.contradicted > 0.5 and consistency(recent.estimates[-1:], pose, gate, radians)[0] > 0.5
+            first = 1.0 if against > 0.5 and not repeated else novelty
+            recent.contradicted = against
+            recent.add(best_place(similarities, map), pose, first, novelty * distinct, first * against, self.memory)
         elif motion is not None and (blind := math.hypot(motion.x, motion.y) / length_scale.metres) > 0.0:
-            self._remember(recent, pose, min(1.0, blind), 0.0)
+            recent.add(pose, pose, min(1.0, blind), 0.0, 0.0, self.memory)
+        agreeing = consistency(recent.places, pose, gate, radians)
+        disagreeing = np.maximum(
+            recent.weights * (1.0 - agreeing), recent.doubts * consistency(recent.estimates, pose, gate, radians)
+        )
         odds = log_odds_of_right(
-            consistency(recent.places, pose, gate, radians), recent.weights, recent.novelties,
+            recent.weights * agreeing, disagreeing, recent.novelties,
             when_wrong.share, self.strength, self.kidnapping_probability,
         )  # fmt: skip
         probability = mass_within(belief, pose, self.within_m, radians) / (1.0 + math.exp(-odds))
@@ -119,12 +152,9 @@ class ConfidenceMonitor(Stage):
             probability *= self.right_in_conflict
         return self.Out(confidence=PoseConfidence(probability))
 
-    def _remember(self, recent: ConfidenceMonitorState, place: Array, novelty: float, distinct: float) -> None:
-        weight = novelty * distinct
-        faded = recent.weights * math.exp(-weight / self.memory)
-        recent.places = np.concatenate([recent.places, place[None]])[-MAX_IMAGES:]
-        recent.novelties = np.concatenate([recent.novelties, [novelty]])[-MAX_IMAGES:]
-        recent.weights = np.concatenate([faded, [weight]])[-MAX_IMAGES:]
+    def _counted(self, lead: float) -> float:
+        """How much an image counts whose best match leads others by so many standard deviations, 0 to 1."""
+        return 1.0 / (1.0 + (self.distinct_lead / max(lead, 1e-9)) ** STEEPNESS)
 
 
 def best_place(similarities: Similarities, map: ReferenceGraph) -> Array:
@@ -141,17 +171,31 @@ def lead_of_best(similarities: Similarities, map: ReferenceGraph, elsewhere_m: f
     """The lead of the most similar reference over the best one elsewhere, in standard deviations of the similarity over
     all that were compared. Elsewhere: beyond so many metres, or seen from another heading; 0 where all show one place.
     """
-    weights, headings = similarities.sampling_weight, similarities.values.shape[1]
-    best = similarities.best.astype(np.float64)
-    places = map.poses[slice(None) if similarities.candidates is None else similarities.candidates]
-    turned = places[:, 2] + similarities.best_heading * (2.0 * math.pi / headings)
+    best, places = similarities.best, _compared(similarities, map)
+    turned = places[:, 2] + similarities.best_heading * (2.0 * math.pi / similarities.values.shape[1])
     row = int(best.argmax())
     away = np.hypot(*(places - places[row])[:, :2].T)
-    elsewhere = (away > elsewhere_m) | (np.abs(wrap(turned - turned[row])) > TURNED)
-    if not elsewhere.any():
+    return _lead_over((away > elsewhere_m) | (np.abs(wrap(turned - turned[row])) > TURNED), similarities)
+
+
+def lead_over_pose(similarities: Similarities, map: ReferenceGraph, pose: Array, near_m: float) -> float:
+    """The lead of the most similar reference over the best one near a pose (3,), seen from any heading, in the same
+    unit; 0 where no compared reference lies within so many metres: images say nothing of a place the map does not show.
+    """
+    return _lead_over(np.hypot(*(_compared(similarities, map) - pose)[:, :2].T) <= near_m, similarities)
+
+
+def _lead_over(rows: npt.NDArray[np.bool_], similarities: Similarities) -> float:
+    if not rows.any():
         return 0.0
+    best, weights = similarities.best.astype(np.float64), similarities.sampling_weight
     spread = math.sqrt(float(np.average(np.square(best - np.average(best, weights=weights)), weights=weights)))
-    return float(best[row] - best[elsewhere].max()) / max(spread, 1e-9)
+    return float(best.max() - best[rows].max()) / max(spread, 1e-9)
+
+
+def _compared(similarities: Similarities, map: ReferenceGraph) -> Array:
+    """Poses (N, 3) of the references that were compared."""
+    return map.poses if similarities.candidates is None else map.poses[similarities.candidates]
 
 
 def mass_within(belief: Particles, pose: Array, metres: float, radians: float) -> float:

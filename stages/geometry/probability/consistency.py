@@ -19,19 +19,18 @@ def consistency(places: Array, pose: Array, metres: float, radians: float) -> Ar
 
 
 def log_odds_of_right(
-    consistent: Array, weights: Array, novelties: Array, when_wrong: float, strength: float, kidnapping: float
+    agreeing: Array, disagreeing: Array, novelties: Array, when_wrong: float, strength: float, kidnapping: float
 ) -> float:
     """Log odds that an estimate is right, by which of the last images agree with it; (N,) each, the oldest first.
 
-    `consistent`: 1 where an image agrees, 0 where it does not; `weights`: how many images it counts as. While the
-    estimate is right, the share of consistent images is not known (light, people): uniform. While it is wrong, the
+    `agreeing`, `disagreeing`: as how many images each one speaks for and against the estimate. While the
+    estimate is right, the share of agreeing images is not known (light, people): uniform. While it is wrong, the
     share has a Beta distribution with mean `when_wrong`, as if known from `strength` images. Before each image
     the robot may have been carried elsewhere, so that an estimate that was right is wrong since, or the other way
     round, with a probability of `kidnapping` times the image's novelty. Likelihoods are Beta-binomial; more than one
     such change is not considered.
     """
-    agree = np.concatenate([[0.0], np.cumsum(weights * consistent)])
-    other = np.concatenate([[0.0], np.cumsum(weights * (1.0 - consistent))])
+    agree, other = (np.concatenate([[0.0], np.cumsum(counts)]) for counts in (agreeing, disagreeing))
     right, wrong = (1.0, 1.0), (when_wrong * strength, (1.0 - when_wrong) * strength)
     before = [_log_likelihood(agree, other, prior) for prior in (right, wrong)]
     since = [_log_likelihood(agree[-1] - agree, other[-1] - other, prior) for prior in (right, wrong)]

@@ -40,7 +40,8 @@ def test_area_under_roc_is_the_statistic_of_mann_and_whitney():
 
 def odds(consistent: list[float], kidnapping: float = 0.0) -> float:
     ones = np.ones(len(consistent))
-    return log_odds_of_right(np.array(consistent, float), ones, ones, 0.05, 20.0, kidnapping)
+    agreeing = np.array(consistent, float)
+    return log_odds_of_right(agreeing, ones - agreeing, ones, 0.05, 20.0, kidnapping)
 
 
 def test_the_odds_after_no_image_are_even_and_agreement_speaks_for_the_estimate():

@@ -38,14 +38,15 @@ def drive(
     spread: float = 0.05,
     novelty: float = 1.0,
     elsewhere: float = 0.0,
+    every: int = 2,
 ) -> list[float]:
     """Confidences along a line; the best match of each image is given (None: no image), `elsewhere` the similarity of
-    every fifth reference, and the estimate follows odometry."""
+    all references or of every so-many-th, and the estimate follows odometry."""
     monitor, recent, rng = ConfidenceMonitor(), ConfidenceMonitorState(), np.random.default_rng(1)
     told = []
     for n, match in enumerate(matches):
         values = np.zeros((len(LINE), 36), np.float32)
-        values[::5, 0] = elsewhere
+        values[::every, 0] = elsewhere
         values[0 if match is None else match, 0] = 0.9
         poses = np.array([at + step * n, 0.0, 0.0]) + rng.normal(0.0, spread, (500, 3))
         belief = Particles(poses, np.full(500, 1 / 500))
@@ -91,13 +92,27 @@ def test_a_kidnapped_robot_is_doubted_after_few_images_and_trusted_again_with_th
     assert told[19] > 0.5
 
 
-def test_images_that_resemble_many_places_neither_convince_nor_cast_doubt():
+def test_images_that_resemble_all_places_neither_convince_nor_cast_doubt():
     away = list(range(39, 27, -1))
-    agreed = drive([*range(12), *range(12, 24)], elsewhere=0.0)
     unclear = drive([*range(12), *away], elsewhere=0.89)
     assert unclear[-1] == pytest.approx(drive([0], elsewhere=0.89)[-1], abs=0.15)
-    assert agreed[-1] > 0.95
+    assert drive([*range(12), *range(12, 24)])[-1] > 0.95
     assert drive(list(range(12)), elsewhere=0.89)[-1] < 0.8
+
+
+def test_images_that_resemble_many_places_but_not_the_estimates_cast_doubt():
+    sure = list(range(15))
+    many = drive([*sure, *range(39, 29, -1)], elsewhere=0.89, every=15)  # 0, 15 and 30, which is not near
+    beyond = drive([*sure, *range(39, 29, -1)], at=-200.0, elsewhere=0.89, every=15)
+    assert many[14] < 0.8  # each of them alone is of several places
+    assert many[-1] < 0.2 < many[14]
+    assert (np.diff(beyond[15:]) < 0.05).all()
+
+
+def test_an_image_that_contradicts_the_estimate_counts_fully_and_its_repetitions_as_the_filter_says():
+    told = drive([*range(15), *range(30, 35)], novelty=0.2)
+    drop = -np.diff(told[14:20])
+    assert drop[0] > 2.0 * drop[1] > 0.0
 
 
 def test_a_way_without_images_lowers_the_confidence_and_standing_does_not():
