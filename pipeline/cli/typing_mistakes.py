@@ -48,7 +48,7 @@ def mistyped_word(arguments: Sequence[str]) -> str:
         if any(space in head for space in SPACES) and not Path(head).exists():
             return f"{word:.60}: a space in it is a no-break space; type it again"
         if word == "=":
-            return f"no spaces around =: type {before}={after}"
+            return f"no spaces around =: type {before or 'NAME'}={after or 'VALUE'}"
         if word.startswith("="):
             return f"{word:.60}: there is no name before =: type {before or 'name'}{word:.60}"
         if word in ("+", "++", "~") or head in ("+", "++", "~"):

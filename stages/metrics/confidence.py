@@ -11,10 +11,12 @@ from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.values.drive import Array, Drive, known
 
 QUANTITIES = {
-    "confidence.confident_share": Quantity(title="Frames with a confident estimate", unit="%", better="higher"),
-    "confidence.first_confident_frame": Quantity(title="First confident frame", better="lower", absent="never"),
+    "confidence.confident_share": Quantity(title="Images with a concentrated belief", unit="%", better="higher"),
+    "confidence.first_confident_frame": Quantity(
+        title="First image with a concentrated belief", better="lower", absent="never"
+    ),
     "confidence.probability": Quantity(title="Confidence, median", unit="%", better="higher", least=0.5),
-    "confidence.doubtful_share": Quantity(title="Frames with a confidence below a half", unit="%", better="lower"),
+    "confidence.doubtful_share": Quantity(title="Images with a confidence below a half", unit="%", better="lower"),
     "confidence.spread_m": Quantity(title="Spread of the belief, median", better="lower"),
     "confidence.weight": Quantity(title="Belief in the estimate, median", unit="%", better="higher"),
     "confidence.path_m": Quantity(title="Length of the estimated path", context=True),
@@ -33,9 +35,9 @@ MAX_SIGMA_M = 1.0
 class Confidence(Stage):
     """Measures a run without ground truth: how sure it was, and whether its estimates agree with odometry.
 
-    Under `confidence`, of the last log. An estimate is confident where it holds at least `min_weight` of the belief
+    Under `confidence`, of the last log. A belief is concentrated where the estimate holds at least `min_weight` of it
     and its position's largest standard deviation is at most `max_sigma_m`; that says how sure the method is, not that
-    it is right. `spread_m`: that standard deviation, `weight`: that share (medians); none of them for a method whose
+    it is right (`confident_share`, `first_confident_frame`). `spread_m`: that standard deviation, `weight`: that share (medians); none of them for a method whose
     belief is always a single pose. `probability`: the confidence that a monitor states (median), `doubtful_share`: the
     share of frames in which it is below a half. `path_m` and `odometry_path_m`: lengths of the estimated path and of
     odometry's; `step_off_odometry_m` and `turn_off_odometry_deg`: how far the estimate's motion from frame to frame

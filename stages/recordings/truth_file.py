@@ -69,7 +69,8 @@ def truth_from(
     if truth is None or not np.isfinite(truth).any():
         raise UnreadableRecording(
             f"{file}: none of the images of {recording.name} has a pose in it: its times are {_span(stamps)}, "
-            f"the images' {_span(shifted)}; clocks that differ: nodes.source.truth_clock_offset_s=SECONDS"
+            f"the images' {_span(shifted)}; clocks that differ: "
+            "nodes.source.truth_clock_offset_s=SECONDS, the file's clock minus the log's"
         )
     for kind, number, noun, what in (
         ("impossible_pose", impossible, "orientation", NO_ROTATION),

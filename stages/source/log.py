@@ -86,7 +86,7 @@ class LogSource(Source):
     """The true poses, where they are not on the log's own topic: a file beside it (TUM, or a CSV with time, x, y and
     heading), a topic, or a frame of a tf topic as /tf:PARENT:CHILD."""
     truth_clock_offset_s: Annotated[float, Bounds(ge=-1e10, le=1e10)] = 0.0
-    """An image taken at t is looked up in the file at t + this."""
+    """The file's clock minus the log's: an image taken at t is looked up in the file at t + this."""
     truth_max_gap_s: Annotated[float, Bounds(gt=0, le=3600)] = 0.5
     """How far in time a pose of the file may be from an image."""
     camera: str | None = None
