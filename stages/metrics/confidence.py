@@ -37,7 +37,8 @@ class Confidence(Stage):
 
     Under `confidence`, of the last log. A belief is concentrated where the estimate holds at least `min_weight` of it
     and its position's largest standard deviation is at most `max_sigma_m`; that says how sure the method is, not that
-    it is right (`confident_share`, `first_confident_frame`). `spread_m`: that standard deviation, `weight`: that share (medians); none of them for a method whose
+    it is right (`confident_share`, `first_confident_frame`).
+    `spread_m`: that standard deviation, `weight`: that share (medians); none of them for a method whose
     belief is always a single pose. `probability`: the confidence that a monitor states (median), `doubtful_share`: the
     share of frames in which it is below a half. `path_m` and `odometry_path_m`: lengths of the estimated path and of
     odometry's; `step_off_odometry_m` and `turn_off_odometry_deg`: how far the estimate's motion from frame to frame
