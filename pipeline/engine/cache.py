@@ -61,7 +61,8 @@ class Cache:
         except OSError as error:
             if error.errno not in DISK:
                 raise
-            where = f"cache: {error.filename or self.folder}: {error.strerror}"
+            file = Path(str(error.filename2 or error.filename or self.folder))  # of a copy, the file that it makes
+            where = f"cache: {file if file.is_relative_to(self.folder) else self.folder}: {error.strerror}"
             say_damaged(f"{where}; results are not kept there: free some space, or type cache=FOLDER")
 
     def discard(self, key: str, suffix: str, why: str) -> None:

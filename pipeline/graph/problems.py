@@ -90,7 +90,8 @@ HINTS = {
 def as_bad_input(error: BaseException) -> BadInput | None:
     """Advice on an error that no reader has put into words; None where it is a defect of ours."""
     if isinstance(error, OSError):
-        where = "" if error.filename is None else f"{error.filename}: "
+        file = error.filename if error.filename2 is None else error.filename2  # of a copy, the file that it makes
+        where = "" if file is None else f"{file}: "
         number = error.errno or 0
         if error.strerror != os.strerror(number):  # words of ours, which say what to do
             return BadInput(f"{where}{error.strerror or error}")

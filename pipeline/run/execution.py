@@ -17,7 +17,7 @@ from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.call import StageFailed
 from omninav.pipeline.engine.engine import Engine, EngineOptions
 from omninav.pipeline.engine.prefix import cached_prefix, keep_prefix
-from omninav.pipeline.files import digest_file, open_itself, whole_file, write_whole
+from omninav.pipeline.files import DISK, digest_file, open_itself, whole_file, write_whole
 from omninav.pipeline.graph.problems import BadInput
 from omninav.pipeline.graph.results import Metrics
 from omninav.pipeline.graph.value import Value
@@ -62,6 +62,8 @@ def running(run: RunFolder, planned: Plan, display: ProgressDisplay | None = Non
             _fail(run, "failed", str(error))
             raise
         except Exception as error:
+            if isinstance(error, OSError) and error.errno in DISK and error.filename is None:
+                error.filename = str(run.folder)  # writing to an open file names none
             _fail(run, "failed", f"{type(error).__name__}: {error}")
             raise
 

@@ -12,6 +12,8 @@ from conftest import DRIVE, TOUR
 import omninav
 from omninav.pipeline.engine.cache import Cache
 from omninav.pipeline.engine.disk_sequence import DiskSequence
+from omninav.pipeline.engine.engine import Engine
+from omninav.pipeline.graph.problems import as_bad_input
 
 
 def test_a_full_disk_names_the_file_that_it_could_not_take(tmp_path: Path) -> None:
@@ -44,6 +46,24 @@ def test_a_full_cache_is_said_and_the_run_goes_on(
     said = capsys.readouterr().err
     assert f"cache: {tmp_path}/cache/" in said
     assert "No space left on device; results are not kept there: free some space, or type cache=FOLDER" in said
+
+
+def test_a_copy_to_a_full_disk_names_the_file_that_it_makes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    copied = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "run/prefix.sequence", None, str(tmp_path / "a.prefix"))
+    with Cache(tmp_path).unless_full():
+        raise copied
+    assert f"cache: {tmp_path}/a.prefix: No space left on device" in capsys.readouterr().err
+    assert str(as_bad_input(copied)).startswith(f"{tmp_path}/a.prefix: No space left on device; free some space")
+
+
+def test_a_full_disk_that_names_no_file_names_the_runs_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(engine: Engine) -> bool:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Engine, "tick", full)
+    words = {"tour": TOUR, "log": DRIVE, "cache": None, "nodes.source.stop": 3, "progress": False}
+    with pytest.raises(omninav.BadInput, match=f"{tmp_path}/run: No space left on device; free some space"):
+        omninav.run("plain_matching", folder=tmp_path / "run", **words)
 
 
 def test_an_error_of_the_cache_that_is_no_full_disk_is_one(tmp_path: Path) -> None:
