@@ -68,7 +68,7 @@ def composed(arguments: Sequence[str], offer: bool = True) -> Iterator[Any]:
 
 
 def offer_plugins() -> None:
-    """Let `match=gradient` find a third party's stage `match.gradient`, as if it had a file in conf/match."""
+    """Let `match=gradient` find a third party's stage `match.gradient`, as those of omninav are found."""
     for entry in plugins():
         if entry.problem:
             print(f"plugin left out: {entry.problem}", file=sys.stderr)

@@ -1,7 +1,7 @@
 """The groups of configuration that omninav brings: which option puts which stage into a graph.
 
-A group's options are its files, and, where a role of stages has its name, every stage of that role: `match=l2` takes
-`match.l2` with its defaults. A file is there for what a name alone does not say: wires, or other values.
+A group's options are its files, those of `options.yaml`, and, where a role of stages has its name, every stage of that
+role: `match=l2` takes `match.l2` with its defaults. A file is there for what a node alone does not say, such as wires.
 """
 
 import functools
@@ -38,12 +38,7 @@ def suggest_option(group: str, option: str, options: Iterable[str], kind: str, p
 @functools.cache
 def replaced() -> dict[str, str]:
     """Reads hints for options (`group=option`) and settings that are gone: name -> what to type."""
-    import yaml
-
-    found: dict[str, str] = yaml.load(
-        files(CONF).joinpath("help/replaced.txt").read_text(encoding="utf-8"), yaml.CSafeLoader
-    )
-    return found
+    return _read("replaced.yaml")
 
 
 def learnable() -> list[str]:
@@ -63,21 +58,31 @@ def listed_groups() -> tuple[str, ...]:
     return tuple(name for name in listed if not name.startswith("override "))
 
 
-def stage_option(group: str, name: str) -> str | None:
-    """The `_target_` of the built-in stage that an option is named after (`match=l2`), None where there is none."""
-    entry = built_in_stage(group, name) if group in listed_groups() else None
-    return entry.target if entry is not None else None
+def node_option(group: str, name: str) -> dict[str, Any] | None:
+    """The node that an option is, of `options.yaml` or of the built-in stage that it is named after; None: neither."""
+    if group not in listed_groups():
+        return None
+    named = _named_nodes().get(group, {}).get(name)
+    entry = built_in_stage(group, name) if named is None else None
+    return {"_target_": entry.target} if entry is not None else named
 
 
-def stage_options(group: str) -> list[str]:
-    """The built-in stages that are options of a group, by name. Imports all of them."""
+def node_options(group: str) -> list[str]:
+    """The options of a group that are one node, by name. Imports the stages of its role."""
     offered = group in listed_groups() and is_role(group)
-    return [entry.name.partition(".")[2] for entry in of_role(group)] if offered else []
+    stages = [entry.name.partition(".")[2] for entry in of_role(group)] if offered else []
+    return [*_named_nodes().get(group, ()), *stages]
+
+
+@functools.cache
+def _named_nodes() -> dict[str, dict[str, dict[str, Any]]]:
+    """The content of `options.yaml`: group -> option -> node."""
+    return _read("options.yaml")
 
 
 def group_options(group: str) -> list[str]:
     """All options of a group that omninav brings, by name. Imports its stages."""
-    return sorted({file.name.removesuffix(".yaml") for file in group_files(group)} | {*stage_options(group)})
+    return sorted({file.name.removesuffix(".yaml") for file in group_files(group)} | {*node_options(group)})
 
 
 def refuse_null_groups(words: Sequence[str]) -> None:
@@ -86,7 +91,7 @@ def refuse_null_groups(words: Sequence[str]) -> None:
         name, _, value = word.partition("=")
         if value == "null" and name.isidentifier() and is_group(name):
             heads = [file.read_text(encoding="utf-8").partition("\n")[0] for file in group_files(name)]
-            one_node = is_role(name) or f"# @package nodes.{name}" in heads
+            one_node = is_role(name) or name in _named_nodes() or f"# @package nodes.{name}" in heads
             what = f"'~nodes.{name}' '~wires.{name}'" if one_node else f"'~{name}'"
             raise ProblemsFound([Problem(name, "it cannot be swapped for nothing", f"to take it out, type {what}")])
 
@@ -98,10 +103,13 @@ def settings_left_open() -> list[str]:
 
 @functools.cache
 def _config_file() -> dict[str, Any]:
+    return _read("config.yaml")
+
+
+def _read(name: str) -> dict[str, Any]:
     import yaml
 
-    text = files(CONF).joinpath("config.yaml").read_text(encoding="utf-8")
-    return dict(yaml.load(text, yaml.CSafeLoader))
+    return dict(yaml.load(files(CONF).joinpath(name).read_text(encoding="utf-8"), yaml.CSafeLoader))
 
 
 def options_with(entry: Entry) -> list[str]:
@@ -109,7 +117,7 @@ def options_with(entry: Entry) -> list[str]:
     role, _, name = entry.name.partition(".")
     if entry.origin != "built in":  # offered to Hydra under its own name
         return [f"{'' if is_group(role) else '+'}{role}={name}"]
-    own = [f"{role}={name}"] if stage_option(role, name) else []
+    own = [f"{role}={name}"] if node_option(role, name) else []
     return list(dict.fromkeys([*own, *_options().get(entry.target, [])]))
 
 
@@ -118,6 +126,9 @@ def _options() -> dict[str, list[str]]:
     import yaml
 
     found: dict[str, list[str]] = {}
+    for group, options in _named_nodes().items():
+        for name, node in options.items():
+            found.setdefault(node["_target_"], []).append(f"{group}={name}")
     for folder in sorted(files(CONF).iterdir(), key=lambda folder: folder.name):
         for file in group_files(folder.name) if folder.is_dir() else ():
             target = (yaml.load(file.read_text(encoding="utf-8"), yaml.CSafeLoader) or {}).get("_target_")

@@ -1,4 +1,4 @@
-"""Texts of `omninav --help` and `omninav COMMAND --help`: those in `omninav.conf`, and of tools."""
+"""Texts of `omninav --help` and `omninav COMMAND --help`: a section of `help.txt`, or a tool's arguments."""
 
 import re
 from collections.abc import Sequence
@@ -8,6 +8,8 @@ from .config_groups import CONF, group_options
 from .tools import tool_help, tools
 
 FLAGS = ("-h", "--help")
+SECTION = re.compile(r"^=== (\w+)\n(.*?\n)(?=\n===|\Z)", re.MULTILINE | re.DOTALL)
+"""A command's name in `help.txt`, and its text."""
 
 
 def asks_for_help(words: Sequence[str]) -> bool:
@@ -18,17 +20,14 @@ def asks_for_help(words: Sequence[str]) -> bool:
 def help_text(words: Sequence[str]) -> str:
     """The text of the command or tool that a command line names, of `omninav` where it names none."""
     named = [word for word in words if word not in (*FLAGS, "help")]
-    texts = files(CONF).joinpath("help")
+    texts = dict(SECTION.findall(files(CONF).joinpath("help.txt").read_text(encoding="utf-8")))
     found: list[str] = []
     tool = " ".join(named[:2])
     of_group = [one for one in tools() if named and one.startswith(f"{named[0]} ")]
-    if tool not in of_group and named and f"{named[0]}.txt" in {file.name for file in texts.iterdir()}:
-        text = texts.joinpath(f"{named[0]}.txt").read_text(encoding="utf-8")
-        found.append(re.sub(r"\{group:(\w+)\}", lambda match: _options(match[1]), text))
+    if tool not in of_group and named and named[0] in texts:
+        found.append(re.sub(r"\{group:(\w+)\}", lambda match: _options(match[1]), texts[named[0]]))
     found += map(tool_help, [tool] if tool in of_group else of_group)
-    if found:
-        return "\n".join(found)
-    return files(CONF).joinpath("help.txt").read_text(encoding="utf-8")
+    return "\n".join(found) or texts["omninav"]
 
 
 def _options(group: str) -> str:

@@ -303,7 +303,7 @@ class OdometryNoise:
     """Standard deviation of the rotation (rad) added per metre, 0.25 degrees."""
     added: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Further noise as in Wolf, Burgard & Burkhardt 2005: mm per sqrt(m), degrees per sqrt(360 degrees), degrees per
-    sqrt(m); `conf/odometry_noise` holds their nine levels."""
+    sqrt(m); `odometry_noise=nine_levels` holds theirs."""
 
 
 def mirror(columns: int = 640) -> dict[str, Any]:

@@ -27,10 +27,11 @@ from omninav.pipeline.graph.signature import signature
 from omninav.pipeline.run.plan import plan
 
 CONF = Path(__file__).resolve().parents[2] / "conf"
+OPTIONS = CONF / "options.yaml"
 FILES = [
     path
     for path in sorted(CONF.rglob("*.yaml"))
-    if path.name not in ("config.yaml", "test_worlds.yaml") and path.parent.name != "recording"
+    if path.parent != CONF and path.name != "test_worlds.yaml" and path.parent.name != "recording"
 ]
 
 
@@ -75,6 +76,8 @@ def stages_in(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
     """The nodes of a file that name their stage, each with its place in the file."""
     content = yaml.safe_load(path.read_text()) or {}
     nodes = content.get("nodes") or {}
+    if path == OPTIONS:
+        nodes = {f"{group}.{name}": node for group, options in content.items() for name, node in options.items()}
     for where, node in [("", content), *((f"nodes.{name}", node) for name, node in nodes.items())]:
         if isinstance(node, dict) and "_target_" in node:
             yield where, dict(node)
@@ -135,6 +138,17 @@ def no_default_is_repeated(path: Path) -> None:
             assert interpolated or problems or converted != parameters[name].default, (
                 f"{where}.{name} repeats the default"
             )
+
+
+def test_an_option_that_is_one_node_says_what_it_is_and_states_what_differs():
+    no_default_is_repeated(OPTIONS)
+    found = re.findall(r"^  # (.{10,}\.)  omninav (.*)\n  (\w+):", OPTIONS.read_text(), re.MULTILINE)
+    nodes = {name: group for group, options in yaml.safe_load(OPTIONS.read_text()).items() for name in options}
+    assert [name for _, _, name in found] == list(nodes)
+    for _, typed, name in found:
+        words = shlex.split(typed)
+        assert f"{nodes[name]}={name}" in words
+        compose(with_unlisted_parameters(words, []))
 
 
 def test_every_variant_builds():
