@@ -21,6 +21,7 @@ from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.homing import DrivingStatus, PathProgress
 from omninav.stages.values.map_places import AnyMap, map_poses
 from omninav.stages.values.planned_route import PlannedRoute
+from omninav.stages.values.similarity import Answers
 from omninav.stages.values.thumbnails import Thumbnails
 from omninav.stages.values.topological_map import TopologicalMap
 from omninav.stages.values.view_mixtures import ViewEvent, ViewMixtures
@@ -37,6 +38,8 @@ from .target_images import target_of
 
 Flags = npt.NDArray[np.bool_]
 Shown = Particles | GaussianMixture | PlaceBelief
+MAX_ANSWERS = 3
+"""References of an answer that are shown at most."""
 MAX_DOTS = 150
 """Particles that are drawn of a belief at most."""
 
@@ -48,6 +51,7 @@ class FrameByFrame(Stage):
     below the robot's, turned as the robot is turned against it. Of a map that is learned on the way the image is one of
     the drive's own `panoramas`, by the map's `events`, and the ring is where the robot was when it saw it.
 
+    With `answers` the most similar references of a database stand there, each with the error of the pose that it means.
     With `homing` the image is the robot's own, with the features that it follows; the target view, the homing vector,
     the planned route and the robot's state are shown too.
     """
@@ -73,6 +77,7 @@ class FrameByFrame(Stage):
         progress: Sequence[PathProgress | None] | None = None,
         statuses: Sequence[DrivingStatus | None] | None = None,
         routes: Sequence[PlannedRoute | None] | None = None,
+        answers: Sequence[Answers | None] | None = None,
     ) -> Out:
         """The whole run at once."""
         ticks = first_seen(events or ())
@@ -108,7 +113,9 @@ class FrameByFrame(Stage):
                 picture = picture_of_view(panoramas[seen], last.reference_turn[n])
             elif photographs and last.reference[n] >= 0:
                 picture = picture_of_reference(last.reference[n], last.reference_turn[n], map, thumbnails)
-            if picture is not None:
+            if (found := _of(answers, tick)) is not None and photographs:
+                photographs += _answers(found, last.truth[n], map, thumbnails)
+            elif picture is not None:
                 photographs.append(("best match in the map", picture))
             label = f"frame {int(last.frames[n])} · {last.seconds[n]:.1f} s"
             slides.append(Slide(label, layer.svg, tuple(photographs), tuple(facts)))
@@ -231,6 +238,26 @@ def _spot(drive: Drive, n: int, map: AnyMap | None) -> Array | None:
     poses = map.poses[map.places] if isinstance(map, TopologicalMap) else map.poses
     spot: Array = poses[reference]
     return spot
+
+
+def _answers(
+    found: Answers, truth: Array, map: AnyMap | None, thumbnails: Thumbnails | None
+) -> list[tuple[str, bytes]]:
+    """Captions and JPEG bytes of the most similar references, best first, with their errors where the truth is known."""
+    shown = []
+    for reference, similarity, turn in zip(found.references, found.similarities, found.turns, strict=True):
+        picture = picture_of_reference(int(reference), float(turn), map, thumbnails)
+        if picture is None:
+            continue
+        words = [f"{100 * similarity:.0f} %"]
+        if np.isfinite(truth).all():
+            pose = (map_poses(map)[reference] + (0.0, 0.0, turn))[None]
+            words.append(f"{position_errors(pose, truth[None])[0]:.1f} m")
+            words.append(f"{heading_errors_deg(pose, truth[None])[0]:.0f}°")
+        shown.append((f"match {len(shown) + 1}: {', '.join(words)}", picture))
+        if len(shown) == MAX_ANSWERS:
+            break
+    return shown
 
 
 def _pose_at(drive: Drive, tick: int) -> Array | None:

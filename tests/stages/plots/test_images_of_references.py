@@ -1,14 +1,13 @@
-import cv2
 import numpy as np
 import pytest
 from small_run import collected, small_run
 
 from omninav.pipeline import Context, Tick
 from omninav.pipeline.engine.codec import decode, encode
+from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.mapping.thumbnails import CollectThumbnails, ReferenceSnapshot, ThumbnailsState
 from omninav.stages.plots.frame_by_frame import FrameByFrame
 from omninav.stages.plots.panorama_snapshot import PanoramaSnapshot
-from omninav.stages.plots.retrieval_strip import RetrievalStrip
 from omninav.stages.values.image import Panorama, Windows
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
@@ -68,28 +67,24 @@ def test_windows_are_kept_side_by_side_from_the_left_to_the_right() -> None:
     assert "Windows" in figure.caption
 
 
-@pytest.mark.parametrize("with_thumbnails", [True, False])
-@pytest.mark.parametrize("kind", ["panorama", "windows"])
-def test_queries_and_their_answers_are_drawn(kind: str, with_thumbnails: bool) -> None:
+def test_the_answers_of_a_database_stand_beside_the_image_with_the_error_of_the_pose_that_each_means() -> None:
     run = small_run()
-    answers = Answers(np.arange(9), np.linspace(0.9, 0.5, 9).astype(np.float32), np.zeros(9))
-    seen = Panorama(plain(120, columns=160)[0]) if kind == "panorama" else windows(120, 40)
-    shots = [PanoramaSnapshot().step(CTX, tick, seen).snapshot for tick in run.ticks]
-    thumbnails = made_thumbnails(run.map) if with_thumbnails else None
-    drawn = [
-        RetrievalStrip().step(CTX, run.drive, shots, [answers] * len(run.ticks), run.map, thumbnails).figure
-        for _ in range(2)
-    ]
-    assert drawn[0] is not None
-    assert drawn[0].content == drawn[1].content
-    assert ("Without thumbnails" in drawn[0].caption) is not with_thumbnails
-    pixels = cv2.imdecode(np.frombuffer(drawn[0].content, np.uint8), cv2.IMREAD_COLOR)
-    assert pixels.shape[1] == 1100
-    assert pixels.std() > 5
-    assert len(drawn[0].content) < 400_000
-
-
-def test_a_drive_without_answers_has_no_strip() -> None:
-    run = small_run()
-    nothing = [None] * len(run.ticks)
-    assert RetrievalStrip().step(CTX, run.drive, nothing, nothing, run.map).figure is None
+    row = 4
+    near = np.argsort(np.hypot(*(run.map.poses - run.drive.truth[row])[:, :2].T))
+    answers = Answers(near[:9], np.linspace(0.9, 0.5, 9).astype(np.float32), np.full(9, 0.5))
+    shots = [PanoramaSnapshot().step(CTX, tick, Panorama(plain(120, columns=160)[0])).snapshot for tick in run.ticks]
+    every = [None if n == 0 else answers for n in range(len(run.ticks))]
+    given = {"map": run.map, "thumbnails": made_thumbnails(run.map), "answers": every}
+    figure = FrameByFrame().step(CTX, run.drive, shots, **given).figure
+    assert figure is not None
+    first, then = figure.slides[0], figure.slides[row]
+    assert [caption for caption, _ in first.photographs] == ["image"]
+    captions = [caption for caption, _ in then.photographs]
+    apart = np.hypot(*(run.map.poses[near[0]] - run.drive.truth[row])[:2])
+    turned = abs(np.degrees(float(wrap(run.map.poses[near[0], 2] + 0.5 - run.drive.truth[row, 2]))))
+    assert captions[:2] == ["image", f"match 1: 90 %, {apart:.1f} m, {turned:.0f}°"]
+    assert len(captions) == 4
+    assert [round(decoded(jpeg).mean() / 5) for _, jpeg in then.photographs[1:]] == near[:3].tolist()
+    without = FrameByFrame().step(CTX, run.drive, shots, **(given | {"thumbnails": None})).figure
+    assert without is not None
+    assert [len(slide.photographs) for slide in without.slides] == [1] * len(without.slides)
