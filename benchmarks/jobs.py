@@ -28,10 +28,7 @@ def rows() -> list[Row]:
 
 
 def _overhead(place: Path) -> list[Row]:
-    jobs = [
-        Job(str(n), "benchmarks.cluster.tasks:nothing", {}, place / f"{n}.log")
-        for n in range(EMPTY)
-    ]
+    jobs = [Job(str(n), "benchmarks.cluster.tasks:nothing", {}, place / f"{n}.log") for n in range(EMPTY)]
     with Workers(EngineSettings(workers=1), place) as workers:
         workers.run(jobs[:5])
         times = []

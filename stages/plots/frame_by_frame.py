@@ -243,7 +243,7 @@ def _spot(drive: Drive, n: int, map: AnyMap | None) -> Array | None:
 def _answers(
     found: Answers, truth: Array, map: AnyMap | None, thumbnails: Thumbnails | None
 ) -> list[tuple[str, bytes]]:
-    """Captions and JPEG bytes of the most similar references, best first, with their errors where the truth is known."""
+    """Captions and JPEG bytes of the most similar references, best first, with their errors where truth is known."""
     shown = []
     for reference, similarity, turn in zip(found.references, found.similarities, found.turns, strict=True):
         picture = picture_of_reference(int(reference), float(turn), map, thumbnails)
