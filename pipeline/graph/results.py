@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import field
 from typing import Any, Literal
 
+from .stage import Outputs, Stage
 from .value import Value
 
 
@@ -126,3 +127,21 @@ class Table(Value):
     columns: tuple[str, ...]
     rows: tuple[tuple[Any, ...], ...]
     order: int = 50
+
+
+class MetricStage(Stage):
+    """Base of stages that measure: `step` returns `self.Out(metrics=…)`, or `self.Out()` where nothing was measured."""
+
+    class Out(Outputs):
+        """`metrics`: entries of metrics.json."""
+
+        metrics: Metrics | None = None
+
+
+class FigureStage(Stage):
+    """Base of stages that plot: `step` returns `self.Out(figure=…)`, or `self.Out()` where there is nothing to show."""
+
+    class Out(Outputs):
+        """`figure`: for the report."""
+
+        figure: Figure | None = None

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Stage, Tick
 from omninav.pipeline.mcap.message_types import encode_message, standard_types
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.pose_messages import (
@@ -71,9 +71,6 @@ class Publish(Stage):
     command_type: Literal["TwistStamped", "Twist"] = "TwistStamped"
     """As Nav2 has them since Kilted, or without a header."""
 
-    class Out(Outputs):
-        """Nothing: what is published is the result."""
-
     def setup(self, ctx: Context) -> None:
         """Join the domain."""
         self._transport: Transport = connect(self.transport, self.domain)
@@ -88,10 +85,10 @@ class Publish(Stage):
         odometry: Pose | None = None,
         command: Command | None = None,
         conflicts: Conflicts | None = None,
-    ) -> Out:
+    ) -> None:
         """Publish what there is. Nothing while a record is made again."""
         if not self._transport.status.live:
-            return self.Out()
+            return
         if self.command is not None and (command is not None or self._watchdog is not None):
             self._drive(tick.stamp, command or Command(0.0, 0.0))
         if estimate is not None:
@@ -99,7 +96,6 @@ class Publish(Stage):
         if conflicts is not None:
             self._transport.status.note("conflicts", "; ".join(conflicts.standing))
         self._transport.status.published(tick.stamp)
-        return self.Out()
 
     def _publish_estimate(self, stamp: int, estimate: PoseEstimate, odometry: Pose | None) -> None:
         self._transport.status.spread_m = float(np.sqrt(max(0.0, np.trace(estimate.covariance[:2, :2]))))
@@ -152,20 +148,16 @@ class PublishBelief(Stage):
     map_frame: str = MAP
     """The map's frame."""
 
-    class Out(Outputs):
-        """Nothing: what is published is the result."""
-
     def setup(self, ctx: Context) -> None:
         """Join the domain."""
         self._transport: Transport = connect(self.transport, self.domain)
 
-    def step(self, ctx: Context, tick: Tick, belief: Particles | GaussianMixture | None = None) -> Out:
+    def step(self, ctx: Context, tick: Tick, belief: Particles | GaussianMixture | None = None) -> None:
         """One tick. `belief`: thinned. Nothing while a record is made again."""
         if self.topic is not None and belief is not None and self._transport.status.live:
             kind, fields = self._message(belief)
             content = encode_message(kind, {"header": header(tick.stamp, self.map_frame)} | fields)
             send(self._transport, self.topic, kind, content)
-        return self.Out()
 
     def _message(self, belief: Particles | GaussianMixture) -> tuple[str, Fields]:
         poses = pose_messages(belief.poses if isinstance(belief, Particles) else belief.means)
@@ -187,19 +179,15 @@ class PublishMessages(Stage):
     grid: str = "/grid"
     """What `/grid` is published as: nav2 reads its map on `/map`."""
 
-    class Out(Outputs):
-        """Nothing: what is published is the result."""
-
     def setup(self, ctx: Context) -> None:
         """Join the domain."""
         self._transport: Transport = connect(self.transport, self.domain)
 
-    def step(self, ctx: Context, messages: RosMessages) -> Out:
+    def step(self, ctx: Context, messages: RosMessages) -> None:
         """One tick."""
         if self._transport.status.live:
             for topic, msgtype, data in zip(messages.topics, messages.types, messages.data, strict=True):
                 send(self._transport, self.grid if topic == "/grid" else topic, msgtype, data, latched=True)
-        return self.Out()
 
 
 def register_nav2() -> None:

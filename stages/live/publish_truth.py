@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Outputs, Stage, Tick
+from omninav.pipeline import Bounds, Context, Stage, Tick
 from omninav.pipeline.mcap.message_types import encode_message
 from omninav.stages.recordings.pose_messages import header, ros_pose
 from omninav.stages.values.drive_tally import DriveTally
@@ -21,18 +21,14 @@ class PublishTruth(Stage):
     domain: Annotated[int, Bounds(ge=0, le=232)] | None = None
     """The ROS domain; null: `ROS_DOMAIN_ID`, else 0."""
 
-    class Out(Outputs):
-        """Nothing: it is sent."""
-
     def setup(self, ctx: Context) -> None:
         """Join the domain."""
         self._transport = connect("rclpy" if self.transport == "ros2" else self.transport, self.domain)
 
-    def step(self, ctx: Context, tick: Tick, truth: Pose, tally: DriveTally) -> Out:
+    def step(self, ctx: Context, tick: Tick, truth: Pose, tally: DriveTally) -> None:
         """One tick; it has the stamp that the driver gave it."""
         fields = {"header": header(tick.stamp), "pose": ros_pose(np.array([truth.x, truth.y, truth.heading]))}
         pose = "geometry_msgs/msg/PoseStamped"
         self._transport.publish("/ground_truth/pose", pose, encode_message(pose, fields))
         number = encode_message("std_msgs/msg/UInt32", {"data": tally.collisions})
         self._transport.publish("/collisions", "std_msgs/msg/UInt32", number)
-        return self.Out()

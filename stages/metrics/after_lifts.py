@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.values.drive import Array, Drive, known
@@ -22,7 +22,7 @@ JUMP_M = 0.5
 """Distance between true motion and odometry of one frame from which the robot was lifted, metres."""
 
 
-class AfterLifts(Stage):
+class AfterLifts(MetricStage):
     """Measures the time from each lifting of the robot until the estimate is right again, in the last log.
 
     The robot was lifted between two frames where its true motion is not that of odometry: it was turned, or put down
@@ -37,12 +37,7 @@ class AfterLifts(Stage):
     jump_deg: Annotated[float, Bounds(gt=0)] = 15.0
     """The same of their turns (degrees)."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `lifts` of metrics.json, absent without lifts."""
-
-        metrics: Metrics | None = None
-
-    def step(self, ctx: Context, drive: Drive) -> Out:
+    def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
         log = drive.last_log
         log = log.at(known(log.truth) & known(log.estimate))

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.maps import ReferenceGraph
@@ -20,13 +20,13 @@ QUANTITIES = {
 }
 
 
-class AnswersNearBy(Stage):
+class AnswersNearBy(MetricStage):
     """Measures what share of a query's most similar images show the same scene.
 
     Wolf, Burgard & Burkhardt 2005, Figure 5: nine answers to a query. Of the last log, under `answers`, on average over
     the images: `nearby_rate`, the share of the answers that were taken within `within_m` of the robot and look the same
     way; `first_nearby_rate`, that of the first ones; `background_rate`, that share of the whole map; the similarities
-    of the first and the last answer. Images that nothing near by was taken of count too.
+    of the first and the last answer. Images that nothing near by was taken of count too. Gives nothing without truth.
     """
 
     within_m: Annotated[float, Bounds(gt=0)] = 5.0
@@ -34,12 +34,9 @@ class AnswersNearBy(Stage):
     within_deg: Annotated[float, Bounds(gt=0, le=180)] = 30.0
     """Largest difference of the directions in which both look, by half of a window's field."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `answers` of metrics.json; absent without truth."""
-
-        metrics: Metrics | None = None
-
-    def step(self, ctx: Context, drive: Drive, answers: Sequence[Answers | None], map: ReferenceGraph) -> Out:
+    def step(
+        self, ctx: Context, drive: Drive, answers: Sequence[Answers | None], map: ReferenceGraph
+    ) -> MetricStage.Out:
         """The whole run at once."""
         last = drive.last_log
         last = last.at(known(last.truth))

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import spearmanr
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.appearance.visual_distance import colour_distances
 from omninav.stages.values.compared_views import ComparedViews
 from omninav.stages.values.local_features import GlobalDescriptor
@@ -27,7 +27,7 @@ QUANTITIES = {
 }
 
 
-class ComparedPairs(Stage):
+class ComparedPairs(MetricStage):
     """Tests claims about comparing views (Goedemé et al. 2007, section 4.2) on every pair of a tour's views.
 
     Under `comparison`: `passed_rate`, the share of pairs whose global colours are close enough for their local features
@@ -43,18 +43,13 @@ class ComparedPairs(Stage):
     within_m: Annotated[float, Bounds(gt=0)] = 8.0
     """Distance of views (m) up to which visual distances are looked at."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `comparison` of metrics.json."""
-
-        metrics: Metrics
-
     def step(
         self,
         ctx: Context,
         views: ComparedViews,
         rooms: Rooms | None = None,
         other_light: Sequence[GlobalDescriptor | None] = (),
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The whole tour at once. `other_light`: of each of its images, the colours of its place in other light."""
         one, other = np.triu_indices(len(views), 1)
         colours = np.stack([each.values for each in views.descriptors]).astype(np.float64)

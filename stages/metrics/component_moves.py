@@ -5,12 +5,12 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage
 from omninav.stages.values.drive import Array
 from omninav.stages.values.view_mixtures import MixturesNow
 
 
-class ComponentMoves(Stage):
+class ComponentMoves(MetricStage):
     """Measures how far the places at which views are seen move with each update, against how many they have had.
 
     Gross, Koenig & Müller 2005, section 2.3: "the influence of a single update step decreases with time, and the MoG
@@ -30,12 +30,7 @@ class ComponentMoves(Stage):
     min_components: Annotated[int, Bounds(ge=1)] = 10
     """Components that a curve needs."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `component_moves` of metrics.json."""
-
-        metrics: Metrics
-
-    def step(self, ctx: Context, mixtures: Sequence[MixturesNow | None]) -> Out:
+    def step(self, ctx: Context, mixtures: Sequence[MixturesNow | None]) -> MetricStage.Out:
         """The whole run at once."""
         often = [moved[: self.moves] for moved in moves(mixtures, self.near_m) if len(moved) >= self.moves]
         enough = len(often) >= self.min_components

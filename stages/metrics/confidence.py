@@ -5,7 +5,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.values.drive import Array, Drive, known
@@ -32,7 +32,7 @@ MAX_SIGMA_M = 1.0
 """Largest standard deviation of the position of a confident estimate."""
 
 
-class Confidence(Stage):
+class Confidence(MetricStage):
     """Measures a run without ground truth: how sure it was, and whether its estimates agree with odometry.
 
     Under `confidence`, of the last log. A belief is concentrated where the estimate holds at least `min_weight` of it
@@ -43,7 +43,7 @@ class Confidence(Stage):
     share of frames in which it is below a half. `path_m` and `odometry_path_m`: lengths of the estimated path and of
     odometry's; `step_off_odometry_m` and `turn_off_odometry_deg`: how far the estimate's motion from frame to frame
     is from odometry's (medians): jumps of the estimate are large there. `similarity` of the best match, where the
-    comparison has one.
+    comparison has one. Gives nothing where the log has ground truth.
     """
 
     min_weight: Annotated[float, Bounds(ge=0, le=1)] = MIN_WEIGHT
@@ -51,12 +51,7 @@ class Confidence(Stage):
     max_sigma_m: Annotated[float, Bounds(gt=0)] = MAX_SIGMA_M
     """Largest standard deviation of a confident estimate's position."""
 
-    class Out(Outputs):
-        """`metrics`: absent where the log has ground truth."""
-
-        metrics: Metrics | None = None
-
-    def step(self, ctx: Context, drive: Drive) -> Out:
+    def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
         if drive.has_truth or not known(drive.estimate).any():
             return self.Out()

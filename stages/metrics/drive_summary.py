@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.drive import Drive
 
 MIN_SPEED = 0.03
@@ -18,19 +18,14 @@ QUANTITIES = {
 }
 
 
-class DriveSummary(Stage):
+class DriveSummary(MetricStage):
     """Measures how long and how far a robot drove by itself, and in a simulated world its collisions.
 
     `stopped_share`: of the time from its first move to its last, in which it made no way. Of a real robot nobody
     tallies contacts, and the distance is that of its odometry.
     """
 
-    class Out(Outputs):
-        """`metrics`: the entry `drive` of metrics.json."""
-
-        metrics: Metrics
-
-    def step(self, ctx: Context, drive: Drive) -> Out:
+    def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
         values: dict[str, Any] = {"duration_s": float(drive.seconds[-1]) if len(drive) else 0.0}
         tallied = np.flatnonzero(np.isfinite(drive.distance))

@@ -5,14 +5,14 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive, known
 
 Index = npt.NDArray[np.int64]
 
 
-class ErrorCurves(Stage):
+class ErrorCurves(MetricStage):
     """Follows the error of the estimate and of odometry alone along the last log that has ground truth.
 
     `laps`: a list with an entry for each lap: `frames`, the mean, median and largest position error and the mean
@@ -32,16 +32,11 @@ class ErrorCurves(Stage):
     distance_m: Annotated[float, Bounds(gt=0)] = 1.0
     """Width (m) of a step of `over_distance`."""
 
-    class Out(Outputs):
-        """`metrics`: the entries `laps`, `over_steps` and `over_distance` of metrics.json."""
-
-        metrics: Metrics
-
     def step(
         self,
         ctx: Context,
         drive: Drive,
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The whole run at once."""
         logs = [log for log in drive.by_log if log.has_truth]
         return self.Out(

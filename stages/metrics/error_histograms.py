@@ -4,7 +4,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage
 from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.values.drive import Array, Drive, known
 
@@ -14,7 +14,7 @@ LARGE_M = 2.0
 """Error above which it is large, metres."""
 
 
-class ErrorHistograms(Stage):
+class ErrorHistograms(MetricStage):
     """Counts how often position errors of each size occur, in every log that has ground truth.
 
     Gross, Koenig & Müller 2005, Figures 5 and 6. `error_histograms`: a list with an entry for each log: lists over the
@@ -29,12 +29,7 @@ class ErrorHistograms(Stage):
     skip: Annotated[float, Bounds(ge=0, lt=1)] = 0.0
     """Share of each log's frames, from its start, that does not count."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `error_histograms` of metrics.json."""
-
-        metrics: Metrics
-
-    def step(self, ctx: Context, drive: Drive) -> Out:
+    def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
         logs = [log.at(slice(int(self.skip * len(log)), None)) for log in drive.by_log]
         scored = [log.at(known(log.truth) & known(log.estimate)) for log in logs]

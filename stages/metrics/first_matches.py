@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import BadInput, Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import BadInput, Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.camera.model import Camera
 from omninav.stages.geometry.appearance.feature_matching import NO_PAIRS, Pairs, mahalanobis_matches, one_way_matches
 from omninav.stages.geometry.appearance.visual_distance import ComparisonOptions, match_patches
@@ -55,7 +55,7 @@ QUANTITIES = {
 }
 
 
-class FirstMatches(Stage):
+class FirstMatches(MetricStage):
     """Counts how many matches of pairs of images are right, from the best to the worst, up to the first wrong one.
 
     Goedemé et al. 2007, section 3.2: of a pair "the first 13 matches are correct". The first image of each pair lies
@@ -90,11 +90,6 @@ class FirstMatches(Stage):
     epipolar_deg: Annotated[float, Bounds(gt=0)] = 1.0
     """Largest angle (degrees) to the epipolar plane, where depths are not known."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `matches` of metrics.json."""
-
-        metrics: Metrics
-
     def step(
         self,
         ctx: Context,
@@ -106,7 +101,7 @@ class FirstMatches(Stage):
         other_features: Sequence[LocalFeatures | None] = (),
         other_segments: Sequence[VerticalSegments | None] = (),
         other_depths: Sequence[Depths | None] = (),
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The whole log at once. The `other_` ones are of the same places in other light: the second image of each pair
         is one of these, where they are there."""
         there = [row for row, pose in enumerate(truth) if pose is not None]

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Outputs, Stage
+from omninav.pipeline import Context, Stage
 from omninav.pipeline.tables import write_table
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive, known
@@ -42,10 +42,7 @@ class FramesTable(Stage):
     | `place` | the most probable place of a topological map |
     """
 
-    class Out(Outputs):
-        """Nothing: the files are the result."""
-
-    def step(self, ctx: Context, drive: Drive) -> Out:
+    def step(self, ctx: Context, drive: Drive) -> None:
         """The whole run at once."""
         if ctx.folder is not None:
             logs = [columns_of(log) for log in drive.by_log] or [columns_of(drive)]
@@ -53,7 +50,6 @@ class FramesTable(Stage):
             for name in ("reference", "place", "confident"):
                 table[name] = np.ma.masked_less(table[name], 0)
             write_table(ctx.folder / "frames", table)
-        return self.Out()
 
 
 def columns_of(drive: Drive) -> Columns:

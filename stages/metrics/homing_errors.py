@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.se2 import between, wrap
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.homing import HomingVector, PathProgress
@@ -31,16 +31,16 @@ HEADLINES = tuple(
 )
 
 
-class HomingErrors(Stage):
+class HomingErrors(MetricStage):
     """Measures how close a robot comes to its first pose by homing, and the errors of its homing vectors.
 
     It begins where the robot was put down last, or where it drove to that is furthest away. Under `homing`: `start_m`,
-    how far away that is; `arrived`, whether it said so (1 or 0); `reached`, whether it was within `within_m` of
-    the target then; `end_error_m` and `end_turn_deg`, from the first pose to the last (and
-    `end`, the same as experiments that pool runs read it); `time_s` until it arrived; `lost_rate`, the share of ticks
-    in which the target was lost; `direction_error_deg` (median, p90, max), between the homing vector and the true
-    direction of the target; `inliers`, median; `first`: `direction_error_deg`, `turn_error_deg` and `inliers` of the
-    first vector, None where the target was not found at first.
+    how far away that is; `arrived`, whether it said so (1 or 0); `reached`, whether it was within `within_m` of the
+    target then; `end_error_m` and `end_turn_deg`, from the first pose to the last (and `end`, the same as experiments
+    that pool runs read it); `time_s` until it arrived; `lost_rate`, the share of ticks in which the target was lost;
+    `direction_error_deg` (median, p90, max), between the homing vector and the true direction of the target; `inliers`,
+    median; `first`: `direction_error_deg`, `turn_error_deg` and `inliers` of the first vector, None where the target
+    was not found at first. Gives nothing where there was never a vector, or no truth.
     """
 
     from_m: Annotated[float, Bounds(ge=0)] = 0.3
@@ -49,18 +49,13 @@ class HomingErrors(Stage):
     within_m: Annotated[float, Bounds(gt=0)] = 0.5
     """Largest distance (m) from the target at which it is reached."""
 
-    class Out(Outputs):
-        """Absent where there was never a vector, or no truth."""
-
-        metrics: Metrics | None = None
-
     def step(
         self,
         ctx: Context,
         drive: Drive,
         vectors: Sequence[HomingVector | None],
         progress: Sequence[PathProgress | None],
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The whole run at once."""
         poses = drive.truth
         if not len(poses) or not known(poses).all():

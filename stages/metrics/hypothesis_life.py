@@ -5,13 +5,13 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.belief import GaussianMixture
 from omninav.stages.values.drive import Array, Drive
 
 
-class HypothesisLife(Stage):
+class HypothesisLife(MetricStage):
     """Measures how many updates wrong hypotheses stay in a belief of Gaussians, and how their weight falls meanwhile.
 
     Gross, Koenig & Müller 2005, section 2.1: "the weights of all unsupported components will be reduced passively …
@@ -29,18 +29,13 @@ class HypothesisLife(Stage):
     points: Annotated[int, Bounds(ge=1)] = 30
     """Length of the list."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `wrong_hypotheses` of metrics.json, absent where there is none."""
-
-        metrics: Metrics | None = None
-
     def step(
         self,
         ctx: Context,
         drive: Drive,
         beliefs: Sequence[GaussianMixture],
         wrong: Sequence[GaussianMixture | None],
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The whole run at once."""
         motions = np.nan_to_num(drive.motion)
         places: dict[int, Array] = {}  # of the wrong hypotheses that are not gone yet, by the row of their statement

@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive, known
 
@@ -25,7 +25,7 @@ QUANTITIES = {
 }
 
 
-class LocalisedShare(Stage):
+class LocalisedShare(MetricStage):
     """Measures the share of frames within the usual error thresholds, and how long a lost robot takes to recover.
 
     Of the last log. `localised`: the share of frames within 0.25 m and 2 degrees (`fine`), 0.5 m and 5 degrees
@@ -33,18 +33,13 @@ class LocalisedShare(Stage):
     "Benchmarking 6DOF outdoor visual localization in changing conditions", section 5). `relocalisation`: `times_lost`,
     how often the position error rose above `lost_m`, a global start included; `frames` and `metres` of true path, the
     medians, until it stayed below 1 m (`lost_m` where that is less) and 20 degrees for ten frames; `never`: how often
-    it did not until the end.
+    it did not until the end. Gives nothing without ground truth.
     """
 
     lost_m: Annotated[float, Bounds(gt=0)] = 2.5
     """Position error (m) above which the robot counts as lost."""
 
-    class Out(Outputs):
-        """`metrics`: absent without ground truth."""
-
-        metrics: Metrics | None = None
-
-    def step(self, ctx: Context, drive: Drive) -> Out:
+    def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
         last = drive.last_log
         last = last.at(known(last.truth) & known(last.estimate))

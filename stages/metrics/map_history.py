@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.view_mixtures import ViewEvent
@@ -24,7 +24,7 @@ QUANTITIES = {
 }
 
 
-class MapHistory(Stage):
+class MapHistory(MetricStage):
     """Counts references added and removed, and measures the odometry drift while the first of them were learned.
 
     A reference comes in the frame in which it was seen, however much later it is learned, and goes in the frame in
@@ -45,18 +45,13 @@ class MapHistory(Stage):
     points: Annotated[int, Bounds(ge=1)] = 60
     """Length of the lists of `map_over_steps`."""
 
-    class Out(Outputs):
-        """`metrics`: the entries `map`, `map_over_steps`, `map_per_lap` and `first_map` of metrics.json."""
-
-        metrics: Metrics
-
     def step(
         self,
         ctx: Context,
         drive: Drive,
         events: Sequence[ViewEvent | None],
         after_last: ViewEvent | None = None,
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The whole run at once."""
         logs = drive.by_log
         counts = counted(events, after_last)

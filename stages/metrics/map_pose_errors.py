@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.drive import pose_rows
 from omninav.stages.values.maps import ReferenceEvent, ReferenceGraph
 from omninav.stages.values.pose import Pose
@@ -21,18 +21,13 @@ QUANTITIES = {
 }
 
 
-class MapPoseErrors(Stage):
+class MapPoseErrors(MetricStage):
     """Measures the positions of references by odometry against true ones, where the log has both.
 
     Under `map_error`: the root mean square distance (m) after the map as a whole was moved and turned to fit best,
     `as_driven_m` by odometry and `straightened_m` by the map that is saved; `references`, of how many. Nothing for a
     map whose poses are true ones.
     """
-
-    class Out(Outputs):
-        """Absent where there is nothing to measure."""
-
-        metrics: Metrics | None = None
 
     def step(
         self,
@@ -41,7 +36,7 @@ class MapPoseErrors(Stage):
         truth: Sequence[Pose | None],
         map: ReferenceGraph,
         straightened: ReferenceGraph,
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The map at the end of the run."""
         if map.pose_source == "truth" or not len(map):
             return self.Out()

@@ -1,6 +1,6 @@
 """Size of a map."""
 
-from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.maps import ReferenceGraph
 
 QUANTITIES = {
@@ -12,15 +12,10 @@ QUANTITIES = {
 }
 
 
-class MapSize(Stage):
+class MapSize(MetricStage):
     """Measures the size of the map: bytes of its arrays as stored, references, edges, and where its poses come from."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `map` of metrics.json."""
-
-        metrics: Metrics
-
-    def step(self, ctx: Context, map: ReferenceGraph) -> Out:
+    def step(self, ctx: Context, map: ReferenceGraph) -> MetricStage.Out:
         """The map at the end of the run."""
         size = map.features.nbytes + map.poses.nbytes + map.edges.nbytes
         ctx.fact("map_poses", map.pose_source)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.geometry.two_views.epipolar import shared_residuals, turn_about_vertical
 from omninav.stages.geometry.two_views.true_matches import right_by_epipolar
@@ -49,7 +49,7 @@ class Judged(NamedTuple):
     right: npt.NDArray[np.bool_]
 
 
-class MatchedAndTracked(Stage):
+class MatchedAndTracked(MetricStage):
     """Compares the matched pairs from which a local map was triangulated with the same features as they are tracked.
 
     Goedemé et al. 2007, section 7.1.2, where matches of the first and the target image are called "more plentiful and
@@ -70,11 +70,6 @@ class MatchedAndTracked(Stage):
     apart_m: Annotated[float, Bounds(gt=0)] = 0.3
     """Images closer than this (m) are not compared: a map that was not tracked so far has no tracks."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `pairs` of metrics.json, absent where there is nothing to compare."""
-
-        metrics: Metrics | None = None
-
     def step(
         self,
         ctx: Context,
@@ -84,7 +79,7 @@ class MatchedAndTracked(Stage):
         targets: Sequence[HomingTarget | None],
         features: Sequence[LocalFeatures | None],
         correspondences: Sequence[Correspondences | None],
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The whole run at once; `tracks` are the tracker's, `correspondences` those of `features` and the target's."""
         poses = drive.truth
         if not len(poses) or not known(poses).all():

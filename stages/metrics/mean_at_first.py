@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.grid import FreeSpace
 
@@ -11,19 +11,15 @@ QUANTITIES = {
 }
 
 
-class MeanAtFirst(Stage):
+class MeanAtFirst(MetricStage):
     """Measures the distance (m) between the mean of the first image's belief and the middle of the free space.
 
     Wolf, Burgard & Burkhardt 2005, section VI-B: with the mean of the samples as the estimate "in the beginning, the
-    estimated position is always close to the center of the map". The middle is the mean of all free cells.
+    estimated position is always close to the center of the map". The middle is the mean of all free cells. Gives
+    nothing without a belief.
     """
 
-    class Out(Outputs):
-        """`metrics`: the entry `mean_at_first` of metrics.json; absent without a belief."""
-
-        metrics: Metrics | None = None
-
-    def step(self, ctx: Context, drive: Drive, free: FreeSpace) -> Out:
+    def step(self, ctx: Context, drive: Drive, free: FreeSpace) -> MetricStage.Out:
         """The whole run at once."""
         means = drive.last_log.mean
         means = means[known(means)]

@@ -9,7 +9,7 @@ import networkx
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.topological_map import TopologicalMap
@@ -37,7 +37,7 @@ HEADLINES = tuple(
 )
 
 
-class Navigation(Stage):
+class Navigation(MetricStage):
     """Measures how a drive to a goal ended: the entry `navigation` of metrics.json.
 
     `reached`: the robot said that it has arrived, close to where the medoid of the route's last place was taken;
@@ -47,16 +47,11 @@ class Navigation(Stage):
     `state` and `reason`: what it last said. `reached_rate` and `collision_free_rate`: 1 or 0, for means over drives.
     Only of drives that reached their goal: `path_length_ratio`, the path driven over the shortest; `time_per_metre_s`,
     seconds for a metre of the shortest; `reached_error_m`, how far from the place it ended. Truth of the map's poses
-    that is not known gives None.
+    that is not known gives None. Gives nothing where no route was ever planned and no truth is known.
     """
 
     within_m: Annotated[float, Bounds(gt=0)] = 0.5
     """Largest distance (m) from the goal at which it is reached."""
-
-    class Out(Outputs):
-        """`metrics`: absent where no route was ever planned and no truth is known."""
-
-        metrics: Metrics | None = None
 
     def step(
         self,
@@ -64,7 +59,7 @@ class Navigation(Stage):
         drive: Drive,
         routes: Sequence[PlannedRoute | None],
         map: TopologicalMap,
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The whole drive at once."""
         planned = [route for route in routes if route is not None]
         spots = drive.truth[known(drive.truth)][:, :2]

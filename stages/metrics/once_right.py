@@ -4,7 +4,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.pose_errors import heading_errors_deg, position_errors
 from omninav.stages.values.drive import Drive, known
 
@@ -16,12 +16,13 @@ QUANTITIES = {
 }
 
 
-class OnceRight(Stage):
+class OnceRight(MetricStage):
     """Measures how reliably a robot is tracked once it has been found.
 
     Wolf, Burgard & Burkhardt 2005, section VI-D: success is below 100 % "because the system always had to perform a
     global localization in the beginning". Of the last log, under `once_right`: `after_frames`, how many frames went by
     before the estimate was right for the first time; `right_rate`, the share of frames from that one on in which it is.
+    Gives nothing without ground truth.
     """
 
     within_m: Annotated[float, Bounds(gt=0)] = 2.0
@@ -29,12 +30,7 @@ class OnceRight(Stage):
     within_deg: Annotated[float, Bounds(gt=0, le=180)] = 35.0
     """Largest heading error (degrees) of a right estimate."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `once_right` of metrics.json; absent without ground truth."""
-
-        metrics: Metrics | None = None
-
-    def step(self, ctx: Context, drive: Drive) -> Out:
+    def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
         last = drive.last_log
         scored = known(last.truth)

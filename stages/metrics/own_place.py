@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import BadInput, Bounds, Context, Metrics, Outputs, Quantity, Stage, Value
+from omninav.pipeline import BadInput, Bounds, Context, Metrics, MetricStage, Outputs, Quantity, Stage, Value
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.maps import ReferenceGraph
 from omninav.stages.values.pose import Pose
@@ -74,21 +74,16 @@ class OwnPlace(Stage):
         return self.Out(likeness=Likeness(float(alike[own].max()), beside, float(best.mean()), float(best.max())))
 
 
-class OwnPlaceRecognition(Stage):
+class OwnPlaceRecognition(MetricStage):
     """Measures how much similarity views keep to those of their own places.
 
     Under `own_place`, means over the images: `similarity` to the view of the same place, `similarity_nearby` and
     `similarity_elsewhere`; `lost` and `lost_nearby`, the shares (1 - own) / (1 - elsewhere) of the similarity that
     there is to lose; `told_rate`, the share of images that are more like their own place than any other place;
-    `images`.
+    `images`. Gives nothing without any comparison.
     """
 
-    class Out(Outputs):
-        """`metrics`: the entry `own_place` of metrics.json; absent without any comparison."""
-
-        metrics: Metrics | None = None
-
-    def step(self, ctx: Context, likenesses: Sequence[Likeness | None]) -> Out:
+    def step(self, ctx: Context, likenesses: Sequence[Likeness | None]) -> MetricStage.Out:
         """The whole run at once."""
         rows = np.array([(each.own, each.nearby, each.average, each.most) for each in likenesses if each is not None])
         if not len(rows):

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.drive import Drive, known
@@ -24,7 +24,7 @@ TOLERANCE_M = 0.5
 """Distance by which a medoid may be farther than the closest for `tolerant_accuracy_after`, metres."""
 
 
-class PlaceAccuracy(Stage):
+class PlaceAccuracy(MetricStage):
     """Measures how often the most probable place is the one truly nearest to the robot.
 
     Goedemé et al. 2007, section 8.3. Under `localisation`, over all logs: `accuracy`, the share of all images;
@@ -34,16 +34,11 @@ class PlaceAccuracy(Stage):
     images that the map keeps (where a place is long, its medoid lies far from its ends); `tolerant_accuracy_after`: its
     medoid is hardly further away than the closest (where the tour came by twice, two medoids may lie side by side).
     `place_distance_m`: the median distance between the believed place's medoid and the truth, and
-    `nearest_place_distance_m`, the closest one's.
+    `nearest_place_distance_m`, the closest one's. Gives nothing where poses or the map's are not ground truth.
     """
 
     updates: Annotated[int, Bounds(ge=1)] = 5
     """Length of the lists by update."""
-
-    class Out(Outputs):
-        """`metrics`: the entry `localisation` of metrics.json; absent where poses or the map's are not ground truth."""
-
-        metrics: Metrics | None = None
 
     def step(
         self,
@@ -52,7 +47,7 @@ class PlaceAccuracy(Stage):
         beliefs: Sequence[PlaceBelief | None],
         begun: Sequence[PlaceBelief | None],
         map: TopologicalMap,
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The whole run at once."""
         medoids, apart = map.poses[map.places][:, :2], links_between(map.links, len(map))
         images = map.poses[:, :2]

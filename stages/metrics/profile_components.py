@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.local_features import VerticalSegments
 
 Array = npt.NDArray[np.float64]
@@ -18,7 +18,7 @@ QUANTITIES = {
 }
 
 
-class ProfileComponents(Stage):
+class ProfileComponents(MetricStage):
     """Measures how close a cosine transform comes to principal components on the profiles of column segments.
 
     Goedemé et al. 2007, section 3.3: "the best features to use" are principal components, which the cosine transform
@@ -26,16 +26,11 @@ class ProfileComponents(Stage):
     both are measured on those of the second: under `profiles`, of the variance about the first half's mean the shares
     that the first 1 to 6 of 7 coefficients keep (`cosine`), and as many components (`principal`); `least_ratio`, the
     least of the six ratios of the two. A descriptor's seven coefficients are orthonormal and hold all of a profile
-    without its mean, so that its components follow from them.
+    without its mean, so that its components follow from them. Gives nothing where either half shows no two segments, or
+    the second none that varies.
     """
 
-    class Out(Outputs):
-        """`metrics`: the entry `profiles` of metrics.json; absent where either half shows no two segments,
-        or the second none that varies."""
-
-        metrics: Metrics | None = None
-
-    def step(self, ctx: Context, vertical_segments: Sequence[VerticalSegments | None]) -> Out:
+    def step(self, ctx: Context, vertical_segments: Sequence[VerticalSegments | None]) -> MetricStage.Out:
         """The whole log at once."""
         shown = [each.descriptors[:, COLOURS:].astype(np.float64) for each in vertical_segments if each is not None]
         halves = shown[: len(shown) // 2], shown[len(shown) // 2 :]

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.geometry.plane.se2 import between
 from omninav.stages.values.drive import Array, Drive, known
@@ -26,7 +26,7 @@ def quantities(distance_m: float) -> dict[str, Quantity]:
     }
 
 
-class RelativeErrors(Stage):
+class RelativeErrors(MetricStage):
     """Measures the absolute trajectory error after the best rigid alignment, and the relative pose error.
 
     Sturm et al. 2012 ("A benchmark for the evaluation of RGB-D SLAM systems", section on metrics), in the plane and
@@ -40,16 +40,11 @@ class RelativeErrors(Stage):
     distance_m: Annotated[float, Bounds(gt=0)] = 1.0
     """Metres of true path between the two frames of a relative pose error."""
 
-    class Out(Outputs):
-        """`metrics`: for metrics.json."""
-
-        metrics: Metrics
-
     def step(
         self,
         ctx: Context,
         drive: Drive,
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The whole run at once."""
         return self.Out(
             metrics=Metrics(trajectory_metrics(drive.last_log, self.distance_m), quantities(self.distance_m))

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.probability.gaussians import density
 from omninav.stages.geometry.probability.particles import weighted_moments
 from omninav.stages.values.belief import GaussianMixture, Particles
@@ -13,7 +13,7 @@ from omninav.stages.values.belief import GaussianMixture, Particles
 QUANTITIES = {"resampling.ratio": Quantity(title="Spread of the particles, after resampling / before")}
 
 
-class ResamplingSpread(Stage):
+class ResamplingSpread(MetricStage):
     """Measures the spread of the particles before and after they are resampled, where belief and map agree.
 
     Porta & Kröse 2004, section 3.1: resampling by pi p(y|x) gives "a concentration of the particles in the
@@ -27,18 +27,13 @@ class ResamplingSpread(Stage):
     agree_above: Annotated[float, Bounds(ge=0)] = 1e-4
     """Mean density, 1/(m^2 rad), above which both agree."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `resampling` of metrics.json."""
-
-        metrics: Metrics
-
     def step(
         self,
         ctx: Context,
         predictions: Sequence[Particles | GaussianMixture],
         hypotheses: Sequence[GaussianMixture | None],
         beliefs: Sequence[Particles | GaussianMixture],
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The whole run at once."""
         spreads = []
         for before, hypothesis, after in zip(predictions, hypotheses, beliefs, strict=True):

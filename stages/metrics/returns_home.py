@@ -4,18 +4,18 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage
 from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.values.drive import Drive, known
 
 from .error_curves import lap_ends
 
 
-class ReturnsHome(Stage):
+class ReturnsHome(MetricStage):
     """Measures the error at the end of each lap of the last log, when the robot is back at its start.
 
-    `returns`: a list with an entry for each lap that ended (as `ErrorCurves` counts them): `step`, the frame nearest
-    to the start; `position_error_m`, the mean of the estimate's over that frame and those that follow it;
+    `returns`: a list with an entry for each lap that ended (as `ErrorCurves` counts them): `step`, the frame nearest to
+    the start; `position_error_m`, the mean of the estimate's over that frame and those that follow it;
     `odometry_error_m`, that of odometry alone, from the first true pose on. Nothing without ground truth.
     """
 
@@ -24,12 +24,7 @@ class ReturnsHome(Stage):
     frames: Annotated[int, Bounds(ge=1)] = 5
     """Frames at the start that count."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `returns` of metrics.json, absent without ground truth."""
-
-        metrics: Metrics | None = None
-
-    def step(self, ctx: Context, drive: Drive) -> Out:
+    def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
         log = drive.last_log
         rows = np.flatnonzero(known(log.truth) & known(log.estimate))

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.geometry.plane.se2 import compose
 from omninav.stages.values.drive import Drive, known
@@ -16,7 +16,7 @@ KIDNAPPED_M = 1.0
 """Distance between true motion and odometry that counts as a kidnapping, metres."""
 
 
-class SuccessRate(Stage):
+class SuccessRate(MetricStage):
     """Measures the share of frames in which the estimate is close to the truth, and how soon it is after a kidnapping.
 
     Wolf, Burgard & Burkhardt 2005, section VI-D (2 m, 35 degrees): all frames count, global localisation at the
@@ -24,7 +24,8 @@ class SuccessRate(Stage):
     `success`: `within_rate`; `at_end`, 1 where the last frame is good, else 0; `unimodal_after_frames`, how many frames
     went by before the belief's heaviest mode, a metre and 30 degrees around it, held a given share of the belief in a
     good frame. After a kidnapping (the true pose left the path of its odometry between two frames), `kidnapped_at` is
-    the frame, and `recovered_after_frames` how many frames later the estimate is good for ten in a row.
+    the frame, and `recovered_after_frames` how many frames later the estimate is good for ten in a row. Gives nothing
+    without ground truth.
     """
 
     within_m: Annotated[float, Bounds(gt=0)] = 2.0
@@ -32,16 +33,11 @@ class SuccessRate(Stage):
     within_deg: Annotated[float, Bounds(gt=0, le=180)] = 35.0
     """Largest heading error (degrees) of a good frame."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `success` of metrics.json; absent without ground truth."""
-
-        metrics: Metrics | None = None
-
     def step(
         self,
         ctx: Context,
         drive: Drive,
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The whole run at once."""
         last = drive.last_log
         if not last.has_truth:

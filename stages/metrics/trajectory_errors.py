@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive, known
 
@@ -36,7 +36,7 @@ def quantities(lost_m: float) -> dict[str, Quantity]:
     }
 
 
-class TrajectoryErrors(Stage):
+class TrajectoryErrors(MetricStage):
     """Measures the errors of the estimate against ground truth, with those of odometry alone and of the belief's mean.
 
     Per log: `frames`; `driven_m`, the length of the true path; `position_error_m` and `heading_error_deg` (mean,
@@ -54,16 +54,11 @@ class TrajectoryErrors(Stage):
     the same frames for every method, where `after_convergence` leaves out more of a method that stays lost for longer.
     None: no such entry."""
 
-    class Out(Outputs):
-        """`metrics`: for metrics.json."""
-
-        metrics: Metrics
-
     def step(
         self,
         ctx: Context,
         drive: Drive,
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The whole run at once."""
         per_log = [drive_metrics(drive, self.lost_m, self.settle_steps) for drive in drive.by_log]
         if not per_log:

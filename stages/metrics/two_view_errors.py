@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.two_views import RelativeView
 
 QUANTITIES = {
@@ -17,7 +17,7 @@ QUANTITIES = {
 }
 
 
-class TwoViewErrors(Stage):
+class TwoViewErrors(MetricStage):
     """Measures the angles between found and true relative poses, and how often both are small.
 
     Under `two_views`: `success_rate`, over all problems; `rotation_error_deg` and `direction_error_deg`, the turn that
@@ -28,12 +28,9 @@ class TwoViewErrors(Stage):
     within_deg: Annotated[float, Bounds(gt=0)] = 3.0
     """Largest error (degrees) of rotation and of direction at which a problem counts as solved."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `two_views` of metrics.json."""
-
-        metrics: Metrics
-
-    def step(self, ctx: Context, truth: Sequence[RelativeView], found: Sequence[RelativeView | None]) -> Out:
+    def step(
+        self, ctx: Context, truth: Sequence[RelativeView], found: Sequence[RelativeView | None]
+    ) -> MetricStage.Out:
         """All problems at once."""
         solved = [(true, view) for true, view in zip(truth, found, strict=True) if view is not None]
         turns = np.array([_turn_between(true.rotation, view.rotation) for true, view in solved])

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.drive import Drive, known
 from omninav.stages.values.view_mixtures import ViewMixtures
 
@@ -23,7 +23,7 @@ QUANTITIES = {
 }
 
 
-class ViewMapSize(Stage):
+class ViewMapSize(MetricStage):
     """Measures the size of a map of views at the end of a run, and how densely it covers what was visited.
 
     Under `map`: `references` (views), `components`, `size_bytes` of all its arrays as stored in its file (whose head,
@@ -35,17 +35,12 @@ class ViewMapSize(Stage):
     near_m: Annotated[float, Bounds(gt=0)] = 1.0
     """Distance (m) from the true path (from the estimates where there is no truth) up to which the area is visited."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `map` of metrics.json."""
-
-        metrics: Metrics
-
     def step(
         self,
         ctx: Context,
         drive: Drive,
         map: ViewMixtures,
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The map at the end of the run."""
         ctx.fact("map_poses", map.pose_source)
         poses = drive.truth if drive.has_truth else drive.estimate

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import ViewMixtures
 from omninav.stages.values.views import WholeView
@@ -33,7 +33,7 @@ QUANTITIES = {
 }
 
 
-class ViewSpacing(Stage):
+class ViewSpacing(MetricStage):
     """Measures how far each view of a map is from its nearest other one, in the views' own distance and in metres.
 
     Porta & Kroese 2004, section 5: learning on-line "guarantees a uniform sampling of the feature space and not of the
@@ -46,12 +46,7 @@ class ViewSpacing(Stage):
     max_views: Annotated[int, Bounds(ge=3)] = 500
     """Views that are measured of a larger map, evenly picked by age."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `spacing` of metrics.json."""
-
-        metrics: Metrics
-
-    def step(self, ctx: Context, drive: Drive, map: ViewMixtures, view: WholeView) -> Out:
+    def step(self, ctx: Context, drive: Drive, map: ViewMixtures, view: WholeView) -> MetricStage.Out:
         """The map at the end of the run, which `drive` waits for; `view`: the last one seen, for how to compare."""
         if len(map) < 3:
             return self.Out(metrics=Metrics({}))

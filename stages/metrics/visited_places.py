@@ -5,14 +5,14 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage
 from omninav.stages.geometry.plane.pose_errors import position_errors
 from omninav.stages.values.drive import Array, Drive, known
 
 Ints = npt.NDArray[np.int64]
 
 
-class VisitedPlaces(Stage):
+class VisitedPlaces(MetricStage):
     """Compares errors at a place's later visits with its first one, over all logs that have ground truth.
 
     A place is a square cell of the floor, by true positions; a visit ends where the robot has driven `away_m` since it
@@ -34,12 +34,7 @@ class VisitedPlaces(Stage):
     away_m: Annotated[float, Bounds(gt=0)] = 5.0
     """True path length (m) since the robot was last in the cell, beyond which it comes for another visit."""
 
-    class Out(Outputs):
-        """`metrics`: the entries `visits` and `first_visits` of metrics.json."""
-
-        metrics: Metrics
-
-    def step(self, ctx: Context, drive: Drive) -> Out:
+    def step(self, ctx: Context, drive: Drive) -> MetricStage.Out:
         """The whole run at once."""
         logs = [log for log in drive.by_log if log.has_truth]
         rows = [known(log.truth) & known(log.estimate) for log in logs]

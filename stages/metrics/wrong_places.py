@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Metrics, Outputs, Quantity, Stage
+from omninav.pipeline import Bounds, Context, Metrics, MetricStage, Quantity
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 
@@ -20,7 +20,7 @@ QUANTITIES = {
 }
 
 
-class WrongPlaces(Stage):
+class WrongPlaces(MetricStage):
     """Measures how long references stay at wrong places, such as those learned right after a kidnapping.
 
     A reference counts whose heaviest component lies far from the true position of the frame in which it was seen, at
@@ -38,18 +38,13 @@ class WrongPlaces(Stage):
     points: Annotated[int, Bounds(ge=1)] = 60
     """Length of the lists over the frames."""
 
-    class Out(Outputs):
-        """`metrics`: the entry `wrong_places` of metrics.json."""
-
-        metrics: Metrics
-
     def step(
         self,
         ctx: Context,
         drive: Drive,
         events: Sequence[ViewEvent | None],
         mixtures: Sequence[MixturesNow | None],
-    ) -> Out:
+    ) -> MetricStage.Out:
         """The whole run at once."""
         path = drive.truth[:, :2]
         seen, came, shares = wrong_shares(events, mixtures, path, self.wrong_m)

@@ -2,20 +2,15 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.chart import Chart
 from omninav.stages.values.drive import Drive
 
 
-class ConfidenceOverTime(Stage):
+class ConfidenceOverTime(FigureStage):
     """Plots the probability that the estimate is right over time (s), the last log's. Nothing without a monitor."""
 
-    class Out(Outputs):
-        """`figure`: absent where no monitor states a confidence."""
-
-        figure: Figure | None = None
-
-    def step(self, ctx: Context, drive: Drive) -> Out:
+    def step(self, ctx: Context, drive: Drive) -> FigureStage.Out:
         """The whole run at once."""
         last = drive.last_log
         if not np.isfinite(last.confidence).any():

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import broken
 from omninav.stages.values.drive import Array, Drive
@@ -15,17 +15,12 @@ from omninav.stages.values.topological_map import TopologicalMap
 from .plan_chart import draw_surroundings, jumps, plan_chart
 
 
-class DriveOverPlan(Stage):
+class DriveOverPlan(FigureStage):
     """Plots the true path of a closed loop over the floor plan, every contact on it, and the path by odometry alone.
 
     With `map` wired its places, where their medoids were taken, joined along the images between them; with `routes` the
-    planned routes, the last one bold, and its goal.
+    planned routes, the last one bold, and its goal. Gives nothing where the robot never was.
     """
-
-    class Out(Outputs):
-        """`figure`: one plot; absent where the robot never was."""
-
-        figure: Figure | None = None
 
     def step(
         self,
@@ -34,7 +29,7 @@ class DriveOverPlan(Stage):
         plan: FloorPlan,
         map: TopologicalMap | None = None,
         routes: Sequence[PlannedRoute | None] | None = None,
-    ) -> Out:
+    ) -> FigureStage.Out:
         """The whole run at once."""
         if not drive.has_truth:
             return self.Out()

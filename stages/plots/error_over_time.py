@@ -4,29 +4,24 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import Chart, Colour, Layer, stacked
 from omninav.stages.geometry.plane.pose_errors import first_settled, heading_errors_deg, position_errors
 from omninav.stages.values.drive import Array, Drive
 
 
-class ErrorOverTime(Stage):
+class ErrorOverTime(FigureStage):
     """Plots position (m) and heading error (degrees) over time, odometry alone beside them, convergence marked.
 
     Nothing is drawn for logs without ground truth.
     """
 
-    class Out(Outputs):
-        """`figure`: position above heading, the logs one after the other."""
-
-        figure: Figure | None = None
-
     def step(
         self,
         ctx: Context,
         drive: Drive,
-    ) -> Out:
+    ) -> FigureStage.Out:
         """The whole run at once."""
         logs = [log for log in drive.by_log if log.has_truth]
         if not logs:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any
 
-from omninav.pipeline import BadInput, Bounds, Context, Outputs, Stage
+from omninav.pipeline import BadInput, Bounds, Context, Stage
 from omninav.pipeline.mcap.message_types import standard_types
 
 from .show_tick import ShownTick
@@ -30,20 +30,16 @@ class FoxgloveServer(Stage):
     host: str = "127.0.0.1"
     """Address to listen on: this machine alone; 0.0.0.0: every machine that reaches this one may watch."""
 
-    class Out(Outputs):
-        """Nothing: it is watched."""
-
     def setup(self, ctx: Context) -> None:
         """Start the server, or clear what it showed of an earlier run."""
         if self.port is not False:
             self._server = _server(self.host, PORT if self.port is True else int(self.port))
             self._server.clear()
 
-    def step(self, ctx: Context, before: PathSoFar, shown: ShownTick) -> Out:
+    def step(self, ctx: Context, before: PathSoFar, shown: ShownTick) -> None:
         """One tick."""
         if self.port is not False:
             self._server.send(shown.tick.stamp, tick_messages([shown], before))
-        return self.Out()
 
 
 @dataclass

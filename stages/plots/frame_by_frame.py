@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.graph.results import Slide
 from omninav.pipeline.report.chart import Chart, Layer, broken
@@ -44,7 +44,7 @@ MAX_DOTS = 150
 """Particles that are drawn of a belief at most."""
 
 
-class FrameByFrame(Stage):
+class FrameByFrame(FigureStage):
     """Shows up to 60 frames of the last log, at even steps: the image, its best match and the belief.
 
     The reference (or place) of the map that looked most like the image is ringed; with `thumbnails` its image stands
@@ -53,13 +53,8 @@ class FrameByFrame(Stage):
 
     With `answers` the most similar references of a database stand there, each with the error of the pose that it means.
     With `homing` the image is the robot's own, with the features that it follows; the target view, the homing vector,
-    the planned route and the robot's state are shown too.
+    the planned route and the robot's state are shown too. Gives nothing where there are no frames.
     """
-
-    class Out(Outputs):
-        """`figure`: absent where there are no frames."""
-
-        figure: Figure | None = None
 
     def step(
         self,
@@ -78,7 +73,7 @@ class FrameByFrame(Stage):
         statuses: Sequence[DrivingStatus | None] | None = None,
         routes: Sequence[PlannedRoute | None] | None = None,
         answers: Sequence[Answers | None] | None = None,
-    ) -> Out:
+    ) -> FigureStage.Out:
         """The whole run at once."""
         ticks = first_seen(events or ())
         last = drive.last_log
@@ -244,7 +239,7 @@ def _answers(
     found: Answers, truth: Array, map: AnyMap | None, thumbnails: Thumbnails | None
 ) -> list[tuple[str, bytes]]:
     """Captions and JPEG bytes of the most similar references, best first, with their errors where truth is known."""
-    shown = []
+    shown: list[tuple[str, bytes]] = []
     for reference, similarity, turn in zip(found.references, found.similarities, found.turns, strict=True):
         picture = picture_of_reference(int(reference), float(turn), map, thumbnails)
         if picture is None:

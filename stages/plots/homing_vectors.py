@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing_field import HomingField
@@ -19,18 +19,14 @@ from .drawing import (
 )
 
 
-class ShowHomingVectors(Stage):
+class ShowHomingVectors(FigureStage):
     """Plots an arrow where each view was taken, along its homing vector, coloured by its error.
 
-    As Figure 15 of Goedemé et al. 2007. With `plan` wired the world's floor plan lies under them.
+    As Figure 15 of Goedemé et al. 2007. With `plan` wired the world's floor plan lies under them. Gives nothing where
+    there is no field.
     """
 
-    class Out(Outputs):
-        """`figure`: absent where there is no field."""
-
-        figure: Figure | None = None
-
-    def step(self, ctx: Context, field: HomingField | None = None, plan: FloorPlan | None = None) -> Out:
+    def step(self, ctx: Context, field: HomingField | None = None, plan: FloorPlan | None = None) -> FigureStage.Out:
         """Draw the field."""
         if field is None:
             return self.Out()

@@ -29,12 +29,8 @@ class ImageAt(Stage):
 class ImageFile(Stage):
     """Writes the first image as `image.png` into the run's folder, without loss."""
 
-    class Out(Outputs):
-        pass
-
-    def step(self, ctx: Context, images: Sequence[Image]) -> Out:
+    def step(self, ctx: Context, images: Sequence[Image]) -> None:
         """Write it, if there is one."""
         if images and ctx.folder is not None:
             _, encoded = cv2.imencode(".png", images[0].pixels)
             write_whole(ctx.folder / "image.png", encoded.tobytes())
-        return self.Out()

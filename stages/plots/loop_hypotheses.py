@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.pose import SOURCE_WORDS
@@ -30,19 +30,16 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 
-class ShowLoopHypotheses(Stage):
+class ShowLoopHypotheses(FigureStage):
     """Plots accepted and rejected loop hypotheses over the drive, and the map with its places, links and path images.
 
     As Figures 11 and 12 of Goedeme et al. 2007. Poses are those that the map keeps for drawing: truth, or odometry.
-    With `plan` wired the world's floor plan lies under both.
+    With `plan` wired the world's floor plan lies under both. Gives nothing where no image has a pose.
     """
 
-    class Out(Outputs):
-        """`figure`: absent where no image has a pose."""
-
-        figure: Figure | None = None
-
-    def step(self, ctx: Context, hypotheses: LoopHypotheses, map: TopologicalMap, plan: FloorPlan | None = None) -> Out:
+    def step(
+        self, ctx: Context, hypotheses: LoopHypotheses, map: TopologicalMap, plan: FloorPlan | None = None
+    ) -> FigureStage.Out:
         """Draw both panels."""
         if not np.isfinite(hypotheses.poses).all(axis=1).any():
             return self.Out()

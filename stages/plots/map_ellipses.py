@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Figure, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Figure, FigureStage
 from omninav.pipeline.report.chart import Colour
 from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.floor_plan import FloorPlan
@@ -19,19 +19,15 @@ MAX_ELLIPSES = 3000
 """Largest number of ellipses: of a larger map the heaviest are drawn."""
 
 
-class MapEllipses(Stage):
+class MapEllipses(FigureStage):
     """Plots a map of views as ellipses, as opaque as they weigh, over the true path and the floor plan.
 
-    Without truth the path is that of the estimates, and no plan is drawn: the map has a frame of its own then.
+    Without truth the path is that of the estimates, and no plan is drawn: the map has a frame of its own then. Gives
+    nothing where the map is empty.
     """
 
     sigmas: Annotated[float, Bounds(gt=0)] = 1.0
     """Half the width of an ellipse in standard deviations."""
-
-    class Out(Outputs):
-        """`figure`: absent where the map is empty."""
-
-        figure: Figure | None = None
 
     def step(
         self,
@@ -39,7 +35,7 @@ class MapEllipses(Stage):
         drive: Drive,
         map: ViewMixtures,
         plan: FloorPlan | None = None,
-    ) -> Out:
+    ) -> FigureStage.Out:
         """The map at the end of the run."""
         if not len(map.weights):
             return self.Out()

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import ViewEvent
@@ -15,15 +15,13 @@ from .drawing import ESTIMATE, MARK, ODOMETRY, REFERENCE
 BINS = 80
 
 
-class MapGrowth(Stage):
-    """Plots references and components over the frames of all logs, with references added and removed."""
+class MapGrowth(FigureStage):
+    """Plots references and components over the frames of all logs, with references added and removed.
+
+    Gives nothing where nothing was ever learned.
+    """
 
     on_request = True
-
-    class Out(Outputs):
-        """`figure`: absent where nothing was ever learned."""
-
-        figure: Figure | None = None
 
     def step(
         self,
@@ -31,7 +29,7 @@ class MapGrowth(Stage):
         drive: Drive,
         events: Sequence[ViewEvent | None],
         after_last: ViewEvent | None = None,
-    ) -> Out:
+    ) -> FigureStage.Out:
         """The whole run at once. `after_last`: what was learned once the last log had ended, counted to its end."""
         rows = [row for row, event in enumerate(events) if event is not None]
         found = [event for event in events if event is not None]

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline import Context, Figure, FigureStage
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.maps import ReferenceGraph
@@ -15,16 +15,12 @@ from .plan_chart import draw_surroundings, plan_chart
 Array = npt.NDArray[np.float64]
 
 
-class MapPlot(Stage):
+class MapPlot(FigureStage):
     """Plots the map's references with their headings, and its edges. Map frame, metres.
 
-    `as_driven`: the same map before it was straightened, drawn where that moved it.
+    `as_driven`: the same map before it was straightened, drawn where that moved it. Gives nothing where the map is
+    empty.
     """
-
-    class Out(Outputs):
-        """`figure`: absent where the map is empty."""
-
-        figure: Figure | None = None
 
     def step(
         self,
@@ -33,7 +29,7 @@ class MapPlot(Stage):
         map: ReferenceGraph,
         plan: FloorPlan | None = None,
         as_driven: ReferenceGraph | None = None,
-    ) -> Out:
+    ) -> FigureStage.Out:
         """The map at the end of the run; `drive` makes it wait until then."""
         if not len(map):
             return self.Out()

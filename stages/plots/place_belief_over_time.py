@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.chart import Chart, Colour, stacked
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
@@ -21,17 +21,12 @@ COLUMNS = 900
 """Ticks that are told apart in the plot; of longer drives the largest belief in each."""
 
 
-class PlaceBeliefOverTime(Stage):
+class PlaceBeliefOverTime(FigureStage):
     """Plots the belief in every place over time, darker where more probable, with the truly nearest place.
 
-    Of the last log. Below it: the belief's share of its maximum, of the truly nearest place, and of
-    that together with its neighbours.
+    Of the last log. Below it: the belief's share of its maximum, of the truly nearest place, and of that together with
+    its neighbours. Gives nothing where nothing was believed.
     """
-
-    class Out(Outputs):
-        """`figure`: absent where nothing was believed."""
-
-        figure: Figure | None = None
 
     def step(
         self,
@@ -39,7 +34,7 @@ class PlaceBeliefOverTime(Stage):
         drive: Drive,
         beliefs: Sequence[PlaceBelief | None],
         map: TopologicalMap,
-    ) -> Out:
+    ) -> FigureStage.Out:
         """The whole run at once."""
         last = drive.last_log
         shares = np.full((len(last), len(map)), np.nan)

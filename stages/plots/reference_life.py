@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Bounds, Context, Figure, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Figure, FigureStage
 from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.values.drive import Drive
@@ -27,11 +27,12 @@ Array = npt.NDArray[np.float64]
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 
-class ReferenceLife(Stage):
+class ReferenceLife(FigureStage):
     """Plots the components of one reference over the frames: their weights, and their places over the plan.
 
     Components of two frames are the same place where they are nearest to each other. True positions are those of the
-    frames at which the reference changed; where map updates come late its view was seen before.
+    frames at which the reference changed; where map updates come late its view was seen before. Gives nothing where
+    that reference never was, or no reference ever changed.
     """
 
     on_request = True
@@ -42,11 +43,6 @@ class ReferenceLife(Stage):
     same_m: Annotated[float, Bounds(gt=0)] = 1.0
     """Largest distance (m) between components of two frames that are the same place."""
 
-    class Out(Outputs):
-        """`figure`: absent where that reference never was, or no reference ever changed."""
-
-        figure: Figure | None = None
-
     def step(
         self,
         ctx: Context,
@@ -54,7 +50,7 @@ class ReferenceLife(Stage):
         events: Sequence[ViewEvent | None],
         mixtures: Sequence[MixturesNow | None],
         plan: FloorPlan | None = None,
-    ) -> Out:
+    ) -> FigureStage.Out:
         """The whole run at once."""
         name = farthest_moved(events) if self.name is None else self.name
         if name is None:

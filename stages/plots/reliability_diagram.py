@@ -2,20 +2,18 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.chart import Chart
 from omninav.stages.values.confidence import ConfidenceReliability
 
 
-class ReliabilityDiagram(Stage):
-    """Plots the share of right estimates over the confidence stated for them."""
+class ReliabilityDiagram(FigureStage):
+    """Plots the share of right estimates over the confidence stated for them.
 
-    class Out(Outputs):
-        """`figure`: absent where there is no confidence, or no ground truth."""
+    Gives nothing where there is no confidence, or no ground truth.
+    """
 
-        figure: Figure | None = None
-
-    def step(self, ctx: Context, reliability: ConfidenceReliability | None = None) -> Out:
+    def step(self, ctx: Context, reliability: ConfidenceReliability | None = None) -> FigureStage.Out:
         """The whole run at once."""
         if reliability is None:
             return self.Out()

@@ -6,7 +6,7 @@ from importlib.resources import files
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Outputs, Stage
+from omninav.pipeline import Context, Stage
 from omninav.pipeline.files import write_whole
 from omninav.pipeline.mcap.writer import LogWriter
 from omninav.stages.recordings.pose_messages import path_bytes
@@ -33,13 +33,10 @@ class ResultLog(Stage):
     Beside it stands `foxglove_layout.json`, a layout of Foxglove's panels for these topics.
     """
 
-    class Out(Outputs):
-        """Nothing: the files are the result."""
-
-    def step(self, ctx: Context, drive: Drive, shown: Sequence[ShownTick], map: AnyMap | None = None) -> Out:
+    def step(self, ctx: Context, drive: Drive, shown: Sequence[ShownTick], map: AnyMap | None = None) -> None:
         """The whole run at once."""
         if ctx.folder is None:
-            return self.Out()
+            return
         with LogWriter(ctx.folder / "result.mcap") as log:
             ended = {int(part.row[-1]): part for part in drive.by_log}
             every = shown[-1].views_every if shown else 1  # the last knows how long the run was
@@ -59,7 +56,6 @@ class ResultLog(Stage):
                 stamp = int(drive.stamps[-1])
                 log.write("/map", "visualization_msgs/msg/MarkerArray", stamp, map_markers(map, stamp))
         write_whole(ctx.folder / LAYOUT, files(__package__).joinpath(LAYOUT).read_text(encoding="utf-8"))
-        return self.Out()
 
 
 def _write_paths(log: LogWriter, drive: Drive) -> None:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from omninav.pipeline import Bounds, Context, Figure, Outputs, Stage
+from omninav.pipeline import Bounds, Context, Figure, FigureStage
 from omninav.pipeline.report.plot_style import plot
 from omninav.stages.geometry.plane.se2 import wrap
 from omninav.stages.values.drive import Array, Drive
@@ -24,7 +24,7 @@ from .similarity_peaks import Peaks
 from .snapshot_times import spread_out
 
 
-class SimilarityHeatMap(Stage):
+class SimilarityHeatMap(FigureStage):
     """Plots each reference's best similarity over the map, and the heading profile of the best one."""
 
     on_request = True
@@ -32,18 +32,13 @@ class SimilarityHeatMap(Stage):
     frames: Annotated[int, Bounds(ge=1, le=8)] = 4
     """Number of columns."""
 
-    class Out(Outputs):
-        """`figure`: a column per frame."""
-
-        figure: Figure | None = None
-
     def step(
         self,
         ctx: Context,
         drive: Drive,
         peaks: Sequence[Peaks | None],
         map: ReferenceGraph,
-    ) -> Out:
+    ) -> FigureStage.Out:
         """The whole run at once; frames of the last log are shown."""
         last = drive.last_log
         kept = [

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from omninav.pipeline import Context, Outputs, Stage
+from omninav.pipeline import Context, Stage
 from omninav.pipeline.files import write_whole
 from omninav.stages.values.drive import Array, Drive, known
 
@@ -17,10 +17,7 @@ class TrajectoryFile(Stage):
     name: str = "trajectory"
     """The file's name without its ending."""
 
-    class Out(Outputs):
-        """Nothing: the files are the result."""
-
-    def step(self, ctx: Context, drive: Drive) -> Out:
+    def step(self, ctx: Context, drive: Drive) -> None:
         """The whole run at once."""
         logs = {}
         for log in drive.by_log:
@@ -34,7 +31,6 @@ class TrajectoryFile(Stage):
                 if len(logs) > 1:
                     write_whole(ctx.folder / f"{self.name}_{number}.tum", text)
             write_whole(ctx.folder / f"{self.name}.tum", logs[max(logs)] if logs else "")
-        return self.Out()
 
 
 def tum_row(stamp: int, pose: Array) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline import Context, Figure, FigureStage
 from omninav.pipeline.report.chart import Colour, broken
 from omninav.stages.geometry.appearance.place_graph import links_between
 from omninav.stages.values.belief import PlaceBelief
@@ -25,17 +25,12 @@ JUDGED: tuple[tuple[int, Colour, str], ...] = (
 """Kinds of believed places, by the truly nearest one."""
 
 
-class TrueAndEstimatedPlace(Stage):
+class TrueAndEstimatedPlace(FigureStage):
     """Plots the true path over the topological map, each image joined with its most probable place (map frame, m).
 
     Faint where it was believed with less than a half; green where that place's medoid is the truly nearest, blue where
-    it is linked with the nearest, orange elsewhere. Of the last log.
+    it is linked with the nearest, orange elsewhere. Of the last log. Gives nothing without ground truth.
     """
-
-    class Out(Outputs):
-        """`figure`: absent without ground truth."""
-
-        figure: Figure | None = None
 
     def step(
         self,
@@ -44,7 +39,7 @@ class TrueAndEstimatedPlace(Stage):
         beliefs: Sequence[PlaceBelief | None],
         map: TopologicalMap,
         plan: FloorPlan | None = None,
-    ) -> Out:
+    ) -> FigureStage.Out:
         """The whole run at once."""
         last = drive.last_log
         last = last.at(known(last.truth))
