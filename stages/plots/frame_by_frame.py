@@ -98,7 +98,7 @@ class FrameByFrame(FigureStage):
             if followed is not None:
                 places = map if isinstance(map, TopologicalMap) else None
                 goal, target = target_of(_of(progress, tick), route, places, drive.truth[0], thumbnails)
-                photographs = homing_frames.pictures(followed, target)
+                photographs = homing_frames.images(followed, target)
                 facts += homing_frames.facts(followed, _of(progress, tick), _of(statuses, tick))
                 homing_frames.draw_vector(layer, last.truth[n], followed.vector, goal)
                 if places is not None:

@@ -23,7 +23,7 @@ COLOURS = (
 """Sentence of the caption that names the features' colours."""
 
 
-def pictures(snapshot: EncodedHomingView, target: Pixels | None) -> list[tuple[str, bytes]]:
+def images(snapshot: EncodedHomingView, target: Pixels | None) -> list[tuple[str, bytes]]:
     """Captions and JPEG bytes: the robot's image with its features and the vector, and the target view."""
     seen = draw_robot_view(decoded(snapshot.jpeg), snapshot)
     if snapshot.vector is None:
