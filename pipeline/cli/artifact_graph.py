@@ -12,7 +12,6 @@ from omegaconf import OmegaConf
 
 from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import UnknownStage, resolve
-from omninav.pipeline.graph.stage import Source
 
 from .config_groups import LEARN
 from .words import word_of
@@ -53,7 +52,7 @@ def words_of_artifact(name: str, variant: Any, words: Sequence[str]) -> list[str
     spec = artifacts[name]
     typed = dict(_keyed(words))
     chosen = variant.hydra.runtime.choices
-    shared = {node: variant.nodes[node] for node in spec.get("inherit") or () if not _is_source(variant.nodes[node])}
+    shared = {node: variant.nodes[node] for node in spec.get("inherit") or () if is_repeatable(variant.nodes[node])}
     options = {node: str(chosen[node]) for node in shared if chosen.get(node)}
     groups = words_of_graph(str(variant.variant), {**options, **spec["choices"]})
     return [
@@ -79,8 +78,9 @@ def _value(node: Any) -> str:
     return word_of(OmegaConf.to_container(node, resolve=False))
 
 
-def _is_source(node: Any) -> bool:
+def is_repeatable(node: Any) -> bool:
+    """Whether a node may stand in an artifact's graph too: all but sources that give their ticks once."""
     try:
-        return issubclass(resolve(str(node.get("_target_"))), Source)
+        return bool(getattr(resolve(str(node.get("_target_"))), "repeatable", True))
     except UnknownStage:  # reported by `build`
-        return False
+        return True

@@ -17,12 +17,12 @@ from omegaconf.errors import OmegaConfBaseException
 
 from omninav.pipeline.graph.ports import convert_fields
 from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
-from omninav.pipeline.graph.registry import UnknownStage, plugins, resolve
+from omninav.pipeline.graph.registry import plugins
 from omninav.pipeline.graph.stage import Bounds
 from omninav.pipeline.run.artifact_specification import ArtifactSpecification, read_specifications, without_absent
 from omninav.pipeline.run.inputs import not_taken, read_inputs
 
-from .artifact_graph import words_of_graph
+from .artifact_graph import is_repeatable, words_of_graph
 from .composition_cache import compose
 from .config_groups import listed_groups, replaced, settings_left_open
 from .hydra_session import hydra_started
@@ -72,6 +72,8 @@ def offer_plugins() -> None:
     for entry in plugins():
         if entry.problem:
             print(f"plugin left out: {entry.problem}", file=sys.stderr)
+            continue
+        if entry.role in settings_left_open():  # a setting takes it by its own name
             continue
         name = entry.name.partition(".")[2]
         ConfigStore.instance().store(name, {"_target_": entry.target}, group=entry.role, package=f"nodes.{entry.role}")
@@ -138,14 +140,6 @@ def _unfit_settings(plain: Mapping[str, Any]) -> list[Problem]:
     return convert_fields(settings, RunSettings, "")[1]
 
 
-def _is_repeatable(node: Any) -> bool:
-    """Whether a node may stand in an artifact's graph too: all but sources that give their ticks once."""
-    try:
-        return bool(getattr(resolve(str(node.get("_target_"))), "repeatable", True))
-    except UnknownStage:  # reported by `build`
-        return True
-
-
 def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]) -> dict[str, Any]:
     spec = specs[name]
     words = words_of_graph(str(config.variant), spec.choices or {})
@@ -165,7 +159,7 @@ def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]
         other[key] = value
     absent = {*spec.inherit} - {*other.nodes}
     for each in (spec, *(other for other in specs.values() if other.together_with == name)):
-        for node in filter(lambda node: _is_repeatable(config.nodes[node]), each.inherit):
+        for node in filter(lambda node: is_repeatable(config.nodes[node]), each.inherit):
             other.nodes[node] = OmegaConf.to_container(config.nodes[node], resolve=False)
         for block, changes in ((other.nodes, each.nodes), (other.wires, each.wires)):
             for node, change in changes.items():

@@ -1,6 +1,6 @@
 """Names to stage classes: built in, installed by others, named in the environment, or given by their full path.
 
-A third party's stage is named `role.name`, as `match.gradient`:
+A third party's stage is named `role.name`, as `match.gradient`; a value of which omninav has a folder is named alike:
 
 * installed: an entry point of the group `omninav.stages`, `"match.gradient" = "package.module:GradientMatch"`;
 * not installed: `OMNINAV_STAGES="match.gradient=path/to/gradient.py:GradientMatch"` (several with commas);
@@ -32,6 +32,7 @@ from omninav.pipeline.files import digest_text, user_path
 from .problems import BadInput, cut
 from .signature import first_line
 from .stage import Source, Stage
+from .value import Value
 
 BUILT_IN = "omninav.stages"
 ENVIRONMENT = "OMNINAV_STAGES"
@@ -67,6 +68,13 @@ def resolve(target: str) -> type[Stage]:
     Raises `UnknownStage` where the module cannot be imported, the name is not in it, or it is not a stage. Whatever
     the name leads to is looked at, never called. Raises `BadInput` for what is not to be imported (`only_listed`).
     """
+    thing = _thing(target)
+    if not _is_stage(thing):
+        raise UnknownStage(f"'{target}' is not a Stage; only stages can be nodes")
+    return thing  # type: ignore[no-any-return]
+
+
+def _thing(target: str) -> Any:
     named = {entry.name: entry.target for entry in plugins()}
     target = named.get(target, target)
     module_name, _, class_name = target.rpartition(":") if ":" in target else target.rpartition(".")
@@ -81,9 +89,7 @@ def resolve(target: str) -> type[Stage]:
     if thing is None:
         here = [name for name, value in vars(module).items() if _is_stage(value)]
         raise UnknownStage(f"module '{module_name}' has no '{class_name}'; its stages: {', '.join(here) or 'none'}")
-    if not _is_stage(thing):
-        raise UnknownStage(f"'{target}' is not a Stage; only stages can be nodes")
-    return thing  # type: ignore[no-any-return]
+    return thing
 
 
 _TYPED: ContextVar[Collection[str] | None] = ContextVar("typed", default=None)
@@ -188,15 +194,29 @@ def plugins() -> list[Entry]:
 def entries() -> Iterator[Entry]:
     """All stages that can be used now, built in and third parties'; a broken plugin is a row with its problem."""
     yield from built_in()
-    for entry in plugins():
-        if entry.problem:
-            yield entry
-            continue
-        try:
-            cls = resolve(entry.target)
-            yield Entry(entry.name, entry.target, entry.origin, first_line(cls))
-        except UnknownStage as error:
-            yield Entry(entry.name, entry.target, entry.origin, problem=str(error))
+    yield from map(_imported, plugins())
+
+
+def offered(role: str) -> list[Entry]:
+    """Import what others offer under the name of a folder of omninav, stages or values; a row for each."""
+    return [_imported(entry) for entry in plugins() if entry.role == role]
+
+
+def _is_value(thing: Any) -> bool:
+    """Tells whether a plugin is a class of values, as a folder of omninav may hold in place of stages."""
+    return inspect.isclass(thing) and issubclass(thing, Value)
+
+
+def _imported(entry: Entry) -> Entry:
+    """A plugin with what its class says of itself, or with its problem."""
+    if entry.problem:
+        return entry
+    try:
+        thing = _thing(entry.target)
+        summary = first_line(thing if _is_value(thing) else resolve(entry.target))
+        return Entry(entry.name, entry.target, entry.origin, summary)
+    except UnknownStage as error:
+        return Entry(entry.name, entry.target, entry.origin, problem=str(error))
 
 
 def built_in() -> Iterator[Entry]:

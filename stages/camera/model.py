@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import BadInput, Bounds, Value
+from omninav.pipeline.graph.registry import offered
 from omninav.stages.values.image import Pixels
 
 from .rays import unit_vectors
@@ -184,9 +185,13 @@ class Camera(Value, ABC):
 
 
 def camera_models() -> dict[str, type[Camera]]:
-    """All camera models by their names in camera.yaml: those of this folder, and those that a user's code defined."""
+    """All camera models by their names in camera.yaml: those of this folder, and those that others offer (`registry`).
+
+    One that cannot be imported is missing; `omninav stages camera` says why.
+    """
     for file in sorted(Path(__file__).parent.glob("[a-z]*.py")):
         importlib.import_module(f"{__package__}.{file.stem}")
+    offered("camera")
     return MODELS
 
 

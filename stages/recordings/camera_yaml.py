@@ -14,6 +14,7 @@ import yaml
 
 from omninav.pipeline.graph.ports import convert
 from omninav.pipeline.graph.problems import BadInput, nearest, shown
+from omninav.pipeline.graph.registry import offered
 from omninav.pipeline.graph.signature import Parameter, read_parameters
 from omninav.pipeline.graph.small_files import parse_yaml, read_yaml
 from omninav.stages.camera.model import Camera, Key, camera_models, require_sight
@@ -115,7 +116,8 @@ def _model(content: dict[str, Any], where: str) -> type[Camera]:
     if not isinstance(name, str) or name not in models:
         near = nearest(name, models) if isinstance(name, str) else None
         hint = f"did you mean '{near}'?" if near else f"one of {', '.join(sorted(models))}"
-        raise UnreadableRecording(f"{where}: 'projection' cannot be {shown(name)}; {hint}")
+        broken = "".join(f"; {entry.name}: {entry.problem}" for entry in offered("camera") if entry.problem)
+        raise UnreadableRecording(f"{where}: 'projection' cannot be {shown(name)}; {hint}{broken}")
     return models[name]
 
 

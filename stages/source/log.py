@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Source, State, Tick
+from omninav.pipeline.engine.code_version import module_version
 from omninav.pipeline.files import digest_file, digest_text, user_path
 from omninav.pipeline.graph.problems import counted
 from omninav.stages.geometry.plane.se2 import between
@@ -158,6 +159,9 @@ class LogSource(Source):
         whole = hashlib.sha256()
         for recording in self._opened:
             whole.update(recording.digest().encode())
+            model = type(recording.camera).__module__
+            if not model.startswith("omninav."):  # its code may change while its name stays
+                whole.update(module_version(model).encode())
         if self._truth_file is not None:
             whole.update(digest_file(self._truth_file).encode())
         return whole.hexdigest()

@@ -5,7 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from conftest import DATA, DRIVE, GRID, TOUR, needs_data
+from conftest import DATA, DRIVE, GRID, TOUR, Command, needs_data
 from made_rings import ring_picture
 
 from omninav.pipeline.cli.main import main
@@ -134,6 +134,53 @@ def test_a_donut_is_refused_where_no_ring_stands_out(tmp_path: Path, capsys: pyt
     assert "no ring of a mirror stands out in its first 2 images; is it another camera (camera=…)? If not, give" in (
         capsys.readouterr().err
     )
+
+
+OWN_CAMERA = '''"""A lens of mine."""
+
+import numpy as np
+
+from omninav.stages.camera.fisheye import Fisheye
+
+
+class Squeezed(Fisheye, projection="squeezed"):
+    """A fisheye lens whose images are squeezed."""
+
+    def project(self, rays):
+        pixels, shown = super().project(rays)
+        return pixels * np.array([1.0, 0.5]), shown
+'''
+
+
+@pytest.mark.parametrize("way", ["file", "package"])
+def test_a_camera_model_of_a_third_party_is_used_by_name(omninav_process: Command, tmp_path: Path, way: str) -> None:
+    site = tmp_path / "site"
+    info = site / "squeezed_camera-1.0.dist-info"
+    info.mkdir(parents=True)
+    (site / "squeezed_camera.py").write_text(OWN_CAMERA)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: squeezed-camera\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[omninav.stages]\ncamera.squeezed = squeezed_camera:Squeezed\n")
+    named = {"OMNINAV_STAGES": "camera.squeezed=site/squeezed_camera.py:Squeezed"}
+    settings = named if way == "file" else {"PYTHONPATH": str(site)}
+    file = "".join(f"{key}: {value}\n" for key, value in FILES["fisheye"].items())
+    (tmp_path / "mine.yaml").write_text(f"projection: squeezed\n{file}")
+    (tmp_path / "broken.py").write_text("import not_there\n")
+    for number in range(3):
+        pixels = np.random.default_rng(number).integers(0, 256, (120, 160, 3), dtype=np.uint8)
+        (tmp_path / "drive").mkdir(exist_ok=True)
+        cv2.imwrite(str(tmp_path / "drive" / f"{number}.png"), pixels)
+    words = ("log=drive", "camera=mine.yaml")
+    refused = omninav_process("camera", "look", *words, OMNINAV_STAGES="camera.broken=broken.py:Lens")
+    assert refused.returncode == 2
+    assert "'projection' cannot be 'squeezed'" in refused.stderr
+    assert "camera.broken: module 'broken.py' cannot be imported" in refused.stderr
+    looked = omninav_process("camera", "look", *words, check=True, **settings)
+    assert "image 0, squeezed camera" in looked.stdout
+    checked = omninav_process("check", "variant=topological_localisation", "tour=drive", *words, check=True, **settings)
+    assert "nothing wrong" in checked.stdout
+    listed = omninav_process("stages", "camera.squeezed", check=True, **settings).stdout
+    assert "camera.squeezed" in listed
+    assert "A fisheye lens whose images are squeezed." in listed
 
 
 def test_a_setting_that_a_tool_does_not_take_is_one_problem(capsys: pytest.CaptureFixture[str]) -> None:

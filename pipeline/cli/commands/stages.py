@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from omninav.pipeline.cli.config_groups import options_with
 from omninav.pipeline.graph.ports import type_name
 from omninav.pipeline.graph.problems import suggest
-from omninav.pipeline.graph.registry import Entry, entries, resolve
+from omninav.pipeline.graph.registry import Entry, UnknownStage, entries, resolve
 from omninav.pipeline.graph.signature import Parameter, signature
 
 
@@ -43,9 +43,12 @@ def _described(entry: Entry) -> Iterator[str]:
     if entry.problem:
         yield f"{entry.name}  [{entry.origin}, cannot be used]\n    {entry.problem}\n"
         return
-    cls = resolve(entry.target)
-    read = signature(cls)
     yield f"{entry.name}  [{entry.origin}]  {entry.summary}"
+    try:
+        cls = resolve(entry.target)
+    except UnknownStage:  # a value, which no graph names
+        return
+    read = signature(cls)
     for port in read.inputs.values():
         every, optional = "all " if port.collects else "", " (optional)" if port.optional else ""
         yield f"    in   {port.name}: {every}{type_name(port.type)}{optional}"

@@ -12,6 +12,8 @@ from made_logs import FRAMES, IMAGE, ODOMETRY, START, TRUTH, Made, compressed, m
 
 from omninav.pipeline import Context
 from omninav.pipeline.mcap.message_types import make_message
+from omninav.stages.camera.equirectangular import Equirectangular
+from omninav.stages.camera.model import MODELS
 from omninav.stages.geometry.plane.se2 import between, compose
 from omninav.stages.recordings.opening import open_recording
 from omninav.stages.recordings.recording import UnreadableRecording
@@ -174,6 +176,22 @@ def test_what_was_lost_at_opening_is_counted_once(tmp_path: Path) -> None:
     assert ctx.counts["cut_file"] == 1
     assert str(path) in ctx.details["cut_file"]
     assert len(outs) == source.length()
+
+
+def test_other_code_of_a_camera_model_of_ones_own_makes_other_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was kept of a log as the model read it before is not used again."""
+    monkeypatch.setitem(
+        MODELS, "mine", type("Mine", (Equirectangular,), {"__module__": __name__, "projection": "mine"})
+    )
+    path, camera = str(write_mcap(tmp_path / "log.mcap")), tmp_path / "camera.yaml"
+    camera.write_text("{projection: mine, image: {width: 48, height: 16}, column_of_forward: 24}")
+    digests = set()
+    for code in ("first", "second"):
+        monkeypatch.setattr("omninav.stages.source.log.module_version", lambda module, code=code: f"{module} {code}")
+        digests.add(LogSource(log=path, camera=str(camera)).inputs_digest())
+    assert len(digests) == 2
 
 
 def test_a_cut_leaves_the_middle_out_and_odometry_does_not_notice(tmp_path: Path) -> None:
