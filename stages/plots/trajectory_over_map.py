@@ -5,11 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from omninav.pipeline import Context, Figure, Outputs, Stage
+from omninav.pipeline.graph.problems import counted
 from omninav.pipeline.report.chart import broken
-from omninav.stages.values.drive import Drive, known
+from omninav.stages.values.drive import Array, Drive, known
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OccupancyGrid
 from omninav.stages.values.map_places import AnyMap, map_poses
+from omninav.stages.values.planned_route import PlannedRoute
 from omninav.stages.values.pose import SOURCE_WORDS
 from omninav.stages.values.topological_map import TopologicalMap
 
@@ -20,7 +22,8 @@ from .plan_chart import draw_surroundings, jumps, plan_chart
 class TrajectoryOverMap(Stage):
     """Plots estimate, truth and odometry alone over the map's references and edges (map frame, m).
 
-    With `grid` or `plan` wired, all of it over what stands on the floor. The last log has a plot of its own.
+    With `grid` or `plan` wired, all of it over what stands on the floor. The last log has a plot of its own. Of a robot
+    that drives by itself every contact is marked; with `routes` the planned routes, the last one bold, and its goal.
     """
 
     class Out(Outputs):
@@ -36,16 +39,18 @@ class TrajectoryOverMap(Stage):
         map: AnyMap | None = None,
         grid: OccupancyGrid | None = None,
         plan: FloorPlan | None = None,
+        routes: Sequence[PlannedRoute | None] | None = None,
     ) -> Out:
         """The whole run at once."""
         logs = drive.by_log
         if not logs:
             return self.Out()
+        planned = [] if routes is None else planned_routes(routes, map)
         last = Figure(
             name="trajectory_over_map",
             title="Trajectory over the map",
-            caption=_caption(logs[-1], map),
-            content=_draw(logs[-1:], map, grid, plan),
+            caption=_caption(logs[-1], map, None if routes is None else len(planned)),
+            content=_draw(logs[-1:], map, grid, plan, planned),
             media_type="image/svg+xml",
             order=10,
         )
@@ -64,9 +69,32 @@ class TrajectoryOverMap(Stage):
         return self.Out(figure=last, earlier=earlier)
 
 
-def _caption(drive: Drive, map: AnyMap | None) -> str:
-    words = [f"The estimate of {len(drive)} frames"]
-    words.append("over the true path." if drive.has_truth else "; this log has no ground truth.")
+def planned_routes(routes: Sequence[PlannedRoute | None], map: AnyMap | None) -> list[Array]:
+    """Each route that was planned, in order: x and y (V, 2) of the views along it."""
+    if not isinstance(map, TopologicalMap):
+        return []
+    found = {route.number: route.places for route in routes if route is not None and len(route.places)}
+    return [map.poses[map.views_along(found[number])[0]][:, :2] for number in sorted(found)]
+
+
+def _drives_itself(drive: Drive) -> bool:
+    return bool(np.isfinite(drive.distance).any())
+
+
+def _caption(drive: Drive, map: AnyMap | None, planned: int | None) -> str:
+    estimated = known(drive.estimate).any()
+    words = [f"The {'estimate' if estimated or not drive.has_truth else 'true path'} of {len(drive)} frames"]
+    if not drive.has_truth:
+        words.append("; this log has no ground truth.")
+    else:
+        words.append("over the true path." if estimated else ".")
+    if _drives_itself(drive):
+        words.append(f"The robot collided {counted(int(drive.collisions.max()), 'time')} (orange crosses).")
+    if planned is not None:
+        earlier = f", thin: the {planned - 1} before it" if planned > 1 else ""
+        words.append(
+            f"Green: the route that it planned last{earlier}, and its goal." if planned else "It planned no route."
+        )
     if drive.odometry_alone() is not None:
         anchor = "starts at the first true pose" if drive.has_truth else "is laid through the last estimate"
         words.append(f"Odometry alone {anchor}.")
@@ -79,12 +107,23 @@ def _caption(drive: Drive, map: AnyMap | None) -> str:
         words.append(
             f"Grey: the {len(map)} reference views of the map, their poses taken from {SOURCE_WORDS[map.pose_source]}."
         )
-    return " ".join(words).replace(" ;", ";")
+    return " ".join(words).replace(" ;", ";").replace(" .", ".")
 
 
-def _draw(logs: Sequence[Drive], map: AnyMap | None, grid: OccupancyGrid | None, plan: FloorPlan | None) -> bytes:
+def _draw(
+    logs: Sequence[Drive],
+    map: AnyMap | None,
+    grid: OccupancyGrid | None,
+    plan: FloorPlan | None,
+    planned: Sequence[Array] = (),
+) -> bytes:
     kept = [drive.truth if drive.has_truth else drive.estimate for drive in logs]
-    chart = plan_chart(extent_of(*kept, map_poses(map), margin=0.05))  # odometry and a lost filter may leave it
+    extent = extent_of(*kept, map_poses(map), margin=0.05)  # odometry and a lost filter may leave it
+    if plan is not None and _drives_itself(logs[-1]):
+        extent = (-0.3, plan.width + 0.3, -0.3, plan.depth + 0.3)
+    chart = plan_chart(extent)
+    for number, route in enumerate(planned):
+        chart.base.line(route, "green", 7.0 if number == len(planned) - 1 else 1.8, opacity=0.45)
     draw_surroundings(chart, map, grid, plan)
     for drive in logs:
         odometry = drive.odometry_alone()
@@ -92,13 +131,21 @@ def _draw(logs: Sequence[Drive], map: AnyMap | None, grid: OccupancyGrid | None,
             chart.base.line(odometry, "orange", 1.4, dashed=True)
             chart.name("odometry alone", "orange", "dashes")
         if drive.has_truth:
-            chart.base.line(drive.truth, "ink", 3.0, opacity=0.75)
+            chart.base.line(broken(drive.truth, jumps(drive.truth)), "ink", 3.0, opacity=0.75)
             chart.name("ground truth", "ink")
-        chart.base.line(broken(drive.estimate, jumps(drive.estimate)), "blue", 1.8)
-        chart.base.dots(drive.estimate, "blue", 1.3)
-        chart.name("estimate", "blue")
+        if known(drive.estimate).any() or not drive.has_truth:
+            chart.base.line(broken(drive.estimate, jumps(drive.estimate)), "blue", 1.8)
+            chart.base.dots(drive.estimate, "blue", 1.3)
+            chart.name("estimate", "blue")
         begins = drive.truth if drive.has_truth else drive.estimate
         if known(begins).any():
             chart.base.square(begins[int(np.argmax(known(begins)))], "green")
             chart.name("start", "green", "square")
+        contacts = np.flatnonzero(np.diff(drive.collisions, prepend=0) > 0)
+        if len(contacts):
+            chart.base.crosses(drive.truth[contacts], "orange")
+            chart.name("contact", "orange", "square")
+    if planned:
+        chart.base.ring(planned[-1][-1], "green", 8.0)
+        chart.name("planned route, goal", "green", "ring")
     return chart.svg()

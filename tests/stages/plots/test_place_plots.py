@@ -8,8 +8,8 @@ from made_places import made_map
 from small_run import collected
 
 from omninav.pipeline import Context, Tick
-from omninav.stages.plots.drive_over_plan import DriveOverPlan, planned_routes
 from omninav.stages.plots.place_belief_over_time import PlaceBeliefOverTime, binned, with_neighbours
+from omninav.stages.plots.trajectory_over_map import TrajectoryOverMap, planned_routes
 from omninav.stages.plots.true_and_estimated_place import BESIDE, RIGHT, WRONG, TrueAndEstimatedPlace, judged
 from omninav.stages.values.belief import PlaceBelief
 from omninav.stages.values.drive_tally import DriveTally
@@ -33,17 +33,18 @@ def green(figure) -> int:
     return sum(max(1, len(re.findall("[ML]", words))) for words in marks)
 
 
-def drawn(**rest):
-    motion, tallies = [Motion(0.15, 0.0, 0.0)] * 20, [DriveTally(0, 0.15 * k) for k in range(20)]
-    return DriveOverPlan().step(CTX, collected(TICKS, TRUTH, motion, tallies=tallies), PLAN, **rest).figure
+def drawn(contact=99, **rest):
+    motion, tallies = [Motion(0.15, 0.0, 0.0)] * 20, [DriveTally(int(k >= contact), 0.15 * k) for k in range(20)]
+    return TrajectoryOverMap().step(CTX, collected(TICKS, TRUTH, motion, tallies=tallies), plan=PLAN, **rest).figure
 
 
 def test_the_way_planned_is_drawn_over_the_plan_with_its_goal():
     ways = [None] * 3 + [PlannedRoute(np.array([0, 1, 2]), "under way", 0)] * 7
     ways += [PlannedRoute(np.array([1, 2, 3]), "under way", 1)] * 10
-    plain, mapped, planned = drawn(), drawn(map=MAP), drawn(map=MAP, routes=ways)
+    plain, mapped, planned = drawn(), drawn(map=MAP, routes=[None] * 20), drawn(map=MAP, routes=ways)
     assert green(planned) > 4 * green(plain) > 0  # the start
-    assert "map" not in plain.caption
+    assert "route" not in plain.caption
+    assert "collided 0 times" in plain.caption
     assert "4 places" in mapped.caption
     assert "It planned no route" in mapped.caption
     assert "thin: the 1 before it" in planned.caption
@@ -51,6 +52,13 @@ def test_the_way_planned_is_drawn_over_the_plan_with_its_goal():
     first, last = planned_routes(ways, MAP)
     assert first.tolist() == [[1.0, 1.0], [1.0, 1.0], [4.0, 1.0], [4.0, 4.0]]  # path images lie at their owner's
     assert len(last) == 5
+
+
+def test_a_contact_of_a_robot_that_drives_itself_is_marked_where_it_was():
+    free, touched = drawn(), drawn(contact=9)
+    assert b"contact" not in free.content
+    assert b"contact" in touched.content
+    assert "collided 1 time " in touched.caption
 
 
 def believed() -> list[PlaceBelief | None]:
