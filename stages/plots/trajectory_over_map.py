@@ -48,7 +48,7 @@ class TrajectoryOverMap(Stage):
         planned = [] if routes is None else planned_routes(routes, map)
         last = Figure(
             name="trajectory_over_map",
-            title="Trajectory over the map",
+            title="Path driven" if map is None else "Trajectory over the map",
             caption=_caption(logs[-1], map, None if routes is None else len(planned)),
             content=_draw(logs[-1:], map, grid, plan, planned),
             media_type="image/svg+xml",
