@@ -3,24 +3,23 @@
 import numpy as np
 
 from omninav.pipeline import Context, Figure, FigureStage
-from omninav.pipeline.report.plot_style import plot
+from omninav.pipeline.report.chart import Colour
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.homing_field import HomingField
 
-from .drawing import (
-    EDGE,
-    ODOMETRY,
-    TRUTH,
-    draw_plan,
-    draw_pose,
-    extent_of,
-    fitting_height,
-    plan_axes,
+from .drawing import extent_of
+from .plan_chart import draw_surroundings, plan_chart
+
+BANDS: tuple[tuple[float, float, Colour, str], ...] = (
+    (0.0, 15.0, "green", "wrong by less than 15°"),
+    (15.0, 45.0, "blue", "15 to 45°"),
+    (45.0, 181.0, "orange", "more than 45°"),
 )
+"""Errors of the direction, degrees: from, to before, and how they are drawn. 15 degrees is the limit of the experiment's claims."""
 
 
 class ShowHomingVectors(FigureStage):
-    """Plots an arrow where each view was taken, along its homing vector, coloured by its error.
+    """Plots a dart where each view was taken, along its homing vector, coloured by its error.
 
     As Figure 15 of Goedemé et al. 2007. With `plan` wired the world's floor plan lies under them. Gives nothing where
     there is no field.
@@ -40,31 +39,33 @@ class ShowHomingVectors(FigureStage):
                 f"Median error of the direction: {median:.1f}° (a view without a vector counts as 180°). Crosses: no "
                 "vector. Rings: every 2 m.",
                 content=_draw(field, plan),
+                media_type="image/svg+xml",
                 order=8,
             )
         )
 
 
 def _draw(field: HomingField, plan: FloorPlan | None) -> bytes:
-    from matplotlib.patches import Circle
-
-    extent = extent_of(field.poses, field.target[None], margin=0.06)
-    with plot(8.0, fitting_height(extent, 6.6, 3.0, 8.0)) as drawn:
-        axes = drawn.canvas.subplots()
-        draw_plan(axes, plan)
-        for metres in np.arange(2.0, float(field.metres.max()) + 1.0, 2.0):
-            axes.add_patch(Circle(tuple(field.target[:2]), metres, fill=False, color=EDGE, linewidth=0.8))
-        found = np.isfinite(field.directions)
-        at, length = field.poses[found], _spacing(field.poses)
-        arrow = 0.85 * length * np.stack([np.cos(field.directions), np.sin(field.directions)], axis=-1)[found]
-        arrows = axes.quiver(*(at[:, :2] - arrow / 2).T, *arrow.T, np.clip(np.degrees(field.errors[found]), 0.0, 90.0),
-                             cmap="viridis", angles="xy", scale_units="xy", scale=1.0, width=0.004,
-                             clim=(0.0, 90.0), zorder=3)  # fmt: skip
-        drawn.canvas.colorbar(arrows, ax=axes, label="error of the direction (degrees)", shrink=0.7)
-        axes.plot(*field.poses[~found, :2].T, "x", color=ODOMETRY, markersize=4, zorder=3)
-        draw_pose(axes, field.target, length, TRUTH, "target")
-        plan_axes(axes, extent)
-    return drawn.content
+    chart = plan_chart(extent_of(field.poses, field.target[None], margin=0.06), (190.0, 560.0))
+    draw_surroundings(chart, None, None, plan)
+    around = np.linspace(0.0, 2.0 * np.pi, 73)
+    for metres in np.arange(2.0, float(field.metres.max()) + 1.0, 2.0):
+        ring = field.target[:2] + metres * np.stack([np.cos(around), np.sin(around)], axis=-1)
+        chart.base.line(ring, "line", 0.8)
+    found = np.isfinite(field.directions)
+    size = float(np.clip(0.55 * _spacing(field.poses) * chart.x.per_unit, 4.0, 12.0))
+    for low, high, colour, name in BANDS:
+        some = found & (np.degrees(field.errors) >= low) & (np.degrees(field.errors) < high)
+        for (x, y, _), direction in zip(field.poses[some], field.directions[some], strict=True):
+            chart.base.dart(np.array([x, y, direction]), colour, size)
+        if some.any():
+            chart.name(name, colour)
+    if not found.all():
+        chart.base.crosses(field.poses[~found], "grey", 3.0)
+        chart.name("no vector", "grey", "square")
+    chart.base.dart(field.target, "ink", 12.0)
+    chart.name("target", "ink")
+    return chart.svg()
 
 
 def _spacing(poses: np.ndarray) -> float:

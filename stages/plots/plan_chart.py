@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from omninav.pipeline.report.chart import Chart, Layer, broken
+from omninav.pipeline.report.chart import Chart, Colour, Layer, broken
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OCCUPIED, OccupancyGrid
 from omninav.stages.values.map_places import AnyMap
@@ -49,11 +49,11 @@ def draw_map(chart: Chart, map: AnyMap) -> None:
     if isinstance(map, TopologicalMap):
         poses = map.poses[map.places]
         lines = [map.poses[[map.places[a], *map.path_of(n), map.places[b]]] for n, (a, b) in enumerate(map.links)]
-        _lines(chart.base, lines)
+        draw_lines(chart.base, lines, "line", 0.9)
         chart.base.dots(poses, "grey", 4.0)
         chart.name(f"places ({len(map)})", "grey", "dot")
         return
-    _lines(chart.base, list(map.poses[map.edges]))
+    draw_lines(chart.base, list(map.poses[map.edges]), "line", 0.9)
     chart.base.dots(map.poses, "grey", _size(len(map)), 0.8)
     chart.name(f"references ({len(map)})", "grey", "dot")
 
@@ -68,10 +68,11 @@ def _size(number: int) -> float:
     return float(np.clip(600 / max(number, 1), 1.1, 2.4))
 
 
-def _lines(layer: Layer, lines: list[Array]) -> None:
+def draw_lines(layer: Layer, lines: list[Array], colour: Colour, width: float) -> None:
+    """Lines, each through points (N, 2 or more), as one mark."""
     if lines:
         ends = np.cumsum([len(line) for line in lines])[:-1].tolist()
-        layer.line(broken(np.concatenate([line[:, :2] for line in lines]), ends), "line", 0.9)
+        layer.line(broken(np.concatenate([line[:, :2] for line in lines]), ends), colour, width)
 
 
 def _outlines(plan: FloorPlan) -> tuple[bytes, Extent]:

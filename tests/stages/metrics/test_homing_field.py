@@ -44,10 +44,12 @@ def test_errors_are_angles_to_the_true_way_and_lost_views_count_as_half_a_turn()
     assert values["within"]["found_rate"][1] == pytest.approx(2 / 3)
 
 
-def test_the_picture_has_an_arrow_for_each_view() -> None:
-    figure = ShowHomingVectors().step(CTX, judged().field).figure
+def test_the_picture_has_a_dart_for_each_view_that_has_a_vector_and_one_for_the_target() -> None:
+    field = judged().field
+    assert field is not None
+    figure = ShowHomingVectors().step(CTX, field).figure
     assert figure is not None
-    assert figure.content.startswith(b"\x89PNG")
+    assert figure.content.count(b"<polygon") == np.isfinite(field.directions).sum() + 1
     assert "From 3 views" in figure.caption
     assert ShowHomingVectors().step(CTX).figure is None
 
