@@ -309,6 +309,11 @@ def broken(points: Array, rows: npt.NDArray[np.int64] | Sequence[int]) -> Array:
     return np.concatenate([row for part in parts for row in (part, gap)][:-1]) if parts else points
 
 
+def steps(at: npt.ArrayLike, heights: npt.ArrayLike) -> Array:
+    """A line (2 N, 2) that stays at each height (N,) from its place to the next one's, `at` (N + 1,)."""
+    return np.column_stack([np.repeat(at, 2)[1:-1], np.repeat(heights, 2)])
+
+
 def _text(x: float, y: float, words: str, anchor: str) -> str:
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(words)}</text>'
 

@@ -1,11 +1,10 @@
-"""Draws maps, grids, plans and poses on the axes of a plan view."""
+"""Draws maps, grids and poses on the axes of a plan view."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from omninav.stages.values.map_places import AnyMap
 from omninav.stages.values.topological_map import TopologicalMap
@@ -64,18 +63,6 @@ def draw_links(axes: "Axes", map: TopologicalMap) -> None:
     poses = map.poses[:, :2]
     paths = [poses[[map.places[a], *map.path_of(link), map.places[b]]] for link, (a, b) in enumerate(map.links)]
     axes.add_collection(LineCollection(paths, colors=REFERENCE, linewidths=0.7, zorder=1))
-
-
-def draw_plan(axes: "Axes", plan: FloorPlan | None) -> None:
-    """What stands on the floor, in grey."""
-    if plan is None:
-        return
-    from matplotlib.collections import PolyCollection
-
-    # edges in the same grey, so that no seams show between the boxes of a grid
-    axes.add_collection(
-        PolyCollection(list(plan.outlines), facecolors=EDGE, edgecolors=EDGE, linewidths=0.6, zorder=0.5)
-    )
 
 
 def draw_grid(axes: "Axes", grid: OccupancyGrid | None) -> None:

@@ -15,7 +15,7 @@ BANDS: tuple[tuple[float, float, Colour, str], ...] = (
     (15.0, 45.0, "blue", "15 to 45°"),
     (45.0, 181.0, "orange", "more than 45°"),
 )
-"""Errors of the direction, degrees: from, to before, and how they are drawn. 15 degrees is the limit of the experiment's claims."""
+"""Errors of the direction, degrees: from, to before, and how they are drawn. The experiment's claims ask for 15."""
 
 
 class ShowHomingVectors(FigureStage):

@@ -6,13 +6,13 @@ import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, FigureStage
-from omninav.pipeline.report.plot_style import plot
+from omninav.pipeline.report.chart import Chart, limits, stacked, steps
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import ViewEvent
 
-from .drawing import ESTIMATE, MARK, ODOMETRY, REFERENCE
-
+Ints = npt.NDArray[np.int64]
 BINS = 80
+X_LABEL = "frames, all logs one after the other"
 
 
 class MapGrowth(FigureStage):
@@ -52,7 +52,7 @@ class MapGrowth(FigureStage):
                 f"{f' ({counted})' if counted else ''}; "
                 f"{found[-1].views} with {found[-1].components} components are left. Below: how many were added and "
                 f"removed per {_width(len(drive))} frames, at the time of learning, which is after they were seen. "
-                "Dotted lines: a new log begins.",
+                "Upright lines: a new log begins.",
                 content=_draw(
                     len(drive),
                     starts,
@@ -62,6 +62,7 @@ class MapGrowth(FigureStage):
                     came,
                     went,
                 ),
+                media_type="image/svg+xml",
                 order=14,
             )
         )
@@ -71,34 +72,20 @@ def _width(frames: int) -> int:
     return max(1, -(-frames // BINS))
 
 
-def _draw(
-    frames: int,
-    starts: Sequence[int],
-    at: npt.NDArray[np.int64],
-    views: npt.NDArray[np.int64],
-    components: npt.NDArray[np.int64],
-    came: npt.NDArray[np.int64],
-    went: npt.NDArray[np.int64],
-) -> bytes:
-    width = _width(frames)
+def _draw(frames: int, starts: Sequence[int], at: Ints, views: Ints, components: Ints, came: Ints, went: Ints) -> bytes:
+    span, width = (0.0, float(max(frames - 1, 1))), _width(frames)
     edges = np.arange(0, frames + width, width)
-    with plot(8.0, 4.4) as drawn:
-        upper, lower = drawn.canvas.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        upper.step(at, components, where="post", color=REFERENCE, linewidth=1.2, label="components")
-        upper.step(at, views, where="post", color=ESTIMATE, linewidth=1.6, label="references")
-        upper.set_ylim(bottom=0)
-        upper.set_ylabel("in the map")
-        upper.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-        for counts, sign, colour, name in ((came, 1, MARK, "came"), (went, -1, ODOMETRY, "went")):
-            heights = np.histogram(at, edges, weights=counts)[0]
-            lower.bar(edges[:-1], sign * heights, width, align="edge", color=colour, linewidth=0, label=name)
-        lower.axhline(0, color="#999999", linewidth=0.7)
-        lower.yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
-        lower.set_ylabel(f"per {width} frames")
-        lower.set_xlabel("frames, all logs one after the other")
-        lower.legend(loc="upper right", ncols=2)
-        for axes in (upper, lower):
-            for start in starts[1:]:
-                axes.axvline(start, color="#999999", linewidth=0.9, linestyle=":")
-        lower.set_xlim(0, max(frames - 1, 1))
-    return drawn.content
+    added, removed = (np.histogram(at, edges, weights=counts)[0] for counts in (came, went))
+    size = Chart(span, (0.0, 1.05 * max(int(components.max()), 1)), "", "in the map")
+    change = Chart(span, limits(np.concatenate([[0.0], added, -removed])), X_LABEL, f"per {width} frames")
+    for counts, colour, name in ((components, "grey", "components"), (views, "blue", "references")):
+        size.base.line(steps(np.append(at, frames - 1), counts), colour, 1.6)
+        size.name(name, colour)
+    for heights, colour, name in ((added, "green", "added"), (-removed, "orange", "removed")):
+        change.base.line(steps(edges, heights), colour, 1.6)
+        change.name(name, colour)
+    change.base.level(0.0, "grey")
+    for chart in (size, change):
+        for start in starts[1:]:
+            chart.base.upright(start, "line")
+    return stacked([size, change])

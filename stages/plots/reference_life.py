@@ -8,23 +8,17 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Context, Figure, FigureStage
 from omninav.pipeline.graph.problems import counted
-from omninav.pipeline.report.plot_style import plot
+from omninav.pipeline.report.chart import Chart, Colour, stacked, steps
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.floor_plan import FloorPlan
 from omninav.stages.values.view_mixtures import MixturesNow, ViewEvent
 
-from .drawing import (
-    EDGE,
-    REFERENCE,
-    TRUTH,
-    draw_plan,
-    extent_of,
-    fitting_height,
-    plan_axes,
-)
+from .drawing import extent_of
+from .map_growth import X_LABEL
+from .plan_chart import draw_surroundings, plan_chart
 
 Array = npt.NDArray[np.float64]
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+COLOURS: tuple[Colour, ...] = ("blue", "orange", "green", "pink")
 
 
 class ReferenceLife(FigureStage):
@@ -73,10 +67,11 @@ class ReferenceLife(FigureStage):
                 title="History of a reference",
                 caption=f"Reference {name} was added in frame {snapshots[0][0]} and changed in "
                 f"{counted(len(snapshots), 'frame')}; {ended}. It was kept at {counted(len(lives), 'place')}, each in "
-                f"one colour in both plots{'; grey: all but the heaviest six' if len(lives) > len(COLOURS) else ''}. "
-                "Right: larger dots weigh more, circles are last places, crosses the true positions at these frames "
+                f"one colour in both plots{'; grey: all but the heaviest four' if len(lives) > len(COLOURS) else ''}. "
+                "Below: larger dots weigh more, circles are last places, crosses the true positions at these frames "
                 "(a map that learns with delay changes a little after the view was seen).",
-                content=_draw(lives, path, np.array(seen), plan, gone),
+                content=_draw(lives, path, np.array(seen), plan, gone, len(drive)),
+                media_type="image/svg+xml",
                 order=16,
             )
         )
@@ -129,29 +124,22 @@ def _draw(
     seen: npt.NDArray[np.int64],
     plan: FloorPlan | None,
     gone: int | None,
+    frames: int,
 ) -> bytes:
-    extent = extent_of(path, *(life[:, 1:3] for life in lives), margin=0.08)
-    with plot(9.0, fitting_height(extent, 4.6, 3.0, 6.0)) as drawn:
-        left, right = drawn.canvas.subplots(1, 2)
-        draw_plan(right, plan)
-        right.plot(*path.T, color=EDGE, linewidth=0.8, zorder=1)
-        true = path[seen][np.isfinite(path[seen]).all(axis=1)]
-        right.plot(*true.T, "x", color=TRUTH, markersize=5, markeredgewidth=1.0, zorder=5, label="true positions")
-        for number, life in enumerate(lives):
-            colour = COLOURS[number] if number < len(COLOURS) else REFERENCE
-            frame, x, y, weight = life.T
-            left.step(frame, weight, where="post", color=colour, linewidth=1.2)
-            left.plot(frame, weight, ".", color=colour, markersize=3)
-            right.plot(x, y, color=colour, linewidth=0.8, alpha=0.6, zorder=3)
-            right.scatter(x, y, s=4 + 36 * np.clip(weight, 0, 1), color=colour, alpha=0.5, linewidths=0, zorder=3)
-            right.plot(x[-1:], y[-1:], "o", markerfacecolor="none", color=colour, markersize=9, zorder=4)
-        if gone is not None:
-            left.axvline(gone, color="#999999", linewidth=1.0, linestyle=":", label="removed")
-            left.legend(loc="upper right")
-        left.set_ylim(bottom=0)
-        left.set_ylabel("weight")
-        left.set_xlabel("frames, all logs one after the other")
-        plan_axes(right, extent)
-        if len(true):
-            right.legend(loc="upper right")
-    return drawn.content
+    heaviest = max(float(life[:, 3].max()) for life in lives)
+    weights = Chart((0.0, float(max(frames - 1, 1))), (0.0, 1.05 * heaviest), X_LABEL, "weight")
+    places = plan_chart(extent_of(path, *(life[:, 1:3] for life in lives), margin=0.08))
+    draw_surroundings(places, None, None, plan)
+    places.base.line(path, "line", 0.8)
+    for number, life in enumerate(lives):
+        colour: Colour = COLOURS[number] if number < len(COLOURS) else "grey"
+        weights.base.line(steps(np.append(life[:, 0], life[-1, 0]), life[:, 3]), colour, 1.2)
+        weights.base.dots(life[:, [0, 3]], colour)
+        places.base.line(life[:, 1:3], colour, 0.8, opacity=0.6)
+        places.base.discs(life[:, 1:3], 2.0 + 4.0 * np.sqrt(np.clip(life[:, 3], 0, 1)), colour, 0.5)
+        places.base.ring(life[-1, 1:3], colour)
+    places.base.crosses(path[seen], "ink", 3.0)
+    places.name("true positions", "ink", "square")
+    if gone is not None:
+        weights.base.upright(gone, "grey", "removed")
+    return stacked([weights, places])
