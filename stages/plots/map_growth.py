@@ -1,16 +1,18 @@
 """Plots how a map of views grew and forgot."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Figure, FigureStage
-from omninav.pipeline.report.chart import Chart, limits, stacked, steps
+from omninav.pipeline.report.chart import Chart, Colour, limits, stacked, steps
 from omninav.stages.values.drive import Drive
 from omninav.stages.values.view_mixtures import ViewEvent
 
 Ints = npt.NDArray[np.int64]
+Named = tuple[npt.NDArray[Any], Colour, str]
 BINS = 80
 X_LABEL = "frames, all logs one after the other"
 
@@ -78,10 +80,12 @@ def _draw(frames: int, starts: Sequence[int], at: Ints, views: Ints, components:
     added, removed = (np.histogram(at, edges, weights=counts)[0] for counts in (came, went))
     size = Chart(span, (0.0, 1.05 * max(int(components.max()), 1)), "", "in the map")
     change = Chart(span, limits(np.concatenate([[0.0], added, -removed])), X_LABEL, f"per {width} frames")
-    for counts, colour, name in ((components, "grey", "components"), (views, "blue", "references")):
+    held: tuple[Named, ...] = ((components, "grey", "components"), (views, "blue", "references"))
+    moved: tuple[Named, ...] = ((added, "green", "added"), (-removed, "orange", "removed"))
+    for counts, colour, name in held:
         size.base.line(steps(np.append(at, frames - 1), counts), colour, 1.6)
         size.name(name, colour)
-    for heights, colour, name in ((added, "green", "added"), (-removed, "orange", "removed")):
+    for heights, colour, name in moved:
         change.base.line(steps(edges, heights), colour, 1.6)
         change.name(name, colour)
     change.base.level(0.0, "grey")
