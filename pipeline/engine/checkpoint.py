@@ -9,7 +9,7 @@ from omninav.pipeline.files import write_whole
 from .codec import BadEncoding, decode, encode, seal, unseal
 from .grown_rows import GrownRows, grows
 
-FORMAT = 4
+FORMAT = 5
 
 
 class OtherVersion(BadEncoding):

@@ -5,13 +5,14 @@ import hashlib
 import json
 import struct
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import Enum
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from omninav.pipeline.graph.stage import State
 from omninav.pipeline.graph.stored_rows import StoredRows
@@ -19,6 +20,7 @@ from omninav.pipeline.graph.value import VALUE_TYPES, Value, value_name
 
 _LENGTH = struct.Struct("<Q")
 _PLAIN = (str, bool, int, float, type(None))
+_PLAIN_TYPES = frozenset(_PLAIN)
 _to_json = json.JSONEncoder(separators=(",", ":")).encode
 
 
@@ -26,28 +28,100 @@ class BadEncoding(ValueError):
     """Bytes that are not what `encode` wrote, or a thing that cannot be written. The message is one line."""
 
 
+class _Arrays:
+    """The bytes of arrays, which follow the header one after the other."""
+
+    def __init__(self) -> None:
+        self.parts: list[bytes] = []
+        self.size = 0
+
+    def add(self, content: bytes) -> int:
+        """Appends an array's bytes. Returns their offset."""
+        offset = self.size
+        self.parts.append(content)
+        self.size += len(content)
+        return offset
+
+
 def encode(thing: Any) -> bytes:
     """A value (or plain data, lists, dicts, arrays) as bytes: a JSON header, then the arrays one after the other."""
-    arrays: list[bytes] = []
-    header = _to_json(_describe(thing, arrays)).encode()
-    return b"".join([_LENGTH.pack(len(header)), header, *arrays])
+    return _encoded(thing, _describe)
+
+
+def encode_all(things: Sequence[Any]) -> bytes:
+    """Encodes several things; values of one class field by field, so that the header names class and fields once."""
+    return _encoded(things, _describe_all)
 
 
 def decode(content: bytes | memoryview) -> Any:
     """Decodes what `encode` wrote. Raises `BadEncoding` where the bytes are damaged or name no value."""
+    return _decoded(content, _restore)
+
+
+def decode_all(content: bytes | memoryview, number: int) -> list[Any]:
+    """Decodes so many things that `encode_all` wrote. Raises `BadEncoding` as `decode` does."""
+    found: list[Any] = _decoded(content, lambda header, data: _restore_all(header, data, number))
+    return found
+
+
+def _encoded(thing: Any, describe: Callable[[Any, _Arrays], Any]) -> bytes:
+    arrays = _Arrays()
+    header = _to_json(describe(thing, arrays)).encode()
+    return b"".join([_LENGTH.pack(len(header)), header, *arrays.parts])
+
+
+def _decoded(content: bytes | memoryview, restore: Callable[[Any, memoryview], Any]) -> Any:
     view = memoryview(content)
     try:
         (size,) = _LENGTH.unpack_from(view)
         start = _LENGTH.size + size
         header = json.loads(bytes(view[_LENGTH.size : start]))
-        return _restore(header, view[start:])
+        return restore(header, view[start:])
     except BadEncoding:
         raise
     except Exception as error:
         raise BadEncoding(f"damaged or foreign bytes ({type(error).__name__}: {error})") from None
 
 
-def _describe(thing: Any, arrays: list[bytes]) -> Any:
+def _describe_all(things: Sequence[Any], arrays: _Arrays) -> Any:
+    # what all have in common is said once; things that differ are described one by one
+    kinds = set(map(type, things))
+    if kinds <= _PLAIN_TYPES:
+        return ["plain", *things]
+    kind = kinds.pop()
+    if not kinds and issubclass(kind, Value):
+        columns = [[getattr(thing, name) for thing in things] for name in field_names(kind)]
+        return ["values", _name_of(kind), *(_describe_all(column, arrays) for column in columns)]
+    if not kinds and kind is dict and all(thing.keys() == things[0].keys() for thing in things):
+        keys = list(things[0])
+        columns = [[thing[key] for thing in things] for key in keys]
+        return ["dicts", _describe(keys, arrays), *(_describe_all(column, arrays) for column in columns)]
+    forms = {(thing.dtype, thing.shape) for thing in things} if not kinds and kind is np.ndarray else ()
+    if len(forms) == 1 and not things[0].dtype.hasobject:
+        offset = arrays.add(b"".join([thing.tobytes() for thing in things]))
+        return ["arrays", things[0].dtype.str, list(things[0].shape), offset]
+    return ["each", *(_describe(thing, arrays) for thing in things)]
+
+
+def _restore_all(header: Any, data: memoryview, number: int) -> list[Any]:
+    form, *rest = header
+    if form == "arrays":
+        stacked = _array(rest[0], [number, *rest[1]], rest[2], data)
+        return [stacked[n, ...].copy() for n in range(number)]
+    if form in ("values", "dicts"):
+        columns = [_restore_all(column, data, number) for column in rest[1:]]
+        rows = zip(*columns, strict=True) if columns else [()] * number
+        if form == "dicts":
+            keys = _restore(rest[0], data)
+            return [dict(zip(keys, row, strict=True)) for row in rows]
+        cls, names = _value_class(rest[0], len(columns))
+        return [cls(**dict(zip(names, row, strict=True))) for row in rows]
+    if form not in ("plain", "each") or len(rest) != number:
+        raise BadEncoding(f"not {number} things")
+    return rest if form == "plain" else [_restore(item, data) for item in rest]
+
+
+def _describe(thing: Any, arrays: _Arrays) -> Any:
     # plain JSON where JSON is exact; everything else is a list whose first item names its form
     if type(thing) in _PLAIN:
         return thing
@@ -65,14 +139,11 @@ def _describe(thing: Any, arrays: list[bytes]) -> Any:
     if isinstance(thing, np.ndarray | StoredRows):
         if thing.dtype.hasobject:
             raise BadEncoding("an array of objects cannot be written: use a numeric array")
-        arrays.append(np.ascontiguousarray(thing).tobytes())
-        offset = sum(map(len, arrays[:-1]))
-        return ["array", thing.dtype.str, list(thing.shape), offset]
+        return ["array", thing.dtype.str, list(thing.shape), arrays.add(np.ascontiguousarray(thing).tobytes())]
     if isinstance(thing, np.generic):
         return ["scalar", thing.dtype.str, thing.tobytes().hex()]
     if isinstance(thing, bytes):
-        arrays.append(thing)
-        return ["bytes", len(thing), sum(map(len, arrays[:-1]))]
+        return ["bytes", len(thing), arrays.add(thing)]
     if isinstance(thing, tuple):
         return ["tuple", *[_describe(item, arrays) for item in thing]]
     if isinstance(thing, list):
@@ -91,22 +162,13 @@ def _restore(header: Any, data: memoryview) -> Any:
         return header
     form, *rest = header
     if form == "array":
-        dtype, shape, offset = np.dtype(rest[0]), tuple(rest[1]), rest[2]
-        count = int(np.prod(shape, dtype=np.int64))
-        if offset + count * dtype.itemsize > len(data):
-            raise BadEncoding("cut short inside an array")
-        return np.frombuffer(data, dtype=dtype, count=count, offset=offset).reshape(shape).copy()
+        return _array(*rest, data).copy()
     if form == "scalar":
         return np.frombuffer(bytes.fromhex(rest[1]), dtype=np.dtype(rest[0]))[0]
     if form == "bytes":
         return bytes(data[rest[1] : rest[1] + rest[0]])
     if form == "value":
-        cls = VALUE_TYPES.get(rest[0])
-        if cls is None:
-            raise BadEncoding(f"unknown value type '{rest[0]}': is the module that defines it loaded?")
-        names = field_names(cls)
-        if len(names) != len(rest) - 1:
-            raise BadEncoding(f"'{rest[0]}' has {len(names)} fields now, {len(rest) - 1} in the file")
+        cls, names = _value_class(rest[0], len(rest) - 1)
         return cls(**{name: _restore(item, data) for name, item in zip(names, rest[1:], strict=True)})
     if form == "tuple":
         return tuple(_restore(item, data) for item in rest)
@@ -119,6 +181,24 @@ def _restore(header: Any, data: memoryview) -> Any:
     if form == "path":
         return Path(rest[0])
     raise BadEncoding(f"unknown form '{form}'")
+
+
+def _array(dtype_name: str, shape: list[int], offset: int, data: memoryview) -> npt.NDArray[Any]:
+    dtype = np.dtype(dtype_name)
+    count = int(np.prod(shape, dtype=np.int64))
+    if offset + count * dtype.itemsize > len(data):
+        raise BadEncoding("cut short inside an array")
+    return np.frombuffer(data, dtype=dtype, count=count, offset=offset).reshape(shape)
+
+
+def _value_class(name: str, fields: int) -> tuple[type[Value], tuple[str, ...]]:
+    cls = VALUE_TYPES.get(name)
+    if cls is None:
+        raise BadEncoding(f"unknown value type '{name}': is the module that defines it loaded?")
+    names = field_names(cls)
+    if len(names) != fields:
+        raise BadEncoding(f"'{name}' has {len(names)} fields now, {fields} in the file")
+    return cls, names
 
 
 def _field_names(cls: Any) -> tuple[str, ...]:

@@ -108,6 +108,7 @@ class Engine:
             collected = {wire.origin for wire in graph.wires if wire.collect and wire.from_node in ticking}
             names = [*sorted(collected.union(kept)), *self.recorded]
             self.sequences = {name: DiskSequence(options.memory / f"{name}.sequence") for name in names}
+        self.source = graph.source
         self.ticks = 0
         self.ended = False
         self._given: set[str] = set()
@@ -168,19 +169,19 @@ class Engine:
 
     def check_source(self) -> None:
         """Have the source refuse now what it can never give to those who read it. Raises `BadInput`."""
-        source = self.graph.source
+        source = self.source
         if source is not None and isinstance(source.stage, Source):
             source.stage.check(self.calls[source.name].ctx)
 
     def set_up_source(self) -> None:
         """Set up the source alone: what it says of its inputs and of who reads them, it says now. Raises `BadInput`."""
-        source = self.graph.source
+        source = self.source
         if source is not None and isinstance(source.stage, Source) and source.stage.repeatable:
             source.stage.setup(self.calls[source.name].ctx)
 
     def tick(self) -> bool:
         """One turn of the loop. False where there is none: the source has ended."""
-        if self.ended or self.graph.source is None:
+        if self.ended or self.source is None:
             return False
         values, calls = self.values, self._ticking
         for key, channel in self.channels.items():
@@ -189,12 +190,12 @@ class Engine:
             if self.ticks >= len(self.replay.ticks):
                 return False
             values.update(self.replay.ticks[self.ticks])
-        elif calls[0].run(values):
-            calls, source = calls[1:], calls[0]
-            source.ctx.tick = values[f"{source.node.name}.tick"]
-        else:
+        elif not calls[0].run(values):
             return False
-        tick = values[f"{self.graph.source.name}.tick"]
+        tick = values[f"{self.source.name}.tick"]
+        if self.replay is None:
+            calls[0].ctx.tick = tick
+            calls = calls[1:]
         for call in calls:
             call.ctx.tick = tick
             call.run(values)
@@ -228,7 +229,7 @@ class Engine:
     def _ticks_in_all(self) -> int | None:
         if self.replay is not None:
             return len(self.replay.ticks)
-        source = self.graph.source
+        source = self.source
         return source.stage.length() if source is not None and isinstance(source.stage, Source) else None
 
     def _end_tick(self) -> None:

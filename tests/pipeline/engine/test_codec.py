@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as arrays
 
 import toys
 from omninav.pipeline.engine.artifact import read_artifact, read_header, write_artifact
-from omninav.pipeline.engine.codec import BadEncoding, decode, encode, seal, unseal
+from omninav.pipeline.engine.codec import BadEncoding, decode, decode_all, encode, encode_all, seal, unseal
 from omninav.pipeline.engine.disk_sequence import DiskSequence, Present
 from omninav.pipeline.graph.problems import BadInput
 
@@ -38,6 +38,38 @@ def test_arrays_come_back_bit_for_bit(array: np.ndarray):
     back = decode(encode({"a": array, "b": [array]}))
     for one in (back["a"], back["b"][0]):
         assert (one.dtype, one.shape, one.tobytes()) == (array.dtype, array.shape, array.tobytes())
+
+
+@given(
+    st.lists(
+        plain
+        | st.floats(allow_nan=False).map(toys.Number)
+        | st.integers(1, 3).map(lambda rows: toys.Big(np.arange(2.0 * rows).reshape(rows, 2)))
+        | st.dictionaries(st.sampled_from("ab"), plain, max_size=2)
+    )
+)
+def test_things_that_are_written_together_come_back_each(things: list[object]):
+    back = decode_all(encode_all(things), len(things))
+    assert [encode(thing) for thing in back] == [encode(thing) for thing in things]
+    assert list(map(type, back)) == list(map(type, things))
+
+
+def test_arrays_of_one_form_are_written_together_and_come_back_apart():
+    for array in (
+        np.float32(1.5) * np.ones((2, 3), np.float32),
+        np.array(2.0),
+        np.zeros((0, 3)),
+        np.asfortranarray(np.eye(3)),
+    ):
+        first, second = decode_all(encode_all([array, array + 1]), 2)
+        np.testing.assert_array_equal(second, array + 1)
+        assert (first.dtype, first.shape, type(first)) == (array.dtype, array.shape, np.ndarray)
+        first[...] = 7.0
+        np.testing.assert_array_equal(second, array + 1)
+    content = encode_all([toys.Number(1.0)] * 50)
+    assert content.count(b"toys.Number") == 1
+    with pytest.raises(BadEncoding):
+        decode_all(content, 49)
 
 
 def test_values_counters_paths_and_scalars_come_back():
@@ -100,6 +132,28 @@ def test_a_spool_that_was_read_is_cut_and_goes_on(tmp_path: Path):
     spool.append(None)
     assert [int(big.array[0, 0]) for big in Present(spool)] == [1, 3, 7]
     spool.verify(7)
+
+
+def test_a_spool_writes_small_values_together_and_large_ones_at_once(tmp_path: Path):
+    spool = DiskSequence(tmp_path / "mixed.spool")
+    values = [toys.Number(float(n)) if n % 3 else None for n in range(200)]
+    written = []
+    for value in values:
+        spool.append(value)
+        written.append(spool.path.stat().st_size)
+    assert len(set(written)) <= 2  # the operating system has the first record at most
+    assert len(spool) == 200
+    assert spool.path.read_bytes().count(b"toys.Number") == 5  # 1, three times 64, and the rest; 0 is absent
+    assert [None if n is None else n.value for n in spool] == [None if n is None else n.value for n in values]
+    assert [spool[n].value for n in (1, 64, 65, 128, -1)] == [1, 64, 65, 128, 199]
+    assert [n.value for n in Present(spool)[40:42]] == [61, 62]
+    spool.append(toys.Big(np.zeros((1, 1 << 20))))
+    spool.flush()
+    before = spool.path.stat().st_size
+    spool.append(toys.Big(np.ones((1, 1 << 20))))
+    assert spool.path.stat().st_size > before
+    assert spool[201].array[0, 0] == 1
+    spool.verify(202)
 
 
 def test_an_artifact_comes_back_with_its_facts_and_opens_in_numpy(tmp_path: Path):

@@ -161,6 +161,6 @@ def test_a_sequence_that_does_not_hold_every_tick_stops_the_run(stopped: RunFold
         append(sequence, value)
 
     monkeypatch.setattr(DiskSequence, "append", twice)
-    with pytest.raises(BadInput, match=r"has 14 records, and there were 10 ticks"):
+    with pytest.raises(BadInput, match=r"has 14 values, and there were 10 ticks"):
         resume(stopped.folder)
     assert read_json(stopped.folder / "manifest.json")["status"] == "failed"
