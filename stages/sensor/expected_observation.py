@@ -7,7 +7,8 @@ import numpy as np
 from omninav.pipeline import Context
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.problems import BadInput
-from omninav.stages.geometry.appearance.segments import MAX_COLOUR_DISTANCE, penalties, sorting_network
+from omninav.stages.geometry.appearance.segments import MAX_COLOUR_DISTANCE, penalties
+from omninav.stages.geometry.appearance.sorting_network import sorting_network
 from omninav.stages.geometry.plane.point_cells import distinct
 from omninav.stages.values.belief import Particles
 from omninav.stages.values.features import SegmentFeatures, SegmentHistograms

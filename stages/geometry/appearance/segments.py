@@ -1,6 +1,7 @@
 """Views described by segments around the robot: turning and comparing them."""
 
 import functools
+import math
 from typing import Literal
 
 import numpy as np
@@ -8,6 +9,9 @@ import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
 from omninav.pipeline.graph.stored_rows import StoredRows
+
+from .best_segments import UNROLLED, selective_sum
+from .sorting_network import sorting_network
 
 Floats = npt.NDArray[np.float32]
 Rows = Floats | StoredRows[np.float32]
@@ -52,23 +56,6 @@ def turned_views(view: Floats, headings: int) -> Floats:
     return turned
 
 
-@functools.cache
-def sorting_network(length: int) -> Ints:
-    """Pairs (i, j), i < j, whose exchange in this order sorts `length` items: Batcher's odd-even merge sort. (P, 2)."""
-    pairs = []
-    p = 1
-    while p < length:
-        k = p
-        while k >= 1:
-            for j in range(k % p, length - k, 2 * k):
-                for i in range(min(k, length - j - k)):
-                    if (i + j) // (2 * p) == (i + j + k) // (2 * p):
-                        pairs.append((i + j, i + j + k))
-            k //= 2
-        p *= 2
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
-
-
 def penalties(segments: int, exponent: float) -> Floats:
     """Factor of the sum of the k best segments, k = 1..segments: k^-exponent n^-(1-exponent); at k = n it is 1 / n."""
     k = np.arange(1, segments + 1)
@@ -76,24 +63,55 @@ def penalties(segments: int, exponent: float) -> Floats:
     return factors
 
 
+def _turned_rows(view: Floats, headings: int) -> tuple[Floats, Ints]:
+    """The rows of `turned_views`, each once: (rows, bins), and which is whose: (headings, segments)."""
+    segments = len(view)
+    parts = headings // math.gcd(headings, segments)  # a turn is a multiple of so small a part of a segment
+    turned = turned_views(view, headings) if parts > 1 else view[None]
+    which = _positions(segments, headings, parts)
+    if parts == 1:
+        return view, which
+    rows = np.empty((segments * parts, view.shape[1]), np.float32)
+    rows[which] = turned
+    return rows, which
+
+
+@functools.cache
+def _positions(segments: int, headings: int, parts: int) -> Ints:
+    return (np.arange(segments) * parts + np.arange(headings)[:, None] * segments * parts // headings) % (
+        segments * parts
+    )
+
+
 @compiled(nogil=True)
 def _compare(
     references: Floats,
-    turned: Floats,
+    rows: Floats,
+    which: Ints,
     histograms: bool,
     network: Ints,
     factors: Floats,
+    unrolled: tuple[np.float32, ...],
     scale: np.float32,
     out: Floats,
 ) -> None:
     # References are the innermost axis throughout: each loop over them is vector instructions, the sorting too.
-    headings, segments, bins = turned.shape
-    block = np.empty((bins, BLOCK), np.float32)
+    headings, segments = which.shape
+    bins = rows.shape[1]
+    block = np.zeros((bins, BLOCK), np.float32)
     alike = np.empty((headings, segments, BLOCK), np.float32)
     total = np.empty(BLOCK, np.float32)
     best = np.empty(BLOCK, np.float32)
-    filled = np.empty(bins, np.int64)
     zero = np.float32(0)
+    # The bins of each row that hold anything, since nothing is common in the others; four at least, and by fours.
+    filled = np.zeros((len(rows), bins + 4), np.int64)
+    held = np.zeros((len(rows), bins + 4), np.float32)
+    numbers = np.zeros(len(rows), np.int64)
+    for u in range(len(rows)):
+        for b in range(bins):
+            if rows[u, b] != zero:
+                filled[u, numbers[u]], held[u, numbers[u]] = b, rows[u, b]
+                numbers[u] += 1
     for start in range(0, len(references), BLOCK):
         count = min(BLOCK, len(references) - start)
         for j in range(segments):
@@ -102,58 +120,61 @@ def _compare(
                 for b in range(bins):
                     block[b, n] = reference[b]
             for h in range(headings):
-                row, view = alike[h, j], turned[h, j]
-                for n in range(count):
-                    row[n] = zero
+                row, u = alike[h, j], which[h, j]
                 if histograms:
-                    number = 0  # of the bins of this view that hold anything: nothing is common in the others
-                    for b in range(bins):
-                        if view[b] != zero:
-                            filled[number] = b
-                            number += 1
-                    fours = number - number % 4
                     # Four bins at once load and store the sums a quarter as often; their order stays.
-                    for b in range(0, fours, 4):
-                        b0, b1, b2, b3 = filled[b], filled[b + 1], filled[b + 2], filled[b + 3]
-                        r0, r1, r2, r3 = block[b0], block[b1], block[b2], block[b3]
-                        v0, v1, v2, v3 = view[b0], view[b1], view[b2], view[b3]
-                        for n in range(count):
-                            row[n] = (
-                                row[n]
-                                + (r0[n] if r0[n] < v0 else v0)
-                                + (r1[n] if r1[n] < v1 else v1)
-                                + (r2[n] if r2[n] < v2 else v2)
-                                + (r3[n] if r3[n] < v3 else v3)
-                            )
-                    for b in range(fours, number):
-                        r0, v0 = block[filled[b]], view[filled[b]]
-                        for n in range(count):
-                            row[n] += r0[n] if r0[n] < v0 else v0
+                    for b in range(0, max(numbers[u], 1), 4):
+                        r0, r1 = block[filled[u, b]], block[filled[u, b + 1]]
+                        r2, r3 = block[filled[u, b + 2]], block[filled[u, b + 3]]
+                        v0, v1, v2, v3 = held[u, b], held[u, b + 1], held[u, b + 2], held[u, b + 3]
+                        if b == 0:
+                            for n in range(BLOCK):
+                                row[n] = (
+                                    (r0[n] if r0[n] < v0 else v0)
+                                    + (r1[n] if r1[n] < v1 else v1)
+                                    + (r2[n] if r2[n] < v2 else v2)
+                                    + (r3[n] if r3[n] < v3 else v3)
+                                )
+                        else:
+                            for n in range(BLOCK):
+                                row[n] = (
+                                    row[n]
+                                    + (r0[n] if r0[n] < v0 else v0)
+                                    + (r1[n] if r1[n] < v1 else v1)
+                                    + (r2[n] if r2[n] < v2 else v2)
+                                    + (r3[n] if r3[n] < v3 else v3)
+                                )
                 else:
+                    for n in range(count):
+                        row[n] = zero
                     for b in range(bins):
-                        r0, v0 = block[b], view[b]
+                        r0, v0 = block[b], rows[u, b]
                         for n in range(count):
                             gap = v0 - r0[n]
                             row[n] += gap * gap
                     for n in range(count):
                         row[n] = max(np.float32(1) - np.sqrt(row[n]) / scale, zero)
         for h in range(headings):
-            for p in range(len(network)):
-                high, low = alike[h, network[p, 0]], alike[h, network[p, 1]]
-                for n in range(count):
-                    a, b_ = high[n], low[n]
-                    high[n] = a if a > b_ else b_
-                    low[n] = b_ if a > b_ else a
-            total[:] = zero
-            best[:] = zero
-            for k in range(segments):
-                row, factor = alike[h, k], factors[k]
-                for n in range(count):
-                    total[n] += row[n]
-                    score = total[n] * factor
-                    best[n] = score if score > best[n] else best[n]
+            if len(unrolled) > 1:
+                for n in range(BLOCK):
+                    best[n] = selective_sum(alike, h, n, unrolled)
+            else:
+                for p in range(len(network)):
+                    high, low = alike[h, network[p, 0]], alike[h, network[p, 1]]
+                    for n in range(count):
+                        a, b_ = high[n], low[n]
+                        high[n] = a if a > b_ else b_
+                        low[n] = b_ if a > b_ else a
+                total[:] = zero
+                best[:] = zero
+                for k in range(segments):
+                    row, factor = alike[h, k], factors[k]
+                    for n in range(count):
+                        total[n] += row[n]
+                        score = total[n] * factor
+                        best[n] = score if score > best[n] else best[n]
             for n in range(count):
-                out[start + n, h] = best[n]
+                out[start + n, h] = min(best[n], np.float32(1))
 
 
 def similarities(
@@ -177,17 +198,23 @@ def similarities(
     """
     some = references[:] if chosen is None else references[chosen]
     out = np.empty((len(some), headings), np.float32)
-    turned = np.ascontiguousarray(turned_views(view, headings), np.float32)
+    rows, which = _turned_rows(np.ascontiguousarray(view, np.float32), headings)
     segments = len(view)
-    network = sorting_network(segments) if selective else np.empty((0, 2), np.int64)
+    network, factors, unrolled = _best_of(segments, selective, exponent)
+    scale = np.float32(max_distance)
+    _compare(np.ascontiguousarray(some, np.float32), rows, which, histograms, network, factors, unrolled, scale, out)
+    return out
+
+
+@functools.cache
+def _best_of(segments: int, selective: bool, exponent: float) -> tuple[Ints, Floats, tuple[np.float32, ...]]:
+    """Network, penalties, and the same as a tuple where segments are sorted in registers."""
     if selective:
         factors = penalties(segments, exponent)
-    else:
-        factors = np.zeros(segments, np.float32)
-        factors[-1] = 1.0 / segments
-    scale = np.float32(max_distance)
-    _compare(np.ascontiguousarray(some, np.float32), turned, histograms, network, factors, scale, out)
-    return np.minimum(out, np.float32(1.0))
+        return sorting_network(segments), factors, tuple(factors) if segments in UNROLLED else (np.float32(0),)
+    factors = np.zeros(segments, np.float32)
+    factors[-1] = 1.0 / segments
+    return np.empty((0, 2), np.int64), factors, (np.float32(0),)
 
 
 def selective_similarity(expected: Floats, observed: Floats, exponent: float = 0.5) -> Floats:

@@ -10,10 +10,10 @@ from omninav.stages.geometry.appearance.segments import (
     selective_similarity,
     similarities,
     similarity_at,
-    sorting_network,
     turned_view,
     turned_views,
 )
+from omninav.stages.geometry.appearance.sorting_network import sorting_network
 
 RNG = np.random.default_rng(0)
 
