@@ -8,12 +8,12 @@ from numba.extending import intrinsic
 
 from .sorting_network import sorting_network
 
+llvm: Any = cgutils
 UNROLLED = range(24, 49)
 """Numbers of segments that are sorted in registers; machine code of more is large, fewer are sorted in no time."""
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def selective_sum(context: Any, alike: Any, heading: Any, reference: Any, factors: Any) -> Any:
+def _selective_sum(context: Any, alike: Any, heading: Any, reference: Any, factors: Any) -> Any:
     """max_k (sum of the k largest) factors[k] over `alike` (headings, segments, references) at one heading and
     reference; `factors` is a tuple of as many float32 as there are segments.
 
@@ -23,12 +23,12 @@ def selective_sum(context: Any, alike: Any, heading: Any, reference: Any, factor
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array = context.make_array(signature.args[0])(context, builder, arguments[0])
-        shape, strides = (cgutils.unpack_tuple(builder, part) for part in (array.shape, array.strides))
+        shape, strides = (llvm.unpack_tuple(builder, part) for part in (array.shape, array.strides))
         values = []
         for segment in range(len(signature.args[3])):
             place = [arguments[1], context.get_constant(types.intp, segment), arguments[2]]
             values.append(
-                builder.load(cgutils.get_item_pointer2(context, builder, array.data, shape, strides, "C", place))
+                builder.load(llvm.get_item_pointer2(context, builder, array.data, shape, strides, "C", place))
             )
         for i, j in sorting_network(len(values)):
             first, second = values[i], values[j]
@@ -38,10 +38,13 @@ def selective_sum(context: Any, alike: Any, heading: Any, reference: Any, factor
                 builder.select(ordered, second, first),
             )
         total = best = context.get_constant(types.float32, 0.0)
-        for value, factor in zip(values, cgutils.unpack_tuple(builder, arguments[3]), strict=True):
+        for value, factor in zip(values, llvm.unpack_tuple(builder, arguments[3]), strict=True):
             total = builder.fadd(total, value)
             score = builder.fmul(total, factor)
             best = builder.select(builder.fcmp_ordered(">", score, best), score, best)
         return best
 
     return types.float32(alike, heading, reference, factors), code
+
+
+selective_sum: Any = intrinsic(_selective_sum)
