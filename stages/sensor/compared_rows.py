@@ -19,6 +19,8 @@ class ComparedRows:
 
     def of(self, compared: Ints | None) -> tuple[Ints, Ints]:
         """Compared references (None: all), and each one's row among them. Valid until the next call."""
+        if compared is None and self._written is self._all:
+            return self._written, self._rows
         self._rows[self._written] = -1
         self._written = self._all if compared is None else compared
         self._rows[self._written] = self._all[: len(self._written)]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from omninav.pipeline import Bounds, Context, Outputs, Stage
 from omninav.pipeline.engine.compiled import compiled
 from omninav.stages.geometry.plane.nearest_cells import NearestCells
-from omninav.stages.geometry.probability.evidence import contrast_power, evidence_novelty
+from omninav.stages.geometry.probability.evidence import contrast_power, evidence_novelty, hazen_quantile
 from omninav.stages.values.belief import Likelihood, Particles
 from omninav.stages.values.calibration import SimilarityCalibration
 from omninav.stages.values.length_scale import LengthScale
@@ -40,7 +40,8 @@ def _expected(
     nearest: Shorts,
     fade_distance_m: float,
     background_level: float,
-) -> Array:
+    out: Array,
+) -> None:
     headings = similarity.shape[1]
     per_radian = headings / (2 * np.pi)
     min_square, decay = 1e-4 * fade_distance_m * fade_distance_m, -0.5 / (fade_distance_m * fade_distance_m)
@@ -48,7 +49,6 @@ def _expected(
     row = np.empty(neighbours, np.int64)
     squares = np.empty(neighbours)
     turned = np.empty(neighbours)
-    out = np.empty(len(poses))
     for n in range(len(poses)):
         x, y, heading = poses[n, 0], poses[n, 1], poses[n, 2]
         out[n] = background_level
@@ -77,7 +77,6 @@ def _expected(
             mass += weight
         known = math.exp(decay * closest)
         out[n] = max(background_level, known * total / mass + (1.0 - known) * background_level)
-    return out
 
 
 def expected_similarity(
@@ -97,7 +96,9 @@ def expected_similarity(
     row in `similarity`, -1 where it was not compared.
     """
     poses, similarity = np.ascontiguousarray(poses), np.ascontiguousarray(similarity)
-    return _expected(poses, references, rows, similarity, nearest, fade_distance_m, background_level)
+    out = np.empty(len(poses))
+    _expected(poses, references, rows, similarity, nearest, fade_distance_m, background_level, out)
+    return out
 
 
 def weighted_quantile(values: Floats, weights: Array, quantile: float) -> float:
@@ -121,13 +122,14 @@ def background_similarity(
     `quantile` over those farther than `background_distance_m` from the best of all; the median of all where there are
     none. `sampling_weight` (R,): how many references of the map each represents; None: one each.
     """
-    gap = places[:, :2] - places[int(np.argmax(best)), :2]
+    gap = places[:, :2] - places[best.argmax(), :2]
     background = gap[:, 0] ** 2 + gap[:, 1] ** 2 > background_distance_m**2
-    if not background.any():
+    there = best[background]
+    if not len(there):
         return weighted_median(best, sampling_weight)
     if sampling_weight is None:
-        return float(np.quantile(best[background], quantile, method="hazen"))  # the same, without sorting
-    return weighted_quantile(best[background], sampling_weight[background], quantile)
+        return hazen_quantile(there, quantile)  # the same, without sorting
+    return weighted_quantile(there, sampling_weight[background], quantile)
 
 
 def similarity_field(similarities: Similarities, floor: float, top: float, power: float) -> SimilarityField:
@@ -137,14 +139,18 @@ def similarity_field(similarities: Similarities, floor: float, top: float, power
     """
     values, each = similarities.values, similarities.sampling_weight
     headings, flat = values.shape[1], values.ravel()
-    each = np.ones(len(values)) if each is None else each
-    above = np.flatnonzero(flat > floor)
-    counted = each[above // headings]
-    weights = np.cumsum(counted * (flat[above].astype(np.float64) / top) ** power)
-    floor_cells = np.cumsum(each * (headings - np.bincount(above // headings, minlength=len(values))))
-    size = headings * float(np.cumsum(each)[-1])
+    above = (flat > floor).nonzero()[0]
+    rows = above // headings
+    heights = (flat[above].astype(np.float64) / top) ** power
+    at_floor = (headings - np.bincount(rows, minlength=len(values))).astype(np.float64)
+    if each is None:
+        size, counted = headings * float(len(values)), float(len(above))
+    else:
+        size, counted = headings * float(each.cumsum()[-1]), float(np.add.reduce(each[rows]))
+        heights, at_floor = each[rows] * heights, each * at_floor
+    weights, floor_cells = heights.cumsum(), at_floor.cumsum()
     peaks = float(weights[-1]) if len(above) else 0.0
-    floor_weight = max(size - float(counted.sum()), 0.0) * (floor / top) ** power
+    floor_weight = max(size - counted, 0.0) * (floor / top) ** power
     mean = (peaks + floor_weight) / size
     return SimilarityField(values, similarities.candidates, floor, above, weights, floor_cells, floor_weight, mean)
 
@@ -232,7 +238,7 @@ class NearReferences(Stage):
         floor = background_similarity(best, places, distance, self.background_quantile, each)
         power = contrast_power(best, self.contrast, each) if self.power is None else self.power
         novelty = evidence_novelty(driven, self.independence_distance * unit, self.min_novelty)
-        top = max(float(best.max()), 1e-12)
+        top = max(float(np.maximum.reduce(best)), 1e-12)
         field = similarity_field(similarities, floor, top, power)
         expected = self._expected(particles.poses, map, rows, values, unit, floor)
         likelihood = Likelihood((expected / top) ** (power * novelty), field.mean, novelty)

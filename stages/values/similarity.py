@@ -31,19 +31,19 @@ class Similarities(Value):
     exponent: float | None = None
     colour_scale: float | None = None
 
-    @property
+    @cached_property
     def best(self) -> npt.NDArray[np.float32]:
         """Each reference's similarity at its best heading: (references,). Not to be changed: others read it too."""
         return self._at_best_headings[0]
 
-    @property
+    @cached_property
     def best_heading(self) -> npt.NDArray[np.int64]:
         """The column of each reference's best heading, of equal ones the first: (references,)."""
         return self._at_best_headings[1]
 
     @cached_property
     def _at_best_headings(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int64]]:
-        return best_headings(np.ascontiguousarray(self.values))
+        return best_headings(self.values)
 
 
 class SimilarityField(Value):

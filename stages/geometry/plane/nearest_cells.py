@@ -18,6 +18,7 @@ FEW_POINTS = 1000
 """Points up to which all of them are looked at for each cell, which takes less time than a search in a tree."""
 TIE = 1e-9
 """Relative difference of squared distances below which the tree decides which comes first."""
+_NO_POINTS = np.zeros((0, 2))
 
 
 class NearestCells:
@@ -40,89 +41,91 @@ class NearestCells:
             self._columns, self._rows = (int(n) for n in np.floor(span / self.cell) + 1)
         self._tree: Any = KDTree(xy)
         self._numbers = np.zeros(self._columns * self._rows, np.int32)  # memory is taken where it is written
-        self._lists, self._known = np.full((64, k), -1, np.int32), 1
+        self._lists, self._known = np.full((1, k), -1, np.int32), 1
 
     def of(self, poses: Array) -> Shorts:
         """The points nearest to the cell of each pose (M, >= 2): (M, k), nearest first, then -1."""
         poses = np.ascontiguousarray(poses, np.float64)
-        cells = self.origin, self.cell, self._columns, self._rows, self._numbers
-        new = _new_cells(poses, *cells, self._known)
-        if len(new):
-            centres = self.origin + self.cell * (np.column_stack(np.divmod(new, self._rows)) + 0.5)
-            found = self._nearest(centres)
-            known = self._known + len(new)
-            if known > len(self._lists):
-                self._lists = np.concatenate([self._lists, np.full((known, self.k), -1, np.int32)])
-            self._lists[self._known : known] = np.where(found < self._tree.n, found, -1)
-            self._known = known
-        lists: Shorts = self._lists[_numbers_of(poses, *cells)]
-        return lists
-
-    def _nearest(self, centres: Array) -> Ints:
-        """The points nearest to centres (M, 2): (M, k), nearest first, then the number of points."""
-        number = self._tree.n
-        if not number or number > FEW_POINTS:
-            return self._in_tree(centres)
-        found, ties = _nearest_of_few(centres, self._tree.data, self.k, self.radius)
-        if ties.any():
-            found[ties] = self._in_tree(centres[ties])
+        if self._known + len(poses) > len(self._lists):
+            more = np.empty((len(self._lists) + len(poses), self.k), np.int32)
+            self._lists = np.concatenate([self._lists[: self._known], more])
+        found, new = np.empty((len(poses), self.k), np.int32), np.empty(len(poses), np.int64)
+        few = self._tree.n <= FEW_POINTS
+        given = poses, self._tree.data if few else _NO_POINTS, self.origin, self.cell, self._columns, self._rows
+        number, sure = _look_up(*given, self.radius, self._numbers, self._lists, self._known, found, new)
+        if number and not (few and sure):
+            centres = self.origin + self.cell * (np.column_stack(np.divmod(new[:number], self._rows)) + 0.5)
+            nearest = self._in_tree(centres)
+            self._lists[self._known : self._known + number] = np.where(nearest < self._tree.n, nearest, -1)
+            _look_up(*given, self.radius, self._numbers, self._lists, self._known, found, new)
+        self._known += number
         return found
 
     def _in_tree(self, centres: Array) -> Ints:
+        """The points nearest to centres (M, 2): (M, k), nearest first, then the number of points."""
         found: Ints = self._tree.query(centres, k=[*range(1, self.k + 1)], distance_upper_bound=self.radius)[1]
         return found
 
 
 @compiled(nogil=True)
-def _new_cells(poses: Array, origin: Array, cell: float, columns: int, rows: int, numbers: Shorts, known: int) -> Ints:
-    # The cells without a list in which poses are, each once; they get the numbers from `known` on.
-    found, number, per_cell = np.empty(len(poses), np.int64), 0, 1.0 / cell
+def _look_up(
+    poses: Array,
+    points: Array,
+    origin: Array,
+    cell: float,
+    columns: int,
+    rows: int,
+    radius: float,
+    numbers: Shorts,
+    lists: Shorts,
+    known: int,
+    found: Shorts,
+    new: Ints,
+) -> tuple[int, bool]:
+    # The list of each pose's cell; list 0 is empty. Cells without a list get the numbers from `known` on, and lists of
+    # these points, which the tree has to make where distances are too equal to say which comes first.
+    number, sure, per_cell = 0, True, 1.0 / cell
+    empty, nearest, squares = lists[0], np.empty(lists.shape[1] + 1, np.int64), np.empty(lists.shape[1] + 1)
     for n in range(len(poses)):
         i = math.floor((poses[n, 0] - origin[0]) * per_cell)
         j = math.floor((poses[n, 1] - origin[1]) * per_cell)
-        if 0 <= i < columns and 0 <= j < rows and numbers[i * rows + j] == 0:
-            numbers[i * rows + j] = known + number
-            found[number] = i * rows + j
-            number += 1
-    return found[:number].copy()
-
-
-@compiled(nogil=True)
-def _numbers_of(poses: Array, origin: Array, cell: float, columns: int, rows: int, numbers: Shorts) -> Shorts:
-    # The number of the list of each pose's cell; list 0 is empty.
-    found, per_cell = np.zeros(len(poses), np.int32), 1.0 / cell
-    for n in range(len(poses)):
-        i = math.floor((poses[n, 0] - origin[0]) * per_cell)
-        j = math.floor((poses[n, 1] - origin[1]) * per_cell)
+        row = empty
         if 0 <= i < columns and 0 <= j < rows:
-            found[n] = numbers[i * rows + j]
-    return found
+            at = numbers[i * rows + j]
+            if at == 0:
+                at = known + number
+                numbers[i * rows + j], new[number] = at, i * rows + j
+                number += 1
+                x, y = origin[0] + cell * (i + 0.5), origin[1] + cell * (j + 0.5)
+                sure = _nearest_of_few(x, y, points, radius, nearest, squares, lists[at]) and sure
+            row = lists[at]
+        for k in range(len(row)):
+            found[n, k] = row[k]
+    return number, sure
 
 
 @compiled(nogil=True)
-def _nearest_of_few(centres: Array, points: Array, k: int, radius: float) -> tuple[Ints, npt.NDArray[np.bool_]]:
-    # As the tree's search gives them, and for which centres distances are too equal to say which comes first.
-    found, ties = np.full((len(centres), k), len(points), np.int64), np.zeros(len(centres), np.bool_)
-    nearest, squares = np.empty(k + 1, np.int64), np.empty(k + 1)
-    limit = radius * radius
-    for m in range(len(centres)):
-        number = 0
-        for n in range(len(points)):
-            x, y = points[n, 0] - centres[m, 0], points[n, 1] - centres[m, 1]
-            square = x * x + y * y
-            if abs(square - limit) <= TIE * limit:
-                ties[m] = True
-            if square >= limit or (number > k and square >= squares[k]):
-                continue
-            at = number if number <= k else k
-            while at > 0 and squares[at - 1] > square:
-                nearest[at], squares[at] = nearest[at - 1], squares[at - 1]
-                at -= 1
-            nearest[at], squares[at] = n, square
-            number = min(number + 1, k + 1)
-        for at in range(1, number):
-            if squares[at] - squares[at - 1] <= TIE * squares[at]:
-                ties[m] = True
-        for at in range(min(number, k)):
-            found[m, at] = nearest[at]
-    return found, ties
+def _nearest_of_few(
+    x: float, y: float, points: Array, radius: float, nearest: Ints, squares: Array, found: Shorts
+) -> bool:
+    # As the tree's search gives them; False where distances are too equal to say which comes first.
+    number, k, limit, sure = 0, len(found), radius * radius, True
+    for n in range(len(points)):
+        dx, dy = points[n, 0] - x, points[n, 1] - y
+        square = dx * dx + dy * dy
+        if abs(square - limit) <= TIE * limit:
+            sure = False
+        if square >= limit or (number > k and square >= squares[k]):
+            continue
+        at = number if number <= k else k
+        while at > 0 and squares[at - 1] > square:
+            nearest[at], squares[at] = nearest[at - 1], squares[at - 1]
+            at -= 1
+        nearest[at], squares[at] = n, square
+        number = min(number + 1, k + 1)
+    for at in range(1, number):
+        if squares[at] - squares[at - 1] <= TIE * squares[at]:
+            sure = False
+    for at in range(k):
+        found[at] = nearest[at] if at < number else -1
+    return sure

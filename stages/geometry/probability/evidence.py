@@ -14,18 +14,41 @@ MIN_SPREAD = 1e-6
 """Standard deviation of log S up to which similarities are alike: the rounding of 32-bit numbers."""
 
 
-@compiled(nogil=True)
 def best_headings(values: Floats) -> tuple[Floats, Ints]:
     """Each reference's similarity at its best heading, and which that is (of equal ones the first): (references,) each,
     of (references, headings >= 1)."""
-    out, at = np.empty(len(values), np.float32), np.zeros(len(values), np.int64)
+    best, at = np.empty(len(values), np.float32), np.empty(len(values), np.int64)
+    _best_headings(np.ascontiguousarray(values), best, at)
+    return best, at
+
+
+@compiled(nogil=True)
+def _best_headings(values: Floats, out: Floats, at: Ints) -> None:
     for n in range(len(values)):  # numpy's maximum along so short an axis takes ten times as long
         best, heading = values[n, 0], 0
         for h in range(1, values.shape[1]):
             if values[n, h] > best:
                 best, heading = values[n, h], h
         out[n], at[n] = best, heading
-    return out, at
+
+
+def hazen_quantile(values: Floats, quantile: float) -> float:
+    """Computes `np.quantile(values, quantile, method="hazen")`, to the bit, in a tenth of its time."""
+    at = len(values) * quantile + 0.5 - 1.0
+    if at < 0.0 or at >= len(values) - 1:
+        return float(values.min() if at < 0.0 else values.max())
+    low = math.floor(at)
+    ordered = values.copy()
+    ordered.partition((low, low + 1))
+    before, after, part = ordered[low], ordered[low + 1], at - low
+    return float(after - (after - before) * (1.0 - part) if part >= 0.5 else before + (after - before) * part)
+
+
+def average(values: Array, weights: Array | None) -> float:
+    """The mean of values by their weights; None: all weigh the same."""
+    if weights is None:
+        return float(np.add.reduce(values)) / len(values)
+    return float(np.add.reduce(values * weights) / np.add.reduce(weights))
 
 
 def contrast_power(best: Floats, contrast: float, sampling_weight: Array | None = None) -> float:
@@ -35,8 +58,8 @@ def contrast_power(best: Floats, contrast: float, sampling_weight: Array | None 
     each represents; None: one each. Where all are alike, as in a map of one, S is taken as it is.
     """
     logarithms = np.log(np.maximum(best, 1e-12)).astype(np.float64)
-    centre = np.average(logarithms, weights=sampling_weight)
-    spread = math.sqrt(float(np.average(np.square(logarithms - centre), weights=sampling_weight)))
+    centre = average(logarithms, sampling_weight)
+    spread = math.sqrt(average(np.square(logarithms - centre), sampling_weight))
     return contrast / spread if spread > MIN_SPREAD else 1.0
 
 

@@ -23,7 +23,7 @@ def standard_scores(similarity: Floats, sampling_weight: Array | None = None) ->
     `sampling_weight` (R,): how many references of the map each represents; None: one each.
     """
     logarithms = np.log(np.maximum(similarity, np.float32(1e-6)))
-    best = best_headings(np.ascontiguousarray(logarithms))[0].astype(np.float64)
+    best = best_headings(logarithms)[0].astype(np.float64)
     centre = float(np.average(best, weights=sampling_weight))
     spread = math.sqrt(float(np.average(np.square(best - centre), weights=sampling_weight)))
     scores: Floats = (logarithms - np.float32(centre)) * np.float32(1.0 / max(spread, 1e-6))

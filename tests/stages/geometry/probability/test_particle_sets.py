@@ -124,8 +124,10 @@ def test_few_points_are_searched_without_the_tree_and_give_what_it_gives(seed: i
     found = NearestCells(points, 4, 0.25, 1.5).of(places)
     monkeypatch.setattr(nearest_cells, "FEW_POINTS", 0)
     assert found.tolist() == NearestCells(points, 4, 0.25, 1.5).of(places).tolist()
+    expected = NearestCells(points[:150], 4, 0.25, 1.5).of(places)
     monkeypatch.undo()
     alone = NearestCells(points[:150], 4, 0.25, 1.5)
-    expected = alone._in_tree(places)
     monkeypatch.setattr(alone, "_in_tree", None)
-    assert alone._nearest(places).tolist() == expected.tolist()
+    for some in np.array_split(places, 7):
+        alone.of(some)
+    assert alone.of(places).tolist() == expected.tolist()
