@@ -1,17 +1,18 @@
 """Watches whether images, odometry, clock and map fit each other."""
 
+import itertools
 import math
 from collections.abc import Callable
-from dataclasses import field
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from omninav.pipeline import Context, Outputs, Stage, State, Tick
-from omninav.stages.geometry.appearance.turn_fit import clipped, explained, turn_fit
-from omninav.stages.geometry.appearance.visual_compass import turn_and_correlation
-from omninav.stages.geometry.plane.se2 import between, compose, wrap
+from omninav.stages.geometry.appearance.turn_fit import TurnFit, clipped, explained, turn_fit
+from omninav.stages.geometry.appearance.visual_compass import turns_and_correlations
+from omninav.stages.geometry.plane.se2 import between, compose, wrap, wrap_angle
 from omninav.stages.geometry.plane.track_fit import agreement, track_fit
 from omninav.stages.values.belief import PoseEstimate
 from omninav.stages.values.conflicts import Conflicts
@@ -39,51 +40,78 @@ COLUMNS = 11
 """Numbers that are remembered of an image."""
 
 
-class Watched(NamedTuple):
-    """The last images, N rows: `times` (s), `odometry` (N, 3) with headings that are not wrapped, best `matches` (N, 3)
-    in the map (NaN without one), whether that lies `at_estimate` (NaN without one), and against the image before: the
-    turn `seen` (rad), its `correlation`, and whether the images are `same`."""
+@dataclass(frozen=True)
+class Watched:
+    """The last images as `rows` (N, 11), each: its time (s), odometry (3) with a heading that is not wrapped, its best
+    match (3) in the map (NaN without one), whether that lies at the estimate (NaN without one), and against the image
+    before: the turn seen (rad), the correlation, and whether the images are the same."""
 
-    times: Array
-    odometry: Array
-    matches: Array
-    at_estimate: Array
-    seen: Array
-    correlation: Array
-    same: Array
-
-    @classmethod
-    def of(cls, rows: Array) -> "Watched":
-        """From rows (N, 11)."""
-        return cls(rows[:, 0], rows[:, 1:4], rows[:, 4:7], *rows[:, 7:].T)
+    rows: Array
 
     def last(self, number: int) -> "Watched":
         """The last images alone."""
-        return Watched(*(part[-number:] for part in self))
+        return Watched(self.rows[-number:])
+
+    @property
+    def times(self) -> Array:
+        """Seconds (N,)."""
+        return self.rows[:, 0]
+
+    @property
+    def odometry(self) -> Array:
+        """Poses (N, 3)."""
+        return self.rows[:, 1:4]
+
+    @property
+    def at_estimate(self) -> Array:
+        """Whether matches lie at the estimate (N,)."""
+        return self.rows[:, 7]
+
+    @property
+    def correlation(self) -> Array:
+        """Correlations with the images before (N,)."""
+        return self.rows[:, 9]
+
+    @property
+    def same(self) -> Array:
+        """Whether images equal those before (N,)."""
+        return self.rows[:, 10]
 
     @property
     def placed(self) -> tuple[Array, Array]:
         """Odometry's poses and the best matches, of images that have one: (M, 3), (M, 3)."""
-        known = np.isfinite(self.matches).all(axis=1)
-        return self.odometry[known], self.matches[known]
+        matches = self.rows[:, 4:7]
+        known = np.isfinite(matches).all(axis=1)
+        return self.odometry[known], matches[known]
 
-    @property
+    @cached_property
     def metres(self) -> float:
         """The path that odometry drove."""
         return float(np.hypot(*np.diff(self.odometry[:, :2], axis=0).T).sum())
 
-    @property
+    @cached_property
     def radians(self) -> float:
         """How much odometry turned, to either side."""
         return float(np.abs(np.diff(self.odometry[:, 2])).sum())
 
+    @cached_property
+    def sure_turns(self) -> Array:
+        """Turns (N - 1,) that are seen in images that are like the ones before; else NaN."""
+        return np.where(self.correlation[1:] > SURE_CORRELATION, self.rows[1:, 8], np.nan)
+
+    @cached_property
+    def turn_fit(self) -> TurnFit:
+        """How these turns lie to odometry's."""
+        return turn_fit(self.times, self.odometry[:, 2], self.sure_turns)
+
 
 class InputConflictsState(State):
-    """`strip` (rows, columns), `stamp` (ns) and `pose` (3,) of the last watched image; `rows` (N, 11) of `Watched`; the
-    kind that the last judgement found; what was said, by its kind, and how many judgements ago each that stands was
-    found last."""
+    """`stamp` (ns) and `pose` (3,) of the last watched image; `rows` (N, 11) of `Watched`, and the `strips` (rows,
+    columns) of the last ones, of which all but the first are still to be compared with the one before; the kind that
+    the last judgement found; what was said, by its kind, and how many judgements ago each that stands was found last.
+    """
 
-    strip: npt.NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 0), np.float32))
+    strips: list[npt.NDArray[np.float32]] = field(default_factory=list)
     stamp: int = 0
     pose: Array = field(default_factory=lambda: np.full(3, np.nan))
     rows: Array = field(default_factory=lambda: np.zeros((0, COLUMNS)))
@@ -131,18 +159,18 @@ class InputConflicts(Stage):
         if sentence := leap(recent, ctx.tick, odometry):
             self._say(ctx, recent, "leap", sentence)
         recent.pose = pose_now(recent.pose, odometry, motion)
-        if strip is not None and np.isfinite(recent.pose).all() and self._due(ctx, recent):
+        if strip is not None and is_known(recent.pose) and self._due(ctx, recent):
             # nothing is compared with a map that is wrong by itself
             metres = math.inf if length_scale is None or of_map else length_scale.metres
-            match = np.full(4, np.nan)
+            remember(recent, ctx.tick.stamp, strip.pixels)
             if similarities is not None and map is not None and min(similarities.values.shape) > 1:
-                match[:3] = best_place(similarities, map)
-                match[3] = lies_at(match[:3], estimate, metres)
-            remember(recent, ctx.tick.stamp, strip.pixels, match)
+                match = best_place(similarities, map)
+                recent.rows[-1, 4:7], recent.rows[-1, 7] = match, lies_at(match, estimate, metres)
             recent.judged += 1
             if not recent.judged % EVERY:
+                compare_strips(recent)
                 self._judge(ctx, recent, metres)
-        standing = of_map + tuple(recent.found[kind] for kind in recent.standing)
+        standing = of_map + tuple([recent.found[kind] for kind in recent.standing])
         misleading = bool(of_map) or not recent.standing.keys() <= HARMLESS
         return self.Out(conflicts=Conflicts(of_map + tuple(recent.found.values()), standing, misleading))
 
@@ -150,7 +178,7 @@ class InputConflicts(Stage):
         return not len(recent.rows) or not 0 <= ctx.tick.stamp - recent.stamp < INTERVAL_S * 1e9
 
     def _judge(self, ctx: Context, recent: InputConflictsState, length_scale_m: float) -> None:
-        kind, sentence = judge(Watched.of(recent.rows), length_scale_m)
+        kind, sentence = judge(Watched(recent.rows), length_scale_m)
         recent.standing = {each: ago + 1 for each, ago in recent.standing.items() if ago + 1 < STANDS or each == kind}
         others = set(recent.standing) - {"leap", kind}
         if kind and (kind in recent.standing or (kind == recent.suspected and not others)):
@@ -170,9 +198,11 @@ def leap(recent: InputConflictsState, tick: Tick, odometry: Pose | None) -> str:
     if odometry is None or isinstance(odometry, GuessedPose) or len(recent.rows) < MIN_BEFORE_LEAP:
         return ""
     seconds = (tick.stamp - recent.stamp) / 1e9
-    before = Watched.of(recent.rows).last(MIN_BEFORE_LEAP)
+    if 0.0 <= seconds < MIN_LEAP_S:
+        return ""
+    before = Watched(recent.rows).last(MIN_BEFORE_LEAP)
     usual = float(np.median(np.diff(before.times)))
-    if 0.0 <= seconds < max(MIN_LEAP_S, LEAP_INTERVALS * usual):
+    if 0.0 <= seconds < LEAP_INTERVALS * usual:
         return ""
     step = between(before.odometry[-2], before.odometry[-1])
     driven = math.hypot(*step[:2])
@@ -186,14 +216,19 @@ def leap(recent: InputConflictsState, tick: Tick, odometry: Pose | None) -> str:
     )
 
 
+def is_known(pose: Array) -> bool:
+    """Tests whether a pose (3,) has a place and a heading."""
+    return math.isfinite(pose[0] + pose[1] + pose[2])
+
+
 def pose_now(before: Array, odometry: Pose | None, motion: Motion | None) -> Array:
     """Odometry's pose (3,) with a heading that is not wrapped; NaN where motion is only guessed, or not known."""
     if isinstance(odometry, GuessedPose) or isinstance(motion, GuessedMotion):
         return np.full(3, np.nan)
-    known = bool(np.isfinite(before).all())
+    known = is_known(before)
     if odometry is not None:
-        turned = float(wrap(odometry.heading - before[2])) if known else 0.0
-        return np.array((odometry.x, odometry.y, before[2] + turned if known else odometry.heading))
+        heading = before[2] + wrap_angle(odometry.heading - before[2]) if known else odometry.heading
+        return np.array((odometry.x, odometry.y, heading))
     if motion is None:
         return before
     start = before if known else np.zeros(3)
@@ -209,16 +244,29 @@ def lies_at(match: Array, estimate: PoseEstimate | None, length_scale_m: float) 
     return float(math.hypot(*away[:2]) < NEAR_SCALES * length_scale_m and abs(wrap(away[2])) < NEAR_RAD)
 
 
-def remember(recent: InputConflictsState, stamp: int, pixels: npt.NDArray[np.float32], match: Array) -> None:
-    """Add a row for an image; `match` (4,): where its best match lies, and whether that is at the estimate."""
-    turn, correlation, same, time = math.nan, math.nan, 0.0, 0.0
-    if recent.strip.shape == pixels.shape and len(recent.rows):
-        turn, correlation = turn_and_correlation(recent.strip, pixels)
-        same = float(np.array_equal(recent.strip, pixels))
-        time = recent.rows[-1, 0] + (stamp - recent.stamp) / 1e9
-    row = np.concatenate([(time,), recent.pose, match, (turn, correlation, same)])
-    recent.rows = np.concatenate([recent.rows, row[None]])[-WINDOW:]
-    recent.strip, recent.stamp = pixels, stamp
+def remember(recent: InputConflictsState, stamp: int, pixels: npt.NDArray[np.float32]) -> None:
+    """Add a row for an image; its comparison with the one before is left to `compare_strips`."""
+    row = np.full((1, COLUMNS), np.nan)
+    row[0, 0], row[0, 1:4], row[0, 10] = 0.0, recent.pose, 0.0
+    if not len(recent.rows):
+        recent.strips = []
+    elif recent.strips[-1].shape == pixels.shape:
+        row[0, 0] = recent.rows[-1, 0] + (stamp - recent.stamp) / 1e9
+    recent.rows = np.concatenate((recent.rows, row))[-WINDOW:]
+    recent.strips.append(pixels)
+    recent.stamp = stamp
+
+
+def compare_strips(recent: InputConflictsState) -> None:
+    """Compare the images since the last judgement with the ones before, all at once."""
+    end = -len(recent.strips)
+    for _, run in itertools.groupby(recent.strips, lambda strip: strip.shape):
+        strips = np.stack(list(run))
+        first, end = end, end + len(strips)
+        if len(strips) > 1:
+            same = (strips[1:] == strips[:-1]).all(axis=(1, 2))
+            recent.rows[first + 1 : end or None, 8:] = np.column_stack([*turns_and_correlations(strips), same])
+    recent.strips = recent.strips[-1:]
 
 
 MIN_BEFORE_LEAP, MIN_LEAP_S, LEAP_INTERVALS = 8, 30.0, 20.0
@@ -296,7 +344,7 @@ def blind(watched: Watched, length_scale_m: float) -> str:
 
 def turned(watched: Watched, length_scale_m: float) -> str:
     """Turns that are seen against turns that are measured."""
-    seen = sure_turns(watched)
+    seen = watched.sure_turns
     sure = np.abs(clipped(seen[np.abs(seen) > SURE_TURN]))
     turning, number = float(sure.sum()), len(watched.times) - 1
     if turning < MIN_SEEN_TURN:
@@ -313,7 +361,7 @@ def turned(watched: Watched, length_scale_m: float) -> str:
             f"odometry's heading does not change ({measured} {over}) while the images turn by {images}: check its "
             "orientation (a quaternion is x, y, z, w)"
         )
-    fit = turn_fit(watched.times, watched.odometry[:, 2], seen)
+    fit = watched.turn_fit
     known = np.isfinite(seen)
     turns = np.diff(watched.odometry[:, 2])[known]
     if fit.explained < EXPLAINED:
@@ -332,10 +380,10 @@ def turned(watched: Watched, length_scale_m: float) -> str:
 
 def late(watched: Watched, length_scale_m: float, min_metres: float = 0.0) -> str:
     """Images that show turns when odometry does not measure them; the robot drives at least so far meanwhile (m)."""
-    seen = sure_turns(watched)
+    seen = watched.sure_turns
     if np.abs(clipped(seen[np.abs(seen) > SURE_TURN])).sum() < MIN_SEEN_TURN or watched.radians == 0.0:
         return ""
-    fit = turn_fit(watched.times, watched.odometry[:, 2], seen)
+    fit = watched.turn_fit
     if fit.sign < 0 or fit.explained < EXPLAINED or fit.explained - fit.as_is < DELAY_GAIN:
         return ""
     driven = watched.metres * abs(fit.delay_s) / max(float(np.ptp(watched.times)), 1e-9)
@@ -356,15 +404,10 @@ def misplacing(watched: Watched, length_scale_m: float) -> str:
 
 def turns_fit(watched: Watched) -> bool:
     """Whether odometry turns as the images do."""
-    seen = sure_turns(watched)
+    seen = watched.sure_turns
     known = np.isfinite(seen) & (np.abs(seen) > SURE_TURN)
     turns = np.diff(watched.odometry[:, 2])[known]
     return bool(np.abs(seen[known]).sum() > MIN_SEEN_TURN and explained(seen[known], turns) > EXPLAINED)
-
-
-def sure_turns(watched: Watched) -> Array:
-    """Turns (N - 1,) that are seen in images that are like the ones before; else NaN."""
-    return np.where(watched.correlation[1:] > SURE_CORRELATION, watched.seen[1:], np.nan)
 
 
 def whose(watched: Watched, length_scale_m: float) -> str:

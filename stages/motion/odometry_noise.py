@@ -6,7 +6,7 @@ from typing import Annotated
 
 from omninav.pipeline import Bounds
 from omninav.stages.geometry.plane.odometry_motion import decompose_motion
-from omninav.stages.geometry.plane.se2 import wrap
+from omninav.stages.geometry.plane.se2 import wrap_angle
 from omninav.stages.values.pose import BridgedMotion, GuessedMotion, Motion, UncertainMotion
 
 
@@ -59,7 +59,7 @@ class OdometryNoiseModel:
 
         `more_turn` (rad) and `more_way` (m): standard deviations of what was not measured.
         """
-        distance, turn = abs(steps[1]), abs(float(wrap(steps[0] + steps[2])))
+        distance, turn = abs(steps[1]), abs(wrap_angle(steps[0] + steps[2]))
         rotation = math.sqrt(
             0.5
             * (self.rotation_per_rotation**2 * turn + self.rotation_per_metre**2 * distance + self.rotation_floor**2)

@@ -1,5 +1,6 @@
 """Turn of a robot from two panoramas: a visual compass."""
 
+import itertools
 import math
 
 import numpy as np
@@ -19,12 +20,16 @@ def turn_between(before: Strip, after: Strip) -> float:
     return angle_of_peak(_likeness(*(view - view.mean(axis=1, keepdims=True) for view in (before, after))))
 
 
-def turn_and_correlation(before: Strip, after: Strip) -> tuple[float, float]:
-    """The turn as `turn_between` finds it, and the correlation of the two panoramas there: 1 where they are equal."""
-    one, other = (view - view.mean(axis=1, keepdims=True) for view in (before, after))
-    likeness = _likeness(one, other)
-    energy = float(np.sqrt(np.square(one).sum(dtype=np.float64) * np.square(other).sum(dtype=np.float64)))
-    return angle_of_peak(likeness), float(likeness.max()) / energy if energy else 0.0
+def turns_and_correlations(strips: Strip) -> tuple[list[float], list[float]]:
+    """Between each of some panoramas (N, rows, columns) and the next, N - 1 of each: the turn as `turn_between` finds
+    it, and the correlation of the two there: 1 where they are equal."""
+    views = strips - strips.mean(axis=2, keepdims=True)
+    spectra = np.fft.rfft(views)
+    likeness = np.fft.irfft((np.conj(spectra[:-1]) * spectra[1:]).sum(axis=1), strips.shape[2])
+    energies = [float(np.square(view).sum(dtype=np.float64)) for view in views]
+    most = [math.sqrt(one * other) for one, other in itertools.pairwise(energies)]
+    correlations = [float(each.max()) / energy if energy else 0.0 for each, energy in zip(likeness, most, strict=True)]
+    return [angle_of_peak(each) for each in likeness], correlations
 
 
 def _likeness(one: Strip, other: Strip) -> npt.NDArray[np.floating]:
@@ -34,8 +39,8 @@ def _likeness(one: Strip, other: Strip) -> npt.NDArray[np.floating]:
 
 def angle_of_peak(values: npt.NDArray[np.floating]) -> float:
     """The angle (rad) at which values around the full circle are largest, between samples by a parabola."""
-    number, best = len(values), int(np.argmax(values))
-    left, middle, right = (float(values[(best + offset) % number]) for offset in (-1, 0, 1))
+    number, best = len(values), int(values.argmax())
+    left, middle, right = float(values[best - 1]), float(values[best]), float(values[(best + 1) % number])
     bend = left - 2.0 * middle + right
     shift = best + (0.5 * (left - right) / bend if bend < 0.0 else 0.0)
     return math.remainder(2.0 * math.pi * shift / number, 2.0 * math.pi)

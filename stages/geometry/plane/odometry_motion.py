@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from omninav.pipeline.engine.compiled import compiled
 
-from .se2 import compose, wrap
+from .se2 import compose, wrap, wrap_angle
 
 Array = npt.NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -23,8 +23,8 @@ def decompose_motion(x: float, y: float, turn: float) -> Triple:
         return 0.0, 0.0, turn
     first = math.atan2(y, x)
     if abs(first) > math.pi / 2:
-        first, translation = float(wrap(first + math.pi)), -translation
-    return first, translation, float(wrap(turn - first))
+        first, translation = wrap_angle(first + math.pi), -translation
+    return first, translation, wrap_angle(turn - first)
 
 
 @compiled(nogil=True)

@@ -14,17 +14,25 @@ def wrap(angle: npt.ArrayLike) -> Array:
     return wrapped
 
 
+def wrap_angle(angle: float) -> float:
+    """One angle brought into [-pi, pi), as `wrap` does it."""
+    return (angle + math.pi) % (2 * math.pi) - math.pi
+
+
+def _poses(x: Array, y: Array, heading: Array) -> Array:
+    poses = np.empty((*np.shape(x), 3))
+    poses[..., 0], poses[..., 1], poses[..., 2] = x, y, heading
+    return poses
+
+
 def compose(pose: npt.ArrayLike, motion: npt.ArrayLike) -> Array:
     """The pose reached from `pose` by a motion given in its frame: (..., 3) and (..., 3) -> (..., 3)."""
     pose, motion = np.asarray(pose, dtype=np.float64), np.asarray(motion, dtype=np.float64)
     cos, sin = np.cos(pose[..., 2]), np.sin(pose[..., 2])
-    return np.stack(
-        [
-            pose[..., 0] + cos * motion[..., 0] - sin * motion[..., 1],
-            pose[..., 1] + sin * motion[..., 0] + cos * motion[..., 1],
-            wrap(pose[..., 2] + motion[..., 2]),
-        ],
-        axis=-1,
+    return _poses(
+        pose[..., 0] + cos * motion[..., 0] - sin * motion[..., 1],
+        pose[..., 1] + sin * motion[..., 0] + cos * motion[..., 1],
+        wrap(pose[..., 2] + motion[..., 2]),
     )
 
 
@@ -33,7 +41,7 @@ def between(start: npt.ArrayLike, end: npt.ArrayLike) -> Array:
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     cos, sin = np.cos(start[..., 2]), np.sin(start[..., 2])
     dx, dy = end[..., 0] - start[..., 0], end[..., 1] - start[..., 1]
-    return np.stack([cos * dx + sin * dy, -sin * dx + cos * dy, wrap(end[..., 2] - start[..., 2])], axis=-1)
+    return _poses(cos * dx + sin * dy, -sin * dx + cos * dy, wrap(end[..., 2] - start[..., 2]))
 
 
 def interpolate(times: npt.ArrayLike, poses: npt.ArrayLike, at: npt.ArrayLike) -> Array:
@@ -44,7 +52,7 @@ def interpolate(times: npt.ArrayLike, poses: npt.ArrayLike, at: npt.ArrayLike) -
     times, poses, at = np.asarray(times), np.asarray(poses, dtype=np.float64), np.asarray(at)
     heading = np.unwrap(poses[:, 2])
     columns = [np.interp(at, times, poses[:, 0]), np.interp(at, times, poses[:, 1]), np.interp(at, times, heading)]
-    return np.stack([columns[0], columns[1], wrap(columns[2])], axis=-1)
+    return _poses(columns[0], columns[1], wrap(columns[2]))
 
 
 def chain(motions: npt.ArrayLike) -> Array:
@@ -55,4 +63,4 @@ def chain(motions: npt.ArrayLike) -> Array:
     cos, sin = np.cos(before), np.sin(before)
     x = np.cumsum(cos * motions[:, 0] - sin * motions[:, 1])
     y = np.cumsum(sin * motions[:, 0] + cos * motions[:, 1])
-    return np.stack([x, y, wrap(heading)], axis=-1)
+    return _poses(x, y, wrap(heading))

@@ -119,7 +119,7 @@ def test_late_images_mislead_where_the_robot_is_elsewhere_by_then(delay_s: float
     odometry = np.column_stack([0.4 * times, np.zeros(64), headings(times)])  # 0.4 m/s
     seen = np.concatenate([[np.nan], np.diff(headings(times - delay_s))])
     matches, alike = np.full((64, 4), np.nan), np.full(64, 0.9)
-    watched = Watched(times, odometry, matches[:, :3], matches[:, 3], seen, alike, np.zeros(64))
+    watched = Watched(np.column_stack([times, odometry, matches, seen, alike, np.zeros(64)]))
     found, sentence = judge(watched, np.inf)
     assert found == kind
     if kind:
