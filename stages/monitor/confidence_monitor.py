@@ -59,11 +59,11 @@ class ConfidenceMonitorState(State):
     def add(self, place: Array, estimate: Array, novelty: float, weight: float, doubt: float, memory: float) -> None:
         """Remember an image; the older ones count less by what this one counts, 1 / e after `memory` full ones."""
         fading = math.exp(-max(weight, doubt) / memory)
-        self.places = np.concatenate([self.places, place[None]])[-MAX_IMAGES:]
-        self.estimates = np.concatenate([self.estimates, estimate[None]])[-MAX_IMAGES:]
-        self.novelties = np.concatenate([self.novelties, [novelty]])[-MAX_IMAGES:]
-        self.weights = np.concatenate([self.weights * fading, [weight]])[-MAX_IMAGES:]
-        self.doubts = np.concatenate([self.doubts * fading, [doubt]])[-MAX_IMAGES:]
+        self.places = np.concatenate((self.places, place[None]))[-MAX_IMAGES:]
+        self.estimates = np.concatenate((self.estimates, estimate[None]))[-MAX_IMAGES:]
+        self.novelties = np.concatenate((self.novelties, (novelty,)))[-MAX_IMAGES:]
+        self.weights = np.concatenate((self.weights * fading, (weight,)))[-MAX_IMAGES:]
+        self.doubts = np.concatenate((self.doubts * fading, (doubt,)))[-MAX_IMAGES:]
 
 
 class ConfidenceMonitor(Stage):
@@ -162,8 +162,8 @@ def best_place(similarities: Similarities, map: ReferenceGraph) -> Array:
     values = similarities.values
     row = int(similarities.best.argmax())
     reference = row if similarities.candidates is None else int(similarities.candidates[row])
-    turn = angle_of_peak(values[row]) if values.shape[1] > 1 else 0.0
-    place: Array = map.poses[reference] + np.array((0.0, 0.0, turn))
+    place: Array = map.poses[reference].copy()
+    place[2] += angle_of_peak(values[row]) if values.shape[1] > 1 else 0.0
     return place
 
 
@@ -174,23 +174,25 @@ def lead_of_best(similarities: Similarities, map: ReferenceGraph, elsewhere_m: f
     best, places = similarities.best, _compared(similarities, map)
     turned = places[:, 2] + similarities.best_heading * (2.0 * math.pi / similarities.values.shape[1])
     row = int(best.argmax())
-    away = np.hypot(*(places - places[row])[:, :2].T)
-    return _lead_over((away > elsewhere_m) | (np.abs(wrap(turned - turned[row])) > TURNED), similarities)
+    away = places - places[row]
+    far = np.hypot(away[:, 0], away[:, 1]) > elsewhere_m
+    return _lead_over(far | (np.abs(wrap(turned - turned[row])) > TURNED), similarities)
 
 
 def lead_over_pose(similarities: Similarities, map: ReferenceGraph, pose: Array, near_m: float) -> float:
     """The lead of the most similar reference over the best one near a pose (3,), seen from any heading, in the same
     unit; 0 where no compared reference lies within so many metres: images say nothing of a place the map does not show.
     """
-    return _lead_over(np.hypot(*(_compared(similarities, map) - pose)[:, :2].T) <= near_m, similarities)
+    away = _compared(similarities, map) - pose
+    return _lead_over(np.hypot(away[:, 0], away[:, 1]) <= near_m, similarities)
 
 
 def _lead_over(rows: npt.NDArray[np.bool_], similarities: Similarities) -> float:
-    if not rows.any():
+    others = similarities.best[rows]
+    if not len(others):
         return 0.0
-    best, weights = similarities.best.astype(np.float64), similarities.sampling_weight
-    spread = math.sqrt(float(np.average(np.square(best - np.average(best, weights=weights)), weights=weights)))
-    return float(best.max() - best[rows].max()) / max(spread, 1e-9)
+    lead = float(np.maximum.reduce(similarities.best)) - float(np.maximum.reduce(others))
+    return lead / max(similarities.spread, 1e-9)
 
 
 def _compared(similarities: Similarities, map: ReferenceGraph) -> Array:
@@ -201,4 +203,4 @@ def _compared(similarities: Similarities, map: ReferenceGraph) -> Array:
 def mass_within(belief: Particles, pose: Array, metres: float, radians: float) -> float:
     """The share of a belief within a tolerance of a pose (3,)."""
     near = are_within(np.ascontiguousarray(belief.poses), pose, metres, radians)
-    return min(1.0, float(belief.weights[near].sum() / belief.weights.sum()))
+    return min(1.0, float(np.add.reduce(belief.weights[near]) / np.add.reduce(belief.weights)))

@@ -13,8 +13,9 @@ def consistency(places: Array, pose: Array, metres: float, radians: float) -> Ar
 
     exp(-d^4 / 2) of the distance d in widths: a Gaussian would take from places that agree as well as matches can.
     """
-    squares = (np.square(places[:, :2] - pose[:2]).sum(axis=1)) / metres**2
-    share: Array = np.exp(-0.5 * np.square(squares + np.square(wrap(places[:, 2] - pose[2]) / radians)))
+    away = places - pose
+    squares = (np.square(away[:, 0]) + np.square(away[:, 1])) / metres**2
+    share: Array = np.exp(-0.5 * np.square(squares + np.square(wrap(away[:, 2]) / radians)))
     return share
 
 
@@ -30,19 +31,22 @@ def log_odds_of_right(
     round, with a probability of `kidnapping` times the image's novelty. Likelihoods are Beta-binomial; more than one
     such change is not considered.
     """
-    agree, other = (np.concatenate([[0.0], np.cumsum(counts)]) for counts in (agreeing, disagreeing))
-    right, wrong = (1.0, 1.0), (when_wrong * strength, (1.0 - when_wrong) * strength)
-    before = [_log_likelihood(agree, other, prior) for prior in (right, wrong)]
-    since = [_log_likelihood(agree[-1] - agree, other[-1] - other, prior) for prior in (right, wrong)]
-    change = np.log(np.maximum(kidnapping * novelties[1:], 1e-300))
-    inner = slice(1, len(agree) - 1)
-    stayed_right, stayed_wrong = before[0][-1], before[1][-1]
-    recovered, kidnapped = before[1][inner] + since[0][inner] + change, before[0][inner] + since[1][inner] + change
-    return float(np.logaddexp.reduce([stayed_right, *recovered]) - np.logaddexp.reduce([stayed_wrong, *kidnapped]))
-
-
-def _log_likelihood(agree: Array, other: Array, prior: tuple[float, float]) -> Array:
     from scipy.special import betaln  # slow to import: not before a run
 
-    found: Array = betaln(prior[0] + agree, prior[1] + other) - betaln(*prior)
-    return found
+    if not len(agreeing):
+        return 0.0
+    agree, other = np.zeros(len(agreeing) + 1), np.zeros(len(agreeing) + 1)
+    agreeing.cumsum(out=agree[1:])
+    disagreeing.cumsum(out=other[1:])
+    left, right = agree[-1] - agree, other[-1] - other
+    a, b = when_wrong * strength, (1.0 - when_wrong) * strength
+    ever, never = betaln(1.0, 1.0), betaln(a, b)
+    right_before, wrong_before = betaln(1.0 + agree, 1.0 + other) - ever, betaln(a + agree, b + other) - never
+    right_since, wrong_since = betaln(1.0 + left, 1.0 + right) - ever, betaln(a + left, b + right) - never
+    # The last of each stayed as it is; in place of the first, which nothing precedes, stands that.
+    change = np.log(np.maximum(kidnapping * novelties[1:], 1e-300))
+    recovered, kidnapped = wrong_before[:-1] + right_since[:-1], right_before[:-1] + wrong_since[:-1]
+    recovered[1:] += change
+    kidnapped[1:] += change
+    recovered[0], kidnapped[0] = right_before[-1], wrong_before[-1]
+    return float(np.logaddexp.reduce(recovered) - np.logaddexp.reduce(kidnapped))
