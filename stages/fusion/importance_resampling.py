@@ -66,23 +66,25 @@ class ImportanceResampling(Stage):
     def step(self, ctx: Context, particles: Particles, likelihood: Likelihood, proposals: Particles | None) -> Out:
         """Fuse prediction and observation."""
         poses, weighted = particles.poses, particles.weights * likelihood.values
-        total, new = float(weighted.sum()), 0.0
+        total, new = float(np.add.reduce(weighted)), 0.0
         if not (math.isfinite(total) and total > 0.0):
             ctx.count("belief_without_support", detail="fusion: no particle explains the image; weights kept")
-            weighted, total, proposals = particles.weights, float(particles.weights.sum()), None
+            weighted, total, proposals = particles.weights, float(np.add.reduce(particles.weights)), None
         moved = self.kidnapping_probability * likelihood.novelty
         if proposals is not None and likelihood.mean_likelihood is not None:
-            new = moved * likelihood.mean_likelihood * float(particles.weights.sum())
+            new = moved * likelihood.mean_likelihood * float(np.add.reduce(particles.weights))
             weighted, total = weighted * (1.0 - moved), total * (1.0 - moved) + new
         tracked = len(poses) - particles.recovery_particles
         wanted = self._wanted(poses[:tracked])
         weights = weighted / total
         recovery = int(self.recovery_share * wanted) if new > 0.0 else 0
-        if float(weights[tracked:].sum()) * wanted > recovery:  # they weigh enough to be resampled with the others
+        if (
+            float(np.add.reduce(weights[tracked:])) * wanted > recovery
+        ):  # they weigh enough to be resampled with the others
             tracked = len(poses)
         main = self._resampled(ctx, poses[:tracked], weights[:tracked], wanted - recovery)
         if proposals is None or not recovery:
-            return self.Out(belief=Particles(main[0], main[1] / main[1].sum()))
+            return self.Out(belief=Particles(main[0], main[1] / np.add.reduce(main[1])))
         others = self._resample_recovery(
             ctx,
             np.concatenate([poses[tracked:], proposals.poses]),
@@ -91,7 +93,7 @@ class ImportanceResampling(Stage):
             recovery,
         )
         both = np.concatenate([main[1], others[1]])
-        return self.Out(belief=Particles(np.concatenate([main[0], others[0]]), both / both.sum(), recovery))
+        return self.Out(belief=Particles(np.concatenate([main[0], others[0]]), both / np.add.reduce(both), recovery))
 
     def _resample_recovery(
         self, ctx: Context, poses: Array, weights: Array, fitness: Array, number: int
@@ -99,14 +101,14 @@ class ImportanceResampling(Stage):
         # Drawn by fit and corrected in the weights: drawn by weight, old hypotheses would displace new ones before
         # evidence for these could accumulate.
         drawn = systematic(fitness, number, float(ctx.rng.random()))
-        return poses[drawn], weights[drawn] / fitness[drawn] * (fitness.sum() / number)
+        return poses[drawn], weights[drawn] / fitness[drawn] * (np.add.reduce(fitness) / number)
 
     def _resampled(self, ctx: Context, poses: Array, weights: Array, wanted: int) -> tuple[Array, Array]:
         # The weights keep their sum, which is below 1 where there are recovery particles.
         if wanted == len(weights) and effective_size(weights) >= self.resample_below * wanted:
             return poses, weights
         drawn = systematic(weights, wanted, float(ctx.rng.random()))
-        return poses[drawn], np.full(wanted, weights.sum() / wanted)
+        return poses[drawn], np.full(wanted, np.add.reduce(weights) / wanted)
 
     def _wanted(self, poses: Array) -> int:
         if self.adapt == "none":

@@ -36,7 +36,8 @@ def peak_of(similarities: Similarities) -> BestMatch | None:
         return None
     row, heading = divmod(int(values.argmax()), values.shape[1])
     reference = row if candidates is None else int(candidates[row])
-    turn = float(np.angle(np.exp(2j * np.pi * heading / values.shape[1])))
+    turned = np.exp(2j * np.pi * heading / values.shape[1])
+    turn = float(np.arctan2(turned.imag, turned.real))
     return BestMatch(reference, turn, similarity=float(values[row, heading]))
 
 

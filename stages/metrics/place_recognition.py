@@ -37,7 +37,7 @@ class RankReferences(Stage):
 
     def step(self, ctx: Context, similarities: Similarities) -> Out:
         """One image."""
-        order = np.argsort(-similarities.best, kind="stable")[: self.best]
+        order = (-similarities.best).argsort(kind="stable")[: self.best]
         candidates = similarities.candidates
         return self.Out(ranked=RankedReferences(order if candidates is None else candidates[order]))
 

@@ -47,7 +47,9 @@ class WidenCovariance(Stage):
     ) -> Out:
         """One estimate."""
         variance = (self.floor * length_scale.metres) ** 2
-        covariance = estimate.covariance + np.diag((variance, variance, 0.0))
+        covariance = estimate.covariance.copy()
+        covariance[0, 0] += variance
+        covariance[1, 1] += variance
         if confidence.probability < self.min_confidence:
             covariance = covariance + map_covariance(np.array(pose_row(estimate.pose)), map)
         return self.Out(estimate=replace(estimate, covariance=covariance))

@@ -214,8 +214,8 @@ def _shown_references(found: Similarities | Neighbours | VisualDistances, map: A
         values, rows = 1.0 / (1.0 + found.distances), map.places if isinstance(map, TopologicalMap) else None
     if not len(values):
         return None, 0.0
-    best = np.argsort(-values, kind="stable")[:SHOWN_REFERENCES]
+    best = (-values).argsort(kind="stable")[:SHOWN_REFERENCES]
     similar = np.empty((len(best), 3))
     similar[:, :2] = map_poses(map)[best if rows is None else rows[best], :2]
     similar[:, 2] = values[best]
-    return similar, float(values.max(initial=0.0))
+    return similar, max(0.0, float(values[best[0]]))

@@ -41,9 +41,9 @@ def thin(belief: Particles, particles: int) -> Particles:
     """Systematic choice by weight at the middles of `particles` equal shares; fewer particles are given as they are."""
     if len(belief.weights) <= particles:
         return belief
-    edges = np.cumsum(belief.weights)
+    edges = belief.weights.cumsum()
     middles = (np.arange(particles) + 0.5) / particles * edges[-1]
-    chosen = np.minimum(np.searchsorted(edges, middles), len(edges) - 1)
+    chosen = np.minimum(edges.searchsorted(middles), len(edges) - 1)
     return Particles(belief.poses[chosen], np.full(particles, 1 / particles))
 
 

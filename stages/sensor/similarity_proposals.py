@@ -66,12 +66,12 @@ def _draw_at_floor(field: SimilarityField, rng: np.random.Generator, number: int
     # By how many references each represents; without meaning where no cell is at the floor.
     headings = field.values.shape[1]
     references = _search(field.floor_cells, rng.random(number) * float(field.floor_cells[-1]))
-    low = np.cumsum(field.values[references] <= field.floor, axis=1)
-    turns = (low <= (rng.random(number) * low[:, -1])[:, None]).sum(axis=1)
+    low = (field.values[references] <= field.floor).cumsum(axis=1)
+    turns = np.add.reduce(low <= (rng.random(number) * low[:, -1])[:, None], axis=1)
     cells: Ints = references * headings + np.minimum(turns, headings - 1)
     return cells
 
 
 def _search(cumulative: Array, quantile: Array) -> Ints:
-    at: Ints = np.minimum(np.searchsorted(cumulative, quantile, side="right"), len(cumulative) - 1)
+    at: Ints = np.minimum(cumulative.searchsorted(quantile, side="right"), len(cumulative) - 1)
     return at

@@ -1,5 +1,7 @@
 """Outputs of a source of drives at every tick, whether they are recorded, happen now or are pushed."""
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -29,10 +31,13 @@ class DriveOutputs(Outputs):
 
 def motion_of(increment: Array, unmeasured_s: float = 0.0) -> Motion:
     """An increment (3,) as a value; a bridged one where some of it was not measured."""
-    x, y, turn = (float(value) for value in increment)
+    x, y, turn = increment.tolist()
     return BridgedMotion(x, y, turn, unmeasured_s) if unmeasured_s else Motion(x, y, turn)
 
 
 def pose_of(row: Array | None, of: type[Pose] = Pose) -> Pose | None:
     """A pose (3,) as a value; None where it is not known."""
-    return None if row is None or not np.isfinite(row).all() else of(*(float(value) for value in row))
+    if row is None:
+        return None
+    x, y, heading = row.tolist()
+    return of(x, y, heading) if math.isfinite(x + y + heading) else None

@@ -51,7 +51,7 @@ class Particles(Belief):
 
     def estimate(self) -> PoseEstimate:
         mode, covariance, share, mean = mode_and_mean(self.poses, self.weights)
-        return PoseEstimate(Pose(*map(float, mode)), covariance, share, Pose(*map(float, mean)))
+        return PoseEstimate(Pose(*mode.tolist()), covariance, share, Pose(*mean.tolist()))
 
 
 class GaussianMixture(Belief):

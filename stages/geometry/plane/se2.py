@@ -20,7 +20,7 @@ def wrap_angle(angle: float) -> float:
 
 
 def _poses(x: Array, y: Array, heading: Array) -> Array:
-    poses = np.empty((*np.shape(x), 3))
+    poses = np.empty((*x.shape, 3))
     poses[..., 0], poses[..., 1], poses[..., 2] = x, y, heading
     return poses
 

@@ -2,7 +2,7 @@ import numpy as np
 
 from omninav.pipeline import Context
 from omninav.stages.features.grey_strip import GreyStrip
-from omninav.stages.geometry.appearance.visual_compass import turn_and_correlation
+from omninav.stages.geometry.appearance.visual_compass import turns_and_correlations
 from omninav.stages.values.image import Panorama, Windows
 
 
@@ -20,7 +20,7 @@ def test_a_turned_robot_sees_its_turn_in_two_strips():
     before, after = (stage.step(ctx, Panorama(np.roll(pixels, shift, axis=1))).strip for shift in (0, 20))
     assert before is not None
     assert after is not None
-    turn, correlation = turn_and_correlation(before.pixels, after.pixels)
+    (turn,), (correlation,) = turns_and_correlations(np.stack([before.pixels, after.pixels]))
     np.testing.assert_allclose((np.degrees(turn), correlation), (40.0, 1.0), atol=1e-3)
 
 
