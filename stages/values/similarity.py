@@ -1,5 +1,6 @@
 """Similarities of the current view to the views of the map."""
 
+import math
 from functools import cached_property
 from typing import Annotated
 
@@ -8,7 +9,7 @@ import numpy.typing as npt
 
 from omninav.pipeline import Bounds, Value
 from omninav.pipeline.graph.contents import Shape
-from omninav.stages.geometry.probability.evidence import best_headings
+from omninav.stages.geometry.probability.evidence import average, best_headings
 
 
 class Similarities(Value):
@@ -40,6 +41,12 @@ class Similarities(Value):
     def best_heading(self) -> npt.NDArray[np.int64]:
         """The column of each reference's best heading, of equal ones the first: (references,)."""
         return self._at_best_headings[1]
+
+    @cached_property
+    def spread(self) -> float:
+        """Standard deviation of `best` over the map."""
+        best, weights = self.best.astype(np.float64), self.sampling_weight
+        return math.sqrt(average(np.square(best - average(best, weights)), weights))
 
     @cached_property
     def _at_best_headings(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int64]]:
