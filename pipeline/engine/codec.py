@@ -162,7 +162,7 @@ def _restore(header: Any, data: memoryview) -> Any:
         return header
     form, *rest = header
     if form == "array":
-        return _array(*rest, data).copy()
+        return _array(rest[0], rest[1], rest[2], data).copy()
     if form == "scalar":
         return np.frombuffer(bytes.fromhex(rest[1]), dtype=np.dtype(rest[0]))[0]
     if form == "bytes":
