@@ -15,6 +15,13 @@ def rooms_of(world: WorldConfig) -> Rooms | None:
     return Rooms(tuple(room.name for room in world.rooms), np.array(corners, np.float64)) if corners else None
 
 
+def known_rooms(log: str | tuple[str, ...] | None, world: WorldConfig) -> Rooms | None:
+    """The rooms that are attached to the first of the logs that has any, or those of a world where no log is named."""
+    if log is None:
+        return rooms_of(world)
+    return next(filter(None, map(rooms_of_log, (log,) if isinstance(log, str) else log)), None)
+
+
 class WorldRooms(Stage):
     """Gives the named rooms of a simulated world, which can be goals of a robot."""
 
@@ -31,7 +38,4 @@ class WorldRooms(Stage):
 
     def step(self, ctx: Context) -> Out:
         """Read the rooms."""
-        logs = (self.log,) if isinstance(self.log, str) else self.log
-        if logs is None:
-            return self.Out(rooms=rooms_of(self.world))
-        return self.Out(rooms=next(filter(None, map(rooms_of_log, logs)), None))
+        return self.Out(rooms=known_rooms(self.log, self.world))

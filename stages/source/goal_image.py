@@ -1,15 +1,17 @@
 """An image of where to go, from a file."""
 
+import shlex
 from pathlib import Path
 
 from omninav.pipeline import Context, Outputs, Stage
 from omninav.pipeline.files import digest_file
-from omninav.pipeline.graph.problems import BadInput
+from omninav.pipeline.graph.problems import BadInput, nearest
 from omninav.pipeline.graph.small_files import read_small
 from omninav.stages.camera.model import Camera
 from omninav.stages.recordings.named_camera import named_camera
 from omninav.stages.simulator.cameras import camera_of
 from omninav.stages.simulator.config import WorldConfig
+from omninav.stages.simulator.world_rooms import known_rooms
 from omninav.stages.values.encoded_image import MAX_FILE_BYTES, Undecodable, decode_image
 from omninav.stages.values.image import Image, Pixels
 
@@ -20,8 +22,9 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".tif", ".tiff", ".webp")
 class GoalImage(Stage):
     """Gives the goal's image, with the robot's own camera as the one that took it.
 
-    Raises BadInput where no goal is named, where there is no such file, where it is no image, and where it has another
-    size than the robot's camera takes: before anything runs, as far as can be.
+    Raises BadInput where no goal is named, where no place of a map that is still to be learned can have its name, where
+    there is no such file, where it is no image, and where it has another size than the robot's camera takes: before
+    anything runs, as far as can be.
     """
 
     goal: str | int | None = None
@@ -30,6 +33,10 @@ class GoalImage(Stage):
     """The simulated world whose robot took it; null: a real one's robot."""
     camera: str | None = None
     """The camera.yaml of a real robot or of another one in that world, or a projection (`equirectangular`, …)."""
+    map: str | None = None
+    """The saved map in which the goal is, if there is one; null: a map is learned first, and takes long."""
+    tour: str | tuple[str, ...] | None = None
+    """The log that the map is learned from; null: a drive through the world."""
 
     class Out(Outputs):
         """Absent where the goal is no image."""
@@ -70,11 +77,23 @@ class GoalImage(Stage):
         if self.goal is None or not str(self.goal).strip():
             raise BadInput("goal: no goal is named; type goal=PLACE, its name or number, or goal=IMAGE.png")
         if not str(self.goal or "").lower().endswith(SUFFIXES):
+            self._refuse_unknown(str(self.goal).strip())
             return None
         file = Path(str(self.goal))
         if not file.is_file():
             raise BadInput(f"goal: there is no file {file}; give an image, or a place's number or name")
         return file
+
+    def _refuse_unknown(self, name: str) -> None:
+        """Raise BadInput for a name that no place of the map can have which is still to be learned."""
+        if self.map is not None or name.isdecimal() or (self.tour is None and self.world is None):
+            return
+        rooms = known_rooms(self.tour, self.world or WorldConfig())
+        names = sorted({*rooms.names} - {""}) if rooms is not None else []
+        if name not in names:
+            known = f"its names are {', '.join(names)}" if names else "its places have no names"
+            example = shlex.quote(f"goal={nearest(name, names) or names[0]}") if names else "goal=0"
+            raise BadInput(f"goal: the map will have no place '{name}'; type {example}, or a place's number ({known})")
 
 
 def read_image(file: Path) -> Pixels:

@@ -11,7 +11,8 @@ from world_files import DEMO
 from omninav.pipeline import Context
 from omninav.pipeline.graph.problems import BadInput
 from omninav.stages.plots.image_file import ImageFile
-from omninav.stages.simulator.config import mirror
+from omninav.stages.simulator.config import Room, mirror
+from omninav.stages.simulator.world_rooms import rooms_of
 from omninav.stages.source.goal_image import GoalImage
 from omninav.stages.values.image import Image
 
@@ -47,7 +48,7 @@ def test_without_a_goal_nothing_runs(goal):
 
 @pytest.mark.parametrize("goal", [3, "3", "kitchen", "png"])
 def test_a_place_is_no_image(goal):
-    stage = GoalImage(goal=goal, world=WORLD)
+    stage = GoalImage(goal=goal, world=WORLD, map="saved.omap")
     assert stage.step(Context("goal_picture")).image is None
     assert stage.inputs_digest() is None
 
@@ -68,3 +69,31 @@ def test_an_image_of_another_camera_is_refused(tmp_path):
     cv2.imwrite(str(tmp_path / "kitchen.png"), PIXELS[:6])
     with pytest.raises(BadInput, match=r"has 16 x 6 pixels, and the robot's camera takes 16 x 12"):
         GoalImage(goal=str(tmp_path / "kitchen.png"), world=WORLD).step(Context("goal_picture"))
+
+
+ROOMS = replace(WORLD, rooms=(Room("kitchen", corner=(0.0, 0.0), size=(3.0, 3.0)), Room("", (3.0, 0.0), (3.0, 3.0))))
+
+
+@pytest.mark.parametrize(
+    ("world", "goal", "said"),
+    [
+        (ROOMS, "kichen", r"no place 'kichen'; type goal=kitchen, or a place's number \(its names are kitchen\)"),
+        (WORLD, "kitchen", r"no place 'kitchen'; type goal=0, or a place's number \(its places have no names\)"),
+    ],
+)
+def test_a_name_that_no_place_can_have_is_said_before_the_map_is_made(world, goal, said):
+    with pytest.raises(BadInput, match=said):
+        GoalImage(goal=goal, world=world).inputs_digest()
+
+
+def test_a_name_that_a_place_may_have_is_left_to_the_map():
+    assert GoalImage(goal="kitchen", world=ROOMS).inputs_digest() is None
+    assert GoalImage(goal="kichen", world=ROOMS, map="saved.omap").inputs_digest() is None
+    assert GoalImage(goal="kichen").inputs_digest() is None
+
+
+def test_the_rooms_of_the_log_that_the_map_is_learned_from_are_its_names(monkeypatch):
+    monkeypatch.setattr("omninav.stages.simulator.world_rooms.rooms_of_log", lambda log: rooms_of(ROOMS))
+    assert GoalImage(goal="kitchen", world=WORLD, tour="tour.mcap").inputs_digest() is None
+    with pytest.raises(BadInput, match="no place 'kichen'"):
+        GoalImage(goal="kichen", world=WORLD, tour="tour.mcap").inputs_digest()
