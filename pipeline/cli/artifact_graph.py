@@ -13,8 +13,11 @@ from omegaconf import OmegaConf
 from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import UnknownStage, resolve
 
-from .config_groups import LEARN
+from .config_groups import LEARN, option_content
 from .words import word_of
+
+MAKING = ("choices", "nodes", "wires")
+"""Keys of an artifact's specification that change the graph which makes it."""
 
 
 def words_of_graph(variant: str, choices: Mapping[str, str]) -> list[str]:
@@ -50,17 +53,32 @@ def words_of_artifact(name: str, variant: Any, words: Sequence[str]) -> list[str
         what = f"variant={variant.variant} has no '{name}' to learn"
         raise ProblemsFound([Problem(LEARN, what, suggest(name, makers, "artifacts", f"{LEARN}=") if makers else "")])
     spec = artifacts[name]
-    typed = dict(_keyed(words))
+    beside = {
+        key: other
+        for key, other in artifacts.items()
+        if other is not None and other.get("together_with") == name and {*MAKING} & {*other}
+    }
+    specs = (spec, *beside.values())
+    typed = [(key, text) for key, text in _keyed(words) if not _makes_artifact(key, text)]
+    set_by_hand = {key for key, _ in typed} - {"variant"}
     chosen = variant.hydra.runtime.choices
-    shared = {node: variant.nodes[node] for node in spec.get("inherit") or () if is_repeatable(variant.nodes[node])}
+    inherited = [node for each in specs for node in each.get("inherit") or ()]
+    shared = {node: variant.nodes[node] for node in inherited if is_repeatable(variant.nodes[node])}
     options = {node: str(chosen[node]) for node in shared if chosen.get(node)}
     groups = words_of_graph(str(variant.variant), {**options, **spec["choices"]})
     return [
-        *(word for word in groups if word.lstrip("+~").partition("=")[0] not in typed.keys() - {"variant"}),
+        *(word for word in groups if word.lstrip("+~").partition("=")[0] not in set_by_hand),
         *(f"++nodes.{name}={_value(node)}" for name, node in shared.items()),
-        *_changes(spec),
-        *(text for key, text in _keyed(words) if key not in (LEARN, "variant")),
+        *(change for each in specs for change in _changes(each)),
+        *(f"++saves.{key}={other['output']}" for key, other in beside.items()),
+        *(text for key, text in typed if key not in (LEARN, "variant")),
     ]
+
+
+def _makes_artifact(group: str, word: str) -> bool:
+    """Whether an option is of the variant alone: it says how an artifact is made."""
+    specs = (option_content(group, word.partition("=")[2]).get("artifacts") or {}).values()
+    return any({*MAKING} & {*spec} for spec in specs)
 
 
 def _changes(spec: Mapping[str, Any]) -> Iterator[str]:

@@ -22,7 +22,7 @@ from omninav.pipeline.graph.stage import Bounds
 from omninav.pipeline.run.artifact_specification import ArtifactSpecification, read_specifications, without_absent
 from omninav.pipeline.run.inputs import not_taken, read_inputs
 
-from .artifact_graph import is_repeatable, words_of_graph
+from .artifact_graph import MAKING, is_repeatable, words_of_graph
 from .composition_cache import compose
 from .config_groups import listed_groups, replaced, settings_left_open
 from .hydra_session import hydra_started
@@ -33,8 +33,6 @@ OF_THE_VARIANT = ("variant", "inputs", "nodes", "wires", "artifacts", "saves")
 """Keys that a variant's file sets; everything else in a configuration is a setting."""
 OF_THE_RUN = ("seed", "runs", "cache", "checkpoint_s", "validate", "record", "objective", "plots")
 """Settings that every run reads, whatever its graph is."""
-MAKING = ("choices", "nodes", "wires")
-"""Keys of an artifact's specification that change the graph which makes it."""
 UNSET = "(unset)"
 INTERPOLATION = re.compile(r"\$\{(?:oc\.select:|unless:(\w+),)?\s*(\w+)")
 

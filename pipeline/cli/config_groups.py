@@ -27,6 +27,12 @@ def group_files(group: str) -> list[Traversable]:
     return sorted(found, key=lambda file: file.name)
 
 
+def option_content(group: str, option: str) -> dict[str, Any]:
+    """The content of an option's file; {} where it has none."""
+    named = group.isidentifier() and option.isidentifier() and files(CONF).joinpath(group, f"{option}.yaml").is_file()
+    return _read(f"{group}/{option}.yaml") if named else {}
+
+
 def suggest_option(group: str, option: str, options: Iterable[str], kind: str, prefix: str = "") -> str:
     """A hint for an option that a group does not have: what took its place, or what is like it."""
     command = option.removesuffix("_live").replace("_", " ")
@@ -109,7 +115,7 @@ def _config_file() -> dict[str, Any]:
 def _read(name: str) -> dict[str, Any]:
     import yaml
 
-    return dict(yaml.load(files(CONF).joinpath(name).read_text(encoding="utf-8"), yaml.CSafeLoader))
+    return dict(yaml.load(files(CONF).joinpath(name).read_text(encoding="utf-8"), yaml.CSafeLoader) or {})
 
 
 def options_with(entry: Entry) -> list[str]:

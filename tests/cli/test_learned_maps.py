@@ -57,6 +57,18 @@ def test_a_map_by_itself_is_the_one_that_is_made_on_the_way(variant: str) -> Non
 
 
 @pytest.mark.usefixtures("hydra")
+@pytest.mark.parametrize("variant", ["omninav", "retrieval_mcl", "omniview_mcl_as_printed"])
+def test_visual_words_are_learned_with_a_map_by_itself_as_on_the_way(variant: str) -> None:
+    typed = ("candidates=words", "nodes.local_features.contrast=0.03")
+    way, alone = planned(f"variant={variant}", *typed), planned(f"variant={variant}", "learn=map", *typed)
+    for name in ("map", "words"):
+        made = next(artifact for artifact in way.artifacts if artifact.name == name)
+        assert made.graph is not None
+        saved = alone.saves[name]
+        assert graph_digest(alone.graph.leading_to([saved])) == graph_digest(made.graph)
+
+
+@pytest.mark.usefixtures("hydra")
 def test_the_words_typed_change_the_map_as_they_would_its_variant() -> None:
     assert set(CHANGED) | {"homing"} <= {file.name.removesuffix(".yaml") for file in group_files("variant")}
     for variant, words in CHANGED.items():
