@@ -12,8 +12,9 @@ from omegaconf import OmegaConf
 
 from omninav.pipeline.graph.problems import Problem, ProblemsFound, suggest
 from omninav.pipeline.graph.registry import UnknownStage, resolve
+from omninav.pipeline.graph.signature import BadStage, signature
 
-from .config_groups import LEARN, option_content
+from .config_groups import LEARN, node_option, option_content
 from .words import word_of
 
 MAKING = ("choices", "nodes", "wires")
@@ -61,6 +62,7 @@ def words_of_artifact(name: str, variant: Any, words: Sequence[str]) -> list[str
     specs = (spec, *beside.values())
     typed = [(key, text) for key, text in _keyed(words) if not _makes_artifact(key, text)]
     set_by_hand = {key for key, _ in typed} - {"variant"}
+    swapped = {key: node_option(key, text.partition("=")[2]) for key, text in typed}
     chosen = variant.hydra.runtime.choices
     inherited = [node for each in specs for node in each.get("inherit") or ()]
     shared = {node: variant.nodes[node] for node in inherited if is_repeatable(variant.nodes[node])}
@@ -69,7 +71,7 @@ def words_of_artifact(name: str, variant: Any, words: Sequence[str]) -> list[str
     return [
         *(word for word in groups if word.lstrip("+~").partition("=")[0] not in set_by_hand),
         *(f"++nodes.{name}={_value(node)}" for name, node in shared.items()),
-        *(change for each in specs for change in _changes(each)),
+        *(change for each in specs for change in _changes(name, each, swapped)),
         *(f"++saves.{key}={other['output']}" for key, other in beside.items()),
         *(text for key, text in typed if key not in (LEARN, "variant")),
     ]
@@ -81,10 +83,12 @@ def _makes_artifact(group: str, word: str) -> bool:
     return any({*MAKING} & {*spec} for spec in specs)
 
 
-def _changes(spec: Mapping[str, Any]) -> Iterator[str]:
+def _changes(name: str, spec: Mapping[str, Any], swapped: Mapping[str, Any]) -> Iterator[str]:
+    """The words that change nodes and wires; but for what is stated for a stage in whose place another was typed."""
     for block in ("nodes", "wires"):
-        for name, change in (spec.get(block) or {}).items():
-            yield f"++{block}.{name}={word_of(change)}"
+        for node, change in (spec.get(block) or {}).items():
+            if block == "wires" or not unfit_changes(name, {node: change}, swapped):
+                yield f"++{block}.{node}={word_of(change)}"
 
 
 def _keyed(words: Sequence[str]) -> list[tuple[str, str]]:
@@ -94,6 +98,22 @@ def _keyed(words: Sequence[str]) -> list[tuple[str, str]]:
 
 def _value(node: Any) -> str:
     return word_of(OmegaConf.to_container(node, resolve=False))
+
+
+def unfit_changes(name: str, changes: Mapping[str, Any], nodes: Mapping[str, Any]) -> list[Problem]:
+    """Parameters that a variant states for nodes of its artifact's graph, and that the stages in their place lack."""
+    found = []
+    for node in (one for one, change in changes.items() if nodes.get(one) and "_target_" not in (change or ())):
+        try:
+            cls = resolve(str(nodes[node].get("_target_")))
+            known = signature(cls).parameters
+        except (UnknownStage, BadStage):  # reported by `build`
+            continue
+        for key in (key for key in changes[node] or () if key not in known):
+            where = f"artifacts.{name}.nodes.{node}"
+            hint = f"{suggest(key, known, 'parameters')}; type '~{where}' to take out those of the variant's own stage"
+            found.append(Problem(f"{where}.{key}", f"{cls.__name__} has no parameter '{key}'", hint))
+    return found
 
 
 def is_repeatable(node: Any) -> bool:

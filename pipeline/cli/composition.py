@@ -22,7 +22,7 @@ from omninav.pipeline.graph.stage import Bounds
 from omninav.pipeline.run.artifact_specification import ArtifactSpecification, read_specifications, without_absent
 from omninav.pipeline.run.inputs import not_taken, read_inputs
 
-from .artifact_graph import MAKING, is_repeatable, words_of_graph
+from .artifact_graph import MAKING, is_repeatable, unfit_changes, words_of_graph
 from .composition_cache import compose
 from .config_groups import listed_groups, replaced, settings_left_open
 from .hydra_session import hydra_started
@@ -159,6 +159,9 @@ def _graph_of(config: Any, name: str, specs: Mapping[str, ArtifactSpecification]
     for each in (spec, *(other for other in specs.values() if other.together_with == name)):
         for node in filter(lambda node: is_repeatable(config.nodes[node]), each.inherit):
             other.nodes[node] = OmegaConf.to_container(config.nodes[node], resolve=False)
+        problems = unfit_changes(name, each.nodes, other.nodes)
+        if problems:
+            raise ProblemsFound(problems)
         for block, changes in ((other.nodes, each.nodes), (other.wires, each.wires)):
             for node, change in changes.items():
                 block[node] = OmegaConf.merge(block.get(node) or {}, change)

@@ -68,6 +68,17 @@ def test_visual_words_are_learned_with_a_map_by_itself_as_on_the_way(variant: st
         assert graph_digest(alone.graph.leading_to([saved])) == graph_digest(made.graph)
 
 
+def test_the_parameters_of_a_stage_that_was_swapped_are_taken_out(capsys: pytest.CaptureFixture[str]) -> None:
+    typed = ["variant=omniview_mcl_as_printed", "artifacts.map.choices.mapping=image_database"]
+    assert main(["check", *typed]) == 2
+    said = capsys.readouterr().err
+    assert "artifacts.map.nodes.mapping.vicinity_m: ImageDatabase has no parameter 'vicinity_m'" in said
+    assert "type '~artifacts.map.nodes.mapping' to take out those of the variant's own stage" in said
+    for taken_out in ("~artifacts.map.nodes.mapping", "~artifacts.map.nodes"):
+        assert main(["check", *typed, taken_out]) == 0
+    assert main(["check", typed[0], "learn=map", "mapping=image_database"]) == 0
+
+
 @pytest.mark.usefixtures("hydra")
 def test_the_words_typed_change_the_map_as_they_would_its_variant() -> None:
     assert set(CHANGED) | {"homing"} <= {file.name.removesuffix(".yaml") for file in group_files("variant")}
