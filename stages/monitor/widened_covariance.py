@@ -28,9 +28,10 @@ class WidenCovariance(Stage):
     """
 
     floor: Annotated[float, Bounds(ge=0)] = 0.6
-    """Standard deviation of the error that particles do not show, in each direction, in length scales of the map."""
+    """Standard deviation of the error that particles do not show, in each direction, in length scales of the map:
+    the larger, the wider the covariance."""
     min_confidence: Annotated[float, Bounds(ge=0, le=1)] = 0.5
-    """Confidence below which the estimate may be anywhere in the map."""
+    """Confidence below which the covariance covers the whole map; 0: never."""
 
     class Out(Outputs):
         """The estimate with the covariance that leaves the system."""
