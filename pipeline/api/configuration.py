@@ -60,8 +60,9 @@ class Configuration:
 def compose(*words: str, **settings: Any) -> Configuration:
     """A configuration of words as on the command line: `compose("omniview_mcl", "match=l2", seed=3)`.
 
-    A first word without `=` names the variant; keywords are settings. Nothing runs, and no log is opened. Raises
-    `ProblemsFound` with everything that is wrong, and `BadInput`.
+    A first word without `=` names the variant, `"--config-dir=FOLDER"` a folder of configurations of your own; keywords
+    are settings. Nothing runs, and no log is opened. Raises `ProblemsFound` with everything that is wrong, and
+    `BadInput`.
     """
     typed = words_of(words, settings)
     if any(word.lstrip("+").startswith("experiment=") for word in typed):
