@@ -20,7 +20,8 @@ def command(arguments: list[str]) -> int:
     for word in arguments:
         if word not in roles | names:
             options, kind = (names, "stages") if "." in word else (roles, "roles")
-            print(suggest(word, options, kind, prefix="omninav stages "), file=sys.stderr)
+            hint = suggest(word, options, kind, prefix="omninav stages ")
+            print(f"there is no {kind.removesuffix('s')} '{word}'; {hint}", file=sys.stderr)
             return 2
     broken = 0
     for entry in known:
